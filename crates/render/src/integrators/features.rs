@@ -1,10 +1,10 @@
-//! What camera paths see, without light: the first surface that is not specular, through mirrors and smooth glass.
+//! Features along camera paths: the first non-specular surface, seen through mirrors and smooth glass.
 //!
-//! The paths are those of the picture: the same camera rays, and at specular surfaces the same random numbers, so that a
-//! feature of a sample belongs to the light of that sample. Nothing is lit, and no path goes beyond the first surface
-//! that scatters. Both integrators see the same, so it does not matter which one renders.
+//! The paths are those of the image: the same camera rays, and at specular surfaces the same random numbers, so that a
+//! feature of a sample belongs to the radiance of that sample. No light is evaluated, and no path continues beyond the
+//! first scattering surface. The features are the same for both integrators.
 //!
-//! Diffuse surfaces are looked at sixteen at a time (`simd/first_hits.rs`), all others one by one. Start reading at
+//! Diffuse surfaces are handled sixteen at a time (`simd/first_hits.rs`), all others one by one. Start reading at
 //! [`FeatureWave::trace`].
 
 use crate::core::material::{Material, MaterialId};
@@ -29,7 +29,8 @@ use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::Vec3;
 
-/// Segments until a surface is taken as it is, however specular: two mirrors face each other for ever.
+/// Number of segments after which a surface counts even if it is specular: paths between two parallel mirrors never
+/// end.
 const MOST_SEGMENTS: u32 = 32;
 
 const MISSES: usize = 0;
@@ -44,19 +45,19 @@ pub(crate) struct FeatureWave {
     sets: MediumSets,
     camera: MediumId,
     seen: Vec<Seen>,
-    /// Metres along the view axis that each slot has come so far, and for each metre of its way.
+    /// Per slot: depth along the view axis so far in metres, and depth per metre of the present segment.
     way: Vec<(f32, f32)>,
 }
 
 impl FeatureWave {
-    /// Before the paths of a picture: they begin in these media.
+    /// Sets the media in which the paths of an image start; must be called first.
     pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32]) {
         self.camera = self.sets.start(scene, camera_media);
     }
 
-    /// Follows the paths that `start` pushes, one a slot, with throughput 1, and answers with what each slot sees.
+    /// Traces the paths that `start` pushes, one per slot, with throughput 1, and returns the features of each slot.
     ///
-    /// `None` when `stop` said so.
+    /// `None` if `stop` returned true.
     pub fn trace(
         &mut self,
         scene: &Prepared,
@@ -93,7 +94,7 @@ impl FeatureWave {
     fn see(&mut self, scene: &Prepared, settings: &RenderSettings, depth: u32, is_last: bool) {
         let set = settings.simd.unwrap_or(InstructionSet::Portable);
         self.sorted.sort(set, scene, &scene.tables.materials.kinds, &self.hits, self.paths.len());
-        // Later segments are few, and have a way behind them.
+        // Later segments are few, and have state.
         let in_lanes = depth == 1 && settings.simd.is_some() && !scene.tables.features.media;
         for kind in 0..KINDS {
             if kind == DIFFUSE + 1 && in_lanes {
@@ -115,7 +116,7 @@ impl FeatureWave {
         }
     }
 
-    /// Looks at one hit, and beyond it where it is specular.
+    /// Handles one hit, and continues the path if the surface is specular.
     fn see_one(&mut self, scene: &Prepared, depth: u32, is_last: bool, i: usize) {
         let Some(hit) = self.hits.get(i) else { return };
         let (ray, mut path, material) = (self.paths.rays.get(i), self.paths.get(i), self.sorted.materials[i]);
@@ -133,7 +134,7 @@ impl FeatureWave {
         let vertex = &at.vertex;
         if !is_last && let Some(sample) = self.specular_bounce(scene, depth, &path, &at) {
             self.way[slot].0 = along;
-            // Where light is slower radiance is larger, which is no colour.
+            // Removes the n² scale of radiance, which is no colour.
             let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze);
             path.throughput *= sample.weight / (squeeze * squeeze);
             let origin = match sample.through {
@@ -152,7 +153,7 @@ impl FeatureWave {
         seen.depth = along;
     }
 
-    /// How the path goes on from a surface that is specular alone, as in the picture; `None` from all others.
+    /// Samples the continuation at a purely specular surface, as in the image; `None` at all others.
     fn specular_bounce(&mut self, scene: &Prepared, depth: u32, path: &Path, at: &Met) -> Option<BsdfSample> {
         let Met { ray, hit, material: id, vertex } = at;
         let id = *id;
@@ -184,7 +185,7 @@ impl FeatureWave {
     }
 }
 
-/// A surface that a path has met.
+/// A hit of a path.
 struct Met {
     ray: Ray,
     hit: Hit,

@@ -1,4 +1,4 @@
-//! From camera rays to light: waves of paths over [`crate::shading`].
+//! Integrators: waves of paths over [`crate::shading`].
 
 pub(crate) mod caustics;
 pub(crate) mod features;

@@ -1,11 +1,11 @@
 //! Unbiased path tracing, a wave of paths at a time.
 //!
-//! All paths of a wave are at the same depth: one batch of rays goes to the kernel, the hits are shaded, one batch of
-//! shadow rays follows, and what survives is the next batch. Light is collected by next-event estimation and by
-//! bounces, combined with the power heuristic (Veach 1997, chapter 9); smooth skies are left to bounces alone, which
-//! find them as well as anything could. Paths end by Russian roulette, never by a limit unless one is asked for.
-//! Materials of one lobe are shaded sixteen hits at a time (`simd/`); what is here shades all others, and whatever is
-//! asked of it as the reference. Start reading at [`PathWave::trace`].
+//! All paths of a wave have the same depth: one batch of closest-hit queries, shading of the hits, one batch of shadow
+//! rays; the surviving paths are the next batch. Direct light is found by light sampling (next-event estimation) and by
+//! BSDF sampling, combined with the power heuristic (Veach 1997, chapter 9); smooth environments are left to BSDF
+//! sampling, which finds them as well. Paths end by Russian roulette, without a depth limit unless requested. Common
+//! materials are shaded sixteen hits at a time (`simd/`); the code here shades all others, and is the reference for the
+//! SIMD code. Start reading at [`PathWave::trace`].
 
 use crate::core::counts::RayCounts;
 use crate::core::material::{Material, MaterialId};
@@ -52,16 +52,16 @@ impl From<CameraPath> for Path {
     }
 }
 
-/// A camera ray and where its light goes.
+/// A camera ray and its destination.
 pub(crate) struct CameraPath {
     pub ray: Ray,
     pub sampler: Sampler,
     pub slot: u32,
-    /// Of what it finds, see [`crate::core::filter`].
+    /// Weight of its radiance, see [`crate::core::filter`].
     pub weight: f32,
 }
 
-/// Scratch memory of one worker: cleared between waves, never given back.
+/// Scratch memory of one worker: cleared between waves, never freed.
 #[derive(Default)]
 pub(crate) struct PathWave {
     paths: PathBatch,
@@ -73,26 +73,27 @@ pub(crate) struct PathWave {
     camera: MediumId,
     /// Segments of the longest path of the last wave.
     pub depth: u32,
-    /// Looks on, when somebody wants to know.
+    /// Records the paths if present.
     pub record: Option<Box<Record>>,
-    /// Adds up what it costs, likewise.
+    /// Counts the cost if present.
     pub work: Option<Box<Work>>,
 }
 
-/// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
+/// Index of misses in [`SortedHits::of_kind`]; materials have [`Material::kind`] + 1.
 const MISSES: usize = 0;
 const EMITTERS: usize = 1;
 
 impl PathWave {
-    /// Before the paths of a picture: they begin in these media, see [`crate::prepare::bodies::Bodies::around`].
+    /// Sets the media in which the paths of an image start, see [`crate::prepare::bodies::Bodies::around`]; must be
+    /// called first.
     pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32]) {
         self.camera = self.sets.start(scene, camera_media);
     }
 
-    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// Traces the paths that `start` pushes, at most one per slot, and adds their radiance to `radiance`, indexed by
     /// slot.
     ///
-    /// `None` when `stop` said so; what is in `radiance` then is of no use.
+    /// `None` if `stop` returned true; `radiance` is meaningless then.
     pub fn trace(
         &mut self,
         scene: &Prepared,
@@ -114,7 +115,7 @@ impl PathWave {
                 return None;
             }
             self.depth = depth;
-            // Camera rays run side by side, and so do the shadow rays of what they hit.
+            // Camera rays are coherent, and so are the shadow rays of their hits.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
@@ -188,7 +189,7 @@ impl PathWave {
                 }
                 (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group, radiance),
-                // What emits no light and is the end of its path adds nothing.
+                // Hits that do not emit and end their path contribute nothing.
                 (Some(_), _) if shade::knows(kind - 1) && is_last => {}
                 (Some(set), _) if shade::knows(kind - 1) => shade::shade(set, kind - 1, group),
                 _ => {
@@ -214,7 +215,7 @@ impl PathWave {
                 throughput *= self.sets.environment_scale(self.paths.media_of(i));
             }
             if always {
-                // Bounces alone find it.
+                // Only BSDF sampling finds it.
                 radiance[self.paths.slot[i] as usize] += throughput * scene.shading.environment.radiance(dir);
                 continue;
             }
@@ -223,7 +224,7 @@ impl PathWave {
         }
     }
 
-    /// Shades one hit: the light that it emits, a light sample and a bounce.
+    /// Shades one hit: emission, a light sample and a bounce.
     fn shade_one(
         &mut self,
         scene: &Prepared,
@@ -279,7 +280,7 @@ impl PathWave {
         }
     }
 
-    /// With hints, where there are any, of where gathered light comes from.
+    /// Scatters with guiding distributions, if there are any.
     #[inline]
     fn scatter_told(&mut self, step: PathStep, bsdf: &impl Scatter) {
         let PathStep { path, vertex, depth, .. } = step;
@@ -298,7 +299,7 @@ impl PathWave {
         self.bounce(&step, bsdf);
     }
 
-    /// Next-event estimation: one point on one light, and a shadow ray to it.
+    /// Light sampling: one point on one light, and a shadow ray to it.
     #[inline]
     fn sample_light(&mut self, step: &PathStep, bsdf: &impl Scatter) {
         let &PathStep { scene, techniques, path, vertex, .. } = step;
@@ -327,14 +328,14 @@ impl PathWave {
         }
         let origin = if through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         let shadow_ray = match target {
-            // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
+            // `dir` leads to the light's own bounded point, where the ray ends: t = 1, excluded.
             Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
             None => Ray::new(origin, sample.wi),
         };
         self.shadows.push(&shadow_ray, path.slot, light);
     }
 
-    /// Chooses how the path goes on, and whether.
+    /// Samples the continuation of the path, with Russian roulette.
     #[inline]
     fn bounce(&mut self, step: &PathStep, bsdf: &impl Scatter) {
         let &PathStep { scene, techniques, vertex, material, depth, .. } = step;
@@ -370,7 +371,7 @@ impl PathWave {
             });
         }
         if let Some(most_kept) = Survival::at(depth, scene, techniques).share {
-            // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
+            // Throughput inside glass contains 1/n², which is restored on leaving: it must not count as a loss.
             let ior = if scene.tables.features.glass { self.sets.ior(path.media) } else { 1.0 };
             let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
             let survival = most.min(most_kept);
@@ -392,13 +393,13 @@ impl PathWave {
     }
 }
 
-/// The side that light is asked for on: the normal, or zero for both.
+/// The side for light sampling: the normal, or zero for both sides.
 #[inline]
 fn lit_side(vertex: &Vertex, bsdf: &impl Scatter) -> Vec3 {
     if bsdf.through().is_some() { Vec3::ZERO } else { vertex.normal }
 }
 
-/// Whether a direction leads to the side that it is meant to: the true surface decides.
+/// Whether a direction leads to the intended side of the true surface.
 #[inline]
 fn leads_on(vertex: &Vertex, wi: Vec3, passes: bool) -> bool {
     if passes { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) }
@@ -412,15 +413,15 @@ struct PathStep<'a> {
     vertex: &'a Vertex,
     hit: &'a Hit,
     material: MaterialId,
-    /// Segments so far.
+    /// Number of segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
-    /// Some directions are chosen by hints.
+    /// Whether directions are sampled with guiding.
     is_told: bool,
 }
 
 impl PathStep<'_> {
-    /// The first sample dimension of this vertex.
+    /// First sample dimension of this vertex.
     fn dimension(&self) -> u32 {
         first_dimension(self.depth)
     }

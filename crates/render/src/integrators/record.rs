@@ -1,8 +1,8 @@
-//! What happens in a wave of paths, written down from outside: nothing that is traced knows of it.
+//! Records a wave of paths from outside: tracing does not know about it.
 //!
-//! A wave adds light to a slot at three moments of each depth: where a path leaves the scene, where it runs into a
-//! emitter, and where a shadow ray gets through. With one path a slot, what a slot gained between two looks is the light
-//! of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
+//! A wave adds radiance to a slot at three moments per depth: where a path leaves the scene, where it hits an emitter,
+//! and where a shadow ray is unoccluded. With one path per slot, the change of a slot between two observations is the
+//! contribution of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
 
 use crate::core::delta_light::DeltaLight;
 use crate::prepare::prepared::Prepared;
@@ -12,60 +12,60 @@ use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::geometry::robust::gamma;
 use glam::{DVec3, Vec3};
 
-/// Where light came from.
+/// Origin of a contribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LightSource {
     /// An object of the snapshot.
     Object(u32),
-    /// A light without size, by its place in [`crate::core::snapshot::Shading::delta_lights`].
+    /// A delta light, by its index in [`crate::core::snapshot::Shading::delta_lights`].
     Delta(u32),
-    /// What is around the scene.
+    /// The environment.
     Sky,
-    /// A point on the very rim of an emitter, where a ray towards it passes by: whose it is cannot be told.
+    /// A point at the very edge of an emitter, which a ray towards it misses: the emitter cannot be determined.
     Rim,
 }
 
-/// How it was found.
+/// Sampling technique of a contribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FoundBy {
-    /// The path ran into the light.
+    /// BSDF sampling: the path hit the light.
     Itself,
-    /// A vertex asked the light for its share.
+    /// Light sampling at a vertex.
     Asking,
 }
 
-/// Where a segment of a path ends.
+/// End of a segment of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
-    /// On an object, in the frame of the snapshot, metres.
+    /// On an object, in the snapshot's frame, metres.
     Surface {
         /// The point, metres.
         position: Vec3,
-        /// Index of the object in the snapshot; `u32::MAX` at the rim of a light, where it is not known.
+        /// Index of the object in the snapshot; `u32::MAX` at the edge of a light, where it is unknown.
         object: u32,
     },
-    /// At a light without size, in the frame of the snapshot, metres.
+    /// At a delta light, in the snapshot's frame, metres.
     Light {
         /// The point, metres.
         position: Vec3,
-        /// As of [`LightSource::Delta`].
+        /// As in [`LightSource::Delta`].
         light: u32,
     },
-    /// Outside of the scene, in this direction (unit).
+    /// The environment, in this direction.
     Sky {
-        /// Unit, from the scene outwards.
+        /// Unit, away from the scene.
         direction: Vec3,
     },
 }
 
-/// Light that a vertex asked for and got.
+/// A light sample with a contribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {
-    /// The light that was asked.
+    /// The sampled light.
     pub source: LightSource,
-    /// The point that was asked, or the direction.
+    /// The sampled point or direction.
     pub place: Place,
-    /// What the pixel got of it in this sample, W·m⁻²·sr⁻¹.
+    /// Contribution to the pixel in this sample, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
 }
 
@@ -74,24 +74,24 @@ pub struct Asked {
 pub struct PathVertex {
     /// Where the segment ends.
     pub place: Place,
-    /// Of light that arrives here, the share that reaches the pixel.
+    /// Throughput from here to the pixel.
     pub throughput: Vec3,
-    /// What the pixel got of the light that shines from here, W·m⁻²·sr⁻¹.
+    /// Contribution of emission at this vertex, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
-    /// What light sampling found from here; `None` where it was not used or found nothing.
+    /// The light sample at this vertex; `None` if there is none or it contributes nothing.
     pub asked: Option<Asked>,
 }
 
-/// One sample.
+/// The path of one sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TracedPath {
     /// Number of the sample within its pixel.
     pub sample: u32,
-    /// On the lens.
+    /// Point on the lens.
     pub origin: Vec3,
-    /// One a segment, in order.
+    /// One per segment, in order.
     pub vertices: Vec<PathVertex>,
-    /// What the film gets.
+    /// Radiance of the sample in the film, W·m⁻²·sr⁻¹.
     pub radiance: Vec3,
 }
 
@@ -99,19 +99,19 @@ pub struct TracedPath {
 #[derive(Debug, Default)]
 pub struct Record {
     pub paths: Vec<TracedPath>,
-    /// What each slot had at the last look.
+    /// Radiance per slot at the last observation.
     before: Vec<Vec3>,
 }
 
 impl Record {
-    /// Of slots for these samples.
+    /// Creates slots for these samples.
     pub fn new(samples: impl Iterator<Item = u32>) -> Self {
         let empty = |sample| TracedPath { sample, origin: Vec3::ZERO, vertices: Vec::new(), radiance: Vec3::ZERO };
         let paths: Vec<TracedPath> = samples.map(empty).collect();
         Self { before: vec![Vec3::ZERO; paths.len()], paths }
     }
 
-    /// Where the rays of a depth end, before anything is shaded.
+    /// Records the ends of the rays of a depth, before shading.
     pub fn see_hits(&mut self, batch: &PathBatch, hits: &HitBatch) {
         for i in 0..batch.len() {
             let path = &mut self.paths[batch.slot[i] as usize];
@@ -128,7 +128,7 @@ impl Record {
         }
     }
 
-    /// After shading: whatever a path of this depth has gained shines from where it ended.
+    /// Records emission after shading: a change of the slot comes from the path's last vertex.
     pub fn see_shaded(&mut self, batch: &PathBatch, radiance: &[Vec3]) {
         for i in 0..batch.len() {
             let slot = batch.slot[i] as usize;
@@ -138,7 +138,7 @@ impl Record {
         }
     }
 
-    /// After the shadow rays: whatever was gained now came along them.
+    /// Records light samples after the shadow rays: a change of the slot comes from them.
     pub fn see_settled(&mut self, scene: &Prepared, shadows: &ShadowBatch, radiance: &[Vec3]) {
         for i in 0..shadows.rays.len() {
             let slot = shadows.slot[i] as usize;
@@ -153,7 +153,7 @@ impl Record {
             } else if let Some(light) = delta {
                 (LightSource::Delta(light), Place::Light { position: ray.at(ray.t_max), light })
             } else {
-                // It ends a hair in front of the emitter and met nothing, so whatever comes next is the emitter.
+                // The ray ends just before the emitter without a hit, so the next hit behind it is the emitter.
                 let emitter = scene.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
                 let emitter = emitter.filter(|hit| scene.tables.lights.shines(hit.object, hit.prim));
                 let object = emitter.map_or(HitBatch::MISS, |hit| hit.object);
@@ -165,7 +165,7 @@ impl Record {
         }
     }
 
-    /// The wave is over.
+    /// Returns the paths after the end of the wave.
     pub fn finish(mut self, radiance: &[Vec3]) -> Vec<TracedPath> {
         for (path, radiance) in self.paths.iter_mut().zip(radiance) {
             path.radiance = *radiance;
@@ -179,11 +179,11 @@ impl Record {
     }
 }
 
-/// The light without size that a shadow ray leads to; the first of several in one place.
+/// Returns the delta light to which a shadow ray leads; the first one if several coincide.
 fn delta_light_of(scene: &Prepared, ray: &Ray) -> Option<u32> {
     let end = ray.at(ray.t_max);
     let is_its = |light: &DeltaLight| match *light {
-        // Shadow rays end in front of a point by a few roundings.
+        // Shadow rays end before a point by a few roundings.
         DeltaLight::Point { position, .. } | DeltaLight::Spot { position, .. } => {
             let size = position.length() + ray.origin.length() + ray.dir.length();
             ray.t_max.is_finite() && end.distance(position) <= gamma(64) * size

@@ -1,24 +1,24 @@
-//! What a camera path sees, without light.
+//! Features of a camera path.
 
 use crate::core::material::MaterialId;
 use glam::Vec3;
 
-/// What one sample sees.
+/// Features of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Colour of the surface times that of the mirrors and glass on the way, 0..1; of the way alone where it leaves the
-    /// scene.
+    /// Colour of the surface times those of the mirrors and glass on the path to it, 0..1; the product of the latter if
+    /// the path leaves the scene.
     pub albedo: Vec3,
-    /// Shading normal, unit, on the side that is seen; zero where nothing is.
+    /// Shading normal, unit, on the visible side; zero for a miss.
     pub normal: Vec3,
-    /// In the frame of the snapshot, metres; zero where nothing is seen.
+    /// Position in the snapshot's frame, metres; zero for a miss.
     pub position: Vec3,
-    /// Length of the whole way along the view axis, metres: of the mirror image where there is a mirror. Infinite where
-    /// nothing is seen.
+    /// Depth along the view axis over the whole path, metres: that of the mirror image behind a mirror. Infinite for a
+    /// miss.
     pub depth: f32,
-    /// What the camera ray itself meets, a mirror or glass included; [`Seen::NONE`] for nothing.
+    /// The object that the camera ray hits, also if it is a mirror or glass; [`Seen::NONE`] for none.
     pub object: u32,
-    /// Its material.
+    /// Material of that object.
     pub material: MaterialId,
 }
 
@@ -26,7 +26,7 @@ impl Seen {
     /// No object, no material.
     pub const NONE: u32 = u32::MAX;
 
-    /// What a path sees that leaves the scene at once.
+    /// Features of a camera ray that leaves the scene.
     pub const NOTHING: Self = Self {
         albedo: Vec3::ONE,
         normal: Vec3::ZERO,

@@ -1,24 +1,24 @@
-//! What paths cost, counted and not timed, so that who decides by it decides alike everywhere.
+//! Cost of paths, counted rather than timed, so that decisions based on it are the same everywhere.
 //!
-//! A ray costs by what it hits: the more parts that has, the deeper is the tree that the ray went through. Trees themselves
-//! are not asked: there may be a better one of the same mesh soon, and it must change no picture.
+//! The cost of a ray depends on the object that it hits: the more primitives that has, the deeper its tree. The actual
+//! tree does not count: a final tree may replace a preview tree, and must not change the image.
 
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
 use firstlight_kdtree::{HitBatch, RayClass, Shape};
 
-/// The unit is a ray that hits something without parts, with all that is done for it: some 50 ns.
+/// Cost per tree level. The unit is a ray that hits an object without a tree, with its shading: about 50 ns.
 const LEVEL: f64 = 0.35;
-/// Camera rays run side by side.
+/// Cost factor of coherent rays.
 const COHERENT: f64 = 0.5;
 const SHADOW_RAY: f64 = 0.6;
-/// To find the hints of a vertex, and how likely two directions are by them.
+/// Cost of finding the guiding distributions of a vertex, and of evaluating two directions.
 const HINTS: f64 = 2.0;
 
-/// Adds up what the paths of one worker cost.
+/// Sums the cost of the paths of one worker.
 #[derive(Clone, Debug)]
 pub(crate) struct Work {
-    /// Of a ray that hits it, for each object.
+    /// Cost of a ray that hits it, per object.
     of_object: Vec<f64>,
     pub total: f64,
 }
@@ -33,13 +33,13 @@ impl Work {
         Self { of_object: parts.map(|n| 1.0 + LEVEL * (n.max(1) as f64).log2()).collect(), total: 0.0 }
     }
 
-    /// Rays, and what they have hit.
+    /// Adds rays and their hits.
     pub fn add_rays(&mut self, hits: &HitBatch, n: usize, class: RayClass) {
         let sum: f64 = hits.object[..n].iter().map(|&object| self.of_object.get(object as usize).unwrap_or(&1.0)).sum();
         self.total += if class == RayClass::Coherent { COHERENT * sum } else { sum };
     }
 
-    /// Vertices of paths that are told where light comes from.
+    /// Adds vertices with guided sampling.
     pub fn add_told(&mut self, scene: &Prepared, paths: &PathBatch, hits: &HitBatch) {
         let asks = |i: &usize| {
             let scatters = |hit| {

@@ -1,18 +1,18 @@
-//! How many light paths a picture gets, and how they are divided.
+//! Number of light paths per image, and their division into batches.
 
-/// Paths in a batch, at most.
+/// Maximum number of paths per batch.
 const MAX_BATCH: u32 = 4096;
 
-/// How the paths of one sample of the whole picture are divided.
+/// Division of the light paths of one sample of the whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Batches {
     pub per_sample: u32,
-    /// Paths in each.
+    /// Paths per batch.
     pub size: u32,
 }
 
 impl Batches {
-    /// - `stride`: camera paths for each light path, at least 1.
+    /// - `stride`: camera paths per light path, at least 1.
     pub fn of_film(n_pixels: usize, stride: u32) -> Self {
         let n_paths = (n_pixels as f64 / f64::from(stride)).ceil();
         let per_sample = (n_paths / f64::from(MAX_BATCH)).ceil();

@@ -1,4 +1,4 @@
-//! Light on its way from a vertex to the lens.
+//! Lens connections: shadow rays from vertices of light paths to the lens.
 
 use crate::shading::paths::{append_vector, get, set};
 use firstlight_kdtree::geometry::Ray;
@@ -6,26 +6,26 @@ use firstlight_kdtree::{RayBatch, append};
 use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector};
 use glam::{Vec2, Vec3};
 
-/// Light that arrives in one pixel.
+/// A contribution to one pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     pub pixel: u32,
     pub light: Vec3,
 }
 
-/// The same, to tell what it is worth to look for it.
+/// A contribution with the data that determines whether searching for it pays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MeasuredSplat {
     pub film: Vec2,
-    /// Before it is weighted against camera paths.
+    /// Contribution before MIS weighting.
     pub light: Vec3,
-    /// Density of the light path over that of the same camera path, see [`super::weight`].
+    /// Pdf of the light path over that of the same camera path, see [`super::weight`].
     pub ratio: f32,
-    /// The probability with which roulette has let it come so far.
+    /// Probability with which the path survived Russian roulette.
     pub kept: f32,
 }
 
-/// Shadow rays to the lens, where in the film each leads, and with how much light.
+/// Shadow rays to the lens, with their film positions and contributions.
 #[derive(Default)]
 pub(crate) struct LensConnections {
     pub rays: RayBatch,
@@ -38,7 +38,7 @@ pub(crate) struct LensConnections {
 }
 
 impl LensConnections {
-    /// Forgets all rays; there is room for `n` new ones afterwards.
+    /// Removes all rays and reserves space for `n` new ones.
     pub fn start(&mut self, n: usize) {
         self.rays.clear();
         self.rays.make_room(n);
@@ -58,7 +58,7 @@ impl LensConnections {
         self.rays.push(ray);
     }
 
-    /// The same of the lanes of `mask`, whose rays end where `dir` does.
+    /// Appends the rays of the lanes in `mask`, which end at the tip of `dir`.
     #[inline(always)]
     pub fn append<S: Simd>(
         &mut self,
@@ -77,12 +77,12 @@ impl LensConnections {
         self.rays.append(mask, origin, dir, light.x.all(1.0));
     }
 
-    /// Where in the film a ray leads, and its light.
+    /// Returns the film position and the contribution of a ray.
     pub fn get(&self, i: usize) -> (Vec2, Vec3) {
         (Vec2::new(self.film[0][i], self.film[1][i]), get(&self.light, i))
     }
 
-    /// As it was measured, where [`super::pass::CausticPass::is_measured`].
+    /// Returns the data of a ray if [`super::pass::CausticPass::is_measured`].
     pub fn measured(&self, i: usize) -> MeasuredSplat {
         let (film, light) = self.get(i);
         MeasuredSplat { film, light, ratio: self.ratio[i], kept: self.kept[i] }

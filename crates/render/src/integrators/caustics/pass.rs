@@ -1,4 +1,4 @@
-//! What of a picture light paths, and paths that are weighed against them, need to know.
+//! Data of an image for light paths, and for camera paths that are weighted against them.
 
 use crate::core::caustic_plan::CausticPlan;
 use crate::core::filter::PixelFilter;
@@ -12,32 +12,32 @@ use crate::shading::mis_state::MisState;
 use firstlight_simd::InstructionSet;
 use glam::{UVec2, Vec2, Vec3};
 
-/// What tracing from the lights and weighting against it need to know of a picture.
+/// Data of an image for light tracing and its MIS weights.
 pub(crate) struct CausticPass<'a> {
     pub scene: &'a Prepared,
     pub casters: &'a CasterTable,
     pub techniques: Techniques,
     pub max_depth: u32,
     pub seed: u32,
-    /// `None` for one path at a time.
+    /// `None` for the scalar code.
     pub simd: Option<InstructionSet>,
     pub size: Vec2,
     pub filter: PixelFilter,
     /// The integral of the filter along one axis.
     pub filter_norm: f64,
     pub plan: CausticPlan,
-    /// Light paths a sample of the whole picture; 0 if there are none.
+    /// Number of light paths per sample of the whole image; 0 if there are none.
     pub paths_per_sample: f64,
-    /// Light paths tell what they bring before it is weighted, and its ratio: see [`super::plan`].
+    /// Light paths return unweighted contributions and pdf ratios: see [`super::plan`].
     pub is_measured: bool,
-    /// Of a pixel on the film; see [`crate::core::camera::Camera::pixel_size`]; square metres.
+    /// Area of a pixel on the film, square metres; see [`crate::core::camera::Camera::pixel_size`].
     pub pixel_area: f32,
     /// See [`crate::prepare::bodies::Bodies::around`].
     pub camera_media: Vec<u32>,
 }
 
 impl<'a> CausticPass<'a> {
-    /// `None` where there is nothing to gain, or nothing is to be used.
+    /// Returns `None` if the scene has no caustics, or no technique for them is used.
     pub fn of(
         scene: &'a Prepared,
         settings: &RenderSettings,
@@ -73,7 +73,7 @@ impl<'a> CausticPass<'a> {
     }
 }
 
-/// What caustics come from, where they are looked for at all.
+/// Returns the casters of a scene, if the settings include caustics.
 pub(crate) fn casters_of<'a>(scene: &'a Prepared, settings: &RenderSettings) -> Option<&'a CasterTable> {
     // Light, mirror, diffuse, camera: three segments.
     let looks = settings.integrator == Integrator::Path && settings.techniques.caustics && settings.max_depth >= 3;
@@ -81,7 +81,7 @@ pub(crate) fn casters_of<'a>(scene: &'a Prepared, settings: &RenderSettings) -> 
 }
 
 impl CausticPass<'_> {
-    /// `None` while it is not prepared, where it knows nothing, and where it is not used.
+    /// Returns the guiding cache; `None` while it is not prepared, if it is empty, or if it is not used.
     #[inline]
     pub fn guide(&self) -> Option<&Guide> {
         if !self.plan.guided {
@@ -90,9 +90,9 @@ impl CausticPass<'_> {
         self.casters.guide.get().filter(|guide| !guide.is_empty())
     }
 
-    /// Hints for a vertex, where light paths are of no use to the path so far.
+    /// Returns the guiding distributions for a vertex, if no light path can find the path so far.
     ///
-    /// - `n_vertices`: up to and with this one.
+    /// - `n_vertices`: number of vertices including this one.
     #[inline]
     pub fn hints(&self, track: &MisState, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
         let needs_them = n_vertices > 1 && track.is_lost();

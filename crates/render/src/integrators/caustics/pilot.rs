@@ -1,4 +1,4 @@
-//! Pilot light paths, which show camera paths the way.
+//! Pilot light paths, which fill the guiding cache.
 
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
@@ -6,15 +6,16 @@ use crate::integrators::caustics::trace::LightWave;
 use crate::prepare::guide::Guide;
 use rayon::prelude::*;
 
-/// Light paths that show the others the way.
+/// Number of pilot light paths.
 const PILOT_PATHS: u32 = 1 << 15;
 
-/// Scouts that one worker sends at once.
+/// Pilot light paths per batch of a worker.
 const PILOT_BATCH: u32 = 2048;
 
-/// Sees to it that hints are there, if they are to be used; false if `stop` said so before they were.
+/// Builds the guiding cache if it is used; returns false if `stop` returned true before it was complete.
 ///
-/// They belong to the lights and surfaces of the scene, so they outlive cameras, seeds and settings.
+/// The cache depends on the lights and surfaces of the scene only, so it stays valid for other cameras, seeds and
+/// settings.
 pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)) -> bool {
     if !pass.plan.guided || pass.casters.guide.get().is_some() {
         return true;
@@ -28,7 +29,7 @@ pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)
         })
         .collect();
     let Some(traces) = traces.into_iter().collect::<Option<Vec<_>>>() else { return false };
-    // Somebody else may have been faster, with the same.
+    // Another thread may have set it first, to the same value.
     let _ = pass.casters.guide.set(Guide::build(traces.concat()));
     true
 }

@@ -1,19 +1,19 @@
-//! Which techniques look for caustics in a picture: chosen by variance times cost, which a small pilot picture tells.
+//! Selects the techniques for caustics of an image by variance times cost, which a small pilot measures.
 //!
-//! Light paths find caustics that camera paths hardly find, and cost rays that many a picture would be better off
-//! without. A pilot traces few paths of each kind, with random numbers of their own, and they are thrown away, so
-//! that the choice does not depend on any sample that is kept. It follows from scene, camera, size of the film and
-//! settings but the seed: parts of a picture agree on it. Its cost is counted in rays, never in seconds.
+//! Light paths find caustics that camera paths rarely find, and cost rays that many images would better spend
+//! otherwise. A pilot traces few paths of each kind, with separate random numbers, and discards them, so that the
+//! choice does not depend on any sample of the image. It is a function of scene, camera, film size and settings except
+//! the seed: all parts of an image agree on it. Its cost is counted in rays, never in seconds.
 //!
-//! What camera paths alone would make of a caustic cannot be measured by them: few find it, and those that do are the
-//! variance. Light paths tell it. Let a light path bring c into a pixel, as one of as many as there are pixels, and let r be the
-//! density of such paths over that of the same camera path (see [`super::weight`]). Sums over light paths of
+//! The variance of a caustic for camera paths alone cannot be measured by camera paths: few find it, and those few are
+//! the variance. Light paths measure it. Let a light path contribute c to a pixel, as one of as many paths as there are
+//! pixels, and let r be its pdf over that of the same camera path (see [`super::weight`]). Sums over light paths of
 //!
-//! - c² r w² are the second moment of what camera paths find with weight w,
-//! - c² w² / φ that of what φ light paths a pixel find with weight w,
+//! - c² r w² are the second moment of the contributions of camera paths with weight w,
+//! - c² w² / φ that of φ light paths per pixel with weight w,
 //!
-//! where the weights are of the ratio φ r. So one pilot tells the variance of every number of light paths, none included.
-//! Start reading at [`choose`].
+//! where the weights depend on the ratio φ r. So one pilot gives the variance for every number of light paths,
+//! including none. Start reading at [`choose`].
 
 use crate::core::caustic_plan::{CausticChoice, CausticPlan};
 use crate::core::filter::PixelFilter;
@@ -31,42 +31,42 @@ use crate::shading::lights::power_weight;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Of all pilot paths; no picture has it but by chance.
+/// Seed of all pilot paths, unlikely to be that of an image.
 const PILOT_SEED: u32 = 0x7069_6c6f;
 
-/// Pixels of the film for each pixel that the pilot looks at, about, and how many it looks at.
+/// Approximate number of film pixels per pilot pixel, and range of the number of pilot pixels.
 const PIXELS_PER_SPOT: f64 = 200.0;
 const SPOTS: (f64, f64) = (1024.0, 2048.0);
 
-/// Camera paths of each such pixel.
+/// Camera paths per pilot pixel.
 const SPOT_SAMPLES: u32 = 4;
 
-/// Spots that one worker takes at once.
+/// Pilot pixels per batch of a worker.
 const SPOTS_AT_ONCE: usize = 64;
 
-/// Light paths for each spot, and how many one worker takes at once.
+/// Light paths per pilot pixel, and per batch of a worker.
 const LIGHT_PATHS_PER_SPOT: u32 = 3;
 const LIGHT_PATHS_AT_ONCE: u32 = 256;
 
-/// To choose where a light path begins, in the unit of [`Work`].
+/// Cost of sampling the start of a light path, in the unit of [`Work`].
 const LIGHT_PATH_START: f64 = 2.0;
 
-/// By how much more the rest varies than a few thousand camera paths show: much of it comes from rare bright samples.
-/// About that of the built-in scenes with glass, and of glass meshes.
+/// Factor by which the variance of the rest exceeds that of a few thousand camera paths: much of it comes from rare
+/// bright samples. About the value for the built-in scenes with glass, and for glass meshes.
 const RARE: f64 = 2.5;
 
-/// What camera paths cost more where they are weighed against light paths.
+/// Cost factor of camera paths that are weighted against light paths.
 const TRACKING: f64 = 1.04;
 
-/// Guiding must promise this factor, and be better in so many of so many parts of the pilot's pixels: what it costs is known,
-/// but a single bright sample without it can seem to be worth as much as all that it saves.
+/// Guiding must gain this factor, and be better in this many of this many subsets of the pilot pixels: its cost is
+/// known, but a single bright sample without it can look like a gain.
 const CLEARLY: f64 = 1.2;
 const IN_PARTS: (usize, usize) = (5, 8);
 
-/// What a splat's variance is relative to is told by cells of which so many lie along the side of a spot.
+/// The level of a splat is measured in cells; number of cells along the side of a spot.
 const CELLS: u32 = 4;
 
-/// Sees to it that it is known how caustics are looked for in a picture; `None` if `stop` said so before it was.
+/// Chooses how caustics are rendered in an image; `None` if `stop` returned true first.
 pub(crate) fn choose(
     scene: &Prepared,
     settings: &RenderSettings,
@@ -83,41 +83,41 @@ pub(crate) fn choose(
     Some(choice)
 }
 
-/// The same, without tracing anything; `None` where that would be needed.
+/// Like [`choose`], without tracing anything; `None` if that would be necessary.
 pub(crate) fn known(scene: &Prepared, settings: &RenderSettings, size: UVec2) -> Option<CausticChoice> {
     let Some(casters) = casters_of(scene, settings) else { return Some(CausticChoice::NONE) };
     let given = settings.techniques.caustic_plan;
-    // Without weights all light that light paths may find is theirs, in any number.
+    // Without MIS, all light that light paths can find is left to them, in any number.
     let fixed = given.or((!settings.techniques.mis).then_some(CausticPlan::UNKNOWN));
     fixed
         .map(|plan| CausticChoice { plan, ..CausticChoice::NONE })
         .or_else(|| casters.plans.find(&PlanKey::new(&scene.camera, settings, size)))
 }
 
-/// What will do for pictures that nothing may delay: the plan of the last view of the scene that was looked at.
+/// Returns a plan for previews, which must not be delayed: that of the last view of the scene that has one.
 pub(crate) fn for_preview(scene: &Prepared, settings: &RenderSettings) -> CausticPlan {
     let Some(casters) = casters_of(scene, settings) else { return CausticPlan::NONE };
     let given = settings.techniques.caustic_plan;
     given.or(casters.plans.newest().map(|choice| choice.plan)).unwrap_or(CausticPlan::UNKNOWN)
 }
 
-/// The part of the picture around one pixel that was looked at.
+/// A part of the image, represented by one pilot pixel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spot {
     mean: DVec3,
-    /// Of one sample.
+    /// Variance of one sample.
     variance: DVec3,
 }
 
-/// What camera paths have found.
+/// Result of the pilot camera paths.
 #[derive(Clone)]
 struct CameraPilot {
     spots: Vec<Spot>,
-    /// Of one sample of the whole picture.
+    /// Cost of one sample of the whole image.
     cost: f64,
 }
 
-/// What pilot paths have found.
+/// Result of all pilot paths.
 struct Pilot {
     grid: UVec2,
     size: UVec2,
@@ -125,13 +125,13 @@ struct Pilot {
     guided: CameraPilot,
     splats: Vec<MeasuredSplat>,
     n_light_paths: f64,
-    /// Of as many light paths as there are pixels.
+    /// Cost of as many light paths as there are pixels.
     light_cost: f64,
-    /// Some light can be found by light paths alone.
+    /// Whether some light can be found by light paths only.
     needs_light_paths: bool,
 }
 
-/// Light path strides that may be chosen, none included.
+/// Candidates for the light path stride; 0 for no light paths.
 const STRIDES: [u32; 7] = [0, 1, 2, 4, 8, 16, 32];
 
 impl Pilot {
@@ -139,7 +139,7 @@ impl Pilot {
         let settings = &RenderSettings {
             seed: PILOT_SEED,
             filter: PixelFilter::Box,
-            // Whatever the picture is shaded with: one path at a time rounds otherwise.
+            // Independent of the instruction set of the image: the scalar code rounds differently.
             simd: RenderSettings::default().simd,
             ..*settings
         };
@@ -162,7 +162,7 @@ impl Pilot {
         let plain =
             if pass.guide().is_some() { CameraPilot::of(&plain, settings, size, grid, stop)? } else { guided.clone() };
         let n_light_paths = (grid.x * grid.y * LIGHT_PATHS_PER_SPOT).next_multiple_of(LIGHT_PATHS_AT_ONCE);
-        // As if there were one for each pixel.
+        // Normalised to one light path per pixel.
         let measured = CausticPass { is_measured: true, paths_per_sample: n_pixels, camera_media, ..pass };
         let batches: Option<Vec<(Vec<MeasuredSplat>, f64)>> = (0..n_light_paths / LIGHT_PATHS_AT_ONCE)
             .into_par_iter()
@@ -198,7 +198,7 @@ impl Pilot {
         let value = |plan: CausticPlan| {
             let CameraPilot { spots, cost } = if plan.guided { &self.guided } else { &self.plain };
             let variance = self.mean_over_spots(spots, |spot| spot.variance);
-            // All but what light paths could find.
+            // Everything that light paths cannot find.
             let rest = (variance - found(known.light_path_stride).camera).max(0.5 * variance) * RARE;
             let Found { camera, light } = found(plan.light_path_stride);
             let tracking = if plan.is_none() { 1.0 } else { TRACKING };
@@ -232,7 +232,7 @@ impl Pilot {
         CausticChoice { plan: best, cost: (more / cost) as f32, gain: (variance / less) as f32 }
     }
 
-    /// Whether camera paths had better be guided, whatever light paths there are.
+    /// Whether guiding camera paths pays, for any number of light paths.
     fn guiding_pays(&self) -> bool {
         let (least, n) = IN_PARTS;
         let levels = self.levels();
@@ -246,12 +246,12 @@ impl Pilot {
         (0..n).filter(is_better).count() >= least
     }
 
-    /// Place in the list of spots of a point of the film.
+    /// Index of the spot that contains a film position.
     fn spot_at(&self, film: Vec2) -> usize {
         cell_at(film, self.size, self.grid)
     }
 
-    /// What variances in each spot are relative to: the mean of the spot and those around it.
+    /// Level of each spot, to which variances are relative: the mean over the spot and its neighbours.
     fn levels(&self) -> Vec<DVec3> {
         let mut found = vec![DVec3::ZERO; self.guided.spots.len()];
         let per_splat = self.per_splat(self.grid);
@@ -272,13 +272,13 @@ impl Pilot {
             .collect()
     }
 
-    /// What a splat adds to the mean of the pixels of a cell of a grid, over its light.
+    /// Factor from a splat's contribution to the mean of the pixels in a cell of a grid.
     fn per_splat(&self, grid: UVec2) -> f64 {
         let n_pixels = f64::from(self.size.x) * f64::from(self.size.y);
         f64::from(grid.x) * f64::from(grid.y) / (self.n_light_paths * n_pixels)
     }
 
-    /// The light of a splat that is not left to camera paths.
+    /// The part of a splat that is not left to camera paths by the MIS weight.
     fn kept(&self, splat: &MeasuredSplat) -> DVec3 {
         let ratio = splat.ratio / CausticPlan::UNKNOWN.light_path_stride as f32;
         splat.light.as_dvec3() * (1.0 - f64::from(power_weight(ratio)))
@@ -289,13 +289,14 @@ impl Pilot {
         spots.iter().zip(levels).map(|(spot, level)| relative(value(spot), level)).sum::<f64>() / spots.len() as f64
     }
 
-    /// Variance of what camera and light paths find of caustics, of a sample of the picture with a light path for every `stride`
-    /// camera paths; 0 for none.
+    /// Variance of the caustics found by camera and light paths, for one sample of the image with a light path per
+    /// `stride` camera paths; 0 for no light paths.
     fn found_by_light(&self, stride: u32) -> Found {
         let paths = if stride == 0 { 0.0 } else { 1.0 / f64::from(stride) };
         let n_pixels = f64::from(self.size.x) * f64::from(self.size.y);
         let levels = self.levels();
-        // Caustics are bright in fewer pixels than a spot stands for: without its own light, a splat knows its cell.
+        // Caustics are bright in fewer pixels than a spot represents: the level comes from a splat's cell, without the
+        // splat itself.
         let cells = self.grid * CELLS;
         let mut means = vec![DVec3::ZERO; (cells.x * cells.y) as usize];
         let per_splat = self.per_splat(cells);
@@ -309,7 +310,7 @@ impl Pilot {
             let spot = self.spot_at(splat.film);
             let others = means[cell_at(splat.film, self.size, cells)] - self.kept(splat) * per_splat;
             let level = levels[spot].max(others);
-            // No camera path finds light without size.
+            // No camera path finds a delta light.
             let by_camera = if ratio.is_finite() { f64::from(power_weight((paths * ratio) as f32)) } else { 0.0 };
             if by_camera > 0.0 {
                 let of_camera = light * by_camera;
@@ -330,19 +331,19 @@ impl Pilot {
     }
 }
 
-/// Variances of a sample, relative, mean over pixels.
+/// Relative variances of a sample, mean over pixels.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     camera: f64,
     light: f64,
 }
 
-/// Over squared radiance, as relMSE has it; mean over channels.
+/// Relative to squared radiance, as in relMSE; mean over channels.
 fn relative(value: DVec3, level: DVec3) -> f64 {
     (value / (level * level + 0.01)).element_sum() / 3.0
 }
 
-/// Index of the cell of a grid over the film in which a point of it lies.
+/// Index of the grid cell that contains a film position.
 fn cell_at(film: Vec2, size: UVec2, grid: UVec2) -> usize {
     let at = (film / size.as_vec2() * grid.as_vec2()).max(Vec2::ZERO).as_uvec2().min(grid - 1);
     (at.y * grid.x + at.x) as usize
@@ -363,7 +364,7 @@ impl CameraPilot {
     }
 }
 
-/// Looks at one pixel in the middle of each part of a grid over the film.
+/// Traces one pixel in each part of a grid over the film.
 fn trace_spots(
     pass: &CausticPass,
     settings: &RenderSettings,
@@ -381,7 +382,7 @@ fn trace_spots(
         let paths = slots.map(|slot| {
             let spot = (first as u32) + slot / SPOT_SAMPLES;
             let at = UVec2::new(spot % grid.x, spot / grid.x);
-            // Anywhere in its part: the middles of all would see the same of a pattern.
+            // A random position in its part: regular positions would alias with patterns.
             let anywhere = Sampler::independent(PILOT_SEED, at.x, at.y, 0).pair(0);
             let pixel = ((at.as_vec2() + anywhere) / grid.as_vec2() * size.as_vec2()).as_uvec2().min(size - 1);
             let sampler = Sampler::new(PILOT_SEED, pixel.x, pixel.y, slot % SPOT_SAMPLES);

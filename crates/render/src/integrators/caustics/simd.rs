@@ -1,7 +1,7 @@
-//! Light paths, sixteen at a time; [`crate::integrators::caustics::trace`] has the same for one.
+//! Light paths in SIMD; [`crate::integrators::caustics::trace`] is the scalar version.
 //!
-//! Diffuse and rough surfaces are known where the true normal shades, for there the camera and the light see the same surface;
-//! mirrors and glass are known everywhere.
+//! Diffuse and rough surfaces are handled where the shading normal is the true normal, because there the camera and the
+//! light see the same surface; mirrors and glass are always handled.
 
 use crate::core::camera::{Camera, Connection};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
@@ -26,32 +26,32 @@ use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector};
 use glam::{Vec2, Vec3};
 
-/// Hits of one kind of material, and where their light and their paths go on.
+/// Hits on one kind of material, and the outputs of their paths.
 pub(crate) struct LightHits<'a> {
     pub pass: &'a CausticPass<'a>,
-    /// Up to and with these.
+    /// Number of vertices including these.
     pub n_vertices: u32,
-    /// The first sample dimension of the vertices.
+    /// First sample dimension of the vertices.
     pub dimension: u32,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
-    /// Of each hit.
+    /// Material per hit.
     pub materials: &'a [u32],
-    /// Which of them.
+    /// Indices of the hits.
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub arrivals: &'a mut LensConnections,
     pub sets: &'a mut MediumSets,
-    /// What the camera is inside of.
+    /// Media of the camera.
     pub camera: MediumId,
 }
 
-/// Whether [`scatter`] knows what to do with a hit on a material of a kind.
+/// Whether [`scatter`] handles a hit on a material of this kind.
 pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
     knows(kind) && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
 }
 
-/// Joins the vertices to the lens, and lets the paths go on.
+/// Connects the vertices to the lens, and continues the paths.
 pub(crate) fn scatter(set: InstructionSet, kind: usize, group: LightHits) {
     match kind {
         DIFFUSE => dispatch!(set, scatter_diffuse(group: LightHits)),
@@ -125,19 +125,19 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
 struct LightPathLanes<'a, S: Simd> {
     pass: &'a CausticPass<'a>,
     at: &'a HitGroup<'a, S>,
-    /// As seen from the light's side.
+    /// As seen from the light.
     place: &'a SurfaceLanes<S>,
     media: &'a [MediumId; LANES],
     throughput: Vector<S>,
     ratio: Float<S>,
-    /// By roulette, so far.
+    /// Probability of having survived Russian roulette.
     kept: Float<S>,
     sampler: SamplerLanes<S>,
     dimension: u32,
 }
 
 impl<S: Simd> LightPathLanes<'_, S> {
-    /// Shadow rays to points of the lens, where in the film they end and the light that they bring.
+    /// Appends shadow rays to points of the lens, with film positions and contributions.
     #[inline(always)]
     fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
@@ -167,7 +167,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = scene.camera.spread(distance2, cos_lens);
-        // `CausticPass::join_ratio`, rounded in an order of its own.
+        // `CausticPass::join_ratio`, rounded in a different order.
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
         let weight = if pass.is_measured { ratio.all(1.0) } else { pass.light_path_weight(ratio) };
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
@@ -184,7 +184,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         arrivals.append(open, [start, lens - start], [film_x, film_y], light, [ratio, self.kept]);
     }
 
-    /// Along the axes of the film, metres.
+    /// Lens points along the film axes, metres.
     #[inline(always)]
     fn lens_offsets(&self, s: S, camera: &Camera) -> [Float<S>; 2] {
         let zero = Float::splat(s, 0.0);
@@ -203,7 +203,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         [Float::load(s, &xs), Float::load(s, &ys)]
     }
 
-    /// Chooses how the paths go on, and whether.
+    /// Samples the continuation of the paths, with Russian roulette.
     #[inline(always)]
     fn go_on<const KIND: usize>(&self, s: S, sets: &mut MediumSets, n_vertices: u32, next: &mut PathBatch) {
         let &Self { at, place, ref sampler, dimension, .. } = self;
@@ -215,7 +215,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
         let mut go_on = at.mask & bounce.go_on;
         go_on &= (bounce.transmitted & along.is_negative()) | (!bounce.transmitted & reached);
-        // A path that scatters before anything specular is left to the camera's side.
+        // A path that scatters before any specular vertex is left to camera paths.
         if n_vertices == 1 {
             go_on &= specular;
         }
@@ -231,7 +231,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         }
         let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
         let gain = etendue_gain(normal, place.normal, place.wo, wi);
-        // Radiance is squeezed on its way into glass, flux is not.
+        // Radiance scales with n² on entering glass, flux does not.
         let white = Vector::splat(s, Vec3::ONE);
         let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;
         let mut ratio = self.ratio / gain;

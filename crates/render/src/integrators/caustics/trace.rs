@@ -1,9 +1,9 @@
-//! Light paths, a wave at a time, joined to the lens wherever they meet something that scatters.
+//! Light paths, a wave at a time, connected to the lens at every scattering vertex.
 //!
-//! The twin of [`crate::integrators::path`], with light and camera in each other's place. Where shading normals differ from true
-//! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the camera's view is the
-//! one that counts, so surfaces are always looked at from the camera's side here. Hits on what has no shading normals of its
-//! own are taken sixteen at a time ([`crate::integrators::caustics::simd`]).
+//! The counterpart of [`crate::integrators::path`], with light and camera exchanged. Where shading normals differ from
+//! true ones, scattering depends on the end at which the path started (Veach 1997, section 5.3); the camera's view is
+//! the reference, so surfaces are always evaluated from the camera's side here. Hits on surfaces without shading
+//! normals are handled sixteen at a time ([`crate::integrators::caustics::simd`]).
 
 use crate::core::counts::RayCounts;
 use crate::core::filter::PixelFilter;
@@ -35,28 +35,29 @@ use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::{Vec2, Vec3};
 
-/// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
+/// Share of pilot paths that glass reflects: more than that of the light, so that faint reflections are covered as
+/// well.
 const PILOT_REFLECTION: f32 = 0.25;
 
 /// The state of one path between two vertices.
 #[derive(Clone, Copy)]
 struct LightPath {
-    /// Flux over density.
+    /// Flux over pdf.
     throughput: Vec3,
-    /// Density over that of the same camera path, up to the vertex to come; see [`crate::integrators::caustics::weight`].
+    /// Pdf over that of the same camera path, up to the next vertex; see [`crate::integrators::caustics::weight`].
     ratio: f32,
     sampler: Sampler,
-    /// To be hit first; no caster any more after that.
+    /// The caster to be hit first; [`NO_CASTER`](crate::prepare::casters::NO_CASTER) afterwards.
     aimed_at: u32,
     media: MediumId,
-    /// The probability with which roulette has let it come so far.
+    /// Probability with which the path survived Russian roulette.
     kept: f32,
-    /// On its first segment only: the light is outside of the scene, see [`casters::LightLine::is_far`].
+    /// On the first segment: whether the light is outside of the scene, see [`casters::LightLine::is_far`].
     is_far: bool,
 }
 
-/// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
-/// slot is what they are aimed at. The normal says what roulette has kept. The place of the last vertex says at first whether the light is far away.
+/// Light paths are stored like camera paths, with other meanings of some fields: `pdf` is the ratio, `slot` the caster
+/// that they are aimed at, `normal` the survival probability, and `position` at first whether the light is far away.
 impl From<LightPath> for Path {
     fn from(LightPath { throughput, ratio, sampler, aimed_at, media, kept, is_far }: LightPath) -> Self {
         let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::splat(kept));
@@ -77,25 +78,25 @@ pub(crate) struct LightWave {
     next: PathBatch,
     hits: HitBatch,
     sorted: SortedHits,
-    /// Of the hits of one kind, those that are shaded sixteen at a time, and the others.
+    /// Hits of one kind: those handled in SIMD, and the others.
     together: Vec<u32>,
     apart: Vec<u32>,
     arrivals: LensConnections,
     sets: MediumSets,
-    /// What the camera is inside of.
+    /// Media of the camera.
     camera: MediumId,
-    /// Adds up what it costs, when somebody wants to know.
+    /// Counts the cost if present.
     pub work: Option<Box<Work>>,
 }
 
-/// One of the two kinds of scattering of a surface.
+/// The BSDF of a surface: a lobe or a blend.
 enum LightPathSurface {
     Lobe(Lobe),
     Blend(Box<Blend>),
 }
 
 impl LightWave {
-    /// Follows paths `first` to `first + n`; `None` when `stop` said so.
+    /// Traces paths `first` to `first + n`; `None` if `stop` returned true.
     pub fn trace(
         &mut self,
         pass: &CausticPass,
@@ -112,7 +113,7 @@ impl LightWave {
         Some((splats, counts))
     }
 
-    /// The same for a pass whose light paths are measured.
+    /// Like [`Self::trace`], for a pass whose light paths are measured.
     pub fn trace_measured(
         &mut self,
         pass: &CausticPass,
@@ -125,7 +126,7 @@ impl LightWave {
         Some(splats)
     }
 
-    /// Follows paths, and lets `take` have all connections to the lens that nothing stands in the way of.
+    /// Traces paths, and passes all unoccluded lens connections to `take`.
     fn trace_to_lens(
         &mut self,
         pass: &CausticPass,
@@ -165,7 +166,7 @@ impl LightWave {
         Some(counts)
     }
 
-    /// Follows paths to where they first scatter, for [`crate::prepare::guide`].
+    /// Traces paths to their first scattering vertex, for [`crate::prepare::guide`].
     pub fn trace_pilots(
         &mut self,
         pass: &CausticPass,
@@ -214,12 +215,12 @@ impl LightWave {
         Some(traces)
     }
 
-    /// - `are_pilots`: they come from lights that camera paths can find.
+    /// - `are_pilots`: only lights that camera paths can find are used.
     fn start(&mut self, pass: &CausticPass, first: u64, n: u32, are_pilots: bool) {
         self.paths.start(n as usize, pass.scene.tables.features.glass, false);
         self.camera = self.sets.start(pass.scene, &pass.camera_media);
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
-        // One sequence for all paths: its stream is none of any pixel's.
+        // One sequence for all paths, different from those of all pixels.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
         for i in first..first + u64::from(n) {
             // A sequence has 2³² points.
@@ -242,7 +243,7 @@ impl LightWave {
         }
     }
 
-    /// - `n_vertices`: up to and with the ones that were hit now.
+    /// - `n_vertices`: number of vertices including the present hits.
     fn scatter(&mut self, pass: &CausticPass, n_vertices: u32) {
         let scene = pass.scene;
         let (surfaces, kinds) = (&scene.surfaces, &scene.tables.materials.kinds);
@@ -250,7 +251,7 @@ impl LightWave {
         self.arrivals.start(self.paths.len());
         let set = pass.simd.unwrap_or(InstructionSet::Portable);
         self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
-        // Those behind the misses.
+        // All kinds after the misses.
         for kind in 0..KINDS - 1 {
             self.together.clear();
             self.apart.clear();
@@ -310,12 +311,12 @@ impl LightWave {
     }
 }
 
-/// The first sample dimension of the vertex that is number `n_vertices`.
+/// First sample dimension of vertex number `n_vertices`.
 fn first_dimension(n_vertices: u32) -> u32 {
     LINE_DIMENSIONS + (n_vertices - 1) * VERTEX_DIMENSIONS
 }
 
-/// `None` where the surface is black.
+/// Returns `None` if the surface is black.
 fn surface_at(
     pass: &CausticPass,
     sets: &mut MediumSets,
@@ -344,12 +345,12 @@ fn surface_at(
 struct LightPathStep<'a> {
     pass: &'a CausticPass<'a>,
     path: &'a LightPath,
-    /// As seen from the light's side.
+    /// As seen from the light.
     vertex: &'a Vertex,
     hit: &'a Hit,
     material: MaterialId,
     n_vertices: u32,
-    /// Of [`LightWave::trace_pilots`], whose paths carry nothing.
+    /// Whether the path is one of [`LightWave::trace_pilots`], which carry no throughput.
     is_scout: bool,
 }
 
@@ -358,10 +359,10 @@ impl LightPathStep<'_> {
         first_dimension(self.n_vertices)
     }
 
-    /// A shadow ray to a point of the lens, where in the film it ends, the light that it brings, and the ratio of its
-    /// density to that of the camera path.
+    /// Connects the vertex to a point of the lens: returns the shadow ray, the film position, the contribution, and the
+    /// ratio of its pdf to that of the camera path.
     ///
-    /// - `media`: what the camera is inside of.
+    /// - `media`: media of the camera.
     fn join(&self, surface: &LightPathSurface, sets: &MediumSets, media: MediumId) -> Option<(Ray, Vec2, Vec3, f32)> {
         let &Self { pass, path, .. } = self;
         let (scene, camera) = (pass.scene, &pass.scene.camera);
@@ -387,7 +388,7 @@ impl LightPathStep<'_> {
         }
         let vertex =
             if through.is_some() { self.vertex.seen_through(to_camera) } else { self.vertex.seen_along(to_camera) };
-        // Light and camera on the same side of the true surface, unless light passes through it.
+        // Light and camera must be on the same side of the true surface, unless light passes through it.
         if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_light) {
             return None;
         }
@@ -414,7 +415,7 @@ impl LightPathStep<'_> {
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light, ratio))
     }
 
-    /// Chooses how the path goes on, and whether; and tells whether it does so off something specular.
+    /// Samples the continuation of the path, with Russian roulette; the flag says whether the vertex was specular.
     fn go_on(&self, surface: &LightPathSurface) -> Option<(Ray, LightPath, bool)> {
         let &Self { pass, vertex, material, n_vertices, .. } = self;
         let scene = pass.scene;
@@ -423,14 +424,14 @@ impl LightPathStep<'_> {
         let u_lobe = || {
             let u = sampler.single(dimension + DIM_LOBE);
             match scene.shading.materials[material as usize] {
-                // Reflected or not, whatever the shares of the light.
+                // Reflects with a fixed probability, whatever the shares of the light.
                 Material::Glass { .. } if self.is_scout => f32::from(u >= PILOT_REFLECTION) * 1.0f32.next_down(),
                 _ => u,
             }
         };
         let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
         let is_specular = sample.pdf.is_infinite();
-        // A path that scatters before anything specular is left to the camera's side.
+        // A path that scatters before any specular vertex is left to camera paths.
         if n_vertices == 1 && !is_specular {
             return None;
         }
@@ -459,7 +460,7 @@ impl LightPathStep<'_> {
         let factor = if is_specular {
             let gain = etendue_gain_at(vertex, vertex.wo, sample.wi);
             path.ratio /= gain;
-            // Radiance is squeezed on its way into glass, flux is not.
+            // Radiance scales with n² on entering glass, flux does not.
             let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);
             sample.weight * (gain / (squeeze * squeeze))
         } else {
@@ -524,25 +525,25 @@ impl LightPathSurface {
 }
 
 impl CausticPass<'_> {
-    /// Whether paths may have more than these vertices: one more, and the way to the camera, are two more segments.
+    /// Whether paths may have more vertices: one more, and the lens connection, are two more segments.
     pub(crate) fn goes_on(&self, n_vertices: u32) -> bool {
         n_vertices + 2 <= self.max_depth
     }
 
-    /// Whether any pixel takes notice of a point of the film.
+    /// Whether the filter of any pixel reaches a film position.
     fn reaches_film(&self, film: Vec2) -> bool {
         let radius = self.filter.radius();
         film.cmpge(Vec2::splat(0.5 - radius)).all() && film.cmplt(self.size + (radius - 0.5)).all()
     }
 
-    /// Gives light to all pixels whose filter reaches a point of the film.
+    /// Distributes a contribution to all pixels whose filter reaches its film position.
     fn spread(&self, film: Vec2, light: Vec3, splats: &mut Vec<Splat>) {
         let radius = self.filter.radius();
         let low = (film - radius + 0.5).floor().max(Vec2::ZERO);
         let high = (film + radius - 0.5).floor().min(self.size - 1.0);
         let (low, high) = (low.as_uvec2(), high.as_ivec2());
         let weight = |pixel: u32, at: f32| match self.filter {
-            // Its rim counts on one side, so that no point of the film is lost between two pixels.
+            // Half-open, so that no film position is lost between two pixels.
             PixelFilter::Box => 1.0,
             _ => self.filter.weight(f64::from(at) - f64::from(pixel) - 0.5) / self.filter_norm,
         };

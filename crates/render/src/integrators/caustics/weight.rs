@@ -1,21 +1,22 @@
-//! What a camera path must remember so that light found by it can be weighed against a light path.
+//! MIS state of camera paths for weighting against light paths.
 //!
-//! Let a path have vertices x₁ … xₖ from the camera to the light point y. Per unit of film, solid angle and étendue, the
-//! ratio of the densities of the two ways to find it is a product of one factor a vertex:
+//! Let a path have vertices x₁ … xₖ from the camera to the light point y. Per unit of film area, solid angle and
+//! étendue, the ratio of the pdfs of the two techniques is a product of one factor per vertex:
 //!
-//! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area), of an orthographic
-//!   camera cos θₒ / (cos θ_lens · pixel area);
-//! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
+//! - x₁, which is connected to the lens: cos θᵢ / (G · p_camera), G = cos θₒ / (t² cos³ θ_lens · pixel area), for an
+//!   orthographic camera cos θₒ / (cos θ_lens · pixel area);
+//! - another scattering vertex: p_light · cos θᵢ / (cos θₒ · p_camera), where p_light and p_camera are its pdfs towards
 //!   the camera's side (o) and the light's side (i);
 //! - the same for one that scatters through a rough interface, times nᵢ² / nₒ²: étendue is n² times area, solid angle
 //!   and cosine;
-//! - a specular one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
-//!   and with the shading normal, where these differ, as étendue is kept about the shading normal (Veach 1997,
+//! - a specular vertex: 1, because mirrors and lenses preserve étendue; or the ratio of the cosines with the true and
+//!   with the shading normal, where these differ, because étendue is preserved about the shading normal (Veach 1997,
 //!   section 5.3);
-//! - the light: the density per étendue with which the line from y was chosen, times light paths.
+//! - the light: the pdf per étendue of sampling the line from y, times the number of light paths.
 //!
-//! All cosines but those inside of densities are with the true normal. The factor n² of the medium that the camera is in
-//! is left out: the light of a path that counts lies outside of all glass. Roulette is left out on both sides, which makes the weights no less valid.
+//! All cosines except those inside of pdfs are with the true normal. The factor n² of the camera's medium is left out:
+//! the light of a path that counts is outside of all glass. Russian roulette is left out on both sides, which leaves
+//! the weights valid.
 
 use crate::integrators::caustics::pass::CausticPass;
 use crate::prepare::casters::NO_CASTER;
@@ -27,25 +28,27 @@ use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 
-/// How a camera path goes on at a vertex.
+/// A bounce of a camera path.
 pub(crate) struct MisBounce<'a> {
     pub vertex: &'a Vertex,
     pub hit: &'a Hit,
-    /// Of the camera ray, if this is its hit.
+    /// Direction of the camera ray, if this is its hit.
     pub eye: Option<Vec3>,
     pub wi: Vec3,
     /// Per steradian; infinite if specular.
     pub pdf: f32,
-    /// What was passed through, if anything was.
+    /// The interface that was passed, if any.
     pub through: Option<Interface>,
-    /// The surface is a blend, of which the part is not known.
+    /// Whether the surface is a blend, whose sampled part is unknown.
     pub blended: bool,
     pub before: MediumId,
     pub after: MediumId,
 }
 
 impl CausticPass<'_> {
-    /// - `reverse_pdf`: density with which the vertex, reached from `wi`, would have scattered towards `wo`.
+    /// Returns the state after a bounce.
+    ///
+    /// - `reverse_pdf`: pdf with which the vertex, reached from `wi`, would have scattered towards `wo`.
     #[inline]
     pub fn follow(&self, track: MisState, bounce: &MisBounce, reverse_pdf: impl FnOnce() -> f32) -> MisState {
         let MisBounce { vertex, wi, .. } = *bounce;
@@ -74,30 +77,30 @@ impl CausticPass<'_> {
         }
     }
 
-    /// The caster that a hit lies on, [`NO_CASTER`] if none.
+    /// Returns the caster of a hit, [`NO_CASTER`] if none.
     #[inline]
     pub fn caster_of(&self, hit: &Hit) -> u32 {
         self.casters.of_hit(hit)
     }
 
-    /// The factor of the vertex that is joined to the lens, and of the number of paths.
+    /// The factor of the vertex that is connected to the lens, and of the number of paths.
     #[inline(always)]
     pub fn join_ratio<R: Real>(&self, distance2: R, cos_lens: R, cos_o: R, cos_i: R, pdf: R) -> R {
         let spread = match self.scene.camera.orthographic {
-            // `Camera::spread`, rounded in an order of its own.
+            // `Camera::spread`, rounded in a different order.
             None => distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens),
             Some(_) => cos_lens * self.density_scale(),
         };
         spread * cos_i / (cos_o * pdf)
     }
 
-    /// Of light paths that are joined to a pixel.
+    /// Pdf scale of lens connections to a pixel: light paths per sample times pixel area.
     #[inline]
     pub fn density_scale(&self) -> f32 {
         self.paths_per_sample as f32 * self.pixel_area
     }
 
-    /// Weight of light that a camera path finds on a light; `None` if light paths do not matter here.
+    /// MIS weight of a light that a camera path hits; `None` if light paths cannot find it.
     #[inline]
     pub fn camera_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
         if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
@@ -109,7 +112,7 @@ impl CausticPass<'_> {
         Some(self.weight_against(track.ratio * density))
     }
 
-    /// Of the way whose competitor has `ratio` times its density.
+    /// Weight of a technique whose competitor has `ratio` times its pdf.
     #[inline(always)]
     fn weight_against<R: Real>(&self, ratio: R) -> R {
         if self.techniques.mis {
@@ -118,15 +121,15 @@ impl CausticPass<'_> {
         select(ratio.is_positive(), ratio.all(0.0), ratio.all(1.0))
     }
 
-    /// Weight of a light path that has `ratio` times the density of the one from the camera.
+    /// Weight of a light path that has `ratio` times the pdf of the camera path.
     #[inline(always)]
     pub fn light_path_weight<R: Real>(&self, ratio: R) -> R {
         ratio.all(1.0) - self.weight_against(ratio)
     }
 }
 
-/// n² on the side that a path comes from over n² beyond what it passes through by scattering; 1 where it passes through
-/// nothing.
+/// Returns n² on the near side over n² on the far side of an interface that was passed by scattering; 1 without an
+/// interface.
 #[inline]
 pub(crate) fn etendue_scale(through: Option<Interface>) -> f32 {
     through.map_or(1.0, |Interface { squeeze, .. }| squeeze * squeeze)
@@ -134,8 +137,8 @@ pub(crate) fn etendue_scale(through: Option<Interface>) -> f32 {
 
 /// Whether a path from the other end could do the same.
 ///
-/// Reflection must be seen from the front of the true surface on both ends, and glass that is left must have been
-/// entered: an camera or a light inside of glass does not know that it is.
+/// Reflection must be on the front of the true surface for both ends, and glass that is left must have been entered: a
+/// camera or a light inside of glass does not know that it is.
 #[inline]
 pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
     if bounce.through.is_some() {
@@ -145,7 +148,8 @@ pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
     }
 }
 
-/// What a specular vertex does to the étendue of light that comes from `wi` and goes to `wo`: 1 where the true normal shades.
+/// Factor by which a specular vertex changes the étendue of light from `wi` to `wo`: 1 if the shading normal is the
+/// true normal.
 ///
 /// - `geometric`, `shading`: the two normals, unit.
 #[inline(always)]
@@ -153,7 +157,7 @@ pub(crate) fn etendue_gain<R: Real>(geometric: Vector3<R>, shading: Vector3<R>, 
     ((geometric.dot(wo) * shading.dot(wi)) / (geometric.dot(wi) * shading.dot(wo))).abs()
 }
 
-/// The same of the two normals of a vertex.
+/// Like [`etendue_gain`], for the normals of a vertex.
 #[inline]
 pub(crate) fn etendue_gain_at(vertex: &Vertex, wi: Vec3, wo: Vec3) -> f32 {
     etendue_gain(vertex.geometric_normal.into(), vertex.normal.into(), wi.into(), wo.into())

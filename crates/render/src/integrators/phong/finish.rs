@@ -1,4 +1,4 @@
-//! What the classic model makes of a material: a diffuse part, highlights, mirrors and panes.
+//! Materials in the classic model: a diffuse part, highlights, mirrors and panes.
 
 use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::integrators::phong::lobe::lobe_pdf;
@@ -11,44 +11,46 @@ use crate::shading::vertex::Vertex;
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-/// A surface at a point, all inputs looked up.
+/// A surface at a point, with all parameters evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Finish {
-    /// Share of the ambient light that comes back.
+    /// Reflected share of the ambient light.
     pub ambient: Vec3,
-    /// Lambert's albedo.
+    /// Diffuse albedo.
     pub diffuse: Vec3,
     shiny: [Shiny; MAX_LOBES],
     n_shiny: usize,
 }
 
-/// A part that sends rays of its own.
+/// A part that sends rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Shiny {
-    /// A mirror that shows lights as they are.
+    /// A mirror that also shows lights.
     Mirror { tint: Vec3 },
-    /// Lights as highlights, (n + 1) / 2π · cosⁿ about the mirrored direction, which sum up to `tint`; all else
-    /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980). Rough ones find lights both ways.
+    /// Highlights of lights, (n + 1) / 2π · cosⁿ about the mirrored direction, normalised to `tint`; everything else is
+    /// mirrored, within the same lobe if `rough`, otherwise perfectly (Whitted 1980). Rough ones find lights by both
+    /// techniques.
     Gloss { tint: Vec3, exponent: f32, rough: bool },
     /// A smooth interface.
     Pane { share: f32, interface: Interface },
 }
 
 impl Finish {
-    /// Black.
+    /// Creates a black surface.
     pub fn new() -> Self {
         let nothing = Shiny::Mirror { tint: Vec3::ZERO };
         Self { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, shiny: [nothing; MAX_LOBES], n_shiny: 0 }
     }
 
-    /// Becomes what a material is at a vertex. One finish for many vertices: to make a new one takes longer than this.
+    /// Evaluates a material at a vertex. The same object is reused for many vertices, because creating one takes longer
+    /// than this.
     pub fn look_up(&mut self, scene: &Prepared, id: MaterialId, vertex: &Vertex, mut sides: Option<&mut Sides>) {
         (self.ambient, self.diffuse, self.n_shiny) = (Vec3::ZERO, Vec3::ZERO, 0);
         self.add(scene, id, vertex, &mut sides, &mut 0, 1.0);
     }
 
-    /// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`crate::prepare::bodies::Bodies`]
-    ///   does.
+    /// - `n_leaves`: number of transparent parts so far, of any weight: counted like in
+    ///   [`crate::prepare::bodies::Bodies`].
     fn add(
         &mut self,
         scene: &Prepared,
@@ -83,8 +85,8 @@ impl Finish {
                 self.push(if alpha < SMALLEST_ALPHA {
                     Shiny::Mirror { tint }
                 } else {
-                    // The lobe about the mirrored direction is four times as wide in solid angle as that of the half
-                    // vector, whose exponent is 2 / α² − 2 (Walter et al. 2007, section 5).
+                    // The lobe about the mirrored direction has four times the solid angle of that of the half vector,
+                    // whose exponent is 2 / α² − 2 (Walter et al. 2007, section 5).
                     Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
                 });
             }
@@ -138,7 +140,7 @@ impl Finish {
                     self.push(pane(weight * (1.0 - metallic) * transmission));
                 }
             }
-            // What has no look of its own in the classic model is diffuse in its colour.
+            // Materials without their own look in the classic model are diffuse in their colour.
             other => {
                 let albedo = weight * other.color().map_or(Vec3::ONE, |color| color.eval(scene, uv));
                 self.diffuse += albedo;
@@ -156,17 +158,17 @@ impl Finish {
         &self.shiny[..self.n_shiny]
     }
 
-    /// Whether lights make a difference to it by themselves.
+    /// Whether direct light contributes.
     pub fn is_lit(&self) -> bool {
         let matte = self.diffuse != Vec3::ZERO || self.ambient != Vec3::ZERO;
         matte || self.shiny().iter().any(|shiny| matches!(shiny, Shiny::Gloss { .. }))
     }
 
-    /// Radiance towards `wo` from light that brings an irradiance of 1 at a right angle, from `wi`.
+    /// Returns the radiance towards `wo` for light from `wi` with an irradiance of 1 on a perpendicular surface.
     ///
-    /// - `mirrored`: unit, `wo` mirrored by the normal.
-    /// - `pdf`: per steradian, with which `wi` was found; `None` for light from a point, which no ray finds. Of rough
-    ///   highlights only the share is given that their own rays do not bring.
+    /// - `mirrored`: unit, `wo` mirrored at the normal.
+    /// - `pdf`: per steradian, of sampling `wi`; `None` for light from a point, which no ray finds. Rough highlights
+    ///   contribute only the share that their own rays do not.
     #[inline]
     pub fn reflected(&self, wi: Vec3, normal: Vec3, mirrored: Vec3, pdf: Option<f32>) -> Vec3 {
         let cos = normal.dot(wi);
@@ -185,8 +187,8 @@ impl Finish {
     }
 }
 
-/// The share of light that goes straight through a surface, for shadows: refraction is left out. And the way through
-/// its first transparent part, `None` where it has none.
+/// Returns the share of light that passes straight through a surface, for shadows without refraction, and the interface
+/// of its first transparent part; `None` if there is none.
 pub(crate) fn straight_through(
     scene: &Prepared,
     id: MaterialId,
@@ -229,7 +231,7 @@ impl Passage {
             _ => return,
         };
         let interface = sides.interface(scene, leaf);
-        // Unbent light meets both sides at the same angle: that of entering counts.
+        // Straight light has the same angle on both sides: that of entering is used.
         let eta = if vertex.front { interface.eta } else { 1.0 / interface.eta };
         self.share += share * (1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), eta).0);
         self.first.get_or_insert(interface);

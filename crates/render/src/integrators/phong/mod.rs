@@ -1,16 +1,16 @@
-//! The classic local model, a wave of rays at a time: Phong 1975 for light, Whitted 1980 for mirrors and glass.
+//! The classic local model, a wave of rays at a time: Phong 1975 for direct light, Whitted 1980 for mirrors and glass.
 //!
-//! Each light adds a diffuse part, a highlight, and a small share to surfaces that it cannot reach (ambient). Lights
-//! with an area are asked at one new point a sample, so that soft shadows get smooth as samples come in; point lights
-//! cast hard ones. Smooth surroundings add ambient light without shadows. Mirrors and glass send rays of their own,
-//! both reflected and refracted, until their weight is small; then chance decides, which costs no accuracy (Arvo and
-//! Kirk 1990). All rays of a wave that are at the same depth go to the kernel in one batch.
+//! Each light adds a diffuse part, a highlight, and a small ambient share to surfaces that it cannot reach. Lights with
+//! an area are sampled at one new point per sample, so that soft shadows converge; point lights cast hard shadows.
+//! Smooth environments add ambient light without shadows. Mirrors and glass send reflected and refracted rays until
+//! their weight is small; then Russian roulette decides, without bias (Arvo and Kirk 1990). All rays of a wave at the
+//! same depth are traced in one batch.
 //!
-//! Hits on diffuse surfaces, and on those with one part that sends a ray, are shaded sixteen at a time (`simd/classic.rs`). What
-//! is here shades all others, and whatever is asked of it as the reference.
+//! Hits on diffuse surfaces, and on those with one part that sends a ray, are shaded sixteen at a time
+//! (`simd/classic.rs`). The code here shades all others, and is the reference for the SIMD code.
 //!
-//! What it leaves out, and [`crate::integrators::path`] does not: light from one diffuse surface to another, and caustics.
-//! Start reading at [`PhongWave::trace`].
+//! Unlike [`crate::integrators::path`], it leaves out light from one diffuse surface to another, and caustics. Start
+//! reading at [`PhongWave::trace`].
 
 mod finish;
 pub(crate) mod lobe;
@@ -38,8 +38,8 @@ use firstlight_kdtree::{HitBatch, RayClass};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-/// How much counts of a light that the ray of a path finds, where it is asked for with the density that `asked` tells for a
-/// position.
+/// Returns the MIS weight of a light that the ray of a path hits, where light sampling from a position has the pdf
+/// `asked`.
 #[inline]
 fn share_of_light(path: &Path, asked: impl FnOnce(Vec3) -> f32) -> f32 {
     match path.pdf {
@@ -49,10 +49,10 @@ fn share_of_light(path: &Path, asked: impl FnOnce(Vec3) -> f32) -> f32 {
     }
 }
 
-/// Of hits, see [`SortedHits::of_kind`]; the others are one more than the kinds of the table.
+/// Index of misses in [`SortedHits::of_kind`]; the kinds of the table follow.
 const MISSES: usize = 0;
 
-/// Scratch memory of one worker: cleared between waves, never given back.
+/// Scratch memory of one worker: cleared between waves, never freed.
 #[derive(Default)]
 pub(crate) struct PhongWave {
     paths: PathBatch,
@@ -64,11 +64,11 @@ pub(crate) struct PhongWave {
 }
 
 impl PhongWave {
-    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// Traces the paths that `start` pushes, at most one per slot, and adds their radiance to `radiance`, indexed by
     /// slot.
     ///
-    /// The longest path as for paths: a light seen in two mirrors is three segments away. `None` when `stop` said so; what
-    /// is in `radiance` then is of no use.
+    /// The maximum depth counts as for path tracing: a light seen in two mirrors is three segments away. `None` if
+    /// `stop` returned true; `radiance` is meaningless then.
     pub fn trace(
         &mut self,
         scene: &Prepared,
@@ -126,7 +126,7 @@ impl PhongWave {
                 continue;
             }
             if kind > MISSES && classic::knows_classic(scene, kind as u32 - 1) {
-                // What emits no light and is the end of its path adds nothing.
+                // Hits that do not emit and end their path contribute nothing.
                 if is_last {
                     continue;
                 }
@@ -188,7 +188,8 @@ impl PhongWave {
         {
             let share = match tables.lights.light_of(hit.object, hit.prim, vertex.front) {
                 None => 1.0,
-                // A point shows to the camera alone: in a mirror its sphere would be a speck that few samples meet.
+                // A point light is visible to the camera only: in a mirror its sphere would be a speck that few samples
+                // hit.
                 Some(id) if depth > 1 && tables.lights.is_point(id) => 0.0,
                 Some(id) => share_of_light(&path, |from| {
                     tables.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))
@@ -214,7 +215,7 @@ impl PhongWave {
         }
     }
 
-    /// Ambient light, returned at once; direct light waits for its shadow rays.
+    /// Returns ambient light; direct light waits for its shadow rays.
     fn light(&mut self, step: &PhongStep, finish: &Finish) -> Vec3 {
         let PhongStep { scene, path, vertex, .. } = *step;
         let tables = &*scene.tables;
@@ -258,7 +259,7 @@ impl PhongWave {
         ambient
     }
 
-    /// The rays of a mirror or of glass.
+    /// Sends the rays of a mirror, a highlight or glass.
     fn send(&mut self, step: &PhongStep, shiny: &Shiny, dimension: u32) {
         let PhongStep { path, vertex, .. } = *step;
         match *shiny {
@@ -276,7 +277,7 @@ impl PhongWave {
                         self.follow(step, weight, wi, None, pdf, dimension);
                         return;
                     }
-                    // Below the surface there is nothing to see: the middle of the lobe stands in.
+                    // Directions below the surface are replaced by the centre of the lobe.
                 }
                 self.follow(step, weight, mirrored, None, DIRECT_ALREADY_SAMPLED, dimension);
             }
@@ -287,7 +288,7 @@ impl PhongWave {
                 self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
                     let wi = refract(vertex.wo.into(), vertex.normal.into(), eta, cos_t).into();
-                    // Radiance is squeezed into a narrower cone where light is slower: the factor η².
+                    // Radiance scales with n² across the interface: the factor η².
                     let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
                     self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);
                 }
@@ -295,7 +296,7 @@ impl PhongWave {
         }
     }
 
-    /// - `through`: what is passed through, if anything is; `pdf`: see [`DIRECT_ALREADY_SAMPLED`].
+    /// - `through`: the interface that is passed, if any; `pdf`: see [`DIRECT_ALREADY_SAMPLED`].
     fn follow(
         &mut self,
         step: &PhongStep,
@@ -306,14 +307,14 @@ impl PhongWave {
         dimension: u32,
     ) {
         let PhongStep { scene, path, vertex, depth } = *step;
-        // The true surface decides which side a direction leads to.
+        // The true surface decides to which side a direction leads.
         let reached =
             if through.is_some() { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) };
         if !reached {
             return;
         }
         let media = through.map_or(path.media, |interface| interface.beyond);
-        // Inside glass weights carry 1/n², which the way out gives back: it must not count as loss.
+        // Weights inside glass contain 1/n², which is restored on leaving: it must not count as a loss.
         let ior = self.sets.ior(media);
         let most = weight.abs().max_element() * ior * ior / least_weight(depth);
         let survival = if depth >= endless_depth(scene) { most.min(ENDLESS_SURVIVAL) } else { most.min(1.0) };
@@ -335,12 +336,12 @@ struct PhongStep<'a> {
     scene: &'a Prepared,
     path: &'a Path,
     vertex: &'a Vertex,
-    /// Segments so far.
+    /// Number of segments so far.
     depth: u32,
 }
 
 impl PhongStep<'_> {
-    /// The first sample dimension of this vertex.
+    /// First sample dimension of this vertex.
     fn dimension(&self) -> u32 {
         first_dimension(self.depth)
     }

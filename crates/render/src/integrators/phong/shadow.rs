@@ -1,7 +1,7 @@
-//! Shadow rays of the classic model: opaque things block them, glass dims them and leaves them straight.
+//! Shadow rays of the classic model: opaque objects block them, glass attenuates them without refraction.
 //!
-//! Straight light through glass is an approximation that keeps shadows of glass from being black where nothing
-//! gathers caustics. A scene without glass asks for any hit and is done.
+//! Straight light through glass is an approximation that keeps shadows of glass from being black without caustics. A
+//! scene without glass uses any-hit queries.
 
 use crate::core::material::{Material, MaterialId};
 use crate::integrators::phong::finish::straight_through;
@@ -17,25 +17,25 @@ use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, append};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
-/// Light that arrives unless something is in its way.
+/// A contribution that arrives unless it is occluded.
 #[derive(Clone, Copy, Debug)]
 struct Arriving {
     slot: u32,
     light: Vec3,
-    /// Where the ray ends; `None` for light from outside the scene.
+    /// End point of the ray; `None` for light from outside of the scene.
     target: Option<Vec3>,
-    /// What the ray began inside of, and is now.
+    /// Media at the origin of the ray, and at its present position.
     start: MediumId,
     media: MediumId,
 }
 
-/// Shadow rays of one wave by what they were sent to, and scratch memory to trace them.
+/// Shadow rays of one wave by light, and scratch memory to trace them.
 ///
-/// Those of one light lie together and run in much the same direction. Light is added light by light, and for each of them in
-/// the order of the rays.
+/// Rays to one light are stored together, since they are fairly coherent. Contributions are added light by light, and
+/// for each light in the order of the rays.
 #[derive(Default)]
 pub(crate) struct Shadows {
-    /// Of each light, and then of the surroundings; those behind the first `n` are not in use.
+    /// Rays per light, and then those of the environment; entries after the first `n` are unused.
     asked: Vec<LightRays>,
     n: usize,
     with_targets: bool,
@@ -49,17 +49,17 @@ pub(crate) struct Shadows {
 #[derive(Default)]
 struct LightRays {
     batch: ShadowBatch,
-    /// Where rays end, for those that go on behind glass.
+    /// End points of the rays, for those that continue behind glass.
     targets: [Vec<f32>; 3],
-    /// What each ray begins inside of; only where it may go on.
+    /// Media at the origin of each ray; only if it may continue.
     media: Vec<MediumId>,
 }
 
-/// Glass surfaces in the way of one shadow ray before it counts as blocked.
+/// Maximum number of glass surfaces that a shadow ray may cross before it counts as blocked.
 const MAX_CROSSINGS: usize = 32;
 
 impl Shadows {
-    /// Forgets all rays; there is room for `n_hits` to each of `n` lights.
+    /// Removes all rays and reserves space for `n_hits` rays to each of `n` lights.
     pub fn start(&mut self, scene: &Prepared, n: usize, n_hits: usize) {
         self.n = n;
         self.with_targets = scene.tables.features.glass;
@@ -76,7 +76,8 @@ impl Shadows {
         }
     }
 
-    /// Light for a path that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
+    /// Adds a shadow ray for a path from `origin` to `target` on light `k`, or along `wi` to a light outside of the
+    /// scene.
     #[inline]
     pub fn push(&mut self, k: usize, path: &Path, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
         let LightRays { batch, targets, media } = &mut self.asked[k];
@@ -88,7 +89,8 @@ impl Shadows {
         batch.push(&shadow_ray(origin, wi, target), path.slot, light);
     }
 
-    /// The same for the lanes of `mask`; rays that end at `target` have a `t_max` of 1, the others none.
+    /// Like [`Self::push`], for the lanes of `mask`; rays that end at `target` have a `t_max` of 1, the others
+    /// infinity.
     #[allow(clippy::too_many_arguments)]
     #[inline(always)]
     pub fn append<S: Simd>(
@@ -113,7 +115,7 @@ impl Shadows {
         batch.append(mask, rays, t_max, slot, light);
     }
 
-    /// Adds what arrives to `radiance`; returns how many rays it took.
+    /// Traces all rays and adds unoccluded contributions to `radiance`; returns the number of rays.
     pub fn cast(&mut self, scene: &Prepared, sets: &mut MediumSets, class: RayClass, radiance: &mut [Vec3]) -> u64 {
         let mut n_rays = 0;
         for k in 0..self.n {
@@ -130,7 +132,7 @@ impl Shadows {
         n_rays
     }
 
-    /// The same for one light where rays may go on behind what they meet.
+    /// Like [`Self::cast`], for one light whose rays may continue behind their hits.
     fn cast_through(
         &mut self,
         k: usize,
@@ -161,7 +163,7 @@ impl Shadows {
             self.next_lights.clear();
             for (i, &arriving) in self.lights.iter().enumerate() {
                 let Some(hit) = self.hits.get(i) else {
-                    // As an interface changes radiance on the way of a path; see `medium`.
+                    // Interfaces scale radiance as on a path; see `medium`.
                     let (here, there) = (sets.ior(arriving.start), sets.ior(arriving.media));
                     let ratio = if arriving.target.is_some() { here / there } else { here };
                     radiance[arriving.slot as usize] += arriving.light * (ratio * ratio);
@@ -199,7 +201,7 @@ impl Shadows {
 #[inline]
 fn shadow_ray(origin: Vec3, wi: Vec3, target: Option<Vec3>) -> Ray {
     match target {
-        // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
+        // `dir` leads to the light's own bounded point, where the ray ends: t = 1, excluded.
         Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
         None => Ray::new(origin, wi),
     }
@@ -212,7 +214,7 @@ fn may_be_clear(scene: &Prepared, id: MaterialId) -> bool {
     }
 }
 
-/// What glass leaves of light on its way through (Beer–Lambert).
+/// Transmittance of glass (Beer–Lambert).
 fn inside(scene: &Prepared, id: MaterialId, distance: f32) -> Vec3 {
     match &scene.shading.materials[id as usize] {
         Material::Glass { absorption, .. }

@@ -10,20 +10,20 @@ use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vect
 use glam::{UVec2, Vec2, Vec3};
 use std::ops::Range;
 
-/// Pixels whose camera rays are wanted, in the order of the rays.
+/// Pixels for which camera rays are generated, in the order of the rays.
 #[derive(Default)]
 pub(crate) struct Pixels {
     pub x: Vec<u32>,
     pub y: Vec<u32>,
-    /// Place among the pixels of one sample.
+    /// Index among the pixels of one sample.
     pub local: Vec<u32>,
 }
 
-/// What all camera rays of a picture share.
+/// Common parameters of all camera rays of an image.
 #[derive(Clone, Copy)]
 pub(crate) struct CameraRays<'a> {
     pub camera: &'a Camera,
-    /// Of the film, pixels.
+    /// Size of the film in pixels.
     pub size: UVec2,
     pub filter: &'a FilterSampler,
     pub seed: u32,
@@ -31,12 +31,13 @@ pub(crate) struct CameraRays<'a> {
 }
 
 impl CameraRays<'_> {
-    /// Whether [`Self::start_paths`] knows filter and aperture.
+    /// Whether [`Self::start_paths`] supports filter and aperture.
     pub fn is_plain(&self) -> bool {
         self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.blades < 3)
     }
 
-    /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
+    /// Samples a ray through a film position, by the pixel's filter, and a lens position; returns it with its sampler
+    /// and its weight.
     #[inline]
     pub fn ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
         let new_sampler = if self.even_samples { Sampler::of_pixel } else { Sampler::independent };
@@ -47,7 +48,7 @@ impl CameraRays<'_> {
         (self.camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
     }
 
-    /// Appends a path for each of the `wanted` pixels; `slot` is that of local pixel 0. There must be room.
+    /// Appends a path for each of the `wanted` pixels; `slot` is that of local pixel 0. Space must have been reserved.
     pub fn start_paths(
         &self,
         set: InstructionSet,

@@ -1,8 +1,8 @@
-//! The classic model for sixteen hits at a time; see `phong/` for one, and for what it is.
+//! The classic model for sixteen hits at a time; see `phong/` for the scalar code and the model.
 //!
-//! Knows diffuse surfaces and those with one part that sends a ray. Each hit sends at most one ray and asks each light
-//! once, and what belongs to one light is kept together: so the order in which light is added up at a pixel does not
-//! depend on which hits share a register.
+//! Supports diffuse surfaces and those with one part that sends a ray. Each hit sends at most one ray and samples each
+//! light once, and the rays to one light are stored together: so the order in which contributions are added to a pixel
+//! does not depend on which hits share a register.
 
 use crate::integrators::phong::lobe::{
     AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight, lobe_pdf, within_lobe,
@@ -30,19 +30,19 @@ use firstlight_simd::{
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-/// Hits on materials of one kind of a [`crate::prepare::classic_table::ClassicTable`], and where their light and their rays go on.
+/// Hits on materials of one kind of a [`crate::prepare::classic_table::ClassicTable`], and their outputs.
 pub(crate) struct ClassicGroup<'a> {
     pub scene: &'a Prepared,
     pub kind: u32,
-    /// Segments so far.
+    /// Number of segments so far.
     pub depth: u32,
-    /// The first sample dimension of the vertices.
+    /// First sample dimension of the vertices.
     pub dimension: u32,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
-    /// Of each hit.
+    /// Material per hit.
     pub materials: &'a [u32],
-    /// Which of them.
+    /// Indices of the hits.
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut Shadows,
@@ -50,18 +50,18 @@ pub(crate) struct ClassicGroup<'a> {
     pub radiance: &'a mut [Vec3],
 }
 
-/// Whether [`shade_classic`] can shade hits of a kind.
+/// Whether [`shade_classic`] supports hits of a kind.
 pub(crate) fn knows_classic(scene: &Prepared, kind: u32) -> bool {
     let lights = &scene.tables.lights;
     kind >= MATTE && (lights.is_empty() || lights.has_lanes())
 }
 
-/// Ambient light is added at once; direct light waits for its shadow rays.
+/// Shades hits. Ambient light is added at once; direct light waits for its shadow rays.
 pub(crate) fn shade_classic(set: InstructionSet, group: ClassicGroup) {
     dispatch!(set, shade(group: ClassicGroup));
 }
 
-/// What of it lights find.
+/// The parts that direct light contributes to.
 struct Lit<S: Simd> {
     mask: Mask,
     weight: Vector<S>,
@@ -77,7 +77,7 @@ struct Gloss<S: Simd> {
     rough: bool,
 }
 
-/// See [`crate::prepare::light::LightTable::sample_each`]; a function of its own, for it is long.
+/// Arguments of [`crate::prepare::light::LightTable::sample_each`]; a separate function because of its size.
 struct AskLight<'a, S: Simd> {
     scene: &'a Prepared,
     k: u32,
@@ -218,9 +218,9 @@ fn color_of<S: Simd>(s: S, at: &HitGroup<S>, inputs: &Inputs, row: Bits<S>, plac
     color
 }
 
-/// Lanes of `found` that send some of what arrives along `wi` to the viewer, and how much.
+/// Returns the lanes of `found` that reflect light from `wi` to the viewer, and the reflected radiance.
 ///
-/// - `pdf`: with which `wi` was found, 0 for light from a point; see [`crate::integrators::phong`] for the share of rough
+/// - `pdf`: of sampling `wi`, 0 for light from a point; see [`crate::integrators::phong`] for the share of rough
 ///   highlights.
 #[inline(always)]
 fn reflect<S: Simd>(
@@ -248,7 +248,7 @@ fn reflect<S: Simd>(
     (found & !light.is_zero(), light)
 }
 
-/// Directions by the picture of the surroundings, one at a time: lanes that found one, their density and radiance.
+/// Samples directions of an environment image, one at a time: returns the lanes that found one, their pdf and radiance.
 #[inline(always)]
 fn ask_environment<S: Simd>(
     s: S,

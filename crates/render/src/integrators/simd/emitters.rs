@@ -1,4 +1,4 @@
-//! Hits on what shines, sixteen at a time.
+//! Hits on emitters, sixteen at a time.
 
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::simd::shade::KindHits;
@@ -9,10 +9,11 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
-/// Adds the light of hits on emitters, weighted against light sampling having found it.
+/// Adds the emission of hits with the MIS weight against light sampling.
 ///
-/// Only where [`crate::prepare::light::LightTable::has_lanes`] and no emission is textured, see [`crate::prepare::material_table::MaterialTable`]; `dimension`, `survival`, `next` and
-/// `shadows` of the group are not used.
+/// Requires [`crate::prepare::light::LightTable::has_lanes`] and no textured emission, see
+/// [`crate::prepare::material_table::MaterialTable`]; `dimension`, `survival`, `next` and `shadows` of the group are
+/// unused.
 pub(crate) fn shade_emitters(set: InstructionSet, group: KindHits, radiance: &mut [Vec3]) {
     dispatch!(set, shade_emissive(group: KindHits, radiance: &mut [Vec3]));
 }
@@ -66,7 +67,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
     }
 }
 
-/// Puts in the densities of light sampling from points that asked on both sides, one at a time.
+/// Replaces the pdfs of light sampling for points that sampled both sides, one at a time.
 fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANES], mask: Mask) -> Float<S> {
     let KindHits { scene, techniques, paths, hits, .. } = *group;
     let mut pdfs = pdf.to_array();
@@ -83,7 +84,7 @@ fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANE
     Float::load(pdf.s, &pdfs)
 }
 
-/// Puts in the weights of light that light paths could have found as well, one at a time.
+/// Replaces the weights of light that light paths could find as well, one at a time.
 #[inline(always)]
 fn light_path_weights<S: Simd>(
     s: S,

@@ -1,4 +1,4 @@
-//! What camera rays see of diffuse surfaces, sixteen at a time; see [`crate::integrators::features`].
+//! Features of camera rays that hit diffuse surfaces, sixteen at a time; see [`crate::integrators::features`].
 
 use crate::integrators::seen::Seen;
 use crate::prepare::prepared::Prepared;
@@ -16,15 +16,15 @@ pub(crate) struct DiffuseHits<'a> {
     pub scene: &'a Prepared,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
-    /// Of each hit.
+    /// Material per hit.
     pub materials: &'a [u32],
-    /// Which of them.
+    /// Indices of the hits.
     pub order: &'a [u32],
-    /// By slot.
+    /// Features by slot.
     pub seen: &'a mut [Seen],
 }
 
-/// Writes down what each of them shows.
+/// Stores the features of each hit.
 pub(crate) fn see_diffuse(set: InstructionSet, group: DiffuseHits) {
     dispatch!(set, see(group: DiffuseHits));
 }
@@ -43,7 +43,7 @@ fn see<S: Simd>(s: S, group: DiffuseHits) {
         let within = |channel: Float<S>| channel.max(zero).min(one).to_array();
         let albedo = [within(color.x), within(color.y), within(color.z)];
         let (normal, position) = (place.normal.to_arrays(), place.position.to_arrays());
-        // `wo` is the direction of the ray, turned round.
+        // `wo` is the negated direction of the ray.
         let depth = (Float::gather(&hits.t, index) * -place.wo.dot(forward)).to_array();
         let vector =
             |arrays: &[[f32; LANES]; 3], lane: usize| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);

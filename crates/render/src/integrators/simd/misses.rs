@@ -1,4 +1,4 @@
-//! Rays that leave the scene, sixteen at a time, under skies that are no pictures.
+//! Rays that leave the scene, sixteen at a time, for environments that are no images.
 
 use crate::core::environment::{Environment, sky_gradient};
 use crate::prepare::prepared::Prepared;
@@ -9,7 +9,7 @@ use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch};
 use glam::Vec3;
 
-/// Adds what the surroundings send along the rays of `order`; see [`Environment::radiance`].
+/// Adds the radiance of the environment along the rays of `order`; see [`Environment::radiance`].
 pub(crate) fn shade_misses(
     set: InstructionSet,
     scene: &Prepared,

@@ -1,9 +1,8 @@
 //! Shading of sixteen paths at a time, for diffuse, mirror, glass, metal, and two of them in one surface.
 //!
-//! A wave's hits come sorted by kind of material, so the lanes of a chunk do the same. What is rare is done lane by
-//! lane with the scalar code: textures, the glasses that a path is inside of, many lights, and pictures of the
-//! surroundings. The scalar version of the whole is `path.rs`, which shades all other materials; tests
-//! hold the two against each other.
+//! A wave's hits are sorted by kind of material, so the lanes of a group take the same branches. Rare cases use the
+//! scalar code lane by lane: textures, the media of a path, many lights, and environment images. The scalar version of
+//! the whole is `path.rs`, which shades all other materials; tests compare the two.
 //!
 //! Start reading at [`shade::shade`].
 

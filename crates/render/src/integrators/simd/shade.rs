@@ -1,4 +1,4 @@
-//! Hits on one kind of material: light from lights, and how paths go on.
+//! Hits on one kind of material: direct light, and the continuation of paths.
 
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
@@ -19,33 +19,33 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
 
-/// Hits of one kind of material, and where their light and their paths go on.
+/// Hits on one kind of material, and the outputs of their paths.
 pub(crate) struct KindHits<'a> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,
     pub caustics: Option<&'a CausticPass<'a>>,
-    /// Segments so far.
+    /// Number of segments so far.
     pub depth: u32,
-    /// The first sample dimension of the vertices.
+    /// First sample dimension of the vertices.
     pub dimension: u32,
     pub survival: Survival,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
-    /// Of each hit.
+    /// Material per hit.
     pub materials: &'a [u32],
-    /// Which of them.
+    /// Indices of the hits.
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut ShadowBatch,
     pub sets: &'a mut MediumSets,
 }
 
-/// Whether [`shade`] knows what to do with hits on materials of a kind.
+/// Whether [`shade`] supports hits on materials of a kind.
 pub(crate) fn knows(kind: usize) -> bool {
     [DIFFUSE, MIRROR, GLASS, METAL, COATED].contains(&kind)
 }
 
-/// Whether light sampling finds something for hits on materials of a kind.
+/// Whether light sampling contributes to hits on materials of a kind.
 pub(crate) fn scatters(kind: usize) -> bool {
     [DIFFUSE, METAL, COATED].contains(&kind)
 }
@@ -137,7 +137,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
                         let passed = light.times(transmittance(s, sets, found & !infinite, &media, distance));
                         light = select_vector(infinite, light, passed);
                     }
-                    // The direction spans the way to the light's own bounded point, where the ray ends.
+                    // `dir` leads to the light's own bounded point, where the ray ends.
                     let dir = select_vector(infinite, wi, points.target - origin);
                     let one = Float::splat(s, 1.0);
                     let t_max = select(infinite, one.all(f32::INFINITY), one);

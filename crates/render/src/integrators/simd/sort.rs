@@ -1,4 +1,4 @@
-//! Hits by kind of material, so that the processor finds those that follow each other all alike.
+//! Hits sorted by kind of material, so that consecutive hits take the same branches.
 
 use crate::core::material::MaterialId;
 use crate::core::material_kind::MaterialKind;
@@ -8,7 +8,7 @@ use crate::shading::vertex::material_of;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 
-/// Kinds of hits: misses, then those of materials, and the one of two parts.
+/// Number of kinds of hits: misses, those of materials, and surfaces of two parts.
 pub(crate) const KINDS: usize = MaterialKind::N + 2;
 
 /// The hits of a wave, sorted.

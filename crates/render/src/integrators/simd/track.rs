@@ -1,4 +1,4 @@
-//! What sixteen paths must remember against light paths; see [`crate::integrators::caustics::pass::CausticPass::follow`].
+//! MIS states of sixteen paths against light paths; see [`crate::integrators::caustics::pass::CausticPass::follow`].
 
 use crate::core::camera::Camera;
 use crate::core::material::Material;
@@ -17,19 +17,19 @@ use crate::shading::surface::{blend_at, lobe_at};
 use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
 
-/// How the paths go on.
+/// The continuations of sixteen paths.
 pub(crate) struct BounceMisStates<'a, S: Simd> {
     pub pass: &'a CausticPass<'a>,
     pub at: &'a HitGroup<'a, S>,
     pub place: &'a SurfaceLanes<S>,
     pub hints: &'a HintLanes<'a>,
     pub bounce: &'a Bounce<S>,
-    /// Behind the bounce.
+    /// Media after the bounce.
     pub media: &'a [MediumId; LANES],
 }
 
 impl<S: Simd> BounceMisStates<'_, S> {
-    /// Appends the tracks of the lanes of `go_on`; `is_first`: their hits are those of camera rays.
+    /// Appends the MIS states of the lanes of `go_on`; `is_first`: their hits are those of camera rays.
     #[inline(always)]
     pub fn append<const KIND: usize>(&self, s: S, go_on: Mask, is_first: bool, tracks: &mut Vec<MisState>) {
         let Self { pass, at, place, hints, bounce, media } = *self;
@@ -84,7 +84,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
         self.pass.join_ratio(distance2, cos_lens, cos_o, cos_i, self.bounce.pdf)
     }
 
-    /// See [`crate::integrators::caustics`]: with which the surface would scatter the other way.
+    /// Pdf of the surface for the reverse direction; see [`crate::integrators::caustics`].
     #[inline(always)]
     fn reverse_pdf<const KIND: usize>(&self, s: S, mask: Mask) -> Float<S> {
         let Self { at, place, bounce, .. } = *self;
