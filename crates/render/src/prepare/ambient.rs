@@ -1,7 +1,8 @@
-//! Light from all around, as the classic model wants it: a smooth function of the normal, without shadows.
+//! Ambient light of the classic model: irradiance of the environment as a smooth function of the normal, without
+//! shadows.
 //!
-//! Irradiance is so smooth a function of direction that nine numbers a channel hold it to about one per cent of its
-//! mean for any surroundings, and exactly for constant ones: Ramamoorthi and Hanrahan 2001, "An Efficient
+//! Irradiance is so smooth a function of direction that nine coefficients per channel represent it to about one per
+//! cent of its mean for any environment, and exactly for constant ones: Ramamoorthi and Hanrahan 2001, "An Efficient
 //! Representation for Irradiance Environment Maps".
 
 use crate::core::environment::Environment;
@@ -9,10 +10,10 @@ use firstlight_simd::{Real, Vector3};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
-/// Irradiance over π: the radiance of a white diffuse surface that sees nothing but the surroundings.
+/// Irradiance over π: the radiance of a white diffuse surface that sees only the environment.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AmbientLight {
-    /// By spherical harmonics up to degree 2, the cosine lobe folded in.
+    /// Coefficients of spherical harmonics up to degree 2, convolved with the cosine lobe.
     coefficients: [Vec3; 9],
 }
 
@@ -21,7 +22,7 @@ impl AmbientLight {
         if matches!(environment, Environment::Black) {
             return Self::default();
         }
-        // Even in the height and in the angle about it, so that all steps have the same solid angle.
+        // Uniform in height and azimuth, so that all steps have the same solid angle.
         const HEIGHTS: usize = 128;
         const ANGLES: usize = 256;
         let mut sums = [DVec3::ZERO; 9];
@@ -36,7 +37,7 @@ impl AmbientLight {
             }
         }
         let step = 4.0 * PI / (HEIGHTS * ANGLES) as f64;
-        // What a clamped cosine leaves of each degree (their equation 8), over π.
+        // Factor of the clamped cosine per degree (their equation 8), over π.
         let lobe = |i: usize| [1.0, 2.0 / 3.0, 0.25][usize::from(i > 0) + usize::from(i > 3)];
         let mut coefficients = [Vec3::ZERO; 9];
         for (i, (coefficient, sum)) in coefficients.iter_mut().zip(sums).enumerate() {
@@ -45,7 +46,7 @@ impl AmbientLight {
         Self { coefficients }
     }
 
-    /// For a unit normal; nowhere negative.
+    /// Radiance for a unit normal; never negative.
     #[inline(always)]
     pub fn radiance<R: Real>(&self, normal: Vector3<R>) -> Vector3<R> {
         let nothing = Vector3::in_all(normal.x, Vec3::ZERO);

@@ -1,4 +1,4 @@
-//! Numbers of three coordinates, one array for each.
+//! Vectors as one array per coordinate.
 
 use glam::Vec3;
 

@@ -1,9 +1,9 @@
-//! The transparent bodies of a scene, smallest last, and which of them a point is inside of.
+//! The transparent bodies of a scene, smallest last, and which of them contain a point.
 //!
-//! A sphere is a body of its own, alone or in a cloud; so are all triangles of one mesh that have the same material.
-//! Quads, triangles and planes of one material are one body together: a box may be made of them.
-//! Each body has as many rows as its material has transparent parts: a blend of two glasses is, for each path, a body of
-//! the one through which the path came in.
+//! A sphere is a separate body, alone or in a group; so are all triangles of one mesh with the same material. Quads,
+//! triangles and planes of one material form one body together: a box may be made of them. Each body has as many rows
+//! as its material has transparent parts: a blend of two glasses is, for each path, a body of the glass through which
+//! the path entered.
 
 use crate::core::material::{Material, MaterialId};
 use crate::core::snapshot::Geometry;
@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 #[derive(Debug, Default)]
 pub(crate) struct Bodies {
     rows: Vec<BodyRow>,
-    /// Of each object.
+    /// Bodies of each object.
     of_object: Vec<BodySurface>,
     deepest: u32,
 }
@@ -27,36 +27,36 @@ pub(crate) struct Bodies {
 struct BodyRow {
     ior: f32,
     absorption: Vec3,
-    /// How many rows the body has.
+    /// Number of rows of the body.
     n_leaves: u32,
 }
 
-/// The bodies whose surfaces an object is, by their first rows.
+/// The bodies to which the surface of an object belongs, by their first rows.
 #[derive(Clone, Debug, Default)]
 enum BodySurface {
     #[default]
     Opaque,
-    /// All of the object.
+    /// One body for the whole object.
     One(u32),
-    /// One a primitive.
+    /// One body per primitive.
     Cloud(Vec<u32>),
-    /// One a transparent material.
+    /// One body per transparent material.
     Parts(Vec<(MaterialId, u32)>),
 }
 
-/// The surface of a body, met from one side.
+/// The surface of a body, hit from one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Boundary {
-    /// Its first row.
+    /// First row of the body.
     pub body: u32,
-    /// Met from outside.
+    /// Whether it was hit from outside.
     pub front: bool,
 }
 
-/// A body that has no row yet.
+/// A body without rows so far.
 struct Candidate {
     material: MaterialId,
-    /// Cubic metres; infinite for a half-space.
+    /// Volume in cubic metres; infinite for a half-space.
     volume: f64,
     low: DVec3,
     high: DVec3,
@@ -71,10 +71,10 @@ enum BodyPart {
     Open(Vec<u32>),
 }
 
-/// Bodies among which the deepest nesting is looked for: nested bodies lie within large ones.
+/// Number of largest bodies among which the deepest nesting is determined: nested bodies lie within large ones.
 const N_LARGEST: usize = 256;
 
-/// Hits that are followed to tell whether a point is inside of a body.
+/// Maximum number of hits that are followed to test whether a point is inside of a body.
 const MOST_HITS: usize = 4096;
 
 impl Bodies {
@@ -118,17 +118,17 @@ impl Bodies {
         Self { rows, of_object, deepest }
     }
 
-    /// How many bodies lie within each other, at most, as far as their boxes tell.
+    /// Maximum nesting of bodies, judged by their bounding boxes.
     pub fn deepest(&self) -> u32 {
         self.deepest
     }
 
-    /// Whether some surface of an object is that of a body.
+    /// Whether some surface of an object belongs to a body.
     pub fn is_transparent(&self, object: u32) -> bool {
         !matches!(self.of_object[object as usize], BodySurface::Opaque)
     }
 
-    /// The boundary that a hit is on.
+    /// Returns the boundary of a hit.
     ///
     /// - `material`: of the hit, transparent or a blend with a transparent part.
     #[inline]
@@ -142,7 +142,7 @@ impl Bodies {
         Boundary { body, front }
     }
 
-    /// Index of refraction of a body whose surface is passed through one transparent part of its material.
+    /// Index of refraction of a body that was entered through one transparent part of its material.
     pub fn ior(&self, boundary: Boundary, leaf: u32) -> f32 {
         self.rows[(boundary.body + leaf) as usize].ior
     }
@@ -153,7 +153,7 @@ impl Bodies {
         (ior, absorption)
     }
 
-    /// n² of the medium in which these bodies overlap.
+    /// n² of the medium where these bodies overlap.
     pub fn environment_scale(&self, rows: &[u32]) -> f32 {
         rows.last().map_or(1.0, |&row| self.medium(row).0.powi(2))
     }
@@ -162,10 +162,10 @@ impl Bodies {
         self.rows[body as usize].n_leaves
     }
 
-    /// Rows of the bodies that a point is inside of, ascending; a body that winds around it twice is there twice. Of a
-    /// body with several transparent parts, the first.
+    /// Returns the rows of the bodies that contain a point, ascending; a body with winding number two is listed twice.
+    /// For a body with several transparent parts, the first row.
     ///
-    /// Costs a look at each transparent object, and rays through those whose box has the point.
+    /// The cost is one test per transparent object, and rays through those whose bounding box contains the point.
     pub fn around(&self, geometry: &Geometry, point: Vec3) -> Vec<u32> {
         let mut rows = Vec::new();
         let mut open: Vec<(u32, Vec<Shape>)> = Vec::new();
@@ -217,8 +217,8 @@ fn is_inside(point: DVec3, center: DVec3, radius: f64) -> bool {
     point.distance_squared(center) < radius * radius
 }
 
-/// How often closed surfaces wind around a point: backs less fronts that a ray meets on its way out, the middle one of
-/// three rays, for a ray may pass along an edge or through a hole.
+/// Returns the winding number of closed surfaces around a point: back hits minus front hits of a ray to infinity, as
+/// the median of three rays, because a ray may pass along an edge or through a hole.
 fn winding(tree: &SceneTree, point: Vec3, counts: &dyn Fn(&Hit) -> bool) -> i32 {
     let directions =
         [Vec3::new(0.482, 0.617, 0.622), Vec3::new(-0.731, 0.289, -0.618), Vec3::new(0.171, -0.842, 0.512)];
@@ -239,7 +239,7 @@ fn winding(tree: &SceneTree, point: Vec3, counts: &dyn Fn(&Hit) -> bool) -> i32 
     windings[1].max(0)
 }
 
-/// Index and absorption of each transparent part of a material, in the order in which shading comes to them.
+/// Index and absorption of each transparent part of a material, in the order of shading.
 fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<(f32, Vec3)> {
     match &materials[id as usize] {
         Material::Blend { a, b, .. } => [leaves_of(materials, *a), leaves_of(materials, *b)].concat(),
@@ -330,7 +330,7 @@ impl Candidate {
         Self { material, volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, of }
     }
 
-    /// Adds a triangle of its surface: by the divergence theorem they sum up to the volume within.
+    /// Adds a triangle of the surface: by the divergence theorem they sum up to the enclosed volume.
     fn add(&mut self, [a, b, c]: [DVec3; 3]) {
         self.volume += a.dot(b.cross(c)) / 6.0;
         self.low = self.low.min(a).min(b).min(c);

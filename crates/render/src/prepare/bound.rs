@@ -1,8 +1,8 @@
-//! The most that any sample of a scene can be, where that is known.
+//! Upper bound of the radiance of all samples of a scene, where one is known.
 //!
-//! A check on the whole integrator that costs nothing: in a scene that is lit by its surroundings alone, found by bounces
-//! alone, off surfaces each of which gives back at most what it gets whatever the sample, no sample is brighter than the
-//! brightest of the surroundings. One that is tells of a fault, and is counted with its place like one that is not finite.
+//! A check of the whole integrator without cost: in a scene that is lit by its environment only, found by BSDF sampling
+//! only, with surfaces whose sample weights are at most 1, no sample is brighter than the brightest part of the
+//! environment. A sample that is indicates a bug, and is counted with its position like one that is not finite.
 
 use crate::core::color::luminance;
 use crate::core::environment::Environment;
@@ -10,7 +10,7 @@ use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_
 use crate::core::material_queries::Emission;
 use glam::Vec3;
 
-/// Largest channel of any sample, outside of all glass, before roulette of endless paths; `None` where there is no bound.
+/// Largest channel of any sample, outside of all glass, before roulette of endless paths; `None` if there is no bound.
 pub(crate) fn radiance_bound(
     environment: &Environment,
     emission: &[Option<Emission>],
@@ -26,7 +26,7 @@ pub(crate) fn radiance_bound(
     (!shines && holds).then(|| brightest.max_element())
 }
 
-/// Whether no sample of the material weighs more than 1 in any channel.
+/// Whether no sample of the material has a weight above 1 in any channel.
 fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
     let at_most_one = |input: &ColorInput| matches!(input, ColorInput::Constant(c) if c.max_element() <= 1.0);
     match &materials[id as usize] {
@@ -37,17 +37,17 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
         Material::Phong { diffuse, specular, .. } => {
             at_most_one(diffuse) && matches!(specular, ScalarInput::Constant(_)) && is_even(diffuse)
         }
-        // Parts are chosen by luminance: without colour, each weighs as much as all of them.
+        // Parts are sampled by luminance: without colour, each has the weight of the whole.
         Material::Blend { weight, a, b } => {
             let part = |id: MaterialId| returns_at_most_all(materials, id) && is_even_part(materials, id);
             matches!(weight, ScalarInput::Constant(_)) && part(*a) && part(*b)
         }
-        // Compensation gives back on some ways what is lost on others.
+        // Compensation adds on some paths what others lose.
         _ => false,
     }
 }
 
-/// Whether a part of a blend is chosen by the very share that it returns.
+/// Whether a part of a blend is sampled exactly in proportion to its reflectance.
 fn is_even_part(materials: &[Material], id: MaterialId) -> bool {
     match &materials[id as usize] {
         Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => is_even(color),
@@ -62,7 +62,7 @@ fn is_even_part(materials: &[Material], id: MaterialId) -> bool {
     }
 }
 
-/// Neither coloured nor looked up.
+/// Whether a colour is grey and constant.
 fn is_even(input: &ColorInput) -> bool {
     matches!(input, ColorInput::Constant(c) if (*c - Vec3::splat(luminance(*c))).abs().max_element() <= 1e-6)
 }
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(scene.tables.radiance_bound, Some(0.5));
         let (report, film) = run(&scene);
         assert_eq!((report.n_above, report.above), (0, vec![]));
-        // As if the surroundings were less bright than they are: each sample is found out, and none is left out.
+        // With an environment bound that is too small, every sample is reported and none is discarded.
         Arc::get_mut(&mut scene.tables).unwrap().radiance_bound = Some(0.499);
         let (report, same) = run(&scene);
         assert_eq!(report.n_above, 8 * 4 * 2);

@@ -1,11 +1,13 @@
-//! Which light to start from, and where to aim: at what is specular and makes caustics.
+//! Sampling of light paths: from which light to start, and at which caster, a specular object that makes caustics, to
+//! aim.
 //!
-//! A line from a light is chosen in three steps: a pair of light and caster by the flux between them, a point on the light
-//! evenly over its area (on a sphere over the cap that the caster can see), a direction evenly over the cone of the sphere
-//! around the caster. A line counts only where the caster it was aimed at is what it hits first, so its density follows
-//! from light, point and that caster alone, without a sum over all cones it may lie in.
+//! A line from a light is sampled in three steps: a pair of light and caster by the flux between them, a point on the
+//! light uniformly over its area (on a sphere: over the cap from which the caster is visible), and a direction
+//! uniformly over the cone of the caster's bounding sphere. A line counts only if the caster that it was aimed at is
+//! its first hit, so its pdf follows from light, point and that caster alone, without a sum over all cones that contain
+//! it.
 //!
-//! Densities are per unit of étendue, cos θ · area · solid angle, which is the same at both ends of a line.
+//! Pdfs are per unit of étendue, cos θ · area · solid angle, which is the same at both ends of a line.
 
 use crate::core::material::Material;
 use crate::core::snapshot::Geometry;
@@ -27,7 +29,8 @@ use std::sync::OnceLock;
 /// No caster.
 pub(crate) const NO_CASTER: u32 = u32::MAX;
 
-/// Up to this many pairs of light and caster are weighed one by one; of more, both are chosen apart.
+/// Maximum number of pairs of light and caster that are weighted individually; above it, both are sampled
+/// independently.
 const MAX_PAIRS: usize = 1 << 16;
 
 /// Sample dimensions of a line.
@@ -36,24 +39,24 @@ const DIM_DIRECTION: u32 = 1;
 const DIM_PAIR: u32 = 2;
 pub(crate) const LINE_DIMENSIONS: u32 = 3;
 
-/// All specular objects, and with which light each goes how well.
+/// All casters, and the sampling weights of their pairs with lights.
 #[derive(Debug)]
 pub(crate) struct CasterTable {
     casters: Vec<Caster>,
-    /// For each object the first of its casters, and whether each of its primitives is one.
+    /// Per object: the first of its casters, and whether each of its primitives is a caster.
     by_object: Vec<(u32, bool)>,
     pairs: Pairs,
     outside: Outside,
-    /// What each light without size is inside of, behind as many lights with one; see
-    /// [`crate::prepare::bodies::Bodies::around`]. Empty where there are none.
+    /// Media that contain each delta light, indexed like all lights; see [`crate::prepare::bodies::Bodies::around`].
+    /// Empty if there are none.
     media: Vec<Vec<u32>>,
-    /// Made when it is first needed.
+    /// Built when first needed.
     pub(crate) guide: OnceLock<Guide>,
-    /// How caustics are looked for in pictures of the scene.
+    /// Cached plans for caustics in images of the scene.
     pub(crate) plans: PlanCache,
 }
 
-/// A sphere around something specular; without end for a plane.
+/// Bounding sphere of a specular object; of infinite radius for a plane.
 #[derive(Clone, Copy, Debug)]
 struct Caster {
     center: Vec3,
@@ -62,7 +65,7 @@ struct Caster {
 
 #[derive(Debug)]
 enum Pairs {
-    /// Caster by caster for each light.
+    /// For each light, all casters.
     Joint(AliasTable),
     Apart {
         lights: AliasTable,
@@ -73,21 +76,21 @@ enum Pairs {
 /// A line from a light.
 pub(crate) struct LightLine {
     pub ray: Ray,
-    /// What it has to hit first.
+    /// The caster that must be its first hit.
     pub caster: u32,
-    /// Per unit of étendue, 1 / (m² sr); of a light without size, per steradian or per square metre.
+    /// Pdf per unit of étendue, 1 / (m² sr); for a delta light, per steradian or per square metre.
     pub density: f32,
-    /// W·m⁻²·sr⁻¹; of a light without size, W·sr⁻¹ or W·m⁻².
+    /// Radiance, W·m⁻²·sr⁻¹; for a delta light, W·sr⁻¹ or W·m⁻².
     pub radiance: Vec3,
     pub light: u32,
-    /// The light has no size, so no camera path finds it.
+    /// Whether the light is a delta light, which no camera path finds.
     pub is_delta: bool,
-    /// From outside of the scene: the air has absorbed what it does.
+    /// Whether it comes from outside of the scene: absorption by the air does not apply.
     pub is_far: bool,
 }
 
 impl CasterTable {
-    /// `None` where no light can come to a specular surface from a finite light.
+    /// Returns `None` if no light from a finite light can reach a specular surface.
     pub fn build(geometry: &Geometry, materials: &[Material], lights: &LightTable) -> Option<Self> {
         let mut casters = Vec::new();
         let is_specular: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
@@ -132,7 +135,7 @@ impl CasterTable {
         })
     }
 
-    /// Finds what lights without size are inside of.
+    /// Determines the media of delta lights.
     pub fn with_media(mut self, geometry: &Geometry, bodies: &Bodies, lights: &LightTable) -> Self {
         self.media = (lights.lights.iter())
             .map(|light| match light.shape {
@@ -143,12 +146,12 @@ impl CasterTable {
         self
     }
 
-    /// Rows of the bodies that a light without size is inside of; none for all others.
+    /// Rows of the bodies that contain a delta light; empty for all other lights.
     pub fn media_of(&self, light: u32) -> &[u32] {
         self.media.get(light as usize).map_or(&[], Vec::as_slice)
     }
 
-    /// The caster that a hit lies on, [`NO_CASTER`] if none.
+    /// Returns the caster of a hit, [`NO_CASTER`] if none.
     #[inline]
     pub fn of_hit(&self, hit: &Hit) -> u32 {
         match self.by_object[hit.object as usize] {
@@ -157,7 +160,7 @@ impl CasterTable {
         }
     }
 
-    /// A line from some light towards some caster; `None` if it points into the light.
+    /// Samples a line from some light towards some caster; `None` if it points into the light.
     pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
         let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
         let light = lights.light(light_id);
@@ -208,8 +211,8 @@ impl CasterTable {
         Some(LightLine { ray, caster, density, radiance, light: light_id, is_delta: false, is_far: false })
     }
 
-    /// Density of [`Self::sample`] to start at `position` of a light in a direction of cosine `cos` with its normal, on
-    /// which `caster` lies first; per unit of étendue.
+    /// Pdf of [`Self::sample`] for a line from `position` on a light, with cosine `cos` to its normal, whose first hit
+    /// is `caster`; per unit of étendue.
     pub(crate) fn density(&self, lights: &LightTable, light_id: u32, caster: u32, position: Vec3, cos: f32) -> f32 {
         let pmf = self.pairs.pmf(self.casters.len(), light_id, caster);
         let Caster { center, radius } = self.casters[caster as usize];
@@ -232,7 +235,7 @@ impl CasterTable {
 impl Caster {
     fn around(geometry: &Geometry, object: &crate::core::snapshot::Object, shape: &Shape) -> Self {
         let of_points = |center: Vec3, points: &mut dyn Iterator<Item = Vec3>| {
-            // A little more, for the rounding of both ends.
+            // With a margin for the rounding of both ends.
             let reach2 = points.map(|p| p.distance_squared(center)).fold(0.0, f32::max);
             Self { center, radius: reach2.sqrt() * (1.0 + 8.0 * f32::EPSILON) }
         };
@@ -259,7 +262,8 @@ impl Caster {
         }
     }
 
-    /// An estimate of the étendue between a light and the sphere, zero only where none of the light can see any of it.
+    /// An estimate of the étendue between a light and the sphere, zero only if no part of the light sees any part of
+    /// it.
     fn coupling(&self, light: &LightShape) -> f64 {
         if light.delta().is_some() {
             return delta_lines::coupling(light, self.center, self.radius);
@@ -279,7 +283,7 @@ impl Caster {
                 return 1.0;
             }
             let (cos, sin) = (offset.dot(point.normal) / distance, self.radius / distance);
-            // The form factor of a sphere, and a parabola where the horizon cuts it.
+            // The form factor of a sphere, with a parabola where the horizon cuts it.
             f64::from(sin * sin * if cos >= sin { cos } else { (cos + sin).max(0.0).powi(2) / (4.0 * sin) })
         });
         f64::from(PI * light_area) * over_points.sum::<f64>() / f64::from(SIDE * SIDE)
@@ -319,7 +323,7 @@ impl Pairs {
         Some(Self::Apart { lights: AliasTable::new(&powers), casters })
     }
 
-    /// Light, caster and the probability of the choice.
+    /// Returns light, caster and the probability of the choice.
     fn sample(&self, n_casters: usize, u: f32) -> (u32, u32, f32) {
         match self {
             Self::Joint(table) => {
@@ -342,17 +346,17 @@ impl Pairs {
     }
 }
 
-/// Height, over the radius, of the cap of a light from which some of a sphere can be seen; 0..2.
+/// Height over radius of the cap of a light from which a part of a sphere is visible; 0..2.
 fn cap_height(light_center: Vec3, light_radius: f32, center: Vec3, radius: f32) -> f32 {
     let distance = light_center.distance(center);
     if radius.is_infinite() || distance <= (light_radius - radius).abs() {
         return 2.0;
     }
-    // A little more, so that rounding leaves nothing out.
+    // With a margin, so that rounding excludes nothing.
     (1.0 - (light_radius - radius) / distance + 8.0 * f32::EPSILON).clamp(0.0, 2.0)
 }
 
-/// Even over the cap of the unit sphere around +z, up to the whole of it.
+/// Samples uniformly over the cap of the unit sphere about +z, up to the whole sphere.
 fn uniform_cap(u: Vec2, height: f32) -> (Vec3, f32) {
     let one_minus_cos = u.x * height;
     let sin = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt();

@@ -1,4 +1,4 @@
-//! What the classic model makes of materials, as arrays that sixteen lanes read at once; see `phong/finish.rs`.
+//! Materials in the classic model, as arrays for SIMD; see `phong/finish.rs`.
 
 use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::prepare::arrays::push;
@@ -6,26 +6,27 @@ use crate::prepare::material_table::Kinds;
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// Materials that are shaded one at a time: all that shines, is clear, has several parts that send rays, or looks up a number.
+/// Materials for the scalar code: emitters, transparent ones, those with several parts that send rays, or with textured
+/// scalars.
 pub(crate) const ONE_BY_ONE: u32 = 0;
-/// Nothing but diffuse.
+/// Diffuse only.
 pub(crate) const MATTE: u32 = 1;
-/// The others may be diffuse beside this: highlights and a sharp mirror,
+/// Optionally diffuse, plus highlights and a sharp mirror,
 pub(crate) const GLOSS: u32 = 2;
-/// rough ones,
+/// plus rough highlights,
 pub(crate) const ROUGH: u32 = 3;
-/// or a mirror that shows lights as well.
+/// or plus a mirror that shows lights as well.
 pub(crate) const PLAIN_MIRROR: u32 = 4;
 
-/// One row for each material.
+/// One row per material.
 #[derive(Debug, Default)]
 pub(crate) struct ClassicTable {
     pub kinds: Kinds,
     pub matte: Inputs,
-    /// Of the ambient light, the share of the diffuse part that comes back.
+    /// Reflected share of the ambient light, relative to the diffuse part.
     pub ambient: Vec<f32>,
     pub shiny: Inputs,
-    /// Of the highlights.
+    /// Exponent of the highlights.
     pub exponent: Vec<f32>,
     /// See [`crate::prepare::material_table::SCHLICK`].
     pub flags: Vec<u32>,
@@ -35,9 +36,9 @@ pub(crate) struct ClassicTable {
 #[derive(Debug, Default)]
 pub(crate) struct Inputs {
     pub color: [Vec<f32>; 3],
-    /// The same where it has to be looked up.
+    /// The same with textures.
     pub inputs: Vec<ColorInput>,
-    /// Whether it has to be.
+    /// Whether a colour is textured.
     pub textured: Vec<u32>,
     pub weight: Vec<f32>,
 }
@@ -113,7 +114,7 @@ impl ClassicTable {
 }
 
 impl ClassicRow {
-    /// `None` where there is no room, or no place at all, for a part.
+    /// Adds a part; `None` if there is no space for it, or it is not supported.
     fn add(&mut self, materials: &[Material], id: MaterialId, weight: f32) -> Option<()> {
         match &materials[id as usize] {
             _ if weight == 0.0 => Some(()),

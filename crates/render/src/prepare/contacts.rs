@@ -1,14 +1,14 @@
-//! Where surfaces of transparent bodies coincide with other surfaces: shared walls, glass that stands on a floor.
+//! Surfaces of transparent bodies that coincide with other surfaces: shared walls, glass that stands on a floor.
 //!
-//! A path that has gone through a surface starts behind it, by the bound of the error of its position. It skips whatever lies
-//! closer than that, so surfaces that coincide are dealt with at one vertex:
+//! A path that has passed a surface starts behind it, by the error bound of its position. It skips everything closer
+//! than that, so coincident surfaces are handled at one vertex:
 //!
-//! - where one of them is opaque, that is the one that is met, from both sides;
-//! - otherwise the path goes through them all, entering what is entered before it leaves what is left, as through one wall
-//!   between the media before and behind them ([`crate::shading::medium::MediumSets::interface`]).
+//! - if one of them is opaque, that one is hit, from both sides;
+//! - otherwise the path passes them all, entering bodies before leaving others, like a single wall between the media
+//!   before and behind them ([`crate::shading::medium::MediumSets::interface`]).
 //!
-//! Which objects may have such places is found when the scene is prepared: two faces in one plane, or two equal spheres. In
-//! scenes without any, nothing is asked.
+//! The objects that may have such points are determined when the scene is prepared: two faces in one plane, or two
+//! equal spheres. Scenes without any have no cost.
 
 use crate::core::material::Material;
 use crate::core::snapshot::Geometry;
@@ -23,11 +23,11 @@ use std::sync::Arc;
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub(crate) struct Contacts {
-    /// Of each object, or of none.
+    /// Per object; empty if there are none.
     of_object: Vec<Vec<Other>>,
 }
 
-/// What the surfaces in one place belong to.
+/// The scene data for coincident surfaces.
 pub(crate) struct ContactScene<'a> {
     pub geometry: &'a Geometry,
     pub materials: &'a [Material],
@@ -38,15 +38,15 @@ pub(crate) struct ContactScene<'a> {
 #[derive(Clone, Debug)]
 struct Other {
     object: u32,
-    /// Nothing but this object.
+    /// A tree of this object only.
     alone: Arc<SceneTree>,
 }
 
-/// What of several surfaces in one place is met: the greatest.
+/// Precedence of coincident surfaces: the greatest is hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum ContactKind {
     Glass,
-    /// Before smooth glass: one rough wall scatters what goes through both.
+    /// Takes precedence over smooth glass: one rough wall scatters light that passes both.
     RoughGlass,
     /// A blend with transparent parts.
     PartlyClear,
@@ -71,8 +71,8 @@ impl Contacts {
         Self { of_object }
     }
 
-    /// Puts what is met in the place of each hit that has an opaque surface, or the first of several transparent ones, where
-    /// it is.
+    /// Replaces each hit by the coincident surface that takes precedence: an opaque one, or the first of several
+    /// transparent ones.
     pub fn settle(&self, touched: &ContactScene, rays: &RayBatch, hits: &mut HitBatch) {
         if self.of_object.is_empty() {
             return;
@@ -101,7 +101,7 @@ impl Contacts {
         met
     }
 
-    /// The boundaries of glass that coincide with that of a hit, which is one of [`Self::settle`].
+    /// Returns the boundaries of glass that coincide with that of a hit, which comes from [`Self::settle`].
     #[inline]
     pub fn along_with(&self, touched: &ContactScene, hit: &Hit, ray: impl FnOnce() -> Ray) -> Vec<Boundary> {
         let mut found = Vec::new();
@@ -152,26 +152,26 @@ fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
     }
 }
 
-/// Of equal surfaces that one is met whose errors are the largest, so that a path that starts behind it is behind the others
-/// too; by what does not depend on the side that a path comes from.
+/// Rank among equal surfaces: the one with the largest errors is hit, so that a path that starts behind it is behind
+/// the others too. It does not depend on the side from which a path comes.
 fn size_rank(touched: &ContactScene, object: u32) -> u32 {
     match &touched.geometry.tree.shapes()[object as usize] {
         Shape::Mesh { tree, world_from_object } => {
             let bounds = tree.bounds();
             let offset = Vec3::from(world_from_object.translation).abs().max_element();
             let scale = world_from_object.matrix3.to_cols_array().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-            // Positive numbers are in the order of their bits.
+            // Positive numbers are ordered like their bits.
             (offset + scale * bounds.min.abs().max(bounds.max.abs()).max_element()).max(f32::MIN_POSITIVE).to_bits()
         }
         _ => 0,
     }
 }
 
-/// A face in the world.
+/// A face in world space.
 struct Face {
     object: u32,
     vertices: [DVec3; 3],
-    /// Unit.
+    /// Unit normal.
     normal: DVec3,
     offset: f64,
 }
@@ -188,7 +188,7 @@ impl Face {
         [a.min(b).min(c), a.max(b).max(c)]
     }
 
-    /// By how much positions here may be off, at most: a few roundings of the matrix and the coordinates.
+    /// Bound on the error of positions: a few roundings of the matrix and the coordinates.
     fn tolerance(&self) -> f64 {
         let [low, high] = self.bounds();
         256.0 * f64::from(UNIT_ROUNDOFF) * low.abs().max(high.abs()).max_element()
@@ -203,19 +203,19 @@ impl Face {
     }
 }
 
-/// Steps by which planes are told apart before they are compared: of the normal, and of the offset over the largest
-/// coordinate.
+/// Grid steps for planes: of the normal, and of the offset relative to the largest coordinate.
 const STEPS: [f64; 2] = [1e-4, 1e-5];
 
-/// Faces of one cell that are compared with a face of another object; if there are more, the objects count as touching.
+/// Maximum number of faces per cell that are compared with a face of another object; if there are more, the objects
+/// count as touching.
 const MOST_COMPARED: usize = 64;
 
-/// Equal spheres that know each other.
+/// Maximum number of equal spheres per position that are paired.
 const MOST_EQUAL: usize = 64;
 
 type Cell = [i64; 4];
 
-/// Pairs of a transparent object and another one with faces in one plane that may overlap.
+/// Returns pairs of a transparent object and another one with possibly overlapping faces in one plane.
 fn touching(geometry: &Geometry, is_clear: &[bool]) -> Vec<(u32, u32)> {
     let shapes = geometry.tree.shapes();
     let clear: Vec<bool> =
@@ -227,7 +227,7 @@ fn touching(geometry: &Geometry, is_clear: &[bool]) -> Vec<(u32, u32)> {
     let boxes: Vec<[Vec3; 2]> = shapes.iter().map(box_of).collect();
     let flat: Vec<u32> =
         (0..shapes.len() as u32).filter(|&i| boxes[i as usize][0].cmple(boxes[i as usize][1]).all()).collect();
-    // Of each object, the part of its box that another one reaches into.
+    // Per object: the part of its box that another object overlaps.
     let mut reached = vec![[Vec3::INFINITY, Vec3::NEG_INFINITY]; shapes.len()];
     let mut near_pairs: FxHashMap<(u32, u32), bool> = FxHashMap::default();
     for (a, b) in overlapping(&flat, &boxes).into_iter().filter(|&(a, b)| clear[a as usize] || clear[b as usize]) {
@@ -269,10 +269,10 @@ fn touching(geometry: &Geometry, is_clear: &[bool]) -> Vec<(u32, u32)> {
     for face in &faces {
         let at = place(face.normal, face.offset);
         for corner in 0..16u32 {
-            // The two cells on each axis that are nearest.
+            // The two nearest cells per axis.
             let cell: Cell = std::array::from_fn(|k| (at[k] - 0.5).floor() as i64 + i64::from(corner >> k & 1));
             let Some(list) = cells.get(&cell) else { continue };
-            // Those of later objects: faces are in the order of their objects.
+            // Faces of later objects only: faces are in the order of their objects.
             let first = list.partition_point(|&j| faces[j as usize].object <= face.object);
             let others = list[first..].iter();
             for (n, &j) in others.enumerate() {
@@ -287,7 +287,7 @@ fn touching(geometry: &Geometry, is_clear: &[bool]) -> Vec<(u32, u32)> {
             }
         }
     }
-    // Planes have no faces: all that lies in them touches them.
+    // Planes have no faces: everything that lies in them touches them.
     for (&(a, b), found) in &mut near_pairs {
         let [a, b] = [a, b].map(|i| &shapes[i as usize]);
         let lies_in = |shape: &Shape, plane: &Shape| match plane {
@@ -335,7 +335,7 @@ fn faces_of(object: u32, shape: &Shape) -> Vec<Face> {
     }
 }
 
-/// Around the faces of a shape, with room for rounding; empty where it has none.
+/// Bounding box of the faces of a shape, with a margin for rounding; empty if there are none.
 fn box_of(shape: &Shape) -> [Vec3; 2] {
     let around = |points: &[Vec3]| {
         let low = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
@@ -357,7 +357,7 @@ fn box_of(shape: &Shape) -> [Vec3; 2] {
     }
 }
 
-/// Pairs of boxes that overlap, found by a sweep along x.
+/// Returns pairs of overlapping boxes, by a sweep along x.
 fn overlapping(objects: &[u32], boxes: &[[Vec3; 2]]) -> Vec<(u32, u32)> {
     let of = |i: u32| boxes[i as usize];
     let mut order = objects.to_vec();
@@ -373,7 +373,7 @@ fn overlapping(objects: &[u32], boxes: &[[Vec3; 2]]) -> Vec<(u32, u32)> {
     pairs
 }
 
-/// Pairs of spheres in the same place of the same size, the first of which is transparent.
+/// Returns pairs of spheres of equal position and size, the first of which is transparent.
 fn equal_spheres(shapes: &[Shape], clear: &[bool]) -> Vec<(u32, u32)> {
     let mut places: FxHashMap<[u32; 4], Vec<u32>> = FxHashMap::default();
     for (i, shape) in (0..).zip(shapes) {
@@ -408,7 +408,7 @@ mod tests {
         (Shape::Mesh { tree, world_from_object: map }, Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) })
     }
 
-    /// Of objects that are all transparent but for those of material 1.
+    /// Pairs of objects that are all transparent except those of material 1.
     fn pairs(parts: Vec<(Shape, Object)>) -> Vec<(u32, u32)> {
         let (shapes, objects) = parts.into_iter().unzip();
         touching(&Geometry::build(shapes, objects), &[true, false])
@@ -429,12 +429,12 @@ mod tests {
             for scale in [1.0, 1e-4, 3e5] {
                 let of = |center: Vec3, size: Vec3| block(center * scale, size * scale, turn);
                 let low = || of(Vec3::new(0.0, -0.5, 0.0), Vec3::new(4.0, 1.0, 0.3));
-                // Across each other, so that no corner of either lies on the other one.
+                // Crossed, so that no vertex of either lies on the other one.
                 let across = of(Vec3::new(1.1, 0.35, 0.2), Vec3::new(0.3, 0.7, 5.0));
                 assert_eq!(pairs(vec![low(), across]), [(0, 1), (1, 0)], "{turn} {scale}");
                 let apart = of(Vec3::new(1.1, 0.36, 0.2), Vec3::new(0.3, 0.7, 5.0));
                 assert_eq!(pairs(vec![low(), apart]), [], "{turn} {scale}");
-                // Boxes tell faces in one plane apart.
+                // Bounding boxes separate faces in one plane.
                 let beside = of(Vec3::new(2.5, 0.35, 0.0), Vec3::new(0.3, 0.7, 5.0));
                 assert!(turn != Quat::IDENTITY || pairs(vec![low(), beside]).is_empty(), "{scale}");
             }

@@ -1,8 +1,8 @@
-//! Lines from lights without size towards what is specular.
+//! Lines from delta lights towards casters.
 //!
-//! From a point the direction is chosen evenly over the cone of the sphere around the caster, or over that of a spot
-//! where it is narrower; directional light evenly over the disc that the sphere is seen as. Densities are per steradian
-//! and per square metre: there is no line from the camera that they could be weighed against.
+//! From a point light the direction is sampled uniformly over the cone of the caster's bounding sphere, or over that of
+//! a spot light if it is narrower; for a directional light the origin is sampled uniformly over the disc of the
+//! projected sphere. Pdfs are per steradian and per square metre: no camera path could find such a line.
 
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
@@ -12,31 +12,31 @@ use firstlight_kdtree::{SceneTree, Shape};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-/// What directional light passes on its way to a caster.
+/// Obstacles of directional light on its way to a caster.
 #[derive(Debug)]
 pub(crate) struct Outside {
-    /// A sphere around all that is finite.
+    /// Bounding sphere of all finite objects.
     center: Vec3,
     radius: f32,
     /// A point and the normal of each infinite plane.
     planes: Vec<(Vec3, Vec3)>,
 }
 
-/// A line, and what it carries.
+/// A line and its strength.
 pub(crate) struct DeltaLine {
     pub ray: Ray,
-    /// Per steradian, or per square metre; without the choice of light and caster.
+    /// Pdf per steradian or per square metre, without the choice of light and caster.
     pub density: f32,
-    /// W·sr⁻¹, or W·m⁻².
+    /// W·sr⁻¹ or W·m⁻².
     pub strength: Vec3,
-    /// From outside of the scene.
+    /// Whether it comes from outside of the scene.
     pub is_far: bool,
 }
 
-/// - `center`, `radius`: of a sphere around the caster, metres, possibly without end;
-/// - `u`: two independent uniform numbers in `[0, 1)`.
+/// Samples a line; `None` if the light emits nothing in its direction.
 ///
-/// `None` where the light sends nothing this way.
+/// - `center`, `radius`: bounding sphere of the caster, metres, possibly infinite;
+/// - `u`: two independent uniform numbers in `[0, 1)`.
 pub(crate) fn sample(light: &Light, outside: &Outside, center: Vec3, radius: f32, u: Vec2) -> Option<DeltaLine> {
     match light.shape {
         LightShape::Point { position, cone } => {
@@ -55,7 +55,7 @@ pub(crate) fn sample(light: &Light, outside: &Outside, center: Vec3, radius: f32
             let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
             let dir = Frame::around(axis).to_world(local).normalize();
             let strength = cone.map_or(1.0, |cone| cone.falloff(dir)) * light.strength();
-            // Something may be in the very place of the light.
+            // There may be a surface at the position of the light.
             let origin = robust::offset_ray_origin(position, robust::gamma(6) * position.abs(), dir, dir);
             let density = cone_pdf(one_minus_cos_max);
             Some(DeltaLine { ray: Ray::new(origin, dir), density, strength, is_far: false })
@@ -74,8 +74,8 @@ pub(crate) fn sample(light: &Light, outside: &Outside, center: Vec3, radius: f32
     }
 }
 
-/// An estimate of the flux over the strength of the light, zero only where nothing of it reaches the sphere; 0 for all
-/// lights with a size.
+/// Estimates flux over strength of the light, zero only if none of it reaches the sphere; 0 for lights that are not
+/// delta lights.
 pub(crate) fn coupling(shape: &LightShape, center: Vec3, radius: f32) -> f64 {
     match shape {
         LightShape::Point { position, cone } => {
@@ -85,7 +85,7 @@ pub(crate) fn coupling(shape: &LightShape, center: Vec3, radius: f32) -> f64 {
             let sphere = if radius < distance { PI * sin2 } else { 4.0 * PI };
             let Some(cone) = cone else { return f64::from(sphere) };
             let beside = match radius < distance {
-                // The angle from the axis to the rim of the sphere, a little less.
+                // The angle from the axis to the edge of the sphere, with a margin.
                 true => (cone.axis.angle_between(to_center) - sin2.sqrt().asin() - 1e-3).max(0.0),
                 false => 0.0,
             };
@@ -114,7 +114,7 @@ impl Outside {
         }
     }
 
-    /// Whether some plane is in the way of light to `position`, outside of all that is finite.
+    /// Whether some plane occludes light to `position`, outside of all finite objects.
     fn is_shaded(&self, position: Vec3, to_light: Vec3) -> bool {
         self.planes.iter().any(|(point, normal)| {
             let (height, climb) = ((*point - position).dot(*normal), to_light.dot(*normal));

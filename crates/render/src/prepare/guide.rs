@@ -1,11 +1,11 @@
-//! Where does gathered light come from? For vertices that are seen in mirrors and through glass.
+//! Guiding cache: directions of light from specular surfaces, for vertices that are seen in mirrors and through glass.
 //!
-//! Light paths cannot be joined to the lens through something specular, so a caustic that is seen in a mirror is
-//! left to camera paths, and these hardly ever find the way on to the light by themselves. They are told the way: a
-//! first wave of light paths leaves, at each diffuse or rough point that it reaches, the point of the specular
-//! surface that it came from (Jensen 1995, "Importance Driven Path Tracing Using the Photon Map"). A tree over the
-//! points reached gives each place a small list of such exits; part of the directions there are chosen towards them,
-//! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.
+//! Light paths cannot be connected to the lens through specular surfaces, so a caustic that is seen in a mirror is left
+//! to camera paths, which rarely find the light by themselves. So they are guided: a first wave of light paths stores,
+//! at each diffuse or rough point that it reaches, the point of the specular surface that it came from (Jensen 1995,
+//! "Importance Driven Path Tracing Using the Photon Map"). A tree over the reached points gives each position a small
+//! list of such exits; a share of the directions there are sampled towards them. The pdf of the mixture is known
+//! exactly, so the result is unbiased for any list.
 
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::Frame;
@@ -13,24 +13,24 @@ use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Truth, Vector, Vecto
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
-/// Most exits in one list. Each costs a few multiplications an evaluation.
+/// Maximum number of exits per list. Each costs a few multiplications per evaluation.
 const LIST: usize = 32;
 
-/// The neighbour of an exit that its sphere reaches: wide enough to overlap, narrow enough to tell one side of a lens from the
-/// other.
+/// Index of the neighbour that the sphere of an exit reaches: large enough to overlap, small enough to separate the two
+/// sides of a lens.
 const NEIGHBOR: usize = 3;
 
-/// Share of directions that are chosen by the list where there is one.
+/// Share of directions that are sampled by the list if there is one.
 pub(crate) const SHARE: f32 = 0.35;
 
-/// Where gathered light went, and where it came from last.
+/// A point that light reached, and the specular point that it came from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trace {
     pub at: Vec3,
     pub from: Vec3,
 }
 
-/// A tree over the places that gathered light comes to; the lower child of a node is the next one.
+/// A tree over the points that light reaches; the lower child of a node is the next node.
 #[derive(Debug, Default)]
 pub(crate) struct Guide {
     splits: Vec<f32>,
@@ -40,19 +40,19 @@ pub(crate) struct Guide {
     blocks: Vec<ExitBlock>,
 }
 
-/// In place of an axis.
+/// Replaces the axis in a leaf.
 const LEAF: u32 = 3;
 
 #[derive(Debug)]
 struct GuideLeaf {
-    /// Nothing is known outside.
+    /// Bounds of the leaf; there are no guiding distributions outside.
     min: Vec3,
     max: Vec3,
     blocks: Range<u32>,
     n_exits: u32,
 }
 
-/// Spheres around exits, side by side; those that there are not have no inside.
+/// Spheres around exits as structure of arrays; those of unused lanes are empty.
 #[derive(Debug)]
 #[repr(C, align(64))]
 struct ExitBlock {
@@ -69,7 +69,7 @@ impl ExitBlock {
     }
 }
 
-/// A sphere around the exit.
+/// A sphere around an exit.
 #[derive(Clone, Copy, Debug)]
 struct Exit {
     center: Vec3,
@@ -92,7 +92,7 @@ impl Guide {
         let max = traces.iter().fold(Vec3::NEG_INFINITY, |max, trace| max.max(trace.at));
         let size = max - min;
         if traces.len() <= LIST || size == Vec3::ZERO {
-            // All of equal points lie in one leaf: enough of them say as much as all.
+            // Equal points share one leaf: this many of them are representative.
             let exits = exits_of(&traces[..traces.len().min(LIST)], size.length());
             let margin = Vec3::splat(0.25 * size.length());
             let first_block = self.blocks.len() as u32;
@@ -117,7 +117,7 @@ impl Guide {
         let axis = size.max_position();
         let middle = traces.len() / 2;
         traces.select_nth_unstable_by(middle, |a, b| {
-            // Ties broken by the rest, so that the tree does not depend on how the selection works.
+            // Ties are broken by the other coordinates, so that the tree does not depend on the selection algorithm.
             let key = |t: &Trace| [t.at[axis], t.at.x, t.at.y, t.at.z, t.from.x, t.from.y, t.from.z];
             key(a)
                 .into_iter()
@@ -136,7 +136,7 @@ impl Guide {
         self.split(above);
     }
 
-    /// What is known at a place.
+    /// Returns the guiding distribution at a position.
     pub fn at(&self, position: Vec3) -> Option<Hints<'_>> {
         let mut node = 0;
         loop {
@@ -149,7 +149,7 @@ impl Guide {
         }
     }
 
-    /// The leaves that sixteen places belong to; see [`Self::in_leaf`]. The guide must not be empty.
+    /// Returns the leaves of sixteen positions; see [`Self::in_leaf`]. The cache must not be empty.
     #[inline(always)]
     pub fn leaves_at<S: Simd>(&self, s: S, mask: Mask, position: Vector<S>) -> [u32; LANES] {
         let mut node = Bits::splat(s, 0);
@@ -180,13 +180,13 @@ impl Guide {
     }
 }
 
-/// A sphere around each exit of a list.
+/// Returns a sphere around each exit of a list.
 ///
-/// - `extent`: of the places reached, metres.
+/// - `extent`: size of the region of reached points, metres.
 ///
-/// It reaches to a neighbour, so that the spheres of one mirror image of a light overlap. A faint image of few exits has its
-/// next neighbours in another one: its spheres are no larger than those of most exits, or than what exits move by from one
-/// end of the places to the other.
+/// A sphere reaches to a neighbour, so that the spheres of one mirror image of a light overlap. For a faint image with
+/// few exits the neighbours belong to another image: its spheres are limited to the size of most others, or to the
+/// distance by which exits move from one end of the region to the other.
 fn exits_of(list: &[Trace], extent: f32) -> Vec<Exit> {
     let reach = |trace: &Trace| {
         let mut distances: Vec<f32> = list.iter().map(|other| other.from.distance_squared(trace.from)).collect();
@@ -200,14 +200,14 @@ fn exits_of(list: &[Trace], extent: f32) -> Vec<Exit> {
     list.iter()
         .zip(reaches)
         .map(|(trace, reach)| {
-            // A lone point still stands for a small piece of its surface.
+            // A single point still represents a small piece of its surface.
             let least = (1e-3 * trace.at.distance(trace.from)).powi(2);
             Exit { center: trace.from, radius2: reach.min(most).max(least) }
         })
         .collect()
 }
 
-/// Where gathered light may come from at one place; never empty.
+/// The guiding distribution at a position; never empty.
 #[derive(Clone, Copy)]
 pub(crate) struct Hints<'a> {
     blocks: &'a [ExitBlock],
@@ -216,7 +216,7 @@ pub(crate) struct Hints<'a> {
 }
 
 impl Hints<'_> {
-    /// A direction to one of the exits, unit.
+    /// Samples a direction to one of the exits, unit.
     ///
     /// - `u_exit`, `u`: independent uniform numbers in `[0, 1)`.
     pub fn sample(&self, u_exit: f32, u: Vec2) -> Vec3 {
@@ -232,7 +232,7 @@ impl Hints<'_> {
         Frame::around(way / distance2.sqrt()).to_world(uniform_cone(u.to_array(), cone).0.into()).normalize()
     }
 
-    /// Per steradian.
+    /// Pdf per steradian.
     pub fn pdf(&self, wi: Vec3) -> f32 {
         let sum: f32 = (0..self.n_exits as usize)
             .map(|i| {
@@ -243,7 +243,7 @@ impl Hints<'_> {
         sum / self.n_exits as f32
     }
 
-    /// [`Self::pdf`], sixteen exits at a time.
+    /// Like [`Self::pdf`], sixteen exits at a time.
     #[inline(always)]
     pub fn pdf_lanes<S: Simd>(&self, s: S, wi: Vec3) -> f32 {
         let (position, wi) = (Vector::splat(s, self.position), Vector::splat(s, wi));
@@ -256,14 +256,14 @@ impl Hints<'_> {
     }
 }
 
-/// Per steradian, with which `wi` is found that is sampled evenly over the directions to a sphere; over all directions from within it.
+/// Pdf per steradian of `wi` for uniform sampling of the directions to a sphere; of all directions from inside of it.
 ///
 /// - `way`: to the centre; `radius2`: square of the radius; `wi`: unit.
 #[inline(always)]
 fn exit_pdf<R: Real>(way: Vector3<R>, radius2: R, wi: Vector3<R>) -> R {
     let distance2 = way.length_squared();
     let inside = distance2.le(radius2);
-    // The line passes the centre within the radius: measured across it, where nothing cancels.
+    // Whether the line passes the centre within the radius: by its perpendicular distance, without cancellation.
     let hit = way.dot(wi).is_positive() & way.cross(wi).length_squared().le(radius2);
     let zero = distance2.all(0.0);
     if !(inside | hit).any() {
@@ -294,7 +294,7 @@ mod tests {
         Guide::build(traces.collect())
     }
 
-    /// The pdf integrates to one, and what is sampled has the frequencies that it tells.
+    /// The pdf integrates to one, and samples have the frequencies that it predicts.
     #[test]
     fn directions_follow_their_density() {
         let guide = guide();
@@ -302,7 +302,7 @@ mod tests {
         for (place, at) in [Vec3::new(0.3, 0.0, 0.4), Vec3::new(0.9, 0.0, 0.05)].into_iter().enumerate() {
             let hints = guide.at(at).expect("the middle of the floor is known");
             let guided = Guided { surface: &matte, hints };
-            // Bins of even solid angle: 24 of height, 24 around.
+            // Bins of equal solid angle: 24 in height, 24 in azimuth.
             let side = 24;
             let bin = |w: Vec3| {
                 let around = (w.z.atan2(w.x) / std::f32::consts::TAU + 0.5) * side as f32;
@@ -321,7 +321,7 @@ mod tests {
                 let solid_angle = std::f64::consts::TAU / (steps * steps) as f64;
                 let share = f64::from(guided.eval(Vec3::Y, w, Vec3::Y).1) * solid_angle;
                 whole += share;
-                // Below the surface nothing is kept.
+                // Directions below the surface are discarded.
                 if y > 0.0 {
                     expected[bin(w)] += share;
                 }
@@ -335,12 +335,12 @@ mod tests {
                 }
             }
             let expected: Vec<f64> = expected.iter().map(|share| share * f64::from(n)).collect();
-            // The fine sum is off by the steps that a rim cuts, some per mille; 2.6 σ is 1 % over both places.
+            // The fine sum is inaccurate by the steps at an edge, some per mille; 2.6 σ is 1 % over both positions.
             ChiSquared::of(&found, &expected, 3e-3).assert_below(2.6, &format!("place {place}"));
         }
     }
 
-    /// Each place with what is known there: whether anything, and the density of a direction.
+    /// Evaluates each position: whether it has a guiding distribution, and the pdf of a direction.
     #[inline(always)]
     fn ask<S: Simd>(s: S, guide: &Guide, asked: &[[Vec3; 2]], answers: &mut Vec<Option<f32>>) {
         for some in asked.chunks_exact(LANES) {

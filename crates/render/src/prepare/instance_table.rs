@@ -1,23 +1,23 @@
-//! What shading looks up of objects with spaces of their own, as arrays that sixteen lanes read at once.
+//! Data of objects with their own space, as arrays for SIMD.
 
 use crate::prepare::arrays::push;
 use firstlight_kdtree::{SceneTree, Shape};
 use firstlight_simd::padded;
 use glam::{Mat3A, Vec3};
 
-/// Three columns, each of three coordinates.
+/// Matrices: three columns of three coordinates.
 pub(crate) type Columns = [[Vec<f32>; 3]; 3];
 
-/// One row for each object with a space of its own.
+/// One row per object with its own space.
 #[derive(Debug, Default)]
 pub(crate) struct InstanceTable {
     pub world_from_object: Columns,
     pub world_offset: [Vec<f32>; 3],
     pub object_from_world: Columns,
     pub object_offset: [Vec<f32>; 3],
-    /// Carries normals of faces, up to length; see [`firstlight_kdtree::SceneTree::instance`].
+    /// Transforms face normals, up to length; see [`firstlight_kdtree::SceneTree::instance`].
     pub normal_from_object: Columns,
-    /// Carries normals of vertices, up to length, and to the outside.
+    /// Transforms vertex normals, up to length, to the outside.
     pub cofactors: Columns,
     pub round_trip: Columns,
     pub round_trip_offset: [Vec<f32>; 3],
@@ -49,7 +49,7 @@ impl InstanceTable {
         self.rim.push(instance.rim);
     }
 
-    /// Ready to be gathered from.
+    /// Pads the arrays for gather operations.
     pub fn padded(self) -> Self {
         let vectors = |v: [Vec<f32>; 3]| v.map(padded);
         Self {

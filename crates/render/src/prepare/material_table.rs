@@ -1,4 +1,4 @@
-//! What shading looks up by material, as arrays that sixteen lanes read at once.
+//! Data by material, as arrays for SIMD.
 
 use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::core::material_kind::MaterialKind;
@@ -8,16 +8,16 @@ use crate::prepare::arrays::push;
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// What materials are sorted by: numbers of [`MaterialKind`], and [`COATED`].
+/// Kinds by which hits are sorted: numbers of [`MaterialKind`], and [`COATED`].
 #[derive(Debug, Default)]
 pub(crate) struct Kinds {
-    /// Ready to be gathered from.
+    /// Kind per material, padded for gather operations.
     pub of_material: Vec<u32>,
-    /// One bit a kind, for those that there are.
+    /// One bit per kind that is present.
     pub present: u32,
 }
 
-/// Of a material in a [`MaterialTable`].
+/// Flags of a material in a [`MaterialTable`].
 pub(crate) const SCHLICK: u32 = 1;
 pub(crate) const COMPENSATE: u32 = 2;
 pub(crate) const TEXTURED: u32 = 4;
@@ -27,20 +27,20 @@ pub(crate) const TEXTURED: u32 = 4;
 pub(crate) struct MaterialTable {
     /// Albedo, reflectance or emitted radiance.
     pub color: [Vec<f32>; 3],
-    /// The same where it has to be looked up.
+    /// The same with textures.
     pub inputs: Vec<ColorInput>,
     pub alpha: Vec<f32>,
     pub flags: Vec<u32>,
     /// See [`MaterialKind`]; [`COATED`] for materials of two parts.
     pub kinds: Kinds,
-    /// Rows of the parts, with their weights; the parts of a classic material have rows behind those of all materials.
+    /// Rows of the parts, with their weights; the parts of a classic material have rows after those of all materials.
     pub parts: [Vec<u32>; 2],
     pub weights: [Vec<f32>; 2],
-    /// Whether some emission has to be looked up.
+    /// Whether some emission is textured.
     pub textured_emission: bool,
-    /// Whether some surface scatters light through itself, and so asks for light on both sides.
+    /// Whether some surface scatters light through itself, so that light is sampled on both sides.
     pub two_sided: bool,
-    /// The material of each object; [`SEVERAL`] where its primitives differ.
+    /// The material of each object; [`SEVERAL`] if its primitives differ.
     pub of_object: Vec<MaterialId>,
 }
 
@@ -79,7 +79,8 @@ impl MaterialTable {
                 _ => {}
             }
             let kind = match material.kind() {
-                // Lanes know one pair of surface coordinates: what asks for more is shaded as blends of many parts are.
+                // The SIMD code supports one pair of texture coordinates: materials that need more are shaded like
+                // blends of many parts.
                 kind if kind != MaterialKind::Emissive && asks_for_more(id) => MaterialKind::Blend as usize,
                 _ if parts[0].1 > 0.0 => COATED,
                 kind => kind as usize,
@@ -114,7 +115,7 @@ impl MaterialTable {
         }
     }
 
-    /// Color, alpha and flags.
+    /// Adds color, alpha and flags.
     fn add(&mut self, material: &Material, materials: &[Material]) {
         let (color, alpha) = match material {
             Material::Diffuse { albedo: color }
@@ -141,7 +142,7 @@ fn is_textured_emitter(material: &Material) -> bool {
     matches!(material, Material::Emissive { radiance: ColorInput::Texture(_) })
 }
 
-/// `None` for what cannot be a part of a [`COATED`] material.
+/// Returns `None` for a material that cannot be a part of a [`COATED`] one.
 fn kind_of_part(material: &Material) -> Option<usize> {
     match material {
         Material::Diffuse { .. } | Material::Mirror { .. } => Some(material.kind() as usize),

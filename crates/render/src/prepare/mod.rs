@@ -1,7 +1,7 @@
-//! What is derived from a snapshot once, so that samples are cheap: tables of lights, materials and surfaces.
+//! Data derived once from a snapshot, so that samples are cheap: tables of lights, materials and surfaces.
 //!
-//! Tables are built from plain data and know nothing of those who read them. [`Prepared`] has them all, and keeps those
-//! whose part of the snapshot did not change.
+//! Tables are built from plain data and do not know their users. [`Prepared`] has them all, and keeps those whose part
+//! of the snapshot did not change.
 
 pub(crate) mod ambient;
 mod arrays;

@@ -1,4 +1,4 @@
-//! The last choices of how to look for caustics, kept with the scene that they are of.
+//! Cache of the latest choices of how to render caustics in a scene.
 
 use crate::core::camera::Camera;
 use crate::core::caustic_plan::CausticChoice;
@@ -6,10 +6,10 @@ use crate::core::settings::RenderSettings;
 use glam::UVec2;
 use std::sync::{Mutex, PoisonError};
 
-/// How many are kept: those of the views and sizes that somebody goes back and forth between.
+/// Number of entries: the views and sizes between which a user switches.
 const MOST: usize = 4;
 
-/// What a choice depends on beside the scene: not the seed, the instruction set, or where samples go.
+/// Dependencies of a choice besides the scene: not the seed, the instruction set, or the sample allocation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlanKey {
     camera: Camera,
@@ -34,7 +34,7 @@ impl PlanCache {
         kept.iter().find(|(of, _)| of == key).map(|(_, choice)| *choice)
     }
 
-    /// The newest, of whatever view.
+    /// The newest choice, of any view.
     pub fn newest(&self) -> Option<CausticChoice> {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.last().map(|(_, choice)| *choice)

@@ -20,8 +20,8 @@ use glam::Vec3;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// What is rendered: a [`Snapshot`], which it is as far as readers are concerned, and tables of it that are shared as its
-/// parts are.
+/// A scene ready for rendering: a [`Snapshot`], to which it dereferences, and its tables, which are shared like its
+/// parts.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     snapshot: Snapshot,
@@ -38,17 +38,17 @@ impl Deref for Prepared {
     }
 }
 
-/// What is derived from [`Shading`] for one [`Geometry`], because lights are objects.
+/// Data derived from [`Shading`] for one [`Geometry`], because lights are objects.
 #[derive(Debug)]
 pub(crate) struct Tables {
     pub(crate) ambient: AmbientLight,
-    /// Whether each material looks up a texture, and so needs surface coordinates.
+    /// Per material: whether it is textured, and so needs texture coordinates.
     pub(crate) textured: Vec<bool>,
-    /// Whether surfaces of each material may not be there, see [`Material::is_cutout`].
+    /// Per material: whether its surfaces may be cut out, see [`Material::is_cutout`].
     pub(crate) cutouts: Vec<bool>,
-    /// Whether each material asks for tangents.
+    /// Per material: whether it needs tangents.
     pub(crate) with_tangents: Vec<bool>,
-    /// What each material adds itself.
+    /// Emission per material.
     pub(crate) emission: Vec<Option<Emission>>,
     pub(crate) lights: LightTable,
     pub(crate) bodies: Bodies,
@@ -56,29 +56,29 @@ pub(crate) struct Tables {
     pub(crate) environment_sampler: Option<EnvironmentSampler>,
     pub(crate) materials: MaterialTable,
     pub(crate) classic: ClassicTable,
-    /// What gathers light, where something does.
+    /// Specular casters, if there are any.
     pub(crate) casters: Option<CasterTable>,
     /// See [`crate::prepare::bound`].
     pub(crate) radiance_bound: Option<f32>,
     pub(crate) features: Features,
 }
 
-/// What the scene uses: what it does not use costs nothing.
+/// Features that the scene uses: unused ones cost nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Features {
-    /// Some surface can send a path through itself, so paths keep track of what they are inside of.
+    /// Some surface transmits paths, so paths keep track of their media.
     pub glass: bool,
-    /// Something absorbs light between surfaces: there may be glass, or there is air that does.
+    /// There is absorption between surfaces: by glass or by air.
     pub media: bool,
-    /// Some light can be found by choosing a point or direction on it.
+    /// Some light can be sampled.
     pub light_sampling: bool,
-    /// The surroundings shine.
+    /// The environment emits.
     pub environment: bool,
-    /// Some material looks up a texture.
+    /// Some material is textured.
     pub textures: bool,
     /// Some surfaces have holes or no back.
     pub cutouts: bool,
-    /// Something specular gathers the light of some emitter, so paths are traced from lights as well.
+    /// Some specular object focuses the light of an emitter, so paths are traced from lights as well.
     pub caustics: bool,
 }
 
@@ -90,33 +90,33 @@ impl Prepared {
         Self { snapshot, surfaces, tables }
     }
 
-    /// The same objects with another look.
+    /// Returns the same objects with other materials and lights.
     pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
         let tables = Arc::new(Tables::build(&self.geometry, &shading));
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
         Self { snapshot, tables, surfaces: self.surfaces.clone() }
     }
 
-    /// The same with other trees of the same meshes: all hits stay what they are, and so do the tables.
+    /// Returns the same scene with other trees of the same meshes: all hits are the same, and so are the tables.
     pub fn with_trees(&self, geometry: Arc<Geometry>) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&geometry.tree));
         let snapshot = Snapshot { geometry, ..self.snapshot.clone() };
         Self { snapshot, surfaces, tables: self.tables.clone() }
     }
 
-    /// The same seen by another camera.
+    /// Returns the same scene with another camera.
     pub fn with_camera(&self, camera: Camera) -> Self {
         let mut seen = self.clone();
         seen.snapshot.camera = camera;
         seen
     }
 
-    /// What the scene uses.
+    /// Features that the scene uses.
     pub fn features(&self) -> Features {
         self.tables.features
     }
 
-    /// As if the scene used more than it does: to measure what that would cost.
+    /// Pretends that the scene uses more features than it does, to measure their cost.
     #[doc(hidden)]
     pub fn with_features(snapshot: Snapshot, features: Features) -> Self {
         let mut prepared = Self::new(snapshot);
@@ -124,7 +124,7 @@ impl Prepared {
         prepared
     }
 
-    /// Whether anything shines, wherever it is.
+    /// Whether anything emits.
     pub fn has_light(&self) -> bool {
         self.tables.features.environment
             || self.tables.emission.iter().any(Option::is_some)
@@ -136,7 +136,7 @@ impl Prepared {
         &self.tables.lights
     }
 
-    /// The bodies that the camera is inside of; see [`Bodies::around`].
+    /// The bodies that contain the camera; see [`Bodies::around`].
     pub(crate) fn camera_media(&self) -> Vec<u32> {
         if !self.tables.features.glass {
             return Vec::new();

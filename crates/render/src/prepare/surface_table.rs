@@ -1,4 +1,4 @@
-//! What shading looks up by object, as arrays that sixteen lanes read at once.
+//! Data by object, as arrays for SIMD.
 
 use crate::prepare::arrays::push;
 use crate::prepare::instance_table::InstanceTable;
@@ -7,12 +7,12 @@ use firstlight_kdtree::{SceneTree, Shape, quad_rim, sphere_error};
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// Shapes that are looked up; all others are asked one at a time.
+/// Kinds of shapes; [`OTHER`] is handled by the scalar code.
 pub(crate) const OTHER: u32 = 0;
 pub(crate) const FLAT: u32 = 1;
 pub(crate) const BALL: u32 = 2;
 pub(crate) const PLANE: u32 = 3;
-/// What has a space of its own.
+/// Shapes with their own space.
 pub(crate) const MESH: u32 = 4;
 pub(crate) const CLOUD: u32 = 5;
 
@@ -25,19 +25,19 @@ pub(crate) struct SurfaceTable {
     /// The edges of a quad, the axes of a plane.
     pub b: [Vec<f32>; 3],
     pub c: [Vec<f32>; 3],
-    /// How far points of a quad stay away from its rim, in its coordinates; of a sphere the first is the error of a point along each
-    /// axis beside the rounding, metres.
+    /// Minimum distance of points of a quad from its edge, in its coordinates; for a sphere the first is the error of a
+    /// point per axis besides rounding, metres.
     pub least: [Vec<f32>; 2],
     pub normal: [Vec<f32>; 3],
-    /// How far from a quad the next ray must start, metres along the normal; of a sphere the radius.
+    /// Offset of the next ray from a quad along its normal, metres; for a sphere the radius.
     pub offset: Vec<f32>,
-    /// Of what has a space of its own, the row in `instances`.
+    /// Row in `instances` of shapes with their own space.
     pub row: Vec<u32>,
     pub instances: InstanceTable,
 }
 
 impl SurfaceTable {
-    /// Whether the true normal of an object shades it, whoever looks.
+    /// Whether the shading normal of an object is its true normal.
     pub fn is_shaded_as_it_is(&self, object: u32) -> bool {
         [FLAT, BALL, PLANE, CLOUD].contains(&self.kind[object as usize])
     }

@@ -1,6 +1,7 @@
-//! Light sampling for sixteen points at a time, where no light is textured.
+//! Light sampling for sixteen points at a time, for untextured lights.
 //!
-//! The formulas are those of [`crate::prepare::light::shape`] and [`crate::prepare::light::selection`]; there is where they are explained.
+//! The formulas are those of [`crate::prepare::light::shape`] and [`crate::prepare::light::selection`], and are
+//! explained there.
 
 use crate::core::material::ColorInput;
 use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
@@ -15,7 +16,7 @@ use firstlight_simd::{
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-/// The lights as arrays that lanes look up.
+/// The lights as arrays for SIMD.
 #[derive(Debug)]
 pub(crate) struct LightArrays {
     pub n: usize,
@@ -26,16 +27,16 @@ pub(crate) struct LightArrays {
     pub flags: Vec<u32>,
     /// Corner, centre or first vertex.
     pub origin: [Vec<f32>; 3],
-    /// Of triangles, whole edges.
+    /// Unit edges; for triangles, whole edges.
     pub unit_u: [Vec<f32>; 3],
     pub unit_v: [Vec<f32>; 3],
     pub normal: [Vec<f32>; 3],
     pub length_u: Vec<f32>,
     pub length_v: Vec<f32>,
-    /// Of spheres, the radius.
+    /// Radius of spheres.
     pub radius: Vec<f32>,
     pub area: Vec<f32>,
-    /// Along the normal of a quad, what its own rounding comes to, metres.
+    /// Bound on a point's rounding error along the normal of a quad, metres.
     pub lift: Vec<f32>,
     pub radiance: [Vec<f32>; 3],
 }
@@ -43,17 +44,17 @@ pub(crate) struct LightArrays {
 pub(crate) const SPHERE: u32 = 1;
 pub(crate) const RECTANGLE: u32 = 2;
 pub(crate) const TRIANGLE: u32 = 4;
-/// With [`SPHERE`]: stands for a point light.
+/// With [`SPHERE`]: represents a point light.
 pub(crate) const POINT: u32 = 8;
-/// Without size.
+/// A delta light.
 pub(crate) const DELTA: u32 = 16;
 /// With [`DELTA`]: infinitely far away.
 pub(crate) const IS_FAR: u32 = 32;
 
-/// Points on lights as seen from sixteen places; see [`crate::prepare::light::emitter::LightSample`].
+/// Light samples for sixteen points; see [`crate::prepare::light::emitter::LightSample`].
 #[derive(Clone, Copy)]
 pub(crate) struct LightLanes<S: Simd> {
-    /// Lanes that found a point.
+    /// Lanes with a sample.
     pub found: Mask,
     pub target: Vector<S>,
     pub wi: Vector<S>,
@@ -64,7 +65,7 @@ pub(crate) struct LightLanes<S: Simd> {
 }
 
 impl LightArrays {
-    /// `None` where lights have to be asked one at a time.
+    /// Returns `None` if lights must be sampled one at a time.
     pub fn build(lights: &[Light]) -> Option<Self> {
         if lights.is_empty() {
             return None;
@@ -146,7 +147,7 @@ impl LightArrays {
         LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi, is_far: 0 }
     }
 
-    /// Points on lights, and what these send out. The choice of the light is not in their densities.
+    /// Samples points on lights and evaluates their radiance. The pdf does not include the choice of the light.
     #[inline(always)]
     pub fn shining<S: Simd>(
         &self,
@@ -161,7 +162,7 @@ impl LightArrays {
         if self.has_deltas { self.with_deltas(id, mask, position, lanes) } else { lanes }
     }
 
-    /// Puts in what lights without size send.
+    /// Replaces the lanes of delta lights.
     #[inline(always)]
     pub fn with_deltas<S: Simd>(
         &self,
@@ -193,7 +194,7 @@ impl LightArrays {
         }
     }
 
-    /// Of lights that have a size, without their radiance.
+    /// Samples points on lights with an area, without their radiance.
     #[inline(always)]
     pub fn points<S: Simd>(
         &self,
@@ -312,7 +313,7 @@ impl LightArrays {
             let cos = one - one_minus_cos;
             let cos_alpha = cos_at_center(sin2, cos, sin2_max);
             let sin_alpha = (one - cos_alpha * cos_alpha).at_least(0.0).sqrt();
-            // The direction on the disc, unit; any in the middle.
+            // The direction on the disc, unit; any at the centre.
             let middle = disc2.is_zero();
             let scale = sin_alpha / select(middle, one, disc2.sqrt());
             let local = Vector { x: select(middle, sin_alpha, x * scale), y: y * scale, z: -cos_alpha };
@@ -354,7 +355,7 @@ impl<S: Simd> LightLanes<S> {
         Self { found, target, wi, pdf, radiance: wi, is_far: 0 }
     }
 
-    /// These where the bit is set, else the others.
+    /// Selects `self` where the bit is set, otherwise `other`.
     #[inline(always)]
     pub fn over(self, mask: Mask, other: Self) -> Self {
         Self {
@@ -368,7 +369,7 @@ impl<S: Simd> LightLanes<S> {
     }
 }
 
-/// Puts in what [`sample_sphere`] finds for the lanes of `close`.
+/// Replaces the lanes of `close` by [`sample_sphere`].
 #[cold]
 fn spheres_close_by<S: Simd>(
     close: Mask,

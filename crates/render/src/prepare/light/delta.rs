@@ -1,44 +1,44 @@
-//! Lights without size, as seen from one point or from sixteen.
+//! Delta lights, seen from one point or from sixteen.
 //!
-//! They are sampled as if they filled a solid angle of 1 / [`SHARPNESS`]: the density is that much larger, and so is
-//! the radiance. What a sample brings is the quotient, which is exact, and next to any bounce's density theirs is so
-//! large that the weight against bounces, which cannot find them, is 1 to the last bit.
+//! They are sampled as if they filled a solid angle of 1 / [`SHARPNESS`]: the pdf is larger by that factor, and so is
+//! the radiance. The contribution of a sample is the quotient, which is exact, and compared with any BSDF pdf theirs is
+//! so large that the MIS weight against BSDF sampling, which cannot find them, is exactly 1.
 
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{Real, Vector3, select, select_vector};
 
-/// Density of the direction to a light without size, per steradian: a power of two, far above that of any bounce.
+/// Pdf per steradian of the direction to a delta light: a power of two, far above any BSDF pdf.
 pub(crate) const SHARPNESS: f32 = (1u64 << 50) as f32;
 
-/// Metres: as far away as directional lights are taken to be where they are weighed against others. Everything that can
-/// be is hundreds of times as near.
+/// Assumed distance of directional lights in metres, where they are weighted against others. All objects are closer by
+/// a factor of hundreds.
 pub(crate) const FAR: f32 = 1e15;
 
-/// Metres: how far from the origin of a scene something can be.
+/// Maximum distance of objects from the origin of a scene, metres.
 pub(crate) const EVERYTHING: f32 = 2e12;
 
-/// A light without size.
+/// A delta light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DeltaSource<R: Real> {
-    /// Where it is, metres; or, unit, in which direction.
+    /// Position in metres; or, if it is far away, unit direction to the light.
     pub origin: Vector3<R>,
-    /// Of a spot, as in [`crate::core::delta_light::Cone`]; zero for all others.
+    /// Cone of a spot light, as in [`crate::core::delta_light::Cone`]; zero axis for all others.
     pub axis: Vector3<R>,
     pub outer: R,
     pub slope: R,
-    /// Infinitely far away.
+    /// Whether it is infinitely far away.
     pub is_far: R::Mask,
 }
 
-/// What a point sees of it.
+/// A sample of a delta light.
 pub(crate) struct DeltaSample<R: Real> {
     pub found: R::Mask,
-    /// Where a shadow ray ends: in front of the point by what the kernel may lose, for something may be there. Where
-    /// the light is far away, its direction.
+    /// End of a shadow ray: just before the light, by the error bound of the kernel, because there may be a surface.
+    /// For a light that is far away, its direction.
     pub target: Vector3<R>,
-    /// Unit.
+    /// Unit, towards the light.
     pub wi: Vector3<R>,
-    /// Radiance over intensity, or over irradiance where the light is far away; per square metre, or per steradian.
+    /// Radiance over intensity, or over irradiance if the light is far away; per square metre, or per steradian.
     pub scale: R,
 }
 
@@ -63,5 +63,5 @@ impl<R: Real> DeltaSource<R> {
     }
 }
 
-/// Of lights without a cone: everything is within it.
+/// Cone of lights without one: all directions are inside.
 pub(crate) const NO_CONE: (f32, f32) = (4.0, 1e30);

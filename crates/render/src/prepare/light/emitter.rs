@@ -1,4 +1,4 @@
-//! One light, and what it sends from a point.
+//! A light, and its samples from a point.
 
 use crate::core::color::luminance;
 use crate::core::delta_light::DeltaLight;
@@ -10,34 +10,34 @@ use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
 use crate::prepare::light::shape::{LightPoint, LightShape, sphere_uv};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-/// One emitter: a sphere, a quad, a triangle, or a light without size.
+/// An emitter: a sphere, a quad, a triangle, or a delta light.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
     pub shape: LightShape,
     pub emission: Emission,
-    /// Mean over the surface, luminance.
+    /// Luminance of the radiance, mean over the surface.
     pub mean_radiance: f32,
-    /// Has no size, or stands for a light without one, see [`crate::core::snapshot::Object::is_point_light`].
+    /// Whether it is a delta light, or represents one, see [`crate::core::snapshot::Object::is_point_light`].
     pub is_point: bool,
     /// See [`crate::core::snapshot::Object::turned`].
     pub turned: Option<Mat3>,
-    /// What textures are asked with at the vertices of a triangle, where its emission is textured; of a quad at the corner and at
-    /// the ends of its edges, where that is not told by its own coordinates.
+    /// Texture coordinates at the vertices of a triangle, if its emission is textured; for a quad at the corner and at
+    /// the ends of its edges, if they differ from its surface coordinates.
     pub corners: Option<Box<[TexturePoint; 3]>>,
 }
 
-/// A point on a light as seen from a shading point.
+/// A point on a light seen from a shading point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightSample {
-    /// Where a shadow ray ends: on the light, lifted off its front by the bound of its own error.
+    /// End of a shadow ray: on the light, offset from its front by the error bound.
     pub target: Vec3,
     /// Unit, towards the light.
     pub wi: Vec3,
-    /// Per steradian at the shading point, the choice of the light included.
+    /// Pdf per steradian at the shading point, including the choice of the light.
     pub pdf: f32,
-    /// W·m⁻²·sr⁻¹, towards the shading point.
+    /// Radiance towards the shading point, W·m⁻²·sr⁻¹.
     pub radiance: Vec3,
-    /// From outside of the scene: shadow rays have no end, and the air absorbs nothing on the way.
+    /// Whether it is outside of the scene: shadow rays are infinite, and the air absorbs nothing.
     pub is_far: bool,
 }
 
@@ -57,7 +57,7 @@ impl Light {
         self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
-    /// What the point with this normal and these surface coordinates sends out, W·m⁻²·sr⁻¹.
+    /// Emitted radiance at the point with this normal and these surface coordinates, W·m⁻²·sr⁻¹.
     #[inline]
     pub fn radiance(&self, textures: &[Texture], normal: Vec3, uv: Vec2) -> Vec3 {
         let point = || match (&self.shape, &self.turned) {
@@ -93,7 +93,7 @@ impl Light {
         LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance, is_far: false }
     }
 
-    /// Of a light without size, whose emission is its intensity or its irradiance.
+    /// Samples a delta light, whose emission is its intensity or its irradiance.
     fn delta_sample(&self, source: &DeltaSource<f32>, position: Vec3, pmf: f32) -> Option<LightSample> {
         let DeltaSample { found, target, wi, scale } = source.seen_from(true, position.into());
         let radiance = self.strength() * scale;
@@ -101,7 +101,7 @@ impl Light {
         found.then(|| LightSample { target: target.into(), wi: wi.into(), pdf, radiance, is_far })
     }
 
-    /// Of a light without size: radiant intensity on the axis, W·sr⁻¹, or irradiance, W·m⁻².
+    /// Strength of a delta light: radiant intensity on the axis, W·sr⁻¹, or irradiance, W·m⁻².
     pub fn strength(&self) -> Vec3 {
         match self.emission.radiance {
             ColorInput::Constant(strength) => strength,
@@ -109,7 +109,7 @@ impl Light {
         }
     }
 
-    /// A light without size.
+    /// Creates a delta light.
     ///
     /// - `reach`: radius of the scene, metres.
     pub fn without_size(light: &DeltaLight, reach: f32) -> Self {

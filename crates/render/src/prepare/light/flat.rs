@@ -1,36 +1,36 @@
-//! Quads and triangles that shine, as seen from one point or from sixteen.
+//! Emissive quads and triangles, seen from one point or from sixteen.
 
 use crate::sampling::{SphericalQuad, SphericalTriangle, uniform_triangle};
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{Elementary, Real, Truth, Vector3, select};
 
-/// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
-/// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
+/// Solid angle in steradians below which flat lights are sampled by area: the two pdfs hardly differ then, while the
+/// inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
 const SMALL_SOLID_ANGLE: f32 = 1e-3;
 
-/// Flat lights whose middle is farther away than this are sampled by area: squared distance over the sum of squared edges.
-/// What distance and cosine vary by over such a light is little against what else varies, and by area costs less: 5 % of
-/// the time of a room with a light in its ceiling, at an error that is larger by 3 %.
+/// Flat lights whose centre is farther away than this are sampled by area: squared distance over the sum of squared
+/// edges. The variation of distance and cosine over such a light is small compared to other variation, and sampling by
+/// area is faster: by 5 % of the time of a room with a light in its ceiling, at a 3 % larger error.
 const NEAR: f32 = 1.5;
 
-/// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
+/// Solid angle above which (half a sphere) the spherical triangle formulas lose theirs.
 const LARGE_SOLID_ANGLE: f32 = 6.0;
 
 /// A parallelogram.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct QuadLight<R: Real> {
     pub corner: Vector3<R>,
-    /// Unit, along the edges.
+    /// Unit vectors along the edges.
     pub units: [Vector3<R>; 2],
-    /// Of the edges, metres.
+    /// Lengths of the edges, metres.
     pub lengths: [R; 2],
-    /// Unit, on the side that shines.
+    /// Unit, on the emitting side.
     pub normal: Vector3<R>,
-    /// Square metres.
+    /// Area in square metres.
     pub area: R,
     /// Bound on the error of its points along the normal, metres.
     pub lift: R,
-    /// Whether its edges are at right angles.
+    /// Whether its edges are perpendicular.
     pub is_rectangle: R::Mask,
 }
 
@@ -38,9 +38,9 @@ pub(crate) struct QuadLight<R: Real> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleLight<R> {
     pub first: Vector3<R>,
-    /// From the first vertex to the others.
+    /// Edges from the first vertex to the others.
     pub edges: [Vector3<R>; 2],
-    /// As of [`QuadLight`].
+    /// As in [`QuadLight`].
     pub normal: Vector3<R>,
     pub area: R,
     pub lift: R,
@@ -48,22 +48,23 @@ pub(crate) struct TriangleLight<R> {
 
 /// A sampled point.
 pub(crate) struct FlatPoint<R: Real> {
-    /// Whether there is one that is seen.
+    /// Whether there is a visible point.
     pub found: R::Mask,
-    /// Where a shadow ray ends, off the light by the bound on its error.
+    /// End of a shadow ray, offset from the light by the error bound.
     pub target: Vector3<R>,
-    /// Unit.
+    /// Unit, towards the light.
     pub wi: Vector3<R>,
-    /// Per steradian.
+    /// Pdf per steradian.
     pub pdf: R,
-    /// Along the edges, 0..1.
+    /// Position along the edges, 0..1.
     pub uv: [R; 2],
 }
 
 impl<R: Elementary> QuadLight<R> {
-    /// A point of the front: even over the solid angle of rectangles where that is stable and `by_angle`, else over the area.
+    /// Samples a point of the front: uniformly over the solid angle for rectangles where that is stable and `by_angle`,
+    /// otherwise over the area.
     ///
-    /// - `asked`: for which lanes; `u`: two independent uniform numbers in `[0, 1)`.
+    /// - `asked`: lanes to sample; `u`: two independent uniform numbers in `[0, 1)`.
     #[inline(always)]
     pub fn sample(&self, by_angle: bool, asked: R::Mask, position: Vector3<R>, u: [R; 2]) -> FlatPoint<R> {
         let Self { corner, units, lengths, normal, .. } = *self;
@@ -84,7 +85,7 @@ impl<R: Elementary> QuadLight<R> {
         flat_point([point, position, normal], uv, [self.area, self.lift], seen, angle)
     }
 
-    /// Density of [`Self::sample`], per steradian.
+    /// Pdf of [`Self::sample`], per steradian.
     ///
     /// - `wi`, `distance`: to the point, unit and in metres.
     #[inline(always)]
@@ -101,7 +102,7 @@ impl<R: Elementary> QuadLight<R> {
 
     /// Whether it is a rectangle that is sampled by solid angle from there; see [`NEAR`].
     ///
-    /// - `relative`: the corner about the point that it is seen from.
+    /// - `relative`: the corner relative to the shading point.
     #[inline(always)]
     fn is_near(&self, relative: Vector3<R>) -> R::Mask {
         let [u, v] = self.lengths;
@@ -109,7 +110,7 @@ impl<R: Elementary> QuadLight<R> {
         self.is_rectangle & middle.length_squared().le((u * u + v * v) * NEAR)
     }
 
-    /// - `relative`: the corner about the point that it is seen from.
+    /// - `relative`: the corner relative to the shading point.
     #[inline(always)]
     fn seen_from(&self, relative: Vector3<R>) -> SphericalQuad<R> {
         let (x, y) = (relative.dot(self.units[0]), relative.dot(self.units[1]));
@@ -118,7 +119,7 @@ impl<R: Elementary> QuadLight<R> {
 }
 
 impl<R: Elementary> TriangleLight<R> {
-    /// As [`QuadLight::sample`].
+    /// Like [`QuadLight::sample`].
     #[inline(always)]
     pub fn sample(&self, by_angle: bool, asked: R::Mask, position: Vector3<R>, u: [R; 2]) -> FlatPoint<R> {
         let Self { first, edges: [e1, e2], normal, area, .. } = *self;
@@ -132,7 +133,7 @@ impl<R: Elementary> TriangleLight<R> {
             if (stable & seen).any() {
                 let (dir, has_area) = triangle.sample(u);
                 seen &= !stable | has_area;
-                // Where the direction meets the plane (Möller and Trumbore 1997).
+                // Intersection of the direction with the plane (Möller and Trumbore 1997).
                 let p = dir.cross(e2);
                 let per_determinant = one / p.dot(e1);
                 let from = -relative;
@@ -147,7 +148,7 @@ impl<R: Elementary> TriangleLight<R> {
         flat_point([point, position, normal], uv, [area, self.lift], seen, angle)
     }
 
-    /// As [`QuadLight::pdf`].
+    /// Like [`QuadLight::pdf`].
     #[inline(always)]
     pub fn pdf(&self, by_angle: bool, position: Vector3<R>, wi: Vector3<R>, distance: R) -> R {
         let pdf = front_pdf(distance, -wi.dot(self.normal), self.area);
@@ -160,7 +161,7 @@ impl<R: Elementary> TriangleLight<R> {
         select(near & is_stable(angle), angle.all(1.0) / angle, pdf)
     }
 
-    /// As [`QuadLight::is_near`], about the first vertex.
+    /// Like [`QuadLight::is_near`], relative to the first vertex.
     #[inline(always)]
     fn is_near(&self, relative: Vector3<R>) -> R::Mask {
         let [u, v] = self.edges;
@@ -169,9 +170,9 @@ impl<R: Elementary> TriangleLight<R> {
     }
 }
 
-/// A point that was chosen, as seen from `position`.
+/// Converts a sampled point to a light sample seen from `position`.
 ///
-/// - `angle`: whether it was chosen by solid angle, and that.
+/// - `angle`: whether it was sampled by solid angle, and that.
 #[inline(always)]
 fn flat_point<R: Real>(
     [point, position, normal]: [Vector3<R>; 3],
@@ -190,21 +191,21 @@ fn flat_point<R: Real>(
     if let Some((by_angle, solid_angle)) = angle {
         (pdf, valid) = (select(by_angle, one / solid_angle, pdf), by_angle | front);
     }
-    // The rounding of the point, and what the kernel loses when it works out where a ray from so far away crosses the light.
+    // The rounding of the point, and the error of the kernel for rays from this distance that end at the light.
     let lift = lift + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
     let found = seen & distance.is_positive() & valid;
     FlatPoint { found, target: offset_along(point, lift, normal), wi, pdf, uv }
 }
 
-/// [`pdf_by_area`] of the front; 0 of the back.
+/// [`pdf_by_area`] for the front; 0 for the back.
 #[inline(always)]
 fn front_pdf<R: Real>(distance: R, cos: R, area: R) -> R {
     select(cos.is_positive() & area.is_positive(), pdf_by_area(distance, cos, area), distance.all(0.0))
 }
 
-/// Per steradian, of points that are even over an area.
+/// Pdf per steradian of points that are uniform over an area.
 ///
-/// - `distance`: metres; `cos`: at the light; `area`: square metres.
+/// - `distance`: metres; `cos`: cosine at the light; `area`: square metres.
 #[inline(always)]
 pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
     distance * distance / (cos * area)

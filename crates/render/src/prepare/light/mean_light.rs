@@ -1,16 +1,16 @@
-//! How bright the textures of lights are: on the whole, and where a triangle shows them.
+//! Mean luminance of emission textures: of the whole texture, and over a triangle.
 
 use crate::core::color::luminance;
 use crate::core::texture::{Texture, TextureId, TexturePoint};
 use glam::Vec2;
 
-/// Luminance of textures; a picture is gone through once, however many triangles show it.
+/// Luminance of textures; the mean of an image is computed once, however many triangles show it.
 pub(super) struct MeanLight<'a> {
     textures: &'a [Texture],
     whole: Vec<Option<f32>>,
 }
 
-/// Spread over a triangle: weights of its second and third corner.
+/// Points of a triangle: barycentric weights of its second and third vertex.
 const POINTS: [Vec2; 10] = [
     Vec2::new(0.33, 0.33),
     Vec2::new(0.05, 0.05),
@@ -24,7 +24,8 @@ const POINTS: [Vec2; 10] = [
     Vec2::new(0.2, 0.6),
 ];
 
-/// Of the whole texture, for what lies between the points: no triangle that shines is never chosen.
+/// Share of the whole texture's mean that is added for details between the points: no emissive triangle has probability
+/// 0.
 const LEAST_SHARE: f32 = 0.02;
 
 impl<'a> MeanLight<'a> {
@@ -32,7 +33,7 @@ impl<'a> MeanLight<'a> {
         Self { textures, whole: vec![None; textures.len()] }
     }
 
-    /// - `corners`: what a triangle looks up; `None` for the whole texture.
+    /// - `corners`: texture coordinates of a triangle; `None` for the whole texture.
     pub fn of(&mut self, id: TextureId, corners: Option<&[TexturePoint; 3]>) -> f32 {
         let texture = &self.textures[id as usize];
         let whole = *self.whole[id as usize].get_or_insert_with(|| luminance(texture.mean()));

@@ -1,7 +1,7 @@
-//! Lights that are chosen one by one: what shines, which of them to ask at a point, and where on it.
+//! Light sampling: the emitters of a scene, which of them to sample from a point, and a point on it.
 //!
-//! [`LightTable::sample`] and [`LightTable::pdf`] are one family: the second gives the density with which the first
-//! would have found a point that a ray hit by itself, which is what multiple importance sampling needs.
+//! [`LightTable::sample`] and [`LightTable::pdf`] are one family: the latter is the pdf with which the former would
+//! have sampled a point that a ray has hit, as multiple importance sampling needs.
 
 pub(crate) mod arrays;
 pub(crate) mod delta;
@@ -30,21 +30,21 @@ use crate::prepare::light::shape::{LightShape, sphere_as_point};
 use crate::sampling::Sampler;
 use glam::{Vec2, Vec3};
 
-/// How many sample dimensions [`LightTable::sample_each`] uses.
+/// Number of sample dimensions of [`LightTable::sample_each`].
 pub(crate) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
 
-/// All finite emitters of a scene, and lights without size.
+/// All finite emitters of a scene, and its delta lights.
 #[derive(Debug, Default)]
 pub struct LightTable {
     pub(crate) lights: Vec<Light>,
-    /// For each object: where its primitives stand among the lights.
+    /// Per object: the light indices of its primitives.
     by_object: Vec<ObjectLights>,
     pub(crate) selection: LightSelection,
     pub(crate) lanes: Option<LightArrays>,
 }
 
 impl LightTable {
-    /// Finds the emitters among the objects; `emission` of each material. Lights without size follow behind them.
+    /// Finds the emitters among the objects; `emission` per material. Delta lights follow after them.
     pub(crate) fn build(
         geometry: &Geometry,
         emission: &[Option<Emission>],
@@ -70,7 +70,7 @@ impl LightTable {
         Self { lights, by_object, selection, lanes }
     }
 
-    /// Number of lights that can be sampled; each triangle of a mesh and each of many spheres counts by itself.
+    /// Number of lights that can be sampled; each triangle of a mesh and each sphere of a group counts separately.
     pub fn len(&self) -> usize {
         self.lights.len()
     }
@@ -80,7 +80,7 @@ impl LightTable {
         self.lights.is_empty()
     }
 
-    /// Whether some of them have no size.
+    /// Whether there are delta lights.
     pub(crate) fn has_delta(&self) -> bool {
         self.lights.iter().any(|light| light.shape.delta().is_some())
     }
@@ -90,21 +90,22 @@ impl LightTable {
         &self.lights[id as usize]
     }
 
-    /// The light that a side of a primitive is, if it is one.
+    /// Returns the light of one side of a primitive, if it is one.
     #[inline]
     pub(crate) fn light_of(&self, object: u32, prim: u32, front: bool) -> Option<u32> {
         self.by_object[object as usize].of(prim, front)
     }
 
-    /// Whether a side of a primitive is a light.
+    /// Whether either side of a primitive is a light.
     pub(crate) fn shines(&self, object: u32, prim: u32) -> bool {
         [true, false].into_iter().any(|front| self.light_of(object, prim, front).is_some())
     }
 
-    /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.
+    /// Samples a point on some light; `None` if the chosen light is not visible from `position`.
     ///
-    /// - `normal`: unit; only light from its side matters. Zero where light from both does, here and in [`Self::pdf`].
-    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`; `u_select` is asked for where there are many lights.
+    /// - `normal`: unit; only light from its side matters. Zero if light from both sides does, here and in
+    ///   [`Self::pdf`].
+    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`; `u_select` is used only if there are many lights.
     #[inline]
     pub(crate) fn sample(
         &self,
@@ -119,10 +120,10 @@ impl LightTable {
         self.lights[id as usize].sample(textures, techniques, position, u, pmf)
     }
 
-    /// Tells `found` of one point on every light, or on one of them where there are many, by the number of the question, and
-    /// whether the light is a point: those are points here.
+    /// Samples one point on every light, or on one of them if there are many, and calls `found` with the index of the
+    /// sample and whether the light is a point; point lights have no radius here.
     ///
-    /// Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, `dimension` being the first.
+    /// Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, starting at `dimension`.
     #[inline]
     pub(crate) fn sample_each(
         &self,
@@ -153,8 +154,8 @@ impl LightTable {
         }
     }
 
-    /// The density with which [`Self::sample_each`] at `position` finds the point of light `id`, not a point light, in
-    /// direction `wi`, `distance` metres away; per steradian.
+    /// Pdf of [`Self::sample_each`] at `position` for the point of light `id`, not a point light, in direction `wi`,
+    /// `distance` metres away; per steradian.
     #[inline]
     pub(crate) fn pdf_each(&self, id: u32, position: Vec3, wi: Vec3, distance: f32) -> f32 {
         let by_angle = Techniques::default().solid_angle;
@@ -166,8 +167,8 @@ impl LightTable {
         self.lights[id as usize].is_point
     }
 
-    /// The density with which [`Self::sample`] at `position` finds the point of light `id` in direction `wi`,
-    /// `distance` metres away; per steradian.
+    /// Pdf of [`Self::sample`] at `position` for the point of light `id` in direction `wi`, `distance` metres away; per
+    /// steradian.
     #[inline]
     pub(crate) fn pdf(
         &self,

@@ -1,4 +1,4 @@
-//! Which lights the primitives of an object are.
+//! Light indices of the primitives of an object.
 
 use crate::core::color::luminance;
 use crate::core::material::{ColorInput, ScalarInput};
@@ -25,7 +25,7 @@ enum Ids {
     None,
     /// Primitive `i` is light `first + i`.
     All(u32),
-    /// One entry a primitive; `u32::MAX` for those that do not shine.
+    /// One entry per primitive; `u32::MAX` for those that do not emit.
     Some(Vec<u32>),
 }
 
@@ -41,15 +41,16 @@ impl Ids {
 }
 
 impl ObjectLights {
-    /// The light that a side of a primitive is, if it is one.
+    /// Returns the light of one side of a primitive, if it is one.
     #[inline]
     pub fn of(&self, prim: u32, front: bool) -> Option<u32> {
         if front { self.front.of(prim) } else { self.back.of(prim) }
     }
 
-    /// Finds the lights of an object.
+    /// Adds the lights of an object.
     ///
-    /// - `emission`: of each of its materials; `lights`: all lights so far, to which these are added; `means`: of all objects.
+    /// - `emission`: per material of the object; `lights`: all lights so far, to which these are added; `means`: shared
+    ///   by all objects.
     pub fn add(
         lights: &mut Vec<Light>,
         object: &Object,
@@ -93,7 +94,7 @@ impl ObjectLights {
                     let center = world_from_object.transform_point3(center);
                     adder.add(emission, LightShape::Sphere { center, radius: radius * scale });
                 }
-                // The inside of a sphere is found by rays alone.
+                // The inside of a sphere is found by BSDF sampling only.
                 Self { front: Ids::All(first), back: Ids::None }
             }
             (Shape::Sphere { center, radius }, Some(emission)) => {
@@ -116,13 +117,13 @@ impl ObjectLights {
                 });
                 Self { front: Ids::All(first), back: back.map_or(Ids::None, Ids::All) }
             }
-            // An infinite plane shines, but has no area to choose from: rays find it by themselves.
+            // An infinite plane emits, but has no finite area to sample: only BSDF sampling finds it.
             _ => Self::default(),
         }
     }
 }
 
-/// What textures ask a vertex of a mesh for; it is corner `k` of its triangle.
+/// Returns the texture coordinates of a mesh vertex, which is corner `k` of its triangle.
 fn corner_of(mesh: &Mesh, vertex: usize, k: usize) -> TexturePoint {
     let uv = mesh.uvs.get(vertex).copied().unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y][k]);
     let second = mesh.uvs2.get(vertex).copied().unwrap_or(uv);

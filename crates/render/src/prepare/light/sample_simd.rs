@@ -1,4 +1,4 @@
-//! Lights for sixteen points at a time, see [`LightTable`].
+//! Light sampling for sixteen points at a time, see [`LightTable`].
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::LightTable;
@@ -9,9 +9,9 @@ use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
 
 impl LightTable {
-    /// As [`Self::sample`] for the lanes of `mask`; `None` where only that can do it.
+    /// Like [`Self::sample`], for the lanes of `mask`; `None` if only the scalar code supports the lights.
     ///
-    /// - `u_select`: of use only where [`Self::selects_apart`].
+    /// - `u_select`: used only if [`Self::selects_apart`].
     #[inline(always)]
     pub(crate) fn sample_lanes<S: Simd>(
         &self,
@@ -29,13 +29,13 @@ impl LightTable {
         Some(sample)
     }
 
-    /// How many questions [`Self::sample_each`] asks.
+    /// Number of samples of [`Self::sample_each`].
     pub(crate) fn n_each(&self) -> usize {
         if self.selects_apart() { 1 } else { self.lights.len() }
     }
 
-    /// The answers to question `k` of [`Self::sample_each`] for the lanes of `mask`, and the lanes whose light is a point.
-    /// Only where [`Self::has_lanes`].
+    /// Returns sample `k` of [`Self::sample_each`] for the lanes of `mask`, and the lanes whose light is a point.
+    /// Requires [`Self::has_lanes`].
     #[inline(always)]
     pub(crate) fn sample_each_lanes<S: Simd>(
         &self,
@@ -81,17 +81,17 @@ impl LightTable {
         (found, as_point)
     }
 
-    /// Whether there are so many lights that choosing one takes a number of its own.
+    /// Whether there are so many lights that choosing one takes a separate random number.
     pub(crate) fn selects_apart(&self) -> bool {
         self.lights.len() > MAX_ESTIMATED
     }
 
-    /// Whether sixteen points at a time can be asked.
+    /// Whether sixteen points at a time are supported.
     pub(crate) fn has_lanes(&self) -> bool {
         self.lanes.is_some()
     }
 
-    /// See [`Self::pdf`]; only where [`Self::has_lanes`].
+    /// See [`Self::pdf`]; requires [`Self::has_lanes`].
     #[inline(always)]
     pub(crate) fn pdf_lanes<S: Simd>(
         &self,
@@ -123,7 +123,7 @@ impl LightTable {
         select(sum.is_positive(), pdf * own / sum, one.all(0.0))
     }
 
-    /// A light for each lane, its probability, and the lanes that some light can reach.
+    /// Selects a light per lane; returns it, its probability, and the lanes that some light can reach.
     #[inline(always)]
     fn select_lanes<S: Simd>(
         &self,
@@ -158,7 +158,7 @@ impl LightTable {
         let (mut id, mut chosen) = (Bits::splat(s, 0), Float::splat(s, 0.0));
         let mut open = mask;
         for (i, &estimate) in (0..).zip(&estimates[..wide.n]) {
-            // Until a light takes the lane, the last that counts has it: rounding may leave a rest after all.
+            // Until a light takes the lane, it holds the last possible one: rounding may leave a remainder.
             let take = open & estimate.is_positive();
             id = Bits { s, v: s.select_u(take, s.splat_u(i), id.v) };
             chosen = select(take, estimate, chosen);

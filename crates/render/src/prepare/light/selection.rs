@@ -1,4 +1,4 @@
-//! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
+//! Light selection: a few lights by an estimate of the contribution of each, many by a tree of such estimates.
 
 use crate::core::delta_light::Cone;
 use crate::core::techniques::Techniques;
@@ -11,17 +11,17 @@ use crate::sampling::AliasTable;
 use firstlight_simd::{Float, Real, Simd, Vector, Vector3, select};
 use glam::Vec3;
 
-/// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
+/// Maximum number of lights whose contributions are estimated individually; more would cost more than they gain.
 pub const MAX_ESTIMATED: usize = 16;
 
 #[derive(Debug, Default)]
 pub(crate) struct LightSelection {
-    /// Bounds for the estimate; empty when there are too many lights.
+    /// Bounds for the estimates; empty if there are too many lights.
     bounds: Vec<LightBounds>,
-    /// When there are many.
+    /// Used for many lights.
     tree: LightTree,
     wide_tree: LightTreeArrays,
-    /// The same by power alone, for what has no point to ask from.
+    /// Selection by power, without a shading point.
     alias: AliasTable,
 }
 
@@ -29,11 +29,11 @@ pub(crate) struct LightSelection {
 pub(crate) struct LightBounds {
     center: Vec3,
     radius: f32,
-    /// Of a flat light; zero for a sphere.
+    /// Normal of a flat light; zero for a sphere.
     normal: Vec3,
     /// Mean radiance times the area that can face a point.
     intensity: f32,
-    /// Of a spot.
+    /// Cone of a spot light.
     cone: Option<Cone>,
 }
 
@@ -49,9 +49,10 @@ impl LightSelection {
         Self { bounds: Vec::new(), tree, wide_tree, alias: AliasTable::new(&powers) }
     }
 
-    /// A light and the probability of the choice; `None` when no light can reach the point.
+    /// Selects a light; returns it and the probability of the choice; `None` if no light can reach the point.
     ///
-    /// Few lights are chosen by `u`, which is left as a uniform number again: then the points on each light are spread
+    /// A few lights are selected by `u`, which is rescaled to a uniform number again: so the points on each light stay
+    /// stratified.
     /// as evenly as the choices.
     #[inline]
     pub fn sample(
@@ -78,7 +79,7 @@ impl LightSelection {
                     rest -= estimates[i];
                     rest < 0.0
                 });
-                // Rounding may leave a rest after the last light that counts.
+                // Rounding may leave a remainder after the last possible light.
                 let chosen = chosen.or_else(|| (0..n).rev().find(|&i| estimates[i] > 0.0))?;
                 if rest < 0.0 {
                     rest += estimates[chosen];
@@ -90,20 +91,20 @@ impl LightSelection {
         }
     }
 
-    /// Of many lights, one by its power alone, and the probability of the choice.
+    /// For many lights: selects one by power; returns it and the probability of the choice.
     #[inline]
     pub fn by_power(&self, u: f32) -> Option<(u32, f32)> {
         let (id, pmf, _) = self.alias.sample(u);
         (pmf > 0.0).then_some((id, pmf))
     }
 
-    /// The probability that light `id` is asked where few are asked each and many by [`Self::by_power`].
+    /// Probability that light `id` is sampled, where few lights are all sampled and many by [`Self::by_power`].
     #[inline]
     pub fn pmf_each(&self, lights: &[Light], id: u32) -> f32 {
         if lights.len() <= MAX_ESTIMATED { 1.0 } else { self.alias.pmf(id) }
     }
 
-    /// The probability that [`Self::sample`] picks light `id`.
+    /// Probability that [`Self::sample`] selects light `id`.
     #[inline]
     pub fn pmf(&self, lights: &[Light], techniques: &Techniques, id: u32, position: Vec3, normal: Vec3) -> f32 {
         match lights.len() {
@@ -118,13 +119,13 @@ impl LightSelection {
         }
     }
 
-    /// Of few lights.
+    /// Bounds of a few lights.
     #[inline]
     pub fn bounds(&self) -> &[LightBounds] {
         &self.bounds
     }
 
-    /// Of many lights.
+    /// Tree of many lights.
     #[inline]
     pub fn wide_tree(&self) -> &LightTreeArrays {
         &self.wide_tree
@@ -172,7 +173,7 @@ impl LightBounds {
         self.estimate(offset.length_squared(), offset / offset.length(), side)
     }
 
-    /// The same from sixteen points.
+    /// Like the scalar estimate, for sixteen points.
     #[inline(always)]
     pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
         let offset = Vector::in_all(position.x, self.center) - position;
@@ -180,10 +181,10 @@ impl LightBounds {
         self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), Some(normal))
     }
 
-    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    /// Estimates the irradiance that the light can cause, never zero if it can cause any.
     ///
-    /// - `distance2`: to the centre, squared; `wi`: unit, to the centre; `normal`: unit, of the surface, if it has one
-    ///   side.
+    /// - `distance2`: squared distance to the centre; `wi`: unit, to the centre; `normal`: unit, of the surface, if it
+    ///   has one side.
     #[inline(always)]
     fn estimate<R: Real>(&self, distance2: R, wi: Vector3<R>, normal: Option<Vector3<R>>) -> R {
         let (r2, one, distance) = (self.radius * self.radius, distance2.all(1.0), distance2.sqrt());
@@ -195,19 +196,19 @@ impl LightBounds {
             estimate = estimate * largest_cosine(-wi.dot(Vector3::in_all(one, self.normal)), cos_u, sin_u);
         }
         if let Some(cone) = self.cone {
-            // A little wider, so that rounding hides nothing.
+            // With a margin, so that rounding excludes nothing.
             let way = wi + Vector3::in_all(one, cone.axis);
             let t = (-(way.length_squared() * 0.5) + (cone.outer + 16.0 * f32::EPSILON)) * cone.slope;
             let t = t.at_least(0.0).at_most(1.0);
             estimate = estimate * (t * t);
         }
-        // Within the bounds of the light anything can happen.
+        // Inside of the light's bounds no estimate is possible.
         let within = one.all((self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE)).min(1e30));
         select(distance2.le(one.all(r2)), within, estimate / distance2)
     }
 }
 
-/// The largest cosine to any direction within the cone, a little more so that rounding hides none.
+/// Returns the largest cosine to any direction within the cone, with a margin for rounding.
 #[inline(always)]
 fn largest_cosine<R: Real>(cos: R, cos_u: R, sin_u: R) -> R {
     let one = cos.all(1.0);

@@ -1,4 +1,4 @@
-//! Points on spheres, quads and triangles as seen from a shading point, by solid angle where that is stable.
+//! Points on spheres, quads and triangles seen from a shading point, by solid angle where that is stable.
 
 use crate::core::delta_light::Cone;
 use crate::prepare::light::delta::{DeltaSource, FAR, NO_CONE};
@@ -8,7 +8,7 @@ use firstlight_kdtree::geometry::{Frame, robust};
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
-/// The surface of a light, which emits on its front alone, or where a light without size is.
+/// The surface of a light, which emits on its front only, or the position of a delta light.
 #[derive(Clone, Debug)]
 pub(crate) enum LightShape {
     Sphere {
@@ -21,25 +21,25 @@ pub(crate) enum LightShape {
         edge_v: Vec3,
         normal: Vec3,
         area: f32,
-        /// The same as it is sampled.
+        /// The same in the form for sampling.
         light: QuadLight<f32>,
     },
     Triangle {
         vertices: [Vec3; 3],
         normal: Vec3,
         area: f32,
-        /// As of a quad.
+        /// The same in the form for sampling.
         light: TriangleLight<f32>,
     },
-    /// Without size.
+    /// A delta light at a point.
     Point {
         position: Vec3,
-        /// Of a spot.
+        /// Cone of a spot light.
         cone: Option<Cone>,
     },
     /// Infinitely far away.
     Directional {
-        /// Unit.
+        /// Unit, towards the light.
         to_light: Vec3,
         /// Radius of the scene, metres.
         reach: f32,
@@ -50,22 +50,22 @@ pub(crate) enum LightShape {
 pub(crate) struct LightPoint {
     pub target: Vec3,
     pub wi: Vec3,
-    /// Per steradian.
+    /// Pdf per steradian.
     pub pdf: f32,
-    /// Unit, at the point.
+    /// Unit normal at the point.
     pub normal: Vec3,
     /// Surface coordinates of flat lights, for textured emission; those of a sphere follow from its normal.
     pub uv: Vec2,
 }
 
-/// A point of a light, whoever looks at it.
+/// A point of a light, independent of the viewer.
 pub(crate) struct SurfaceOfLight {
     pub position: Vec3,
     /// Bound on its error, metres per axis.
     pub error: Vec3,
-    /// Unit.
+    /// Unit normal.
     pub normal: Vec3,
-    /// As of [`LightPoint`].
+    /// As in [`LightPoint`].
     pub uv: Vec2,
 }
 
@@ -83,7 +83,7 @@ impl LightShape {
             normal: normal.into(),
             area,
             lift: normal.abs().dot(error),
-            // At right angles as far as the numbers can tell.
+            // Perpendicular to within rounding.
             is_rectangle: edge_u.dot(edge_v).abs() <= 8.0 * f32::EPSILON * length_u * length_v,
         };
         Self::Quad { corner, edge_u, edge_v, normal, area, light }
@@ -104,7 +104,7 @@ impl LightShape {
         Self::Triangle { vertices, normal, area, light }
     }
 
-    /// As the lights without size are sampled; `None` for all others.
+    /// The form of delta lights for sampling; `None` for all others.
     #[inline]
     pub fn delta(&self) -> Option<DeltaSource<f32>> {
         let nowhere = Vec3::ZERO;
@@ -118,8 +118,8 @@ impl LightShape {
         Some(DeltaSource { origin: origin.into(), axis: axis.into(), outer, slope, is_far })
     }
 
-    /// Square metres, of the side that emits. For lights without size, what makes of their intensity the power of a
-    /// sphere: an irradiance is that of a point as far away as the scene is wide.
+    /// Area of the emitting side, square metres. For delta lights, the factor from their strength to power as for a
+    /// sphere: irradiance corresponds to a point as far away as the scene is wide.
     pub fn area(&self) -> f32 {
         match self {
             Self::Sphere { radius, .. } => 4.0 * std::f32::consts::PI * radius * radius,
@@ -129,7 +129,7 @@ impl LightShape {
         }
     }
 
-    /// The middle of a sphere or quad, some point inside of a triangle; far away for directional light.
+    /// Centre of a sphere or quad, some point inside of a triangle; far away for directional light.
     pub fn center(&self) -> Vec3 {
         match self {
             Self::Sphere { center, .. } => *center,
@@ -140,7 +140,8 @@ impl LightShape {
         }
     }
 
-    /// A point evenly over the area of a flat light; of a sphere, that which faces as [`uniform_sphere`] says.
+    /// Returns a point uniformly over the area of a flat light; of a sphere, the point with the normal given by
+    /// [`uniform_sphere`].
     pub fn at_area(&self, u: Vec2) -> SurfaceOfLight {
         match self {
             Self::Sphere { .. } => self.at_normal(uniform_sphere(u)),
@@ -165,7 +166,7 @@ impl LightShape {
         }
     }
 
-    /// The point of a sphere with this outward normal; the middle of a flat light, which has but one.
+    /// Returns the point of a sphere with this outward normal; the centre of a flat light, which has a single normal.
     pub fn at_normal(&self, outwards: Vec3) -> SurfaceOfLight {
         match self {
             Self::Sphere { center, radius } => SurfaceOfLight {
@@ -178,9 +179,9 @@ impl LightShape {
         }
     }
 
-    /// A point of the front seen from `position`, or `None` when there is none; for lights with a size.
+    /// Samples a point of the front visible from `position`, `None` if there is none; for lights with an area.
     ///
-    /// - `by_angle`: evenly over the solid angle where that is stable, otherwise over the area.
+    /// - `by_angle`: uniformly over the solid angle where that is stable, otherwise over the area.
     /// - `u`: two independent uniform numbers in `[0, 1)`.
     #[inline]
     pub(crate) fn sample(&self, position: Vec3, by_angle: bool, u: Vec2) -> Option<LightPoint> {
@@ -197,7 +198,7 @@ impl LightShape {
         }
     }
 
-    /// Density of [`Self::sample`] at the point that lies `distance` metres along `wi`; per steradian.
+    /// Pdf of [`Self::sample`] for the point `distance` metres along `wi`; per steradian.
     #[inline]
     pub(crate) fn pdf(&self, position: Vec3, by_angle: bool, wi: Vec3, distance: f32) -> f32 {
         match *self {
@@ -221,7 +222,7 @@ impl LightShape {
 }
 
 impl LightPoint {
-    /// `None` where the point is not seen.
+    /// Returns `None` if the point is not visible.
     #[inline]
     fn of(FlatPoint { found, target, wi, pdf, uv }: FlatPoint<f32>, normal: Vec3) -> Option<Self> {
         found.then(|| Self { target: target.into(), wi: wi.into(), pdf, normal, uv: uv.into() })
@@ -262,12 +263,14 @@ pub(crate) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) 
     })
 }
 
-/// Within this many squared radii of the centre of a sphere its points are found by [`sphere_from_close_by`].
+/// Squared distance from the centre, in squared radii, below which points of a sphere are computed by
+/// [`sphere_from_close_by`].
 pub(crate) const CLOSE: f32 = 2.0;
 
-/// Where the direction `wi` (about the centre) meets a sphere that fills much of the sky.
+/// Intersection of the direction `wi` (towards the centre) with a sphere that fills much of the field of view.
 ///
-/// Right above the surface all points that are seen lie within an angle at the centre that `f32` cannot resolve, so the way to
+/// Directly above the surface all visible points lie within an angle at the centre that `f32` cannot resolve, so the
+/// vector to the surface is computed instead, with its length from the power of the point, which does not cancel.
 /// the surface is what is computed, and its length from the power of the point, which does not cancel.
 #[cold]
 fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one_minus_cos_max: f32) -> LightPoint {
@@ -288,7 +291,7 @@ fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one
     }
 }
 
-/// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².
+/// Returns a sphere as a point light at its centre: π r² of radiance over distance².
 ///
 /// `None` from inside of it.
 #[inline]
@@ -307,7 +310,7 @@ pub(crate) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Opti
     })
 }
 
-/// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
+/// Samples uniformly over the whole sphere: at least half of the points lie on the invisible side.
 fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
     let normal = uniform_sphere(u);
     let point = center + radius * normal;
@@ -317,7 +320,7 @@ fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Opt
     Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
 }
 
-/// Even over all directions.
+/// Samples uniformly over all directions.
 fn uniform_sphere(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
     let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
@@ -325,17 +328,17 @@ fn uniform_sphere(u: Vec2) -> Vec3 {
     Vec3::new(r * cos_phi, r * sin_phi, z)
 }
 
-/// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.
+/// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u increases counter-clockwise from −X seen from +Y.
 #[inline]
 pub(crate) fn sphere_uv(normal: Vec3) -> Vec2 {
     use std::f32::consts::{PI, TAU};
     Vec2::new(0.5 + (-normal.z).atan2(normal.x) / TAU, 1.0 - normal.y.clamp(-1.0, 1.0).acos() / PI)
 }
 
-/// Where a shadow ray may end without meeting the light itself.
+/// Returns the end of a shadow ray that does not hit the light itself.
 ///
-/// The light's own error is one part; the other is what the kernel loses when it works out where a ray from
-/// `distance` metres away crosses the surface: at most a few roundings of numbers of that size, for every shape.
+/// The offset has two parts: the light's own error, and the error of the kernel for a ray from `distance` metres away:
+/// at most a few roundings of numbers of that size, for every shape.
 #[inline]
 fn lifted(point: Vec3, error: Vec3, normal: Vec3, distance: f32) -> Vec3 {
     robust::offset_ray_origin(point, error + Vec3::splat(robust::gamma(16) * distance), normal, normal)
@@ -348,17 +351,17 @@ fn direction(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
     (distance > 0.0).then(|| (offset / distance, distance))
 }
 
-/// A density per square metre turned into one per steradian; `None` when the front is not seen.
+/// Converts a pdf per square metre to one per steradian; `None` if the front is not visible.
 #[inline]
 fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
     let cos = -wi.dot(normal);
     (cos > 0.0 && area > 0.0).then(|| pdf_by_area(distance, cos, area))
 }
 
-/// Cosine of the angle at the centre of a sphere between the point that is seen and the one that looks (Pharr et al., section
-/// 6.2.4), written so that nothing cancels for a sphere of few pixels.
+/// Cosine of the angle at the centre of a sphere between a visible point and the viewer (Pharr et al., section 6.2.4),
+/// in a form without cancellation for small spheres.
 ///
-/// - `sin2`, `cos`: of the angle at the one that looks; `sin2_max`: of that of the rim.
+/// - `sin2`, `cos`: of the angle at the viewer; `sin2_max`: of that of the silhouette.
 #[inline(always)]
 pub(crate) fn cos_at_center<R: Real>(sin2: R, cos: R, sin2_max: R) -> R {
     let rest = (cos.all(1.0) - sin2 / sin2_max).at_least(0.0);
@@ -391,7 +394,7 @@ mod tests {
             .flat_map(move |by_angle| lights.iter().enumerate().map(move |(case, shape)| (by_angle, case, shape)))
     }
 
-    /// Irradiance on a floor point from radiance 1 by plain area sampling in f64.
+    /// Irradiance of a floor point from radiance 1, by area sampling in f64.
     fn irradiance_by_area(shape: &LightShape) -> f64 {
         let n = 1500;
         let mut sum = 0.0;
@@ -445,7 +448,7 @@ mod tests {
                 let position = Vec3::new(0.1 * (i % 16) as f32 - 0.8, 0.0, 0.1 * (i / 16) as f32 - 0.8);
                 let Some(point) = shape.sample(position, by_angle, Sampler::new(1, 0, 0, i).pair(0)) else { continue };
                 let pdf = shape.pdf(position, by_angle, point.wi, (point.target - position).length());
-                // By area the normal is found again from the point: a far, small sphere leaves it few digits.
+                // By area the normal is reconstructed from the point: a small, distant sphere leaves it few digits.
                 let bound = if by_angle { 1e-3 } else { 1e-2 };
                 assert!((pdf / point.pdf - 1.0).abs() < bound, "light {case}: {pdf} for {}", point.pdf);
             }

@@ -1,10 +1,10 @@
-//! A tree over many lights, so that one of them is chosen by what it could send to a point without asking them all.
+//! A tree over many lights, for selecting one by its potential contribution to a point without evaluating all.
 //!
-//! Every node knows a sphere around its lights, a cone around the directions in which they face, and their power. From
-//! the root down, one of two children is chosen in proportion to a bound on the light that it can send: power over
-//! distance squared, times the largest cosines at both ends (Conty Estevez and Kulla 2018, "Importance Sampling of Many
-//! Lights with Adaptive Tree Splitting", without the splitting). The tree is built by their cost, surface area times
-//! orientation. The same walk down to a given light tells the probability of its choice, exactly.
+//! Every node has a bounding sphere of its lights, a cone of their normals, and their power. From the root down, one of
+//! two children is selected in proportion to a bound on its contribution: power over distance squared, times the
+//! largest cosines at both ends (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree
+//! Splitting", without the splitting). The tree is built by their cost, surface area times orientation. Descending to a
+//! given light gives the exact probability of its selection.
 
 use crate::prepare::light::delta::{EVERYTHING, FAR};
 use crate::prepare::light::emitter::Light;
@@ -14,18 +14,18 @@ use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// From here on nodes are halved by number, so that the way to a light fits into 64 bits.
+/// Depth from which on nodes are split by count, so that the path to a light fits into 64 bits.
 const MAX_UNEVEN_DEPTH: u32 = 32;
 
 const BINS: usize = 12;
 
 #[derive(Debug, Default)]
 pub(crate) struct LightTree {
-    /// Children lie side by side.
+    /// Children are stored next to each other.
     pub(crate) nodes: Vec<LightNode>,
-    /// For each light the way to it from the root: bit k says which child on level k.
+    /// Per light the path from the root: bit k selects the child on level k.
     pub(crate) ways: Vec<u64>,
-    /// There are spots among the lights.
+    /// Whether there are spot lights.
     pub(crate) has_spots: bool,
 }
 
@@ -35,11 +35,12 @@ pub(crate) struct LightNode {
     pub radius: f32,
     /// Mean direction of the normals, unit.
     pub axis: Vec3,
-    /// By how much the cosine with some normal can exceed that with the axis: 2 sin(s/2) for normals up to s away.
+    /// Bound on how much the cosine with some normal can exceed that with the axis: 2 sin(s/2) for normals up to s
+    /// away.
     pub widening: f32,
-    /// Luminance of the radiance, times area that can face a point.
+    /// Luminance of the radiance times area that can face a point.
     pub power: f32,
-    /// Where all are spots, the cosine of the widest cone: no light goes beyond. Else −1.
+    /// If all are spot lights, the cosine of the widest cone, beyond which there is no light. Otherwise −1.
     pub least_cos: f32,
     /// First of the two children, or `LEAF` plus a light.
     pub link: u32,
@@ -47,7 +48,7 @@ pub(crate) struct LightNode {
 
 pub(crate) const LEAF: u32 = 1 << 31;
 
-/// A light as the builder sees it.
+/// A light in the builder.
 #[derive(Clone, Copy)]
 struct LightItem {
     bounds: Aabb,
@@ -55,7 +56,7 @@ struct LightItem {
     power: f32,
     least_cos: f32,
     id: u32,
-    /// Of a directional light.
+    /// Whether it is a directional light.
     is_far: bool,
 }
 
@@ -67,7 +68,7 @@ struct Cone {
 }
 
 impl LightTree {
-    /// At least two lights.
+    /// Requires at least two lights.
     pub fn build(lights: &[Light]) -> Self {
         let mut items: Vec<LightItem> = (0..).zip(lights).map(|(id, light)| LightItem::new(id, light)).collect();
         let has_spots = items.iter().any(|item| item.least_cos >= 0.0);
@@ -87,7 +88,7 @@ impl LightTree {
         let some_are_far = items.iter().any(|item| item.is_far) && !items.iter().all(|item| item.is_far);
         let middle = match (depth < MAX_UNEVEN_DEPTH && !some_are_far).then(|| best_split(items)).flatten() {
             Some((axis, limit)) => partition(items, |item| item.middle()[axis] < limit),
-            // They would make a box of everything.
+            // They would make the bounding box infinite.
             None if some_are_far => partition(items, |item| item.is_far),
             None => {
                 let all = Aabb::from_points(items.iter().map(LightItem::middle));
@@ -104,7 +105,7 @@ impl LightTree {
         self.split(first + 1, above, depth + 1, way | 1 << depth);
     }
 
-    /// A light and the probability of the choice; `None` when none can reach the point.
+    /// Selects a light; returns it and the probability of the choice; `None` if none can reach the point.
     pub fn sample(&self, position: Vec3, normal: Vec3, mut u: f32) -> Option<(u32, f32)> {
         let (mut node, mut pmf) = (self.nodes[0], 1.0);
         while node.link < LEAF {
@@ -121,7 +122,7 @@ impl LightTree {
         Some((node.link & !LEAF, pmf))
     }
 
-    /// The probability that [`Self::sample`] chooses a light.
+    /// Probability that [`Self::sample`] selects a light.
     pub fn pmf(&self, id: u32, position: Vec3, normal: Vec3) -> f32 {
         let (mut node, mut pmf, mut way) = (self.nodes[0], 1.0, self.ways[id as usize]);
         while node.link < LEAF {
@@ -132,7 +133,7 @@ impl LightTree {
                 return 0.0;
             }
             let second = (way & 1) as usize;
-            // As `sample` divides, so that both tell the same to the last bit.
+            // The same division as in `sample`, so that both results are equal to the last bit.
             pmf *= bounds[second] / sum;
             node = children[second];
             way >>= 1;
@@ -159,7 +160,7 @@ impl LightNode {
         let center = 0.5 * (bounds.min + bounds.max);
         Self {
             center,
-            // Both a little more, so that rounding leaves nothing out.
+            // Both with a margin, so that rounding excludes nothing.
             radius: 0.5 * (bounds.max - bounds.min).length() * (1.0 + 8.0 * f32::EPSILON)
                 + 4.0 * f32::EPSILON * center.length(),
             axis: cone.axis,
@@ -171,23 +172,24 @@ impl LightNode {
     }
 }
 
-/// A node, or sixteen, as seen from a point.
+/// A node, or sixteen, seen from a point.
 pub(crate) struct NodeBound<R> {
-    /// From the point to the centre.
+    /// Vector from the point to the centre.
     pub offset: Vector3<R>,
     pub radius: R,
     pub axis: Vector3<R>,
     pub widening: R,
     pub power: R,
-    /// In trees with spots.
+    /// Only in trees with spot lights.
     pub least_cos: Option<R>,
 }
 
 impl<R: Real> NodeBound<R> {
-    /// About the largest irradiance that the lights can cause, never zero where they can cause any.
+    /// Approximate upper bound of the irradiance that the lights can cause, never zero if they can cause any.
     ///
-    /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
-    /// sphere is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
+    /// It is evaluated twice per level, so it takes a single root and no trigonometry: the cosine of the largest angle
+    /// over a sphere is approximated by that of its centre plus radius over distance, and the cone of normals widens it
+    /// further.
     ///
     /// - `normal`: unit, of the surface, if it has one side.
     #[inline(always)]
@@ -195,7 +197,7 @@ impl<R: Real> NodeBound<R> {
         let Self { offset, radius, axis, widening, power, least_cos } = self;
         let (distance2, r2) = (offset.length_squared(), radius * radius);
         let inv_distance = radius.all(1.0) / distance2.sqrt();
-        // A little more, so that rounding hides nothing.
+        // A margin, so that rounding excludes nothing.
         let slack = 16.0 * f32::EPSILON;
         let receiver = match normal {
             Some(normal) => (offset.dot(normal) + radius) * inv_distance + slack,
@@ -205,23 +207,23 @@ impl<R: Real> NodeBound<R> {
         let receiver = receiver.at_least(0.0).at_most(1.0);
         let mut emitter = emitter.at_least(0.0).at_most(1.0);
         if let Some(least_cos) = least_cos {
-            // From any place in the sphere the cosine differs by a chord: √2 times radius over distance at most.
+            // Over the positions in the sphere the cosine differs by at most a chord: √2 times radius over distance.
             let most_cos = (radius * 1.4143 - offset.dot(axis)) * inv_distance + widening + slack;
             emitter = select(most_cos.lt(least_cos), emitter.all(0.0), emitter);
         }
         let outside = power * receiver * emitter * (inv_distance * inv_distance);
-        // Within the sphere anything can happen; on average the lights are about a radius away.
+        // Inside of the sphere no bound is possible; on average the lights are about a radius away.
         select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
     }
 }
 
-/// One step down from a node whose children have these bounds, of which not both are zero: whether it leads to the second, the
-/// probability of that, and what is left of the uniform number `u`, for the steps further down.
+/// Takes one step down from a node whose children have these bounds, not both of them zero: returns whether it leads to
+/// the second child, its probability, and the rescaled uniform number `u` for further steps.
 #[inline(always)]
 pub(crate) fn step_down<R: Real>([first, second]: [R; 2], u: R) -> (R::Mask, R, R) {
     let sum = first + second;
     let share = first / sum;
-    // Rounding must not lead to a child that sends nothing.
+    // Rounding must not lead to a child that contributes nothing.
     let take = (share.le(u) & second.is_positive()) | first.is_zero();
     let part = select(take, second / sum, share);
     let rest = (select(take, u - share, u) / part).at_least(0.0).at_most(1.0f32.next_down());
@@ -243,7 +245,8 @@ impl LightItem {
                 (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
-            // Its rays leave the axis by 90° at most, and those near it are the brightest: as those of a flat light.
+            // Its rays deviate from the axis by at most 90°, and those near it are the brightest: like those of a flat
+            // light.
             LightShape::Point { position, cone: Some(spot) } => {
                 (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
             }
@@ -252,7 +255,7 @@ impl LightItem {
                 (Aabb { min: center - size, max: center + size }, everywhere, 0.0)
             }
         };
-        // A light that is black on the mean may still shine somewhere: it keeps a little.
+        // A light with mean radiance 0 may still emit somewhere: its power is positive.
         let is_far = matches!(light.shape, LightShape::Directional { .. });
         let least_cos = match light.shape {
             LightShape::Point { cone: Some(spot), .. } => 1.0 - spot.outer,
@@ -284,18 +287,18 @@ impl Cone {
             return Self { axis: wide.axis, spread: PI };
         }
         let turn = glam::Quat::from_axis_angle(across.normalize(), spread - wide.spread);
-        // Turning rounds.
+        // Rotation rounds.
         Self { axis: (turn * wide.axis).normalize(), spread: spread + 1e-5 }
     }
 
-    /// How much of the sphere the lights shine to, weighted by cosine beyond the cone (Conty and Kulla, section 4.4).
+    /// Solid angle of the lights' emission, weighted by cosine beyond the cone (Conty and Kulla, section 4.4).
     fn measure(self) -> f32 {
         let (o, w) = (self.spread, (self.spread + FRAC_PI_2).min(PI));
         2.0 * PI * (1.0 - o.cos()) + FRAC_PI_2 * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos())
     }
 }
 
-/// What a half of a split costs: power times area times orientation.
+/// One side of a split; its cost is power times area times orientation.
 #[derive(Clone, Copy)]
 struct Half {
     bounds: Aabb,
@@ -322,7 +325,7 @@ impl Half {
     }
 }
 
-/// Axis and limit of the middles; `None` where all middles are one, or where no bound tells a difference.
+/// Returns axis and limit of the centres; `None` if all centres are equal, or no split has a lower cost.
 fn best_split(items: &[LightItem]) -> Option<(usize, f32)> {
     let middles = Aabb::from_points(items.iter().map(LightItem::middle));
     let size = middles.max - middles.min;
@@ -337,7 +340,7 @@ fn best_split(items: &[LightItem]) -> Option<(usize, f32)> {
             let bin = &mut bins[(place as usize).min(BINS - 1)];
             *bin = bin.with(Half { bounds: item.bounds, cone: Some(item.cone), power: item.power });
         }
-        // Thin boxes are cut across.
+        // Long boxes are preferably split across.
         let slimness = size.max_element() / size[axis];
         let mut above = [Half::EMPTY; BINS];
         for i in (0..BINS - 1).rev() {
@@ -361,7 +364,7 @@ fn best_split(items: &[LightItem]) -> Option<(usize, f32)> {
     (0 < n_below && n_below < items.len()).then_some((axis, limit))
 }
 
-/// Those that `is_below` come first, in their order; how many there are.
+/// Moves the items for which `is_below` holds to the front, in order; returns their number.
 fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> usize {
     items.sort_by_key(|item| !is_below(item));
     items.partition_point(is_below)
@@ -404,7 +407,7 @@ mod tests {
             .collect()
     }
 
-    /// Points among the lights, on their rims and far away, with normals every way.
+    /// Points among the lights, on their edges and far away, with normals in all directions.
     fn places() -> Vec<(Vec3, Vec3)> {
         (0..60)
             .map(|i| {
@@ -478,7 +481,7 @@ mod tests {
                         None => in_vain += 1,
                     }
                 }
-                // What is missing to one are choices of nodes that turn out to hold nothing that reaches the point.
+                // The difference to one consists of selections of nodes whose lights do not reach the point.
                 let missing = 1.0 - sum - in_vain as f32 / draws as f32;
                 assert!(missing.abs() < 0.02, "{sum} with {in_vain} of {draws} in vain");
             }
@@ -506,7 +509,7 @@ mod tests {
                 continue;
             }
             n_judged += 1;
-            // 3.2 σ is 1 % over twelve places.
+            // 3.2 σ is 1 % over twelve positions.
             ChiSquared::of(&found, &expected, 0.0).assert_below(3.2, &format!("place {k}"));
         }
         assert!(n_judged >= 6, "too few places that light reaches: {n_judged}");
@@ -533,7 +536,7 @@ mod tests {
 
     #[test]
     fn spots_that_shine_elsewhere_are_left_out() {
-        // A ceiling of them, each with a circle of its own on the floor.
+        // A ceiling of spot lights, each with its own circle on the floor.
         let cone = crate::core::delta_light::Cone::new(Vec3::NEG_Y, 0.1, 0.17);
         let at = |i: u32| Vec3::new((i % 16) as f32, 3.0, (i / 16) as f32);
         let light = lights(1, 5).remove(0);

@@ -1,6 +1,6 @@
-//! The way down a [`LightTree`] from sixteen points at once, each lane to a light of its own.
+//! Descends a [`LightTree`] from sixteen points at once, each lane to its own light.
 //!
-//! The numbers are those of the scalar walk, bit for bit. Nodes are numbered by level here: the first levels, which all
+//! The values are those of the scalar code, bit for bit. Nodes are numbered by level here: the first levels, which all
 //! lanes pass, fit into registers.
 
 use crate::prepare::light::tree::{LEAF, LightTree, NodeBound, step_down};
@@ -9,17 +9,17 @@ use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, Word, padded
 #[derive(Debug, Default)]
 pub(crate) struct LightTreeArrays {
     all: Rows,
-    /// The first of them.
+    /// The first nodes.
     top: Rows,
-    /// The way to each light, lower and upper half.
+    /// The path to each light, lower and upper half.
     ways: [Vec<u32>; 2],
     has_spots: bool,
 }
 
-/// How many nodes are looked up in registers.
+/// Number of nodes that are looked up in registers.
 const TOP: usize = 2 * LANES;
 
-/// One entry a node; see `LightNode` of the tree.
+/// One entry per node; see `LightNode` of the tree.
 #[derive(Debug, Default)]
 struct Rows {
     center: [Vec<f32>; 3],
@@ -33,7 +33,7 @@ struct Rows {
 
 impl LightTreeArrays {
     pub fn new(tree: &LightTree) -> Self {
-        // Numbers in the tree, by level.
+        // Node numbers of the tree, by level.
         let mut order = vec![0];
         let mut all = Rows::default();
         let mut next = 0;
@@ -60,7 +60,7 @@ impl LightTreeArrays {
         Self { top, all: all.map(padded, padded), ways, has_spots: tree.has_spots }
     }
 
-    /// See [`LightTree::sample`]: lights, their probabilities, and the lanes that some light can reach.
+    /// See [`LightTree::sample`]: returns lights, their probabilities, and the lanes that some light can reach.
     #[inline(always)]
     pub fn sample<S: Simd>(
         &self,
@@ -118,7 +118,7 @@ impl LightTreeArrays {
         pmf
     }
 
-    /// Where the children of all open lanes stand.
+    /// Returns the table that has the children of all open lanes.
     #[inline(always)]
     fn rows<S: Simd>(&self, open: Mask, node: Bits<S>) -> &Rows {
         let s = node.s;
@@ -127,7 +127,7 @@ impl LightTreeArrays {
     }
 }
 
-/// The first [`TOP`], or that many.
+/// Returns the first [`TOP`] entries, padded to that number.
 fn first_of<T: Copy + Default>(mut array: Vec<T>) -> Vec<T> {
     array.resize(TOP, T::default());
     array
@@ -160,7 +160,7 @@ impl Rows {
         bound.irradiance(Some(normal))
     }
 
-    /// Where open lanes go on.
+    /// Returns the next nodes of open lanes.
     #[inline(always)]
     fn children<S: Simd>(&self, open: Mask, second: Mask, node: Bits<S>) -> Bits<S> {
         let s = node.s;
