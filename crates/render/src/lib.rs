@@ -1,7 +1,7 @@
-//! From a read-only snapshot of the scene to light on the film. Knows no entities, files or windows.
+//! Renderer: from a read-only snapshot of the scene to radiance on the film. Knows no entities, files or windows.
 //!
-//! Start reading at [`Snapshot`] and [`Prepared`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes). The
-//! folders are layers, each of which imports from those before it alone.
+//! Start reading at [`Snapshot`] and [`Prepared`] (input), [`advance`] (rendering) and [`Film`] (output). The folders
+//! are layers, each of which imports only from those before it.
 
 mod core;
 mod denoise;

@@ -9,7 +9,7 @@ use firstlight_kdtree::Shape;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Seen from the origin along −z, with 90° from top to bottom.
+/// The camera is at the origin and looks along −z, with a vertical field of view of 90°.
 pub(crate) fn prepared(
     shapes: Vec<Shape>,
     objects: Vec<Object>,

@@ -1,13 +1,13 @@
-//! Whether counts are what they should be, for tests.
+//! χ² tests of counts.
 
-/// χ² of counts against what is expected of them; what is expected less than five times counts together.
+/// χ² of counts against their expectations; bins with expectations below five are merged.
 pub(crate) struct ChiSquared {
     pub value: f64,
     pub degrees_of_freedom: f64,
 }
 
 impl ChiSquared {
-    /// - `slack`: the share of each expectation by which it may be off itself.
+    /// - `slack`: relative uncertainty of the expectations.
     pub fn of(counts: &[f64], expected: &[f64], slack: f64) -> Self {
         let (mut value, mut bins) = (0.0, 0.0);
         let mut add = |count: f64, expected: f64| {
@@ -28,7 +28,7 @@ impl ChiSquared {
         Self { value, degrees_of_freedom: bins - 1.0 }
     }
 
-    /// Fails where it is further from its mean than `most` standard deviations of a normal distribution (Wilson and
+    /// Fails if it exceeds its mean by more than `most` standard deviations of a normal distribution (Wilson and
     /// Hilferty 1931).
     pub fn assert_below(&self, most: f64, name: &str) {
         let Self { value, degrees_of_freedom: dof } = *self;

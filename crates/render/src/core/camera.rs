@@ -1,7 +1,7 @@
-//! Thin-lens camera: from a point on the film and a point on the lens to a ray.
+//! Thin-lens camera: from a film position and a lens position to a ray.
 //!
-//! A perspective camera looks through a lens at one place. An orthographic one has a lens at every point of the film (the
-//! limit of a telecentric lens): without an aperture all of its rays are parallel, with one each point of the film sees a
+//! A perspective camera has one lens at a point. An orthographic one has a lens at every point of the film (the limit
+//! of a telecentric lens): without an aperture all of its rays are parallel; with one, each point of the film sees a
 //! cone whose tip lies in the focal plane.
 
 use crate::sampling::{polygon_disc, uniform_disc};
@@ -10,32 +10,33 @@ use firstlight_simd::{Real, Vector3};
 use glam::{Vec2, Vec3};
 use thiserror::Error;
 
-/// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
+/// A thin-lens camera in the snapshot's frame. The focal *plane* is perpendicular to `forward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Centre of the lens, metres; of an orthographic camera the middle of the plane that its rays begin in.
+    /// Centre of the lens, metres; for an orthographic camera the centre of the plane in which its rays start.
     pub eye: Vec3,
-    /// To the right in the picture. The three axes are unit and mutually perpendicular; `right × up` points at the viewer.
+    /// Right direction of the image. The three axes are unit and mutually perpendicular; `right × up` points at the
+    /// viewer.
     pub right: Vec3,
-    /// Upwards in the picture.
+    /// Up direction of the image.
     pub up: Vec3,
-    /// Into the picture, along the optical axis.
+    /// View direction, along the optical axis.
     pub forward: Vec3,
-    /// Tangent of half the vertical field of view, in perspective.
+    /// Tangent of half the vertical field of view of a perspective camera.
     pub tan_half_vfov: f32,
-    /// Half the height of what an orthographic camera sees, metres; `None` sees in perspective.
+    /// Half the visible height of an orthographic camera, metres; `None` for a perspective camera.
     pub orthographic: Option<f32>,
-    /// Metres; 0 is a pinhole, which samples no lens.
+    /// Radius of the lens in metres; 0 is a pinhole, which samples no lens.
     pub lens_radius: f32,
-    /// Metres along `forward` from the camera to the focal plane, positive; may be infinite.
+    /// Distance from the camera to the focal plane along `forward`, metres, positive; may be infinite.
     pub focus_distance: f32,
-    /// Straight edges of the aperture; below 3 it is round.
+    /// Number of aperture blades; below 3 the aperture is round.
     pub blades: u32,
-    /// Radians, counter-clockwise seen from behind the camera.
+    /// Rotation of the blades in radians, counter-clockwise seen from behind the camera.
     pub blade_rotation: f32,
 }
 
-/// A camera that takes no picture: which field, what it is, and what is allowed.
+/// An invalid camera: which field, its value, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("camera: `{field}` is {value}, but must {allowed}")]
 pub struct CameraError {
@@ -43,12 +44,12 @@ pub struct CameraError {
     pub field: &'static str,
     /// Its value, as text.
     pub value: String,
-    /// What it must be instead, as the end of a sentence that begins with "must".
+    /// Requirement, as the end of a sentence that begins with "must".
     pub allowed: &'static str,
 }
 
 impl Camera {
-    /// Whether rays through every point of the film and the lens have an origin and a direction.
+    /// Checks that rays through every film and lens position have an origin and a direction.
     ///
     /// # Errors
     /// The first field that is out of range.
@@ -85,7 +86,7 @@ impl Camera {
         Ok(())
     }
 
-    /// The ray through a point of the film, with a unit direction.
+    /// Returns the ray through a film position, with a unit direction.
     ///
     /// - `film`: pixels from the upper left corner; `size`: width and height of the film in pixels.
     /// - `lens`: two numbers in `[0, 1)`; unused by a pinhole.
@@ -96,16 +97,16 @@ impl Camera {
         Ray::new(origin.into(), dir.into())
     }
 
-    /// The ray through a point of the film and the middle of the lens, with a unit direction; see [`Self::ray`].
+    /// Returns the ray through a film position and the centre of the lens, with a unit direction; see [`Self::ray`].
     #[inline]
     pub fn middle_ray(&self, film: Vec2, size: Vec2) -> Ray {
         let (origin, dir) = self.rays(film.to_array(), size, None);
         Ray::new(origin.into(), dir.into())
     }
 
-    /// Origin and unit direction of the ray through a point of the film.
+    /// Returns origin and unit direction of the ray through a film position.
     ///
-    /// - `aperture`: the point of the lens over its radius, along `right` and `up`; `None` for its middle.
+    /// - `aperture`: lens position over its radius, along `right` and `up`; `None` for its centre.
     #[inline(always)]
     pub(crate) fn rays<R: Real>(&self, film: [R; 2], size: Vec2, aperture: Option<[R; 2]>) -> (Vector3<R>, Vector3<R>) {
         let eye = Vector3::in_all(film[0], self.eye);
@@ -126,7 +127,7 @@ impl Camera {
         }
     }
 
-    /// Along `right` and `up`, in units of `half`, which is half the height of the film.
+    /// Offsets along `right` and `up`, in units of `half`, which is half the height of the film.
     #[inline(always)]
     fn film_offsets<R: Real>(&self, [x, y]: [R; 2], size: Vec2, half: f32) -> [R; 2] {
         [(x * 2.0 - size.x) / size.y * half, (x.all(size.y) - y * 2.0) / size.y * half]
@@ -138,9 +139,9 @@ impl Camera {
         Vector3::in_all(x, self.right) * x + Vector3::in_all(x, self.up) * y
     }
 
-    /// Origin and unit direction of the ray through a point of the lens.
+    /// Returns origin and unit direction of the ray through a lens position.
     ///
-    /// - `direction`: to the plane one metre ahead; `aperture`: the point over the radius of the lens, along `right` and `up`.
+    /// - `direction`: to the plane one metre ahead; `aperture`: lens position over its radius, along `right` and `up`.
     #[inline(always)]
     fn through_lens<R: Real>(
         &self,
@@ -151,39 +152,40 @@ impl Camera {
         let (focus, one) = (self.focus_distance, aperture[0].all(1.0));
         let offset = self.across(aperture).mul_all(self.lens_radius);
         let origin = middle + offset;
-        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the camera.
+        // Both ends divided by the focus distance: valid for a plane at infinity, and without cancellation.
         if focus >= 1.0 {
             return (origin, (direction - offset * (one / one.all(focus))).normalize());
         }
-        // Or the other way round, for a plane so near that the quotient would leave the range of f32.
+        // Multiplied instead, for a plane so close that the quotient would leave the range of f32.
         let towards = direction.mul_all(focus) - offset;
         (origin, (towards * (one / towards.abs().max_element())).normalize())
     }
 
-    /// Nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one pixel of a
-    /// picture so many pixels high; the farthest may be infinite, and for a pinhole everything is sharp.
+    /// Returns the nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one
+    /// pixel of an image that is `height` pixels high; the farthest may be infinite, and for a pinhole everything is in
+    /// focus.
     ///
-    /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane
-    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; by an orthographic camera at
-    /// x + o (1 − z/f), in metres.
+    /// A point at depth z is projected from a point o of the lens to x + o (1/f − 1/z), in units of the plane at 1 m,
+    /// so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; an orthographic camera projects it
+    /// to x + o (1 − z/f), in metres.
     pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
         if let Some(half) = self.orthographic {
             let slack = half / (height.max(1) as f32 * self.lens_radius);
-            // Focused at infinity, all rays of a point of the film are one direction.
+            // Focused at infinity, all rays of a film position have one direction.
             if self.focus_distance.is_infinite() || slack.is_infinite() {
                 return (0.0, f32::INFINITY);
             }
             return (self.focus_distance * (1.0 - slack).max(0.0), self.focus_distance * (1.0 + slack));
         }
         let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
-        // For a pinhole infinite, and then nothing is subtracted from it.
+        // Infinite for a pinhole, and then not subtracted from.
         let slack = pixel / (2.0 * self.lens_radius);
         let focus = self.focus_distance.recip();
         let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
         ((focus + slack).recip(), far)
     }
 
-    /// A point of the lens by its distance from the camera along `right` and `up`, metres.
+    /// Returns a lens position as its offset from the camera along `right` and `up`, metres.
     ///
     /// - `u`: two numbers in `[0, 1)`.
     #[inline]
@@ -191,30 +193,30 @@ impl Camera {
         self.lens_radius * self.aperture_point(u)
     }
 
-    /// The same over the radius of the lens.
+    /// Like [`Self::lens_offset`], over the radius of the lens.
     #[inline]
     fn aperture_point(&self, u: Vec2) -> Vec2 {
         if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
-    /// How light from a point comes through a point of the lens to the film: the inverse of [`Self::ray`]. `None` for light
-    /// from behind.
+    /// Connects a point through a lens position to the film: the inverse of [`Self::ray`]. `None` for points behind the
+    /// camera.
     ///
-    /// - `offset`: the point of the lens; see [`Self::lens_offset`].
+    /// - `offset`: lens position; see [`Self::lens_offset`].
     #[inline]
     pub(crate) fn connection(&self, offset: Vec2, position: Vec3, size: Vec2) -> Option<Connection<f32>> {
         let connection = self.connections(offset.to_array(), position.into(), size);
         (connection.depth > 0.0).then_some(connection)
     }
 
-    /// See [`Self::connection`]; what lies behind has a depth that is not positive.
+    /// See [`Self::connection`]; points behind the camera have a depth that is not positive.
     #[inline(always)]
     pub(crate) fn connections<R: Real>(&self, offset: [R; 2], position: Vector3<R>, size: Vec2) -> Connection<R> {
         let x = offset[0];
         let eye = Vector3::in_all(x, self.eye);
         let forward = Vector3::in_all(x, self.forward);
         if let Some(half) = self.orthographic {
-            // All light of one point of the lens comes in one direction.
+            // All light through one lens position has one direction.
             let from_eye = position - eye;
             let depth = from_eye.dot(forward);
             let part = depth / self.focus_distance;
@@ -237,11 +239,12 @@ impl Camera {
         Connection { lens, film: [(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5], depth }
     }
 
-    /// Square metres across the way of light that a square metre of the film takes in, for one point of the lens.
+    /// Returns the area perpendicular to the light, in square metres, per square metre of the film, for one lens
+    /// position.
     ///
     /// The film of a perspective camera is the plane one metre ahead.
     ///
-    /// - `distance2`: square of the distance to the lens; `cos_lens`: of the light's way with `forward`.
+    /// - `distance2`: squared distance to the lens; `cos_lens`: cosine between the light's direction and `forward`.
     #[inline(always)]
     pub(crate) fn spread<R: Real>(&self, distance2: R, cos_lens: R) -> R {
         if self.orthographic.is_some() {
@@ -250,20 +253,20 @@ impl Camera {
         distance2 * (cos_lens * cos_lens * cos_lens)
     }
 
-    /// Width and height of a pixel on the film, metres; see [`Self::spread`].
+    /// Returns the side length of a pixel on the film, metres; see [`Self::spread`].
     pub(crate) fn pixel_size(&self, size: Vec2) -> f32 {
         2.0 * self.orthographic.unwrap_or(self.tan_half_vfov) / size.y
     }
 }
 
-/// The way of light through the lens to the film.
+/// A connection of a point through the lens to the film.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Connection<R> {
-    /// The point of the lens, metres.
+    /// Lens position in the snapshot's frame, metres.
     pub lens: Vector3<R>,
-    /// Where in the film the light ends, pixels.
+    /// Film position, pixels.
     pub film: [R; 2],
-    /// How far ahead along `forward` the light comes from, metres.
+    /// Depth of the point along `forward`, metres.
     pub depth: R,
 }
 
@@ -366,7 +369,7 @@ mod tests {
         }
     }
 
-    /// By moving the point: what a square metre across the light's way becomes on the film.
+    /// By finite differences: the area on the film of a square metre perpendicular to the light.
     #[test]
     fn the_spread_is_how_the_film_sees_an_area() {
         let size = Vec2::new(200.0, 100.0);
@@ -388,7 +391,7 @@ mod tests {
         }
     }
 
-    /// `offset / focus` left the range of `f32`, or its square did, and rays had no direction.
+    /// Regression: `offset / focus` or its square left the range of `f32`, and rays had no direction.
     #[test]
     fn no_lens_and_no_focus_leave_a_ray_without_direction() {
         for lens in [1e-30, 1e-3, 1.0, 1e12] {

@@ -1,25 +1,25 @@
-//! How caustics are looked for: which of the techniques are worth their cost in a picture.
+//! Plans for caustics: which of the techniques are worth their cost in an image.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Which techniques look for caustics in a picture. Each plan has the same mean; they differ in noise and in cost.
+/// The techniques for caustics in an image. All plans have the same expectation; they differ in noise and cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct CausticPlan {
-    /// Camera paths for each path from the lights: one of [`Self::STRIDES`], or 0 for no such paths.
+    /// Camera paths per light path: one of [`Self::STRIDES`], or 0 for no light paths.
     pub light_path_stride: u32,
-    /// Camera paths that light paths are of no use to are guided to where caustics come from.
+    /// Whether camera paths that light paths cannot replace are guided.
     pub guided: bool,
 }
 
 impl CausticPlan {
-    /// Camera paths for each light path that may be chosen: powers of two.
+    /// Possible numbers of camera paths per light path: powers of two.
     pub const STRIDES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
-    /// Camera paths alone, by themselves.
+    /// Unguided camera paths only.
     pub const NONE: Self = Self { light_path_stride: 0, guided: false };
 
-    /// What is used before anything is known of a picture.
+    /// The plan before anything is known about an image.
     pub const UNKNOWN: Self = Self { light_path_stride: 4, guided: true };
 
     /// Whether any of the techniques is used.
@@ -32,26 +32,26 @@ impl CausticPlan {
         self.light_path_stride > 0
     }
 
-    /// Whether it can be the plan of a picture.
+    /// Whether it can be the plan of an image.
     pub fn is_valid(self) -> bool {
         self.light_path_stride == 0 || Self::STRIDES.contains(&self.light_path_stride)
     }
 }
 
-/// What a pilot has found out about a picture: see `integrators/caustics/plan.rs`.
+/// Result of the pilot for an image: see `integrators/caustics/plan.rs`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CausticChoice {
-    /// What is used.
+    /// The chosen plan.
     pub plan: CausticPlan,
-    /// By how much light paths make a sample more expensive, those of the plan or, where it has none, the best that there
-    /// could be; 1 where nothing was measured.
+    /// Factor by which light paths increase the cost of a sample: those of the plan or, if it has none, the best
+    /// candidate; 1 if nothing was measured.
     pub cost: f32,
-    /// By how much they make its variance smaller.
+    /// Factor by which they reduce its variance.
     pub gain: f32,
 }
 
 impl CausticChoice {
-    /// Nothing to choose.
+    /// The choice without alternatives.
     pub const NONE: Self = Self { plan: CausticPlan::NONE, cost: 1.0, gain: 1.0 };
 }
 

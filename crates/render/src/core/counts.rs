@@ -1,4 +1,4 @@
-//! How many rays were traced.
+//! Ray counts.
 
 use std::ops::AddAssign;
 
@@ -9,7 +9,7 @@ pub struct RayCounts {
     pub camera: u64,
     /// Rays that continue a camera path from a surface, and all segments of light paths.
     pub bounce: u64,
-    /// Rays that ask whether a surface sees a light, or the lens in light paths.
+    /// Rays that test the visibility of a light, or of the lens in light paths.
     pub shadow: u64,
 }
 

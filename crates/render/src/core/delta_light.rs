@@ -1,20 +1,20 @@
-//! Lights without size: points, spots and parallel light. No ray ever hits one.
+//! Delta lights: point, spot and directional lights. No ray ever hits one.
 
 use glam::Vec3;
 
-/// A light that shines from a single point or in a single direction.
+/// A light that emits from a single point or in a single direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DeltaLight {
-    /// Evenly into all directions.
+    /// Uniform in all directions.
     Point {
-        /// Metres.
+        /// Position in metres.
         position: Vec3,
         /// Radiant intensity, W·sr⁻¹.
         intensity: Vec3,
     },
     /// Into a cone.
     Spot {
-        /// Metres.
+        /// Position in metres.
         position: Vec3,
         /// Radiant intensity within the inner cone, W·sr⁻¹.
         intensity: Vec3,
@@ -23,23 +23,24 @@ pub enum DeltaLight {
     },
     /// From infinitely far away.
     Directional {
-        /// Unit, where the light goes.
+        /// Unit direction in which the light travels.
         direction: Vec3,
-        /// On a surface that faces the light, W·m⁻².
+        /// Irradiance on a surface that faces the light, W·m⁻².
         irradiance: Vec3,
     },
 }
 
-/// How a spot light falls off from its axis.
+/// Falloff of a spot light from its axis.
 ///
-/// Angles are kept as 1 − cos, which tells narrow cones apart where the cosine is 1 in `f32`.
+/// Angles are stored as 1 − cos, which distinguishes narrow cones whose cosine is 1 in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Unit, away from the tip.
     pub axis: Vec3,
-    /// 1 − cos of the angle from which on there is no light, 0..1.
+    /// 1 − cos of the angle beyond which there is no light, 0..1.
     pub outer: f32,
-    /// One over the difference to 1 − cos of the angle up to which the light is whole; finite.
+    /// Reciprocal of the difference between `outer` and 1 − cos of the angle up to which the intensity is constant;
+    /// finite.
     pub slope: f32,
 }
 
@@ -53,7 +54,7 @@ impl Cone {
         Self { axis, outer, slope: 1.0 / (outer - inner).max(1e-30) }
     }
 
-    /// The share of the intensity that goes along `dir`, 0..1.
+    /// Returns the share of the intensity in direction `dir`, 0..1.
     ///
     /// - `dir`: unit, away from the tip.
     ///
@@ -63,7 +64,7 @@ impl Cone {
         self.falloff_at(0.5 * (dir - self.axis).length_squared())
     }
 
-    /// The same at an angle, given as 1 − cos.
+    /// Like [`Self::falloff`], at an angle given as 1 − cos.
     #[inline]
     pub fn falloff_at(&self, one_minus_cos: f32) -> f32 {
         let t = ((self.outer - one_minus_cos) * self.slope).clamp(0.0, 1.0);
@@ -80,7 +81,7 @@ impl DeltaLight {
         }
     }
 
-    /// Radiant intensity along a unit direction, W·sr⁻¹; of a directional light, its irradiance.
+    /// Radiant intensity in a unit direction, W·sr⁻¹; for a directional light, its irradiance.
     #[inline]
     pub fn towards(&self, dir: Vec3) -> Vec3 {
         match self {

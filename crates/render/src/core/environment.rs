@@ -1,4 +1,4 @@
-//! Light from infinitely far away.
+//! Environments: radiance from infinitely far away.
 
 use crate::core::color::luminance;
 use crate::core::texture::ImageTexture;
@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Radiance that arrives from outside the scene, W·m⁻²·sr⁻¹.
+/// Radiance that arrives from outside of the scene, W·m⁻²·sr⁻¹.
 #[derive(Clone, Debug, Default)]
 pub enum Environment {
     /// No light from outside.
@@ -16,7 +16,7 @@ pub enum Environment {
     Black,
     /// The same radiance from every direction.
     Constant(Vec3),
-    /// A smooth sky: `horizon` to `zenith` above, `ground` below.
+    /// A smooth gradient: `horizon` to `zenith` above, `ground` below.
     Gradient {
         /// Radiance from straight above (+Y).
         zenith: Vec3,
@@ -25,13 +25,13 @@ pub enum Environment {
         /// Radiance from everywhere below the horizon.
         ground: Vec3,
     },
-    /// Equirectangular picture: its middle column looks along −Z, its top row along +Y.
+    /// Equirectangular image: its centre column is at −Z, its top row at +Y.
     Image {
-        /// The picture, which the scale turns into radiance.
+        /// The image, which `scale` converts to radiance.
         image: Arc<ImageTexture>,
-        /// Radiance of a texel of 1, by channel.
+        /// Radiance of a texel of value 1, per channel.
         scale: Vec3,
-        /// Radians about +Y.
+        /// Rotation in radians about +Y.
         rotation: f32,
     },
 }
@@ -56,19 +56,19 @@ impl Environment {
     }
 }
 
-/// A smooth sky of these radiances (zenith, horizon, ground) along a direction that rises by `y` a metre.
+/// Returns the radiance of a gradient (zenith, horizon, ground) in a direction whose height is `y`.
 #[inline(always)]
 pub(crate) fn sky_gradient<R: Real>([zenith, horizon, ground]: [Vector3<R>; 3], y: R) -> Vector3<R> {
-    // The air is thickest along the horizon: most of the change lies in its lowest quarter.
+    // The air mass is largest at the horizon: most of the change lies in its lowest quarter.
     let rest = -y + 1.0;
     let share = -(rest * rest * rest) + 1.0;
     let above = horizon * (-share + 1.0) + zenith * share;
     select_vector(y.is_negative(), ground, above)
 }
 
-/// Directions by the brightness of an environment picture.
+/// Importance sampling of an environment image.
 ///
-/// Smooth skies need none: a bounce finds them as well as any other sample would, and costs no shadow ray.
+/// Smooth environments need none: BSDF sampling finds them as well, and costs no shadow ray.
 #[derive(Debug)]
 pub(crate) struct EnvironmentSampler {
     distribution: PictureDistribution,
@@ -89,7 +89,7 @@ impl EnvironmentSampler {
         Some(Self { distribution, rotation: *rotation })
     }
 
-    /// A unit direction and its density per steradian.
+    /// Samples a unit direction; returns it with its pdf per steradian.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<(Vec3, f32)> {
         let (uv, pdf) = self.distribution.sample(u);
@@ -97,7 +97,7 @@ impl EnvironmentSampler {
         (sin_theta > 0.0).then(|| (dir, pdf / (TAU * PI * sin_theta)))
     }
 
-    /// Per steradian.
+    /// Pdf per steradian.
     #[inline]
     pub fn pdf(&self, dir: Vec3) -> f32 {
         let sin_theta = (1.0 - dir.y * dir.y).max(0.0).sqrt();
@@ -108,7 +108,7 @@ impl EnvironmentSampler {
     }
 }
 
-/// `v` from the top.
+/// `v` counts from the top.
 #[inline]
 fn direction_to_uv(dir: Vec3, rotation: f32) -> Vec2 {
     let u = 0.5 + (dir.x.atan2(-dir.z) + rotation) / TAU;
@@ -150,7 +150,7 @@ mod tests {
     fn sampling_integrates_the_picture() {
         let environment = sun_and_sky();
         let sampler = EnvironmentSampler::build(&environment).unwrap();
-        // ∫ L dω by even steps against the sampled estimate, and the pdf must integrate to one.
+        // ∫ L dω by uniform steps against the sampled estimate; the pdf must integrate to one.
         let (n, mut integral, mut pdf_integral) = (2000, 0.0_f64, 0.0_f64);
         for i in 0..n * n {
             let (z, phi) = (1.0 - 2.0 * ((i % n) as f32 + 0.5) / n as f32, TAU * ((i / n) as f32 + 0.5) / n as f32);

@@ -1,38 +1,38 @@
-//! Pixel filters, by choosing where in the film a sample goes (Ernst, Stamminger and Greiner 2006, "Filter Importance
-//! Sampling"): every sample belongs to one pixel and, where the filter is nowhere negative, counts in full, so that
-//! pixels stay independent of each other and an evenly bright picture stays exactly even.
+//! Reconstruction filters by importance sampling of film positions (Ernst, Stamminger and Greiner 2006, "Filter
+//! Importance Sampling"): every sample belongs to one pixel and, for a filter without negative lobes, has weight 1, so
+//! that pixels are independent and a uniform image stays exactly uniform.
 //!
-//! All filters are products of one function of x and the same of y; widths are in pixels from the pixel's centre.
+//! All filters are separable products of one function of x and y; widths are in pixels from the pixel's centre.
 
 use firstlight_simd::{Float, Real, Simd, select};
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
-/// How the light around a pixel is weighted.
+/// Reconstruction filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelFilter {
-    /// The pixel's own square, evenly.
+    /// The pixel's square, uniform.
     #[default]
     #[serde(alias = "Box")]
     Box,
-    /// Falls in a straight line to zero at 1.
+    /// Falls linearly to zero at 1.
     #[serde(alias = "Tent")]
     Tent,
-    /// A bell with a standard deviation of 1/2, lowered to reach zero at 1.5.
+    /// Gaussian with a standard deviation of 1/2, offset to reach zero at 1.5.
     #[serde(alias = "Gaussian")]
     Gaussian,
-    /// The window of Harris 1978 with four terms, zero from 1.65 on: hardly any ringing.
+    /// The four-term window of Harris 1978, zero from 1.65 on: almost no ringing.
     #[serde(alias = "BlackmanHarris")]
     BlackmanHarris,
-    /// Mitchell and Netravali 1988, B = C = 1/3, zero from 2 on: sharpens. Its negative rim gives samples negative
-    /// weight, so a few samples look peppered; the mean is right.
+    /// Mitchell and Netravali 1988, B = C = 1/3, zero from 2 on: sharpens. Its negative lobes give samples negative
+    /// weights, so that images with few samples look speckled; the expectation is correct.
     #[serde(alias = "Mitchell")]
     Mitchell,
 }
 
 impl PixelFilter {
-    /// How far from the centre light counts, pixels along each axis.
+    /// Radius of the filter, pixels along each axis.
     pub fn radius(self) -> f32 {
         match self {
             Self::Box => 0.5,
@@ -43,7 +43,7 @@ impl PixelFilter {
         }
     }
 
-    /// The weight along one axis, not normalised; zero from the radius on.
+    /// Weight along one axis, not normalised; zero from the radius on.
     pub fn weight(self, x: f64) -> f64 {
         let x = x.abs();
         let radius = f64::from(self.radius());
@@ -68,7 +68,7 @@ impl PixelFilter {
 }
 
 impl PixelFilter {
-    /// Of [`Self::weight`] along one axis.
+    /// Integral of [`Self::weight`] along one axis.
     pub(crate) fn integral(self) -> f64 {
         const STEPS: u32 = 1 << 12;
         let step = 2.0 * f64::from(self.radius()) / f64::from(STEPS);
@@ -77,21 +77,21 @@ impl PixelFilter {
     }
 }
 
-/// Places in the film by the size of a filter's weight, made once a pass.
+/// Importance sampling of a filter, prepared once per pass.
 #[derive(Clone, Debug)]
 pub(crate) struct FilterSampler {
     filter: PixelFilter,
-    /// How far out the share ½ (i / [`STEPS`])⁴ of |weight| lies beyond, on one side; empty where a formula does. The
-    /// power spreads the thin tails over many steps.
+    /// Quantiles: the position beyond which the share ½ (i / [`STEPS`])⁴ of |weight| lies, on one side; empty if there
+    /// is a formula. The power resolves the thin tails by many steps.
     quantiles: Vec<f32>,
-    /// Weight of every sample but for its sign: ∫|f| over ∫f, both axes together.
+    /// Absolute weight of every sample: ∫|f| over ∫f, both axes together.
     scale: f32,
 }
 
 const STEPS: usize = 512;
 
 impl FilterSampler {
-    /// Weight of every sample but for its sign.
+    /// Absolute weight of every sample.
     pub fn scale(&self) -> f32 {
         self.scale
     }
@@ -100,7 +100,7 @@ impl FilterSampler {
         if matches!(filter, PixelFilter::Box | PixelFilter::Tent) {
             return Self { filter, quantiles: Vec::new(), scale: 1.0 };
         }
-        // Fine steps of |f| from the rim inwards, summed up and read backwards.
+        // Fine steps of |f| from the rim inwards, accumulated and inverted.
         const FINE: usize = 1 << 16;
         let radius = f64::from(filter.radius());
         let place = |i: f64| radius * (1.0 - i / FINE as f64);
@@ -125,7 +125,7 @@ impl FilterSampler {
         Self { filter, quantiles, scale: ((total / signed) as f32).powi(2) }
     }
 
-    /// A place relative to the upper left corner of the pixel, and the weight of what is seen there.
+    /// Samples a position relative to the upper left corner of the pixel; returns it with the weight of its radiance.
     #[inline]
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
         match self.filter {
@@ -145,12 +145,12 @@ impl FilterSampler {
         }
     }
 
-    /// Whether [`Self::sample_lanes`] knows the filter; all samples weigh the same then.
+    /// Whether [`Self::sample_lanes`] supports the filter; all samples have the same weight then.
     pub fn is_plain(&self) -> bool {
         matches!(self.filter, PixelFilter::Box | PixelFilter::Tent)
     }
 
-    /// The place of [`Self::sample`], sixteen times, for plain filters.
+    /// Like [`Self::sample`] for sixteen positions, for plain filters.
     #[inline(always)]
     pub fn sample_lanes<S: Simd>(&self, [x, y]: [Float<S>; 2]) -> [Float<S>; 2] {
         match self.filter {
@@ -168,7 +168,7 @@ impl FilterSampler {
     }
 }
 
-/// Uniform to triangular on −1..1.
+/// Maps a uniform number to the triangular distribution on −1..1.
 #[inline(always)]
 fn tent<R: Real>(u: R) -> R {
     let one = u.all(1.0);
@@ -202,7 +202,7 @@ mod tests {
         for filter in ALL {
             let sampler = FilterSampler::new(filter);
             let n = 1 << 16;
-            // Moments tell the width; the last one, steps between pixels, where the weight goes.
+            // Moments measure the width; the last one, a step between pixels, the spatial distribution.
             type Moment = fn(f64) -> f64;
             let tests: [(&str, Moment); 4] =
                 [("whole", |_| 1.0), ("x²", |x| x * x), ("x⁴", |x| x.powi(4)), ("neighbour", |x| f64::from(x > 0.5))];

@@ -1,10 +1,10 @@
-//! Pictures in memory, each in the depth of its file.
+//! Images in memory, in the bit depth of their files.
 
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
-/// A picture, row by row from the top.
+/// An image, row by row from the top.
 #[derive(Debug, PartialEq)]
 pub struct ImageTexture {
     /// Width in pixels.
@@ -15,40 +15,40 @@ pub struct ImageTexture {
     pub texels: Texels,
 }
 
-/// Pixels in the depth of their file; channels of a pixel stand side by side.
+/// Pixels in the bit depth of their file; channels are interleaved.
 #[derive(Debug, PartialEq)]
 pub enum Texels {
-    /// 8 bits a channel; 1 to 4 channels: grey, grey and alpha, RGB, RGBA.
+    /// 8 bits per channel; 1 to 4 channels: grey, grey and alpha, RGB, RGBA.
     U8 {
-        /// Channels of a pixel, 1..=4.
+        /// Channels per pixel, 1..=4.
         channels: usize,
         /// All channels of all pixels.
         data: Vec<u8>,
     },
-    /// 16 bits a channel, channels likewise.
+    /// 16 bits per channel, with the same channels.
     U16 {
-        /// Channels of a pixel, 1..=4.
+        /// Channels per pixel, 1..=4.
         channels: usize,
         /// All channels of all pixels.
         data: Vec<u16>,
     },
-    /// Linear numbers, red, green and blue; alpha is 1.
+    /// Linear floating-point RGB; alpha is 1.
     F32(Vec<Vec3>),
 }
 
-/// What the numbers of a picture mean.
+/// Interpretation of an image's numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// Integers are sRGB, floating-point numbers are linear.
     #[default]
     Auto,
-    /// Integers are linear as well: for normals, roughness and other data. Alpha always is.
+    /// Integers are linear as well: for normals, roughness and other data. Alpha always is linear.
     Linear,
 }
 
 impl ImageTexture {
-    /// From linear numbers, `width · height` of them.
+    /// Creates an image of `width · height` linear colours.
     pub fn from_linear(width: u32, height: u32, texels: Vec<Vec3>) -> Self {
         Self { width, height, texels: Texels::F32(texels) }
     }
@@ -69,7 +69,7 @@ impl ImageTexture {
         self.texels.texel(i, Encoding::Auto).truncate()
     }
 
-    /// Bytes in memory.
+    /// Size in memory in bytes.
     pub fn bytes(&self) -> usize {
         match &self.texels {
             Texels::U8 { data, .. } => data.len(),
@@ -113,7 +113,7 @@ impl Texels {
     }
 }
 
-/// Grey goes to all three colours; alpha is 1 where there is none.
+/// Expands to RGBA: grey is used for all three colours; alpha is 1 if there is none.
 #[inline]
 fn widened<T: Copy>(pixel: &[T], color: impl Fn(T) -> f32, alpha: impl Fn(T) -> f32) -> Vec4 {
     match *pixel {
@@ -140,7 +140,7 @@ fn srgb_words() -> &'static [f32] {
     CURVE.get_or_init(|| (0..=u16::MAX).map(|value| linear_from_srgb(f32::from(value) / 65535.0)).collect())
 }
 
-/// The sRGB transfer function backwards (IEC 61966-2-1).
+/// Inverse sRGB transfer function (IEC 61966-2-1).
 fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn integers_become_linear_light_and_data_stay_as_they_are() {
         let picture = ImageTexture { width: 1, height: 1, texels: Texels::U8 { channels: 2, data: vec![188, 51] } };
-        // Byte 188 is the usual stand-in for half the light.
+        // Byte 188 is approximately half of the linear range.
         assert!(picture.texels.texel(0, Encoding::Auto).abs_diff_eq(Vec4::new(0.5029, 0.5029, 0.5029, 0.2), 1e-3));
         assert_eq!(picture.texels.texel(0, Encoding::Linear), Vec3::splat(188.0 / 255.0).extend(0.2));
         let deep = Texels::U16 { channels: 4, data: vec![0, 188 * 257, u16::MAX, 13107] };

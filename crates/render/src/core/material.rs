@@ -1,8 +1,8 @@
-//! What a surface does to light: one enum for the scene file, the world and the snapshot.
+//! Materials: one enum for the scene file, the world and the snapshot.
 //!
-//! [`Material`] is the same in all three but for what it refers to ([`Params`]): a texture and another material are names
-//! in a file, entities in the world and indices in a snapshot. [`Material::map`] goes from one to the next. A new kind of
-//! material begins here: its variant, its [`kind`](Material::kind), its rows in `map`, `params_of` and
+//! [`Material`] is the same in all three except for its references ([`Params`]): a texture and another material are
+//! names in a file, entities in the world and indices in a snapshot. [`Material::map`] converts between them. To add a
+//! kind of material, start here: its variant, its [`kind`](Material::kind), its rows in `map`, `params_of` and
 //! [`of_kind`](Material::of_kind).
 
 use super::material_defaults::{
@@ -16,28 +16,28 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// Below it a GGX surface is a mirror: its highlight is narrower than directions in `f32` can tell apart.
+/// Width below which a GGX surface is a mirror: its lobe is narrower than directions in `f32` can resolve.
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-4;
 
-/// Lobes that a blend may come to, however it is nested; see [`Material::n_lobes`].
+/// Maximum number of lobes of a blend, including nested ones; see [`Material::n_lobes`].
 pub const MAX_LOBES: usize = 8;
 
 /// Index into the materials of a snapshot.
 pub type MaterialId = u32;
 
-/// How a material refers to what it uses.
+/// Types of a material's parameters and references.
 pub trait Params {
-    /// A colour, linear Rec. 709, the same everywhere or looked up.
+    /// A colour, linear Rec. 709, constant or textured.
     type Color: Clone + Debug + PartialEq + From<Vec3>;
-    /// A number without unit, the same everywhere or looked up.
+    /// A dimensionless number, constant or textured.
     type Scalar: Clone + Debug + PartialEq + From<f32>;
-    /// A colour that cannot be looked up.
+    /// A constant colour.
     type Rgb: Copy + Debug + Default + PartialEq + From<Vec3> + Into<Vec3>;
     /// Another material.
     type Material: Clone + Debug + PartialEq;
 }
 
-/// By index into the tables of a snapshot.
+/// Parameters of a snapshot: references by index into its tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InSnapshot;
 
@@ -48,19 +48,19 @@ impl Params for InSnapshot {
     type Material = MaterialId;
 }
 
-/// A colour, linear Rec. 709, the same everywhere or looked up.
+/// A colour, linear Rec. 709, constant or textured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorInput {
-    /// The same colour everywhere.
+    /// A constant colour.
     Constant(Vec3),
     /// The colour of a texture at the surface point.
     Texture(TextureId),
 }
 
-/// A number without unit, the same everywhere or the red channel of a texture.
+/// A dimensionless number, constant or the red channel of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScalarInput {
-    /// The same number everywhere.
+    /// A constant number.
     Constant(f32),
     /// The red channel of a texture at the surface point.
     Texture(TextureId),
@@ -78,7 +78,7 @@ impl From<f32> for ScalarInput {
     }
 }
 
-/// How the reflectance of a metal grows towards grazing angles.
+/// Angular dependence of a metal's reflectance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fresnel {
@@ -89,7 +89,7 @@ pub enum Fresnel {
     Schlick,
 }
 
-/// A closed set of surfaces; all are two-sided but for emission.
+/// A closed set of materials; all are two-sided except for emission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[serde(bound(
@@ -100,25 +100,25 @@ pub enum Fresnel {
 pub enum Material<P: Params = InSnapshot> {
     /// Lambert: f = albedo / π.
     Diffuse {
-        /// Share of light that is reflected, per channel, 0..1.
+        /// Reflected share of light, per channel, 0..1.
         albedo: P::Color,
     },
-    /// Perfect mirror, the same reflectance at every angle.
+    /// Perfect mirror with the same reflectance at every angle.
     Mirror {
-        /// Share of light that is reflected, per channel, 0..1.
+        /// Reflected share of light, per channel, 0..1.
         #[serde(default = "white")]
         reflectance: P::Color,
     },
     /// Isotropic GGX microfacets.
     Metal {
-        /// Width of the lobe, 0..1: the square of what other programs call roughness.
+        /// GGX width, 0..1: the square of what other programs call roughness.
         alpha: P::Scalar,
-        /// Share of light that is reflected at normal incidence, per channel, 0..1.
+        /// Reflectance at normal incidence, per channel, 0..1.
         reflectance: P::Color,
-        /// How the reflectance depends on the angle.
+        /// Angular dependence of the reflectance.
         #[serde(default, skip_serializing_if = "is_default")]
         fresnel: Fresnel,
-        /// Give back the energy that single scattering loses (Turquin 2019).
+        /// Compensate the energy that single scattering loses (Turquin 2019).
         #[serde(default, skip_serializing_if = "is_default")]
         compensate: bool,
     },
@@ -127,58 +127,58 @@ pub enum Material<P: Params = InSnapshot> {
         /// Index of refraction.
         #[serde(default = "glass_ior")]
         ior: f32,
-        /// Per metre inside (Beer–Lambert).
+        /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
     },
     /// Dielectric with GGX microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
     RoughGlass {
-        /// Width of the distribution of normals, 0..1: the square of what other programs call roughness.
+        /// GGX width, 0..1: the square of what other programs call roughness.
         alpha: P::Scalar,
         /// Index of refraction.
         #[serde(default = "glass_ior")]
         ior: f32,
-        /// Per metre inside (Beer–Lambert).
+        /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
-        /// Give back the energy that single scattering loses, after Kulla and Conty 2017.
+        /// Compensate the energy that single scattering loses, after Kulla and Conty 2017.
         #[serde(default, skip_serializing_if = "is_default")]
         compensate: bool,
     },
-    /// The classic local model. For paths it is diffuse, mirror and glass in shares that sum to 1: `transparency`, of
-    /// the rest `specular`, of the rest `diffuse`.
+    /// The classic local model. In path tracing it is diffuse, mirror and glass in shares that sum to 1:
+    /// `transparency`, of the rest `specular`, of the rest `diffuse`.
     Phong {
-        /// Share of light that is reflected diffusely, of what is neither transparent nor specular; per channel, 0..1.
+        /// Diffusely reflected share of the light that is neither transmitted nor mirrored; per channel, 0..1.
         diffuse: P::Color,
-        /// Of the ambient light, the share of `diffuse` that comes back.
+        /// Reflected share of the ambient light, relative to `diffuse`.
         #[serde(default = "one")]
         ambient: f32,
-        /// Share that is mirrored; lights appear in it as highlights.
+        /// Mirrored share, 0..1; lights appear in it as highlights.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         specular: P::Scalar,
         /// Exponent of the highlights.
         #[serde(default = "dull")]
         shininess: f32,
-        /// Share that is glass.
+        /// Transmitted share, 0..1.
         #[serde(default, skip_serializing_if = "is_default")]
         transparency: f32,
-        /// Of the transparent part, as for glass.
+        /// Index of refraction of the transparent part, as for glass.
         #[serde(default = "glass_ior")]
         ior: f32,
-        /// Of the transparent part, as for glass.
+        /// Absorption of the transparent part, as for glass.
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
     },
-    /// Layers by the parameters of glTF 2.0 and of most programs: a clear coat, on a sheen, on a base that is metal, or a
-    /// dielectric over what scatters or lets light through; see `shading/principled`.
+    /// Layers with the parameters of glTF 2.0 and of most programs: a clear coat, on a sheen, on a base that is metal,
+    /// or a dielectric over a diffuse or transmissive layer; see `shading/principled`.
     Principled {
-        /// Share of light that the base returns, per channel, 0..1.
+        /// Reflected share of light of the base, per channel, 0..1.
         #[serde(default = "light_grey")]
         base_color: P::Color,
         /// Share of the base that is metal, 0..1.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         metallic: P::Scalar,
-        /// Root of the width α of the base's microfacets, 0..1.
+        /// Root of the GGX width α of the base, 0..1.
         #[serde(default = "half")]
         roughness: P::Scalar,
         /// Index of refraction of the dielectric.
@@ -190,71 +190,71 @@ pub enum Material<P: Params = InSnapshot> {
         /// Colour of the reflection of the dielectric at normal incidence, a factor per channel, 0 or more.
         #[serde(default = "white", skip_serializing_if = "is_white")]
         specular_color: P::Color,
-        /// Share of the dielectric that lets light through in place of scattering it, 0..1.
+        /// Share of the dielectric that transmits light instead of scattering it, 0..1.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         transmission: P::Scalar,
-        /// Light that passes goes on as through a pane without thickness: it is not refracted, and nothing absorbs it.
+        /// Light is transmitted as by a pane without thickness: not refracted, and not absorbed.
         #[serde(default, skip_serializing_if = "is_default")]
         thin_walled: bool,
-        /// Per metre inside (Beer–Lambert).
+        /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
-        /// Ratio of the width of the lobe along the tangent to that across grows from 1 to 1/α, 0..1; see
+        /// Anisotropy, 0..1: the ratio of the widths along the tangent and across grows from 1 to 1/α; see
         /// `KHR_materials_anisotropy`.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         anisotropy: P::Scalar,
-        /// Degrees from the tangent, counter-clockwise, to the direction of anisotropy.
+        /// Direction of anisotropy, degrees from the tangent, counter-clockwise.
         #[serde(default, skip_serializing_if = "is_default")]
         anisotropy_rotation: f32,
-        /// Red and green: direction of anisotropy about the tangent, 0.5 being 0; blue: factor of its strength.
+        /// Red and green: direction of anisotropy relative to the tangent, 0.5 is 0; blue: factor of its strength.
         #[serde(default = "along_tangent", skip_serializing_if = "is_along_tangent")]
         anisotropy_map: P::Color,
-        /// Strength of the sheen of fibres at grazing angles, per channel, 0..1.
+        /// Strength of the sheen at grazing angles, per channel, 0..1.
         #[serde(default = "black", skip_serializing_if = "is_black")]
         sheen_color: P::Color,
         /// Root of the width of the sheen, 0..1.
         #[serde(default = "half", skip_serializing_if = "is_half")]
         sheen_roughness: P::Scalar,
-        /// Share of the surface that has a clear coat with an index of 1.5, 0..1.
+        /// Share of the surface with a clear coat of index 1.5, 0..1.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         clearcoat: P::Scalar,
-        /// Root of the width α of the coat's microfacets, 0..1.
+        /// Root of the GGX width α of the coat, 0..1.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         clearcoat_roughness: P::Scalar,
-        /// Normals of the coat about the smooth normal, as in `normal_map`.
+        /// Normal map of the coat, relative to the interpolated normal, as in `normal_map`.
         #[serde(default = "flat", skip_serializing_if = "is_flat")]
         clearcoat_normal_map: P::Color,
-        /// Share of the surface that has a thin film, whose reflection is coloured by interference, 0..1.
+        /// Share of the surface with a thin film, whose reflection is coloured by interference, 0..1.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
         iridescence: P::Scalar,
-        /// Index of refraction of the film.
+        /// Index of refraction of the thin film.
         #[serde(default = "film_ior", skip_serializing_if = "is_film_ior")]
         iridescence_ior: f32,
-        /// Thickness of the film where `iridescence_map` is 0, and where it is 1, nanometres.
+        /// Thickness of the film in nanometres where `iridescence_map` is 0; `iridescence_max` applies where it is 1.
         #[serde(default = "thin", skip_serializing_if = "is_thin")]
         iridescence_min: f32,
         /// See `iridescence_min`.
         #[serde(default = "thick", skip_serializing_if = "is_thick")]
         iridescence_max: f32,
-        /// Place between the two, 0..1.
+        /// Position between the two, 0..1.
         #[serde(default = "one_scalar", skip_serializing_if = "is_one")]
         iridescence_map: P::Scalar,
-        /// Radiance that the front sends out beside what it reflects, W·sr⁻¹·m⁻².
+        /// Radiance emitted by the front, in addition to reflection, W·sr⁻¹·m⁻².
         #[serde(default = "black", skip_serializing_if = "is_black")]
         emission: P::Color,
-        /// Share of the surface that is there, 0..1: rays pass the rest straight.
+        /// Opacity, 0..1: rays pass the rest without refraction.
         #[serde(default = "one_scalar", skip_serializing_if = "is_one")]
         opacity: P::Scalar,
-        /// The surface is there where its opacity is at least this, and nowhere else, 0..1.
+        /// If given, the surface is present where its opacity is at least this, and absent elsewhere, 0..1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         opacity_cutoff: Option<f32>,
-        /// Normals in the frame of tangent, bitangent and normal, 0..1 standing for −1..1.
+        /// Normals in the frame of tangent, bitangent and normal; 0..1 encodes −1..1.
         #[serde(default = "flat", skip_serializing_if = "is_flat")]
         normal_map: P::Color,
-        /// Factor of the slope of `normal_map`.
+        /// Factor of the first two components of `normal_map`.
         #[serde(default = "one", skip_serializing_if = "is_one_number")]
         normal_scale: f32,
-        /// The back is a surface as well, and shines as the front does; otherwise rays pass it.
+        /// Whether the back is visible, and emits like the front; otherwise rays pass it.
         #[serde(default = "yes", skip_serializing_if = "is_yes")]
         two_sided: bool,
     },
@@ -270,12 +270,12 @@ pub enum Material<P: Params = InSnapshot> {
     },
     /// A black body: emits on its front (a sphere outwards, a face along its normal), reflects nothing.
     Emissive {
-        /// W·sr⁻¹·m⁻².
+        /// Emitted radiance, W·sr⁻¹·m⁻².
         radiance: P::Color,
     },
 }
 
-/// To be read.
+/// A parameter by reference.
 pub type ParamRef<'a, P> = Param<
     &'a <P as Params>::Color,
     &'a <P as Params>::Scalar,
@@ -286,7 +286,7 @@ pub type ParamRef<'a, P> = Param<
     &'a <P as Params>::Material,
 >;
 
-/// To be changed.
+/// A parameter by mutable reference.
 pub type ParamMut<'a, P> = Param<
     &'a mut <P as Params>::Color,
     &'a mut <P as Params>::Scalar,
@@ -297,7 +297,7 @@ pub type ParamMut<'a, P> = Param<
     &'a mut <P as Params>::Material,
 >;
 
-/// Names as in a scene file; of a reference to a material, or of a mutable one.
+/// The parameters with their names in a scene file, for a reference to a material or a mutable one.
 macro_rules! params_of {
     ($material:expr) => {
         match $material {
@@ -390,7 +390,7 @@ macro_rules! params_of {
     };
 }
 
-/// Of a reference to a material, or of a mutable one.
+/// The main colour, for a reference to a material or a mutable one.
 macro_rules! color_of {
     ($material:expr) => {
         match $material {
@@ -405,18 +405,18 @@ macro_rules! color_of {
     };
 }
 
-/// What a material refers to, looked up for another place; see [`Material::map`].
+/// Conversion of a material's references; see [`Material::map`].
 pub trait MapParams<From: Params, To: Params> {
-    /// Looks up a colour.
+    /// Converts a colour.
     fn color(&mut self, color: &From::Color) -> To::Color;
-    /// Looks up a number.
+    /// Converts a number.
     fn scalar(&mut self, scalar: &From::Scalar) -> To::Scalar;
-    /// Looks up another material.
+    /// Converts a reference to another material.
     fn material(&mut self, material: &From::Material) -> To::Material;
 }
 
 impl<P: Params> Material<P> {
-    /// The same material with other references.
+    /// Returns the same material with converted references.
     pub fn map<Q: Params>(&self, to: &mut impl MapParams<P, Q>) -> Material<Q> {
         let rgb = |rgb: &P::Rgb| Q::Rgb::from((*rgb).into());
         match self {
@@ -510,12 +510,12 @@ impl<P: Params> Material<P> {
         }
     }
 
-    /// Its parameters with their names in a scene file; those that are no quantity are left out.
+    /// Its parameters with their names in a scene file, without those that are no quantity.
     pub fn params(&self) -> Vec<(&'static str, ParamRef<'_, P>)> {
         params_of!(self)
     }
 
-    /// Its parameters to be changed, otherwise as in [`Self::params`].
+    /// Its parameters for modification, otherwise as in [`Self::params`].
     pub fn params_mut(&mut self) -> Vec<(&'static str, ParamMut<'_, P>)> {
         params_of!(self)
     }
@@ -536,7 +536,7 @@ impl<P: Params> Material<P> {
         }
     }
 
-    /// For how many of [`MAX_LOBES`] a material counts in a blend; a blend itself counts by its parts.
+    /// Contribution to [`MAX_LOBES`] as a part of a blend; a blend itself counts by its parts.
     pub fn n_lobes(&self) -> usize {
         match self {
             Self::Phong { .. } => 3,
@@ -545,9 +545,9 @@ impl<P: Params> Material<P> {
         }
     }
 
-    /// A plain material of a kind, with usual parameters; `None` for a blend.
+    /// Returns a plain material of a kind, with common parameters; `None` for a blend.
     ///
-    /// - `color`: what the material is known by, see [`Self::color`].
+    /// - `color`: the main colour, see [`Self::color`].
     pub fn of_kind(kind: MaterialKind, color: P::Color) -> Option<Self> {
         Some(match kind {
             MaterialKind::Diffuse => Self::Diffuse { albedo: color },
@@ -580,7 +580,7 @@ impl<P: Params> Material<P> {
         })
     }
 
-    /// A principled material of this colour, with the defaults of a scene file for all the rest.
+    /// Returns a principled material of this colour, with the defaults of a scene file for all other parameters.
     pub fn principled(base_color: P::Color) -> Self {
         Self::Principled {
             base_color,
@@ -614,7 +614,7 @@ impl<P: Params> Material<P> {
         }
     }
 
-    /// What the material is known by: albedo, reflectance, diffuse colour or radiance; `None` where it has no colour.
+    /// The main colour: albedo, reflectance, diffuse colour or radiance; `None` if there is none.
     #[inline]
     pub fn color(&self) -> Option<&P::Color> {
         color_of!(self)

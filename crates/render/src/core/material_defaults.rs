@@ -1,4 +1,4 @@
-//! What a scene file need not say of a material, and whether it is what it says.
+//! Defaults of material parameters in a scene file, and tests for them.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! The kinds of materials, and what their parameters may be.
+//! The kinds of materials, and the types of their parameters.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ pub enum MaterialKind {
 }
 
 impl MaterialKind {
-    /// The kinds that a material can be turned into; a blend needs two others.
+    /// The kinds into which a material can be converted; a blend needs two others.
     pub const PLAIN: [Self; 8] = [
         Self::Diffuse,
         Self::Principled,
@@ -40,7 +40,7 @@ impl MaterialKind {
 
     pub(crate) const N: usize = Self::Blend as usize + 1;
 
-    /// As in a scene file.
+    /// Name in a scene file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Emissive => "emissive",
@@ -56,35 +56,35 @@ impl MaterialKind {
     }
 }
 
-/// A parameter of a material, by what may stand in it.
+/// A parameter of a material, by the kind of its value.
 #[derive(Clone, Copy, Debug)]
 pub enum Param<Color, Scalar, Number, Flag, Cutoff, Rgb, Part> {
     /// Share of light per channel, 0..1.
     Reflectance(Color),
-    /// W·sr⁻¹·m⁻².
+    /// Radiance, W·sr⁻¹·m⁻².
     Radiance(Color),
-    /// 0..1.
+    /// A share, 0..1, possibly textured.
     Share(Scalar),
-    /// 0..1, the same everywhere.
+    /// A constant share, 0..1.
     ConstantShare(Number),
     /// A factor per channel, 0 or more.
     Factor(Color),
-    /// Data in the channels of a picture, 0..1.
+    /// Data in the channels of an image, 0..1.
     Map(Color),
-    /// Finite.
+    /// A finite number.
     Number(Number),
-    /// Yes or no.
+    /// A flag.
     Flag(Flag),
-    /// 0..1 where there is one.
+    /// An optional share, 0..1.
     Cutoff(Cutoff),
     /// Index of refraction, above 0.
     Ior(Number),
-    /// 0 or more.
+    /// An exponent, 0 or more.
     Exponent(Number),
-    /// 0 or more, nanometres.
+    /// A thickness, 0 or more, nanometres.
     Thickness(Number),
-    /// Per metre.
+    /// Absorption per metre.
     Absorption(Rgb),
-    /// Another material, of which a blend consists.
+    /// Another material, as a part of a blend.
     Part(Part),
 }

@@ -1,4 +1,4 @@
-//! What the renderer asks of the materials of a snapshot: what lets light through, what is specular, what shines.
+//! Properties of materials in a snapshot for the renderer: transmissive, specular, emissive.
 
 use super::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use super::material_kind::Param;
@@ -16,7 +16,7 @@ impl Material {
         }
     }
 
-    /// Whether it, or a part of it, lets light pass.
+    /// Whether it, or a part of it, is transmissive.
     pub(crate) fn has_clear_part(&self, materials: &[Self]) -> bool {
         match self {
             Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_clear_part(materials)),
@@ -24,7 +24,7 @@ impl Material {
         }
     }
 
-    /// Whether the inside of it takes light away.
+    /// Whether its inside absorbs light.
     pub(crate) fn absorbs(&self) -> bool {
         match self {
             Self::Glass { absorption, .. }
@@ -47,7 +47,8 @@ impl Material {
             }
             Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].is_specular(materials)),
             Self::Principled { metallic, roughness, transmission, .. } => {
-                // What the base mirrors in the main; the faint reflection of a dielectric or a coat is left to camera paths.
+                // The main reflection of the base; the weak reflection of a dielectric or a coat is left to camera
+                // paths.
                 let is_smooth = matches!(roughness, ScalarInput::Constant(r) if r * r < SMALLEST_ALPHA);
                 is_smooth && (can_be_above_zero(metallic) || can_be_above_zero(transmission))
             }
@@ -55,7 +56,7 @@ impl Material {
         }
     }
 
-    /// Whether rays may pass its surfaces as if they were not there.
+    /// Whether rays may pass its surfaces.
     pub(crate) fn is_cutout(&self) -> bool {
         match self {
             Self::Principled { two_sided, opacity, opacity_cutoff, .. } => {
@@ -69,7 +70,7 @@ impl Material {
         }
     }
 
-    /// Whether it spreads light that passes, and so asks for light on both sides.
+    /// Whether it scatters transmitted light, so that light is sampled on both sides.
     pub(crate) fn scatters_through(&self) -> bool {
         match self {
             Self::RoughGlass { .. } => true,
@@ -78,18 +79,18 @@ impl Material {
         }
     }
 
-    /// Whether light that passes it takes one of several ways, so that only sampling finds it.
+    /// Whether transmitted light takes one of several paths, so that only BSDF sampling finds it.
     pub(crate) fn is_blended(&self) -> bool {
         matches!(self, Self::Blend { .. } | Self::Principled { .. })
     }
 
-    /// Whether it looks up normals or turns its highlights, and so asks for tangents.
+    /// Whether it has normal maps or anisotropy, and so needs tangents.
     pub(crate) fn asks_for_tangents(&self) -> bool {
         let Self::Principled { normal_map, clearcoat_normal_map, anisotropy, .. } = self else { return false };
         normal_map.is_normal_map() || clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
     }
 
-    /// The same of it or of a part of it.
+    /// Whether it, or a part of it, needs tangents.
     pub(crate) fn has_tangents(&self, materials: &[Self]) -> bool {
         match self {
             Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_tangents(materials)),
@@ -97,12 +98,12 @@ impl Material {
         }
     }
 
-    /// Whether it, or a part of it, looks up a texture.
+    /// Whether it, or a part of it, is textured.
     pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
         self.any_texture(materials, &mut |_| true)
     }
 
-    /// Whether a texture of it, or of a part of it, asks for more than the first surface coordinates.
+    /// Whether a texture of it, or of a part of it, needs more than the first texture coordinates.
     pub(crate) fn asks_for_more_than_uv(&self, materials: &[Self], textures: &[Texture]) -> bool {
         self.any_texture(materials, &mut |id| textures[id as usize].asks_for_more_than_uv())
     }
@@ -121,39 +122,39 @@ impl Material {
 }
 
 impl ColorInput {
-    /// Whether normals of this map differ from those of the surface.
+    /// Whether the map changes normals.
     pub(crate) fn is_normal_map(&self) -> bool {
         !matches!(self, Self::Constant(color) if *color == Vec3::new(0.5, 0.5, 1.0))
     }
 }
 
-/// Whether a parameter is more than 0 somewhere, as far as one can tell without looking it up.
+/// Whether a parameter may be positive somewhere, without evaluating textures.
 fn can_be_above_zero(scalar: &ScalarInput) -> bool {
     !matches!(scalar, ScalarInput::Constant(value) if *value <= 0.0)
 }
 
-/// The light that a material adds itself.
+/// The light that a material emits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emission {
     /// Radiance of the emissive material, W·m⁻²·sr⁻¹, before `scale`.
     pub radiance: ColorInput,
     /// Share of an emissive part in a blend.
     pub scale: f32,
-    /// Whether the back shines as well.
+    /// Whether the back emits as well.
     pub two_sided: bool,
-    /// Share of the surface that is there, and from which share on it is there as a whole.
+    /// Opacity, and the cutoff from which on the surface is present.
     pub opacity: (ScalarInput, Option<f32>),
 }
 
 impl Emission {
     const WHOLE: (ScalarInput, Option<f32>) = (ScalarInput::Constant(1.0), None);
 
-    /// Of a front that shines alike everywhere, W·m⁻²·sr⁻¹.
+    /// Emission of a front with constant radiance, W·m⁻²·sr⁻¹.
     pub(crate) fn even(radiance: Vec3) -> Self {
         Self { radiance: ColorInput::Constant(radiance), scale: 1.0, two_sided: false, opacity: Self::WHOLE }
     }
 
-    /// The emission of a material, looked for in blends; `None` for one that does not shine.
+    /// Returns the emission of a material or of a part of a blend; `None` if there is none.
     pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
         match &materials[id as usize] {
             Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,

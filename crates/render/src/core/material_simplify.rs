@@ -1,12 +1,12 @@
-//! Layered materials that are really something simpler, which is shaded faster and meets more techniques.
+//! Replaces principled materials by equivalent simpler ones, which are shaded faster and support more techniques.
 
 use super::material::{ColorInput, Fresnel, Material, SMALLEST_ALPHA, ScalarInput};
 use glam::Vec3;
 
 impl Material {
-    /// The same surface as a diffuse one, a metal or glass, where a principled material says no more than that.
+    /// Returns an equivalent diffuse material, metal or glass, if a principled material has no other effects.
     ///
-    /// Glass has exact Fresnel either way; a metal is the principled one to the last formula.
+    /// Glass has exact Fresnel either way; a metal is equal to the principled one in all formulas.
     pub fn simplified(self) -> Self {
         let Self::Principled {
             base_color,

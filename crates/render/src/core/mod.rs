@@ -1,4 +1,4 @@
-//! What a picture is a function of, as plain data: scene, camera, settings.
+//! The inputs of an image as plain data: scene, camera, settings.
 
 pub(crate) mod camera;
 pub(crate) mod caustic_plan;

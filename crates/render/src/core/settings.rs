@@ -1,4 +1,4 @@
-//! What decides the samples of a picture besides the scene.
+//! Render settings: what determines the samples of an image besides the scene.
 
 use crate::core::filter::PixelFilter;
 use crate::core::techniques::Techniques;
@@ -6,11 +6,11 @@ use firstlight_kdtree::InstructionSet;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The light model.
+/// The integrator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// The truth: unbiased path tracing.
+    /// Unbiased path tracing.
     #[default]
     #[serde(alias = "Path")]
     Path,
@@ -19,14 +19,14 @@ pub enum Integrator {
     Phong,
 }
 
-/// How samples are spread over the pixels.
+/// Sample allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleAllocation {
-    /// Every pixel gets as many.
+    /// Every pixel gets the same number.
     #[default]
     Uniform,
-    /// More where the error is larger, so that this error of the whole picture falls fastest.
+    /// More samples where the error is larger, to reduce this error of the whole image fastest.
     Adaptive(ErrorMetric),
 }
 
@@ -34,38 +34,38 @@ pub enum SampleAllocation {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorMetric {
-    /// relMSE: that of linear light relative to its level, which is what is estimated, too.
+    /// relMSE: the squared error of radiance relative to its level, which is also what is estimated.
     #[default]
     RelativeMse,
-    /// The squared error of the encoded picture: dark pixels count more, those above white little.
+    /// The squared error of the encoded image: dark pixels count more, those above white little.
     Display {
-        /// Exposure of the display, factors of two.
+        /// Exposure of the display in stops (factors of two).
         exposure_stops: f32,
     },
 }
 
-/// What decides the samples of a picture besides the scene.
+/// What determines the samples of an image besides the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// The light model.
+    /// The integrator.
     pub integrator: Integrator,
-    /// Longest path in segments; 1 shows emitters alone. `u32::MAX` is unbounded.
+    /// Maximum path length in segments; 1 shows emitters only. `u32::MAX` is unlimited.
     pub max_depth: u32,
-    /// Picks the random numbers of all samples: another seed gives independent noise.
+    /// Seed of the random numbers of all samples: another seed gives independent noise.
     pub seed: u32,
-    /// Weights of the light around the middle of a pixel.
+    /// Reconstruction filter.
     pub filter: PixelFilter,
-    /// Techniques of variance reduction that are used.
+    /// Variance reduction techniques.
     pub techniques: Techniques,
-    /// How samples are spread over the pixels.
+    /// Sample allocation.
     pub allocation: SampleAllocation,
-    /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
-    /// tests compare with. All sets give the same bits.
+    /// Instruction set for shading sixteen paths at a time; `None` for the scalar code, which is the reference of
+    /// tests. All instruction sets give the same bits.
     #[doc(hidden)]
     pub simd: Option<InstructionSet>,
 }
 
-/// Settings that no picture comes of.
+/// Invalid settings.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SettingsError {
     /// [`RenderSettings::max_depth`] is 0.
@@ -74,10 +74,10 @@ pub enum SettingsError {
 }
 
 impl RenderSettings {
-    /// Whether a picture comes of them.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// When `max_depth` is 0.
+    /// If `max_depth` is 0.
     pub fn check(&self) -> Result<(), SettingsError> {
         if self.max_depth == 0 { Err(SettingsError::NoDepth) } else { Ok(()) }
     }

@@ -1,26 +1,27 @@
-//! Switches for the techniques that make the picture better sooner, so that a report can tell what each is worth.
+//! Switches for variance reduction techniques, so that a report can measure the benefit of each.
 
 use crate::core::caustic_plan::CausticPlan;
 
-/// Which techniques are used. Each leaves the mean of the picture as it is: without it there is more noise, or the
+/// The techniques in use. None of them changes the expectation of the image: without it there is more noise, or the
 /// same noise takes longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Techniques {
-    /// Each diffuse or rough vertex asks a light for its share; off: paths run into lights by themselves or not at all.
+    /// Each diffuse or rough vertex samples a light; off: only BSDF sampling finds lights.
     pub light_sampling: bool,
-    /// Light that both light sampling and bounces find is weighted between them; off: light sampling takes all of it.
+    /// Light that both light sampling and BSDF sampling find is weighted between them; off: light sampling takes all of
+    /// it.
     pub mis: bool,
     /// A pixel's samples are Owen-scrambled nets; off: they are independent.
     pub even_samples: bool,
-    /// Points on lights are spread evenly over the angle under which they are seen; off: over their area.
+    /// Lights are sampled uniformly in solid angle; off: in area.
     pub solid_angle: bool,
-    /// Lights are asked by what they could send or by their power; off: all alike.
+    /// Lights are selected by estimated contribution or by power; off: uniformly.
     pub light_selection: bool,
-    /// Where specular surfaces gather light, paths are traced from the lights as well; off: from the camera alone.
+    /// Paths are also traced from the lights if there are specular casters; off: from the camera only.
     pub caustics: bool,
-    /// How, where [`Self::caustics`] are; `None`: as a pilot finds best for the picture, see [`crate::caustic_plan`].
+    /// Plan for caustics, if [`Self::caustics`] is set; `None`: the choice of a pilot, see [`crate::caustic_plan`].
     pub caustic_plan: Option<CausticPlan>,
-    /// Dim paths are ended early; off: only very long ones.
+    /// Russian roulette by throughput; off: for very long paths only.
     pub roulette: bool,
 }
 
@@ -45,7 +46,7 @@ impl Default for Techniques {
 }
 
 impl Techniques {
-    /// Each switched off alone, with the name of what is missing.
+    /// One technique switched off at a time, with its name.
     pub fn ablations() -> [(&'static str, Self); 7] {
         let all = Self::default();
         [

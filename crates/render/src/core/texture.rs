@@ -1,4 +1,4 @@
-//! Colours that vary over a surface.
+//! Textures: colours that vary over a surface.
 
 pub use super::image_texture::{Encoding, ImageTexture, Texels};
 use firstlight_simd::{Elementary, Real};
@@ -9,20 +9,20 @@ use std::sync::Arc;
 /// Index into the textures of a snapshot.
 pub type TextureId = u32;
 
-/// What happens outside the unit square.
+/// Behaviour of an image outside of the unit square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// The pattern repeats.
     #[default]
     Repeat,
-    /// The pattern repeats, mirrored every other time.
+    /// The pattern repeats, every other copy mirrored.
     Mirror,
     /// The texel at the edge continues.
     Clamp,
 }
 
-/// One channel of a picture.
+/// One channel of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
@@ -32,63 +32,63 @@ pub enum Channel {
     G,
     /// Blue.
     B,
-    /// Alpha; 1 where the picture has none.
+    /// Alpha; 1 if the image has none.
     A,
 }
 
-/// A pattern, how surface coordinates find their place in it, and what becomes of its colours.
+/// A pattern, the mapping from surface coordinates to it, and modifications of its colours.
 ///
-/// Surface coordinates: `uv` of a mesh or quad (0..1), longitude and latitude of a sphere (0..1, v = 1 at +Y of
-/// the object), metres along two axes of an infinite plane.
+/// Surface coordinates: `uv` of a mesh or quad (0..1), longitude and latitude of a sphere (0..1, v = 1 at +Y of the
+/// object), metres along two axes of an infinite plane.
 #[derive(Clone, Debug)]
 pub struct Texture {
-    /// What the texture shows.
+    /// The pattern.
     pub pattern: TexturePattern,
-    /// Which coordinates of a mesh it uses: 0 for the first, 1 for the second. Other shapes have one set.
+    /// Texture coordinate set of a mesh: 0 for the first, 1 for the second. Other shapes have one set.
     pub uv_set: u8,
     /// Applied to surface coordinates first: rotation and scale.
     pub uv_matrix: Mat2,
     /// Added after `uv_matrix`.
     pub uv_offset: Vec2,
-    /// The channel that is looked up, for all of red, green and blue; `None` for the colour.
+    /// The channel that is used for red, green and blue; `None` for the colour.
     pub channel: Option<Channel>,
-    /// Colours are multiplied with it.
+    /// Factor of the colours.
     pub tint: Vec3,
-    /// Colours are multiplied with those of the vertices of a mesh.
+    /// Whether colours are multiplied by the vertex colours of a mesh.
     pub vertex_colors: bool,
 }
 
-/// Colours over pattern coordinates.
+/// A pattern: colours over pattern coordinates.
 #[derive(Clone, Debug)]
 pub enum TexturePattern {
-    /// White everywhere: for vertex colours by themselves.
+    /// White: for vertex colours only.
     White,
     /// Squares of side 1 in pattern coordinates; the one at (0, 0)..(1, 1) has colour `a`.
     Checker {
-        /// Colour of squares whose whole coordinates have an even sum, linear Rec. 709.
+        /// Colour of squares whose integer coordinates have an even sum, linear Rec. 709.
         a: Vec3,
         /// Colour of the others, linear Rec. 709.
         b: Vec3,
     },
-    /// The picture covers 0..1; its top row is at v = 1.
+    /// An image that covers 0..1; its top row is at v = 1.
     Image {
-        /// The picture.
+        /// The image.
         image: Arc<ImageTexture>,
-        /// What its numbers mean.
+        /// Interpretation of its numbers.
         encoding: Encoding,
-        /// What the texture shows outside 0..1, along u and along v.
+        /// Behaviour outside of 0..1, along u and along v.
         wrap: [Wrap; 2],
-        /// Bilinear when true, else the nearest texel.
+        /// Bilinear if true, otherwise the nearest texel.
         smooth: bool,
     },
 }
 
-/// A place on a surface, as textures ask for it.
+/// Texture lookup coordinates of a surface point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexturePoint {
     /// First and second surface coordinates.
     pub uv: [Vec2; 2],
-    /// The interpolated colour of the vertices with alpha, linear Rec. 709; white where there is none.
+    /// Interpolated vertex colour with alpha, linear Rec. 709; white if there is none.
     pub color: Vec4,
 }
 
@@ -99,7 +99,7 @@ impl From<Vec2> for TexturePoint {
 }
 
 impl TexturePoint {
-    /// Between three corners: `first + x (second − first) + y (third − first)`.
+    /// Interpolates between three corners: `first + x (second − first) + y (third − first)`.
     pub(crate) fn between([a, b, c]: &[Self; 3], Vec2 { x, y }: Vec2) -> Self {
         let w = 1.0 - x - y;
         let uv = std::array::from_fn(|k| w * a.uv[k] + x * b.uv[k] + y * c.uv[k]);
@@ -108,7 +108,7 @@ impl TexturePoint {
 }
 
 impl Texture {
-    /// A pattern in surface coordinates as they are, with its colours as they are.
+    /// Creates a texture with unmodified coordinates and colours.
     pub fn new(pattern: TexturePattern) -> Self {
         Self {
             pattern,
@@ -121,7 +121,7 @@ impl Texture {
         }
     }
 
-    /// The colour at a place.
+    /// Evaluates the colour at a point.
     #[inline]
     pub fn eval(&self, point: impl Into<TexturePoint>) -> Vec3 {
         let point = point.into();
@@ -150,7 +150,7 @@ impl Texture {
         !self.asks_for_more_than_uv() && self.channel.is_none() && self.tint == Vec3::ONE
     }
 
-    /// Whether it looks at what only meshes have: second surface coordinates or colours of vertices.
+    /// Whether it needs data that only meshes have: second texture coordinates or vertex colours.
     pub(crate) fn asks_for_more_than_uv(&self) -> bool {
         self.uv_set != 0 || self.vertex_colors
     }
@@ -165,14 +165,14 @@ impl Texture {
         }
     }
 
-    /// Surface coordinates as the pattern counts them.
+    /// Converts surface coordinates to pattern coordinates.
     #[inline(always)]
     pub(crate) fn pattern_coordinates<R: Real>(&self, [u, v]: [R; 2]) -> [R; 2] {
         let (m, offset) = (self.uv_matrix, self.uv_offset);
         [u * m.x_axis.x + v * m.y_axis.x + offset.x, u * m.x_axis.y + v * m.y_axis.y + offset.y]
     }
 
-    /// The mean colour over the pattern, for the power of lights; vertices count as white.
+    /// Mean colour over the pattern, for the power of lights; vertex colours count as white.
     pub fn mean(&self) -> Vec3 {
         let mean = match &self.pattern {
             TexturePattern::White => Vec4::ONE,
@@ -189,7 +189,7 @@ impl Texture {
 /// Whether a point lies in a square of the first colour of a checker.
 #[inline(always)]
 pub(crate) fn is_even_square<R: Elementary>([x, y]: [R; 2]) -> R::Mask {
-    // Parity of the sum without integers, which far planes would overflow.
+    // Parity of the sum without integers, which distant planes would overflow.
     let half = (x.floor() + y.floor()) * 0.5;
     (half - half.truncated()).is_zero()
 }
@@ -218,7 +218,7 @@ impl ImageTexture {
 impl Wrap {
     fn apply(self, i: i64, n: i64) -> i64 {
         match self {
-            // Most places lie within the picture, and a division is slow.
+            // Most lookups are inside of the image, and a division is slow.
             _ if (0..n).contains(&i) => i,
             Self::Repeat => i.rem_euclid(n),
             Self::Clamp => i.clamp(0, n - 1),

@@ -1,6 +1,6 @@
-//! Discrete choice in constant time.
+//! Sampling of discrete distributions in constant time.
 
-/// Picks index `i` with probability proportional to its weight (Walker 1977, Vose 1991).
+/// Samples index `i` with probability proportional to its weight (Walker 1977, Vose 1991).
 #[derive(Clone, Debug, Default)]
 pub struct AliasTable {
     bins: Vec<Bin>,
@@ -8,14 +8,14 @@ pub struct AliasTable {
 
 #[derive(Clone, Copy, Debug)]
 struct Bin {
-    /// Below it the bin's own index is taken, from it on the alias.
+    /// Below it the bin's own index is selected, above it the alias.
     threshold: f32,
     alias: u32,
     pmf: f32,
 }
 
 impl AliasTable {
-    /// Weights are finite and not negative. If all are zero, every index is equally likely.
+    /// Creates a table for finite, non-negative weights. If all are zero, every index is equally likely.
     pub fn new(weights: &[f64]) -> Self {
         let n = weights.len();
         debug_assert!(weights.iter().all(|w| w.is_finite() && *w >= 0.0));
@@ -35,7 +35,7 @@ impl AliasTable {
                 small.push(l);
             }
         }
-        // What is left over differs from 1 by rounding alone; but a weight of zero must never be picked.
+        // The remaining bins differ from 1 by rounding only; but a weight of zero must never be selected.
         for i in small {
             if pmf[i] == 0.0
                 && let Some(other) = pmf.iter().position(|&p| p > 0.0)
@@ -47,7 +47,7 @@ impl AliasTable {
         Self { bins }
     }
 
-    /// Index, its probability, and a fresh number in `[0, 1)` made of what the choice left of `u`.
+    /// Samples an index; returns it, its probability, and `u` rescaled to `[0, 1)`.
     #[inline]
     pub fn sample(&self, u: f32) -> (u32, f32, f32) {
         let n = self.bins.len();
@@ -69,12 +69,12 @@ impl AliasTable {
         self.bins[index as usize].pmf
     }
 
-    /// Number of indices to choose from.
+    /// Number of indices.
     pub fn len(&self) -> usize {
         self.bins.len()
     }
 
-    /// Whether there is nothing to choose from.
+    /// Whether there are no indices.
     pub fn is_empty(&self) -> bool {
         self.bins.is_empty()
     }
@@ -98,7 +98,7 @@ mod tests {
             assert!((0.0..1.0).contains(&fresh));
         }
         for (i, &w) in weights.iter().enumerate() {
-            // Evenly spaced u: off by rounding at bin borders only.
+            // Uniformly spaced u: deviates by rounding at bin borders only.
             let expected = w / sum * f64::from(n);
             assert!((f64::from(counts[i]) - expected).abs() < 4.0, "index {i}: {} for {expected}", counts[i]);
         }

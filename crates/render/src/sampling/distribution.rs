@@ -1,20 +1,20 @@
-//! Points in the unit square with the density of a picture.
+//! Sampling of the unit square in proportion to an image.
 
 use glam::Vec2;
 
-/// A piecewise constant density over the unit square, sampled by inversion so that even points stay even.
+/// A piecewise constant pdf over the unit square, sampled by inversion, which preserves stratification.
 #[derive(Clone, Debug)]
 pub struct PictureDistribution {
     width: usize,
     height: usize,
-    /// Running sums of the rows, normalised: row y holds `width + 1` numbers from 0 to 1.
+    /// Cumulative sums of the rows, normalised: row y has `width + 1` numbers from 0 to 1.
     rows: Vec<f32>,
-    /// Running sum over the rows, normalised: `height + 1` numbers.
+    /// Cumulative sum over the rows, normalised: `height + 1` numbers.
     columns: Vec<f32>,
 }
 
 impl PictureDistribution {
-    /// `weights` row by row, finite and not negative. `None` when all are zero.
+    /// Creates a distribution from `weights` row by row, finite and not negative. `None` if all are zero.
     pub fn new(width: usize, height: usize, weights: &[f32]) -> Option<Self> {
         assert_eq!(weights.len(), width * height);
         let mut rows = Vec::with_capacity((width + 1) * height);
@@ -28,7 +28,7 @@ impl PictureDistribution {
         (total > 0.0).then_some(Self { width, height, rows, columns })
     }
 
-    /// A point and its density with respect to area on the unit square.
+    /// Samples a point; returns it with its pdf with respect to area on the unit square.
     #[inline]
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
         let (y, dy, py) = invert(&self.columns, u.y);
@@ -38,7 +38,7 @@ impl PictureDistribution {
         (point, px * py * (self.width * self.height) as f32)
     }
 
-    /// Density with respect to area on the unit square.
+    /// Pdf with respect to area on the unit square.
     #[inline]
     pub fn pdf(&self, point: Vec2) -> f32 {
         let x = ((point.x * self.width as f32) as usize).min(self.width - 1);
@@ -49,7 +49,7 @@ impl PictureDistribution {
     }
 }
 
-/// Appends 0 and the running sums scaled to end at 1 (even ones where all weights are zero); returns the sum.
+/// Appends 0 and the cumulative sums scaled to end at 1 (uniform steps if all weights are zero); returns the sum.
 fn push_cumulative(target: &mut Vec<f32>, weights: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
     let sum: f64 = weights.clone().sum();
     let n = weights.len() as f64;
@@ -59,14 +59,14 @@ fn push_cumulative(target: &mut Vec<f32>, weights: impl ExactSizeIterator<Item =
         running += weight;
         target.push(if sum > 0.0 { (running / sum) as f32 } else { ((i + 1) as f64 / n) as f32 });
     }
-    // Rounding must not leave a gap at the end, and a last weight of zero must keep its zero width.
+    // Rounding must not leave a gap at the end, and last weights of zero must keep zero width.
     let last = *target.last().expect("just pushed");
     let start = target.len() - (n as usize + 1);
     target[start..].iter_mut().rev().take_while(|x| **x == last).for_each(|x| *x = 1.0);
     sum
 }
 
-/// The interval that holds `u`, where in it, and its width.
+/// Returns the index of the interval that contains `u`, the position in it, and its width.
 #[inline]
 fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
     let after = cumulative.partition_point(|&c| c <= u).clamp(1, cumulative.len() - 1);

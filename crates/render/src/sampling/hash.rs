@@ -1,4 +1,4 @@
-//! Integer hashes: the only source of randomness; of one number or of sixteen.
+//! Integer hashes, the only source of randomness; for one number or sixteen.
 
 use firstlight_simd::Word;
 
@@ -16,7 +16,7 @@ pub fn hash_combine<W: Word>(seed: W, value: W) -> W {
     mix(seed, hash_u32(value ^ FLIP))
 }
 
-/// The same of one `value` for all.
+/// Like [`hash_combine`], with one `value` for all lanes.
 #[inline(always)]
 pub(super) fn hash_combine_all<W: Word>(seed: W, value: u32) -> W {
     mix(seed, seed.all(hash_u32(value ^ FLIP)))

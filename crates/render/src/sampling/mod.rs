@@ -1,4 +1,4 @@
-//! Numbers that fill a square evenly, and the maps from squares to discs, spheres and lights.
+//! Sample sequences, and maps from the unit square to discs, spheres and lights.
 //!
 //! Every number is a function of (seed, pixel, sample, dimension): [`Sampler`]. Knows no scene.
 
@@ -23,13 +23,13 @@ pub use warp::{
 
 use glam::{Vec2, Vec3};
 
-/// Uniform on the unit disc; keeps neighbours together (Shirley and Chiu 1997).
+/// Samples the unit disc uniformly; preserves stratification (Shirley and Chiu 1997).
 #[inline]
 pub fn uniform_disc(u: Vec2) -> Vec2 {
     warp::uniform_disc(u.to_array()).into()
 }
 
-/// Cosine-weighted on the hemisphere around +z; density [`cosine_hemisphere_pdf`].
+/// Samples the hemisphere about +z by cosine; pdf [`cosine_hemisphere_pdf`].
 #[inline]
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
     warp::cosine_hemisphere(u.to_array()).into()

@@ -1,30 +1,30 @@
 //! Owen-scrambled Sobol' points, padded two dimensions at a time.
 //!
 //! Each pair of dimensions is the two-dimensional Sobol' sequence, its points scrambled and its order shuffled by
-//! hashes of (seed, pixel, pair). Any power-of-two run of samples of one pair is a scrambled (0, 2)-net, and the
-//! pairs are independent of each other: Burley 2020, "Practical Hash-based Owen Scrambling", with the better mixing
-//! constants of Vegdahl 2021. The second Sobol' coordinate is computed without a table (Ahmed 2024).
-//! The first point is kept: without it the sequence is no net (Owen 2020, "On dropping the first Sobol' point").
+//! hashes of (seed, pixel, pair). Any aligned power-of-two run of samples of one pair is a scrambled (0, 2)-net, and
+//! the pairs are independent of each other: Burley 2020, "Practical Hash-based Owen Scrambling", with the better mixing
+//! constants of Vegdahl 2021. The second Sobol' coordinate is computed without a table (Ahmed 2024). The first point is
+//! kept: without it the sequence is no net (Owen 2020, "On dropping the first Sobol' point").
 //!
-//! The first dimensions of pixels are spread over the screen as well: there all pixels share one scrambled sequence, each
-//! with a digital shift of its own, and the shifts are a scrambled sequence along a Z-order curve. So each pixel has the
-//! same points as ever, a scrambled net, but any sample of an aligned block of 2ᵏ × 2ᵏ pixels (up to 64 × 64) is a net too, and what is
-//! left of noise is fine-grained (the idea is that of Ahmed and Wonka 2020, "Screen-Space Blue-Noise Diffusion", made
-//! progressive: the number of samples need not be known).
+//! The first dimensions of pixels are also stratified over the screen: all pixels of a block share one scrambled
+//! sequence, each with its own digital shift, and the shifts are a scrambled sequence along a Z-order curve. So each
+//! pixel still has a scrambled net, and any sample of an aligned block of 2ᵏ × 2ᵏ pixels (up to 64 × 64) is a net too,
+//! which makes the remaining noise fine-grained (the idea is that of Ahmed and Wonka 2020, "Screen-Space Blue-Noise
+//! Diffusion", made progressive: the number of samples need not be known).
 
 use super::hash::{hash_combine, hash_combine_all, hash_u32};
 use firstlight_simd::{Bits, Float, Simd, Truth, Word};
 use glam::Vec2;
 use std::sync::LazyLock;
 
-/// The random numbers of one sample of one pixel, or of sixteen, bit for bit the same; see [`Sampler`].
+/// The random numbers of one sample of one pixel, or of sixteen, with the same bits; see [`Sampler`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SamplerOf<W> {
     /// Hash of seed and pixel.
     pub(crate) stream: W,
     /// Bits of the sample number, lowest first.
     pub(crate) reversed_index: W,
-    /// See [`screen_place`]; 0 for what is not a pixel. Either all lanes are pixels or none is.
+    /// See [`screen_place`]; 0 for sequences that do not belong to pixels. Either all lanes belong to pixels or none.
     pub(crate) screen: W,
 }
 
@@ -34,41 +34,41 @@ pub type Sampler = SamplerOf<u32>;
 /// The random numbers of sixteen samples.
 pub(crate) type SamplerLanes<S> = SamplerOf<Bits<S>>;
 
-/// How many dimensions of a pixel's samples are spread over the screen: the camera's and those of the first vertex of a
-/// path, whose noise is what the camera sees first.
+/// Number of dimensions that are stratified over the screen: those of the camera and of the first vertex of a path,
+/// whose noise is directly visible.
 pub(super) const SCREEN_DIMENSIONS: u32 = 7;
 
 impl Sampler {
-    /// Of one of a family of sequences that know nothing of each other.
+    /// Creates a sampler of one of a family of independent sequences.
     #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self::of_family(seed, [x, y], sample)
     }
 
-    /// Of a pixel: its samples are spread evenly together with those of the pixels around.
+    /// Creates a sampler of a pixel: its samples are stratified together with those of neighbouring pixels.
     #[inline]
     pub fn of_pixel(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self::of_pixels(seed, [x, y], sample)
     }
 
-    /// Numbers that owe nothing to the other samples of the pixel: plain random sampling, to compare with.
+    /// Creates a sampler of independent random numbers, for comparison.
     pub fn independent(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self::all_independent(seed, [x, y], sample)
     }
 
-    /// What it consists of, see [`Self::from_parts`].
+    /// Its components, see [`Self::from_parts`].
     #[inline]
     pub(crate) fn parts(&self) -> [u32; 3] {
         [self.stream, self.reversed_index, self.screen]
     }
 
-    /// The sampler that [`Self::parts`] were taken from.
+    /// Creates a sampler from [`Self::parts`].
     #[inline]
     pub(crate) fn from_parts([stream, reversed_index, screen]: [u32; 3]) -> Self {
         Self { stream, reversed_index, screen }
     }
 
-    /// Two numbers in `[0, 1)`, well spread together over the samples of a pixel.
+    /// Two numbers in `[0, 1)`, stratified together over the samples of a pixel.
     #[inline]
     pub fn pair(&self, dimension: u32) -> Vec2 {
         self.two(dimension).into()
@@ -116,7 +116,7 @@ impl<W: Word> SamplerOf<W> {
         [to_unit(x.reversed()), to_unit(y.reversed())]
     }
 
-    /// One number in `[0, 1)`, well spread over the samples of a pixel.
+    /// One number in `[0, 1)`, stratified over the samples of a pixel.
     #[inline(always)]
     pub fn single(&self, dimension: u32) -> W::Real {
         let x = if self.is_on_screen(dimension) {
@@ -133,7 +133,7 @@ impl<W: Word> SamplerOf<W> {
         dimension < SCREEN_DIMENSIONS && (!self.screen.equals(0)).any()
     }
 
-    /// What the pixels of a block share, in the dimensions where they share something.
+    /// Seed that the pixels of a block share, in the dimensions that are stratified over the screen.
     #[inline(always)]
     fn screen_seed(&self, dimension: u32) -> W {
         hash_combine_all(self.screen.shift_right(2 * LOG_BLOCK), dimension)
@@ -146,8 +146,8 @@ impl<W: Word> SamplerOf<W> {
     }
 }
 
-/// Place of a pixel along a Z-order curve through its block in the lowest bits, above them a hash of seed and block that is
-/// not 0.
+/// Returns the index of a pixel along a Z-order curve through its block in the lowest bits, and above them a hash of
+/// seed and block that is not 0.
 #[inline(always)]
 fn screen_place<W: Word>(seed: u32, [x, y]: [W; 2]) -> W {
     let first = x.all(hash_u32(seed));
@@ -156,21 +156,21 @@ fn screen_place<W: Word>(seed: u32, [x, y]: [W; 2]) -> W {
     (block | BLOCK_PIXELS) & !(BLOCK_PIXELS - 1) | z
 }
 
-/// Pixels in a row of a block, as a power of two: small enough for [`SHIFTS`] to stay in a cache.
+/// Logarithm to base 2 of the side of a block in pixels: small enough for [`SHIFTS`] to stay in a cache.
 const LOG_BLOCK: u32 = 6;
 const BLOCK_PIXELS: u32 = 1 << (2 * LOG_BLOCK);
-/// What of a coordinate tells where in its block a pixel is.
+/// Mask of the bits of a coordinate inside of a block.
 const LOW: u32 = (1 << LOG_BLOCK) - 1;
 
-/// The first and second coordinates of the shifts of all pixels of a block, dimension by dimension, along the curve; their
-/// bits are in reverse.
+/// First and second coordinates of the shifts of all pixels of a block, dimension by dimension, along the curve, with
+/// reversed bits.
 static SHIFTS: LazyLock<[Vec<u32>; 2]> = LazyLock::new(|| {
     let places = (0..SCREEN_DIMENSIONS).flat_map(|dimension| (0..BLOCK_PIXELS).map(move |z| (dimension, z)));
     let (x, y) = places.map(|(dimension, z)| sobol_pair(z.reverse_bits(), hash_u32(dimension)).into()).unzip();
     [x, y]
 });
 
-/// The lower eight bits, a zero above each.
+/// Spreads the lower eight bits, with a zero above each.
 #[inline(always)]
 fn spread_bits<W: Word>(x: W) -> W {
     let x = (x | x.shift_left(4)) & 0x0f0f;
@@ -178,7 +178,7 @@ fn spread_bits<W: Word>(x: W) -> W {
     (x | x.shift_left(1)) & 0x5555
 }
 
-/// A point of the scrambled sequence, the bits of its coordinates lowest first.
+/// Returns a point of the scrambled sequence, the bits of its coordinates lowest first.
 #[inline(always)]
 fn sobol_pair<W: Word>(reversed_index: W, seed: W) -> [W; 2] {
     let index = scramble(reversed_index, seed).reversed();
@@ -186,16 +186,16 @@ fn sobol_pair<W: Word>(reversed_index: W, seed: W) -> [W; 2] {
     [x, scramble(sobol_second_reversed(index), hash_u32(seed ^ 0x02e5_be93))]
 }
 
-/// The same for one dimension. Shuffling the order of a scrambled van der Corput sequence is what keeps it independent
-/// of other dimensions.
+/// Like [`sobol_pair`], for one dimension. Shuffling the order of a scrambled van der Corput sequence makes it
+/// independent of other dimensions.
 #[inline(always)]
 fn van_der_corput<W: Word>(reversed_index: W, seed: W) -> W {
     let index = scramble(reversed_index, seed).reversed();
     scramble(index, hash_u32(seed ^ 0x68bc_21eb))
 }
 
-/// The second Sobol' coordinate of point `index`, lowest bit first: bit i is the xor of the bits j of the index with
-/// i ⊆ j, because the generator matrix is Pascal's triangle modulo 2.
+/// Returns the second Sobol' coordinate of point `index`, lowest bit first: bit i is the xor of the bits j of the index
+/// with i ⊆ j, because the generator matrix is Pascal's triangle modulo 2.
 #[inline(always)]
 fn sobol_second_reversed<W: Word>(index: W) -> W {
     let v = index ^ index.shift_right(16);
@@ -205,7 +205,7 @@ fn sobol_second_reversed<W: Word>(index: W) -> W {
     v ^ (v & 0xaaaa_aaaa).shift_right(1)
 }
 
-/// Owen scrambling of a number whose bits come lowest first: each bit is flipped by a hash of the bits below it.
+/// Owen scrambling of a number with the lowest bit first: each bit is flipped by a hash of the bits below it.
 #[inline(always)]
 fn scramble<W: Word>(reversed: W, seed: W) -> W {
     let x = (reversed ^ reversed.times_all(0x3d20_adea)).plus(seed);
@@ -214,7 +214,7 @@ fn scramble<W: Word>(reversed: W, seed: W) -> W {
     x ^ x.times_all(0x53a2_2864)
 }
 
-/// The upper 24 bits as a number in `[0, 1)`, exactly.
+/// Converts the upper 24 bits to a number in `[0, 1)`, exactly.
 #[inline(always)]
 fn to_unit<W: Word>(bits: W) -> W::Real {
     bits.shift_right(8).to_real() * (1.0 / 16_777_216.0)
@@ -226,7 +226,7 @@ mod tests {
     use crate::test_statistics::ChiSquared;
     use firstlight_simd::{InstructionSet, LANES, dispatch};
 
-    /// The definition by direction numbers (primitive polynomial x + 1), which the bit trick must reproduce.
+    /// The definition by direction numbers (primitive polynomial x + 1), to which the bit operations must be equal.
     fn sobol_second_by_directions(index: u32) -> u32 {
         let mut direction = 1u32 << 31;
         let mut y = 0;
@@ -295,7 +295,7 @@ mod tests {
                     let around = (0..side * side).map(|i| Sampler::of_pixel(9, x + i % side, y + i / side, sample));
                     let points: Vec<_> = around.clone().map(|sampler| sampler.pair(dimension)).collect();
                     let on_screen = dimension < SCREEN_DIMENSIONS;
-                    // Without the screen, four points would make a net by chance once in ten.
+                    // Without stratification over the screen, four points would be a net at random once in ten.
                     assert!(
                         is_net(&points) == on_screen || side == 2 && !on_screen,
                         "{side} at ({x}, {y}), {dimension}"
@@ -309,7 +309,7 @@ mod tests {
         }
     }
 
-    /// Neighbours must not share the fine digits of their points: their errors would be alike.
+    /// Neighbours must not share the low digits of their points: their errors would be correlated.
     #[test]
     fn errors_of_neighbours_are_independent_when_samples_have_come_in() {
         let f = |p: Vec2| f64::from((p.x - 0.31).abs() + (p.x * p.y + 0.2).sqrt());
@@ -324,14 +324,14 @@ mod tests {
                 (means[(y * side + x) as usize] - truth) * (means[((y + dy) * side + x + dx) as usize] - truth)
             });
             let correlation = products.sum::<f64>() / f64::from((side - dx) * (side - dy)) / variance;
-            // Noise that evens out nearby is welcome, noise in blotches is not.
+            // Negative correlation of neighbours is welcome, positive correlation is not.
             assert!((-0.25..0.1).contains(&correlation), "({dx}, {dy}): {correlation}");
         }
     }
 
     #[test]
     fn independent_samples_fill_the_square_evenly_and_know_nothing_of_each_other() {
-        // Pairs of one sample, and one coordinate in two samples that follow each other, in 16 × 16 cells.
+        // Pairs of one sample, and one coordinate of two consecutive samples, in 16 × 16 cells.
         let n = 1 << 16;
         let (mut within, mut between) = ([0.0; 256], [0.0; 256]);
         let cell = |x: f32, y: f32| (16.0 * x) as usize + 16 * (16.0 * y) as usize;

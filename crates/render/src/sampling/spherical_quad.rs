@@ -1,14 +1,14 @@
-//! Rectangles as seen from a point: their solid angle, and directions uniform in it; for one point or sixteen.
+//! Rectangles seen from a point: their solid angle, and uniform sampling of it; for one point or sixteen.
 
 use firstlight_simd::{Elementary, Real, Vector3, select};
 
-/// A rectangle seen from a reference point, ready to be sampled by solid angle.
+/// A rectangle seen from a reference point, prepared for sampling by solid angle.
 ///
 /// Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles". The solid
 /// angle comes from van Oosterom and Strackee 1983 instead: a sum of four angles less 2π cancels when it is small.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalQuad<R> {
-    /// Nearest and farthest corner in the frame of the rectangle, about the reference point; `z` is not positive.
+    /// First and opposite corner in the frame of the rectangle, relative to the reference point; `z` is not positive.
     x0: R,
     y0: R,
     z0: R,
@@ -18,7 +18,10 @@ pub struct SphericalQuad<R> {
 }
 
 impl<R: Elementary> SphericalQuad<R> {
-    /// - `corner`: the first one along the sides and the normal, about the reference point; on either side of the plane;
+    /// Prepares a rectangle.
+    ///
+    /// - `corner`: the first corner along the sides and the normal, relative to the reference point; on either side of
+    ///   the plane;
     /// - `lengths`: of the sides, metres; `area`: their product.
     #[inline(always)]
     pub fn new(corner: Vector3<R>, [length_u, length_v]: [R; 2], area: R) -> Self {
@@ -34,28 +37,29 @@ impl<R: Elementary> SphericalQuad<R> {
             Vector3 { x: ax, y: by, z },
         ];
         let length = [corner[0].length(), corner[1].length(), corner[2].length(), corner[3].length()];
-        // The triple product of both halves: exact up to rounding, however small the rectangle looks.
+        // The triple product of both halves: accurate to rounding, however small the rectangle appears.
         let triple = area * unit * unit * -z;
         let first = half(&corner, &length, [0, 1, 2]);
         let second = half(&corner, &length, [0, 2, 3]);
-        // Each half is twice the angle of (denominator, triple); the product of the two as complex numbers adds them.
+        // Each half is twice the angle of (denominator, triple); their product as complex numbers adds the angles.
         let solid_angle = (triple * (first + second)).atan2(first * second - triple * triple) * 2.0;
         Self { x0, y0, z0, x1, y1, solid_angle }
     }
 
-    /// Steradians.
+    /// Solid angle in steradians.
     #[inline(always)]
     pub fn solid_angle(&self) -> R {
         self.solid_angle
     }
 
-    /// Where on the rectangle, `[0, 1]²` along its sides, a direction uniform in solid angle meets it.
+    /// Samples a direction uniformly in solid angle; returns its intersection with the rectangle, `[0, 1]²` along its
+    /// sides.
     #[inline(always)]
     pub fn sample(&self, [u, v]: [R; 2]) -> [R; 2] {
         let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
         let one = x0.all(1.0);
-        // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle. Of
-        // each, the square of what it lacks to 1 is known without cancellation.
+        // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle. For
+        // each, 1 − height² is known without cancellation.
         let z2 = z0 * z0;
         let ((h0, r0), (b1, r1), (h3, r3)) = (height(z2, y0), height(z2, y1), height(z2, x0));
         let (b0, n3) = (-h0, -h3);
@@ -63,19 +67,19 @@ impl<R: Elementary> SphericalQuad<R> {
         let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
         let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
         let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
-        // The slice of the wanted area ends at the plane with angle u · area − sum (mod 2π).
+        // The slice of the required area ends at the plane with angle u · area − sum (mod 2π).
         let (sin_part, cos_part) = (u * solid_angle).sin_cos();
         let cos_au = cos_part * cos_sum + sin_part * sin_sum;
         let sin_au = sin_part * cos_sum - cos_part * sin_sum;
-        // cos · b0 − b1: all three may be near 1, and then only what each lacks to 1 tells them apart.
+        // cos · b0 − b1: all three may be near 1, and then only their differences to 1 distinguish them.
         let product = cos_au * b0;
         let (lack_0, lack_1) = (r0 / (b0.abs() + 1.0), r1 / (b1.abs() + 1.0));
         let lack_au = sin_au * sin_au / (cos_au.abs() + 1.0);
         let lacking = (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * one.copysign(b1);
         let difference = select((product * b1).is_positive(), lacking, product - b1);
         let fu = difference / sin_au;
-        // Where that plane meets the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not cancel. NaN becomes
-        // the lower end.
+        // Intersection of that plane with the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not
+        // cancel. NaN becomes the lower end.
         let xu = (-z0).copysign(fu) / (fu * fu - r0).at_least(f32::MIN_POSITIVE).sqrt();
         let xu = xu.max(x0).min(x1);
         let d2 = xu * xu + z2;
@@ -89,7 +93,7 @@ impl<R: Elementary> SphericalQuad<R> {
     }
 }
 
-/// Denominator of the solid angle of half the rectangle.
+/// Denominator of the solid angle of half of the rectangle.
 #[inline(always)]
 fn half<R: Real>(corner: &[Vector3<R>; 4], length: &[R; 4], [p, q, r]: [usize; 3]) -> R {
     let (a, b, c) = (corner[p], corner[q], corner[r]);
@@ -97,7 +101,7 @@ fn half<R: Real>(corner: &[Vector3<R>; 4], length: &[R; 4], [p, q, r]: [usize; 3
     la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
 }
 
-/// Height of an edge plane's normal, and the square of what it lacks to 1.
+/// Height of an edge plane's normal, and 1 − height².
 #[inline(always)]
 fn height<R: Real>(z2: R, y: R) -> (R, R) {
     let h2 = z2 + y * y;
@@ -115,7 +119,7 @@ mod tests {
         SphericalQuad::new(corner.into(), [u.length(), v.length()], u.length() * v.length())
     }
 
-    /// Solid angle in f64 by adding up small pieces.
+    /// Solid angle in f64 by numerical integration.
     fn solid_angle_by_parts(corner: Vec3, u: Vec3, v: Vec3) -> f64 {
         let (corner, u, v) = (corner.as_dvec3(), u.as_dvec3(), v.as_dvec3());
         let n = 400;
@@ -169,7 +173,7 @@ mod tests {
         }
     }
 
-    /// The mean direction over the solid angle in f64: half the sum of edge angle times edge normal, over the angle.
+    /// Mean direction over the solid angle in f64: half the sum of edge angle times edge normal, over the angle.
     fn mean_direction(corner: Vec3, u: Vec3, v: Vec3, solid_angle: f64) -> glam::DVec3 {
         let (corner, u, v) = (corner.as_dvec3(), u.as_dvec3(), v.as_dvec3());
         let corners = [corner, corner + u, corner + u + v, corner + v];

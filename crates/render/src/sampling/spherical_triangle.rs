@@ -1,25 +1,27 @@
-//! Triangles as seen from a point: their solid angle, and directions uniform in it; for one point or sixteen.
+//! Triangles seen from a point: their solid angle, and uniform sampling of it; for one point or sixteen.
 
 use firstlight_simd::{Elementary, Vector3, select, select_vector};
 
-/// A triangle seen from a reference point, ready to be sampled by solid angle.
+/// A triangle seen from a reference point, prepared for sampling by solid angle.
 ///
 /// Source: Arvo 1995, "Stratified Sampling of Spherical Triangles"; solid angle by van Oosterom and Strackee 1983.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalTriangle<R> {
-    /// Unit directions to the corners.
+    /// Unit directions to the vertices.
     corners: [Vector3<R>; 3],
     solid_angle: R,
 }
 
 impl<R: Elementary> SphericalTriangle<R> {
-    /// - `a`: the first corner, seen from the reference point; `e1`, `e2`: from there to the others. No corner lies in the
-    ///   point.
+    /// Prepares a triangle.
+    ///
+    /// - `a`: the first vertex, relative to the reference point; `e1`, `e2`: edges from there to the others. No vertex
+    ///   coincides with the reference point.
     #[inline(always)]
     pub fn new(a: Vector3<R>, e1: Vector3<R>, e2: Vector3<R>) -> Self {
         let (b, c) = (a + e1, a + e2);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
-        // By the edges: the product of the directions themselves would cancel.
+        // Computed from the edges: the product of the directions would cancel.
         let triple = a.dot(e1.cross(e2)).abs();
         let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         let one = la.all(1.0);
@@ -27,24 +29,25 @@ impl<R: Elementary> SphericalTriangle<R> {
         Self { corners, solid_angle: triple.atan2(denominator) * 2.0 }
     }
 
-    /// Steradians.
+    /// Solid angle in steradians.
     #[inline(always)]
     pub fn solid_angle(&self) -> R {
         self.solid_angle
     }
 
-    /// A unit direction uniform in the triangle, and whether there is one: not where the triangle looks like a line.
+    /// Samples a unit direction uniformly in the triangle, and returns whether there is one: not if the triangle
+    /// appears as a line.
     #[inline(always)]
     pub fn sample(&self, [u, v]: [R; 2]) -> (Vector3<R>, R::Mask) {
         let [a, b, c] = self.corners;
         let (one, zero) = (u.all(1.0), u.all(0.0));
         let (n_ab, n_ca) = (a.cross(b), a.cross(c));
         let (l_ab, l_ca) = (n_ab.length(), n_ca.length());
-        // The angle α at `a`, between the two edges that meet there.
+        // The angle α at `a`, between its two edges.
         let (n_ab, n_ca) = (n_ab * (one / l_ab), n_ca * (one / l_ca));
         let (cos_alpha, sin_alpha) = (n_ab.dot(n_ca), n_ab.cross(n_ca).length());
-        // The smaller triangle that keeps corner `a` and has the share u of the area: its angles sum to β' + γ' =
-        // share − α + π. Sine and cosine of (area + π − α) − π, signs folded in.
+        // The smaller triangle with vertex `a` and the share u of the area: its angles sum to β' + γ' = share − α + π.
+        // Sine and cosine of (area + π − α) − π, with the signs included.
         let (sin, cos) = (u * self.solid_angle).sin_cos();
         let (sin_phi, cos_phi) = (sin * cos_alpha - cos * sin_alpha, cos * cos_alpha + sin * sin_alpha);
         let k1 = cos_phi - cos_alpha;

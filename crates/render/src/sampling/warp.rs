@@ -1,14 +1,15 @@
-//! Maps from the unit square to discs, hemispheres, cones and triangles, with their densities; for one point or sixteen.
+//! Maps from the unit square to discs, hemispheres, cones and triangles, with their pdfs; for one point or sixteen.
 
 use firstlight_simd::{Real, Vector3, select, sin_cos_eighth};
 use glam::Vec2;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-/// Uniform on the unit disc; keeps neighbours together (Shirley and Chiu 1997).
+/// Samples the unit disc uniformly; preserves stratification (Shirley and Chiu 1997).
 #[inline(always)]
 pub(crate) fn uniform_disc<R: Real>([u, v]: [R; 2]) -> [R; 2] {
     let (x, y) = (u * 2.0 - 1.0, v * 2.0 - 1.0);
-    // The longer coordinate is the radius, the quotient of the two an eighth of a turn at most to either side.
+    // The longer coordinate is the radius; the quotient of the two gives an angle of at most an eighth of a turn to
+    // either side.
     let across = y.abs().lt(x.abs());
     let (r, short) = (select(across, x, y), select(across, y, x));
     let divisor = select(r.is_zero(), r.all(1.0), r);
@@ -17,7 +18,8 @@ pub(crate) fn uniform_disc<R: Real>([u, v]: [R; 2]) -> [R; 2] {
     [select(across, long, short), select(across, short, long)]
 }
 
-/// Uniform on the regular polygon with `blades` corners on the unit circle, the first at angle `rotation`.
+/// Samples the regular polygon with `blades` corners on the unit circle uniformly, the first corner at angle
+/// `rotation`, radians.
 #[inline]
 pub fn polygon_disc(u: Vec2, blades: u32, rotation: f32) -> Vec2 {
     debug_assert!(blades >= 3, "{blades} blades enclose nothing");
@@ -28,46 +30,47 @@ pub fn polygon_disc(u: Vec2, blades: u32, rotation: f32) -> Vec2 {
     a * corner(blade) + b * corner(blade + 1.0)
 }
 
-/// Cosine-weighted on the hemisphere around +z; density [`cosine_hemisphere_pdf`].
+/// Samples the hemisphere about +z by cosine; pdf [`cosine_hemisphere_pdf`].
 #[inline(always)]
 pub(crate) fn cosine_hemisphere<R: Real>(u: [R; 2]) -> Vector3<R> {
     let [x, y] = uniform_disc(u);
-    // Rounding may put the point just outside the circle.
+    // Rounding may put the point just outside of the circle.
     let z = (x.all(1.0) - (x * x + y * y)).at_least(0.0).sqrt();
     Vector3 { x, y, z }
 }
 
-/// Per steradian; 0 below the horizon.
+/// Pdf per steradian; 0 below the horizon.
 #[inline(always)]
 pub fn cosine_hemisphere_pdf<R: Real>(cos_theta: R) -> R {
     cos_theta.at_least(0.0) * FRAC_1_PI
 }
 
-/// 1 − cos θ for θ in `[0, π/2]` from sin²θ, exact for small cones where 1 − √(1 − sin²θ) would cancel.
+/// Returns 1 − cos θ for θ in `[0, π/2]` from sin²θ, accurate for small cones where 1 − √(1 − sin²θ) would cancel.
 #[inline(always)]
 pub fn one_minus_cos_from_sin2<R: Real>(sin2: R) -> R {
     sin2 / ((sin2.all(1.0) - sin2).at_least(0.0).sqrt() + 1.0)
 }
 
-/// Uniform in the cone around +z with half angle θ, given as 1 − cos θ; density [`cone_pdf`].
+/// Samples the cone about +z with half angle θ, given as 1 − cos θ, uniformly; pdf [`cone_pdf`].
 ///
-/// Returns the direction and 1 − cos of its own angle, which the caller may need without cancellation.
+/// Returns the direction and 1 − cos of its own angle, without cancellation.
 #[inline(always)]
 pub fn uniform_cone<R: Real>(u: [R; 2], one_minus_cos_max: R) -> (Vector3<R>, R) {
     let [x, y] = uniform_disc(u);
-    // The radius on the disc squared is uniform, and so is 1 − cos on the cap.
+    // The squared radius on the disc is uniform, and so is 1 − cos on the cap.
     let one_minus_cos = (x * x + y * y).at_most(1.0) * one_minus_cos_max;
     let sin_over_r = (one_minus_cos_max * (-one_minus_cos + 2.0)).at_least(0.0).sqrt();
     (Vector3 { x: x * sin_over_r, y: y * sin_over_r, z: -one_minus_cos + 1.0 }, one_minus_cos)
 }
 
-/// Per steradian.
+/// Pdf per steradian.
 #[inline(always)]
 pub fn cone_pdf<R: Real>(one_minus_cos_max: R) -> R {
     one_minus_cos_max.all(1.0) / (one_minus_cos_max * TAU)
 }
 
-/// Barycentric weights of the first two corners of a uniform point in a triangle (Heitz 2019, low distortion).
+/// Samples a triangle uniformly; returns the barycentric weights of the first two vertices (Heitz 2019, low
+/// distortion).
 #[inline(always)]
 pub fn uniform_triangle<R: Real>([u, v]: [R; 2]) -> [R; 2] {
     let halves = [u * 0.5, v * 0.5];
@@ -165,7 +168,7 @@ mod tests {
                 let ring = (one_minus_cos / one_minus_cos_max * 8.0).min(7.0) as usize;
                 let sector = ((d.truncate().to_angle() + PI) / TAU * 16.0).min(15.0) as usize;
                 counts[ring * 16 + sector] += 1;
-                // The angle in the plane must say the same as 1 − cos: this fails when either cancels.
+                // The angle in the plane must agree with 1 − cos: this fails if either cancels.
                 let sin2 = d.truncate().length_squared();
                 let from_sin = one_minus_cos_from_sin2(sin2);
                 assert!((from_sin - one_minus_cos).abs() <= 2e-3 * one_minus_cos_max, "{from_sin} {one_minus_cos}");

@@ -53,7 +53,6 @@ impl LightSelection {
     ///
     /// A few lights are selected by `u`, which is rescaled to a uniform number again: so the points on each light stay
     /// stratified.
-    /// as evenly as the choices.
     #[inline]
     pub fn sample(
         &self,

@@ -271,7 +271,6 @@ pub(crate) const CLOSE: f32 = 2.0;
 ///
 /// Directly above the surface all visible points lie within an angle at the centre that `f32` cannot resolve, so the
 /// vector to the surface is computed instead, with its length from the power of the point, which does not cancel.
-/// the surface is what is computed, and its length from the power of the point, which does not cancel.
 #[cold]
 fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one_minus_cos_max: f32) -> LightPoint {
     let (to_center, dir, r) = (center.as_dvec3() - position.as_dvec3(), wi.as_dvec3().normalize(), f64::from(radius));
