@@ -1,9 +1,9 @@
-//! A value that nothing is made from.
+//! Values out of range and inconsistent values.
 
 use std::fmt;
 use thiserror::Error;
 
-/// A value that nothing is made from: which field, what it is, and what is allowed.
+/// An invalid value: which field, its value, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum BadValue {
     /// A field has a value outside of its range.
@@ -13,10 +13,10 @@ pub enum BadValue {
         field: &'static str,
         /// Its value, as text.
         value: String,
-        /// What it must be instead, as the end of a sentence that begins with "must".
+        /// What is allowed, as the end of a sentence that begins with "must".
         allowed: String,
     },
-    /// Values that do not go together.
+    /// Values that are inconsistent with each other.
     #[error("{problem}")]
     Unfit {
         /// Name of the field, as in a scene file; `camera` for the camera as a whole.
@@ -35,7 +35,7 @@ impl BadValue {
         Self::Unfit { field, problem: problem.into() }
     }
 
-    /// As scene files call it; `camera` where the camera as a whole says too little.
+    /// Name of the field, as in a scene file; `camera` if the camera as a whole is incomplete or contradictory.
     pub fn field(&self) -> &'static str {
         match self {
             Self::OutOfRange { field, .. } | Self::Unfit { field, .. } => field,

@@ -1,5 +1,5 @@
-//! What cameras, films and settings may be. Each limit stands here once, and every way in passes it: scene files, the
-//! notes of pictures and films, recordings, settings, the command line, and whoever uses the library.
+//! Limits of cameras, films and settings. Each limit is defined once, here, and checked for every source of values:
+//! scene files, the metadata of images and films, recordings, settings, the command line, and the library interface.
 //!
 //! Start reading at [`CameraPart::components`], [`FilmSize::try_new`] and [`BadValue`].
 
@@ -12,26 +12,26 @@ use super::view::{Lens, Projection, View, unit_direction};
 use crate::render::{Film, RenderSettings};
 use glam::{DVec3, Vec3};
 
-/// Degrees. Below this, all rays of a picture are one and the same in `f32`.
+/// Degrees. Below this, all camera rays of an image are equal in `f32`.
 pub const LEAST_VFOV_DEG: f64 = 1e-6;
 
-/// By how much the length of an axis, or the cosine between two, may be off: whatever moves a camera keeps them to rounding.
+/// Tolerance for the length of an axis and for the cosine between two axes. Camera moves are exact to rounding.
 const AXIS_SLACK: f64 = 1e-3;
 
-/// Metres. `f32` knows a point further from the axis no better than to 6 cm, and where such rays pass is less certain still:
-/// they have to be tested against all of a mesh.
+/// Metres. At this distance from the axis, `f32` resolves 6 cm, and the error of such rays is larger still: they would
+/// have to be tested against whole meshes.
 const MOST_LENS_RADIUS: f64 = 1e6;
 
-/// Stops of exposure, up or down. Beyond this, everything is black or white.
+/// Stops of exposure, up or down. Beyond this, every image is black or white.
 pub const MOST_STOPS: f32 = 64.0;
 
-/// A number for a message: neither three hundred digits nor a NaN without a name.
+/// A number for a message: very large and very small ones in scientific notation.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
-/// Three numbers for a message.
+/// A vector for a message.
 pub(crate) fn triple(DVec3 { x, y, z }: DVec3) -> String {
     format!("({}, {}, {})", number(x), number(y), number(z))
 }
@@ -44,12 +44,12 @@ pub(crate) fn is_size(size: f64) -> bool {
     (SceneFile::MIN_SIZE..=SceneFile::MAX_COORDINATE).contains(&size)
 }
 
-/// What a point must be.
+/// The rule for points, as the end of a sentence that begins with "must".
 pub(crate) fn coordinate_rule() -> String {
     format!("be finite and within {:e} m of the origin", SceneFile::MAX_COORDINATE)
 }
 
-/// What a size must be.
+/// The rule for sizes, as the end of a sentence that begins with "must".
 pub(crate) fn size_rule() -> String {
     format!("lie between {:e} and {:e} m", SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE)
 }
@@ -63,7 +63,7 @@ fn check_size(field: &'static str, size: f64) -> Result<(), BadValue> {
     if is_size(size) { Ok(()) } else { Err(BadValue::out_of_range(field, number(size), size_rule())) }
 }
 
-/// Light or absorption.
+/// Checks a radiance, intensity, irradiance or absorption: finite and not negative.
 pub(crate) fn check_light(field: &'static str, light: Vec3) -> Result<(), BadValue> {
     if light.is_finite() && light.cmpge(Vec3::ZERO).all() {
         return Ok(());
@@ -72,7 +72,7 @@ pub(crate) fn check_light(field: &'static str, light: Vec3) -> Result<(), BadVal
     Err(BadValue::out_of_range(field, format!("({x}, {y}, {z})"), "be finite and not negative"))
 }
 
-/// The radius of a point light; metres.
+/// Checks the radius of a point light; metres.
 pub(crate) fn check_light_radius(radius: f64) -> Result<(), BadValue> {
     if radius == 0.0 || is_size(radius) {
         return Ok(());
@@ -80,7 +80,7 @@ pub(crate) fn check_light_radius(radius: f64) -> Result<(), BadValue> {
     Err(BadValue::out_of_range("radius", number(radius), format!("be 0 or {}", size_rule())))
 }
 
-/// The cone of a spot light; degrees from its axis.
+/// Checks the cone of a spot light; degrees from its axis.
 pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue> {
     if !(outer_deg > 0.0 && outer_deg <= 90.0) {
         return Err(BadValue::out_of_range("outer_angle", number(outer_deg), "lie above 0 and at most at 90 degrees"));
@@ -92,7 +92,7 @@ pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue>
     Ok(())
 }
 
-/// The unit vector along a direction of any finite length.
+/// The unit vector along `vector`, which may have any finite length but 0.
 fn check_direction(field: &'static str, vector: DVec3) -> Result<DVec3, BadValue> {
     let unit = unit_direction(vector);
     unit.ok_or_else(|| BadValue::out_of_range(field, triple(vector), "be finite and have a length"))
@@ -109,10 +109,10 @@ fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
 }
 
 impl CameraPart {
-    /// The components that this says.
+    /// The components that it describes.
     ///
     /// # Errors
-    /// All that is wrong with it, in the order of its fields.
+    /// All problems, in the order of its fields.
     pub fn components(&self) -> Result<(View, Projection, Lens), Vec<BadValue>> {
         let mut problems = Vec::new();
         let mut note = |result: Result<(), BadValue>| problems.extend(result.err());
@@ -217,7 +217,7 @@ fn check_focus(distance: f64) -> Result<(), BadValue> {
 
 impl View {
     /// # Errors
-    /// When no picture can be taken from here.
+    /// If a coordinate is out of range, or the axes are not of unit length and perpendicular.
     pub fn check(&self) -> Result<(), BadValue> {
         check_point("eye", self.eye)?;
         for (field, axis) in [("forward", self.forward), ("up", self.up)] {
@@ -235,7 +235,7 @@ impl View {
 
 impl Projection {
     /// # Errors
-    /// When there is no flat picture of this field of view or height.
+    /// If the field of view or the height is out of range.
     pub fn check(&self) -> Result<(), BadValue> {
         if (LEAST_VFOV_DEG..180.0).contains(&self.vfov_deg) {
             return self.orthographic_height.map_or(Ok(()), check_height);
@@ -247,7 +247,7 @@ impl Projection {
 
 impl Lens {
     /// # Errors
-    /// When there is no such lens.
+    /// If a value is out of range.
     pub fn check(&self) -> Result<(), BadValue> {
         check_lens_radius("lens_radius", self.radius)?;
         check_focus(self.focus_distance)?;
@@ -257,16 +257,16 @@ impl Lens {
 
 impl DisplayPart {
     /// # Errors
-    /// When nothing would be seen.
+    /// If the exposure is out of range.
     pub fn check(&self) -> Result<(), BadValue> {
         check_stops(self.exposure)
     }
 }
 
-/// Whether there is such an exposure, factors of two.
+/// Checks an exposure; stops (factors of two).
 ///
 /// # Errors
-/// When it is out of range.
+/// If it is out of range.
 pub fn check_stops(stops: f32) -> Result<(), BadValue> {
     if stops.abs() <= MOST_STOPS {
         return Ok(());
@@ -275,10 +275,10 @@ pub fn check_stops(stops: f32) -> Result<(), BadValue> {
     Err(BadValue::out_of_range("exposure", stops, rule))
 }
 
-/// Whether there are such paths, segments; `None` is without a limit.
+/// Checks the maximum length of paths, in segments; `None`: unlimited.
 ///
 /// # Errors
-/// When it is 0.
+/// If it is 0.
 pub fn check_max_depth(max_depth: Option<u32>) -> Result<(), BadValue> {
     let settings = RenderSettings { max_depth: max_depth.unwrap_or(u32::MAX), ..RenderSettings::default() };
     settings.check().map_err(|error| BadValue::unfit("max_depth", error.to_string()))
@@ -286,7 +286,7 @@ pub fn check_max_depth(max_depth: Option<u32>) -> Result<(), BadValue> {
 
 impl FilmSize {
     /// # Errors
-    /// When it has no pixels, or more than a film may have.
+    /// If it has no pixels, or more than a film may have.
     pub fn try_new(width: u32, height: u32) -> Result<Self, BadValue> {
         let pixels = u64::from(width) * u64::from(height);
         if width == 0 || height == 0 {
@@ -306,10 +306,10 @@ impl FilmSize {
     }
 }
 
-/// Whether a film may have this size.
+/// Checks the size of a film; pixels.
 ///
 /// # Errors
-/// When it is out of range.
+/// If it is out of range.
 pub fn check_film_size(width: u32, height: u32) -> Result<(), BadValue> {
     FilmSize::try_new(width, height).map(drop)
 }
@@ -348,7 +348,7 @@ mod tests {
                 assert!(problems[0].to_string().contains("parallel") && problems[0].to_string().contains("1.5e-8"));
             }
         }
-        // Too far away, and nothing else.
+        // Too far away is the only problem.
         let far = CameraPart { look_at: Some(DVec3::NEG_Z * 1e300), ..good() };
         let problems = far.components().unwrap_err();
         assert!(problems.len() == 1 && problems[0].to_string().contains("(0, 0, -1e300), but must be finite"));

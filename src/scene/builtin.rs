@@ -1,6 +1,6 @@
-//! The scenes inside the program: plain scene files, embedded.
+//! The built-in scenes: ordinary scene files, embedded in the program.
 
-/// Name, what it shows, and the text of the scene file.
+/// Name, description, and text of the scene file.
 pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
     (
         "gallery",
@@ -51,7 +51,7 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// The scene file of a built-in scene.
+/// The text of a built-in scene; `None` if there is no such scene.
 pub fn builtin_text(name: &str) -> Option<&'static str> {
     BUILTIN_SCENES.iter().find(|(known, _, _)| *known == name).map(|(_, _, text)| *text)
 }

@@ -5,13 +5,13 @@ use super::units::lens_radius_of;
 use super::view::{Lens, Projection, View, unit_direction};
 use glam::DVec3;
 
-/// The camera that a scene file describes; [`CameraPart::components`] is the same with all checks.
+/// The camera that a scene file describes, unchecked; [`CameraPart::components`] also checks it.
 pub(super) fn camera(part: &CameraPart) -> (View, Projection, Lens) {
-    // Of a length that can be squared.
+    // Scaled so that its square neither overflows nor underflows.
     let wanted = if part.up.length_squared().is_normal() { part.up } else { along(part.up) };
     let level = |forward: DVec3| wanted.reject_from_normalized(forward).normalize();
     let view = match (part.forward, part.look_at) {
-        // A saved view comes back to the last bit: nothing is normalised that is unit and square already.
+        // A saved view is restored exactly: axes that are already orthonormal are not normalised again.
         (Some(forward), _) => {
             let forward = unit(forward);
             let square = is_unit(part.up) && forward.dot(part.up).abs() <= ROUNDING;
@@ -35,19 +35,19 @@ pub(super) fn camera(part: &CameraPart) -> (View, Projection, Lens) {
     (view, Projection { vfov_deg: part.vfov, orthographic_height: part.orthographic_height }, lens)
 }
 
-/// What rounding leaves of a length of 1 or a right angle.
+/// Tolerance for lengths of 1 and right angles.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 fn is_unit(vector: DVec3) -> bool {
     (vector.length_squared() - 1.0).abs() <= ROUNDING
 }
 
-/// Of length 1; one that is so already keeps its bits.
+/// The vector scaled to length 1; exactly itself if it already has that length.
 pub(super) fn unit(vector: DVec3) -> DVec3 {
     if is_unit(vector) { vector } else { along(vector) }
 }
 
-/// Of length 1; NaN for what has no direction, as `normalize` has it.
+/// The vector scaled to length 1; NaN if it has no direction, like `normalize`.
 fn along(vector: DVec3) -> DVec3 {
     unit_direction(vector).unwrap_or(DVec3::NAN)
 }

@@ -1,19 +1,19 @@
-//! What of a model is shown, where its file has more than one of it.
+//! Selection of the contents of a model file: camera, time and variant.
 
-/// Which camera, moment and variant of a glTF file to open, and what it may read.
+/// Which camera, time and material variant of a glTF file to open, and which files it may read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelChoice {
-    /// Name of the camera that is looked through; the first one when not given.
+    /// Name of the camera to use; `None`: the first one.
     pub camera: Option<String>,
-    /// Seconds into the animations; what the file stores when not given.
+    /// Time in the animations, seconds; `None`: the pose stored in the file.
     pub at: Option<f64>,
-    /// Name of the variant of materials; the usual materials when not given.
+    /// Name of the material variant; `None`: the default materials.
     pub variant: Option<String>,
-    /// A model may name files of this computer that are not in its folder or below.
+    /// Whether the model may refer to files outside of its folder.
     pub allow_outside: bool,
 }
 
 impl ModelChoice {
-    /// Nothing is chosen.
+    /// No selection.
     pub const DEFAULT: Self = Self { camera: None, at: None, variant: None, allow_outside: false };
 }

@@ -1,4 +1,4 @@
-//! What the entities of a scene are made of.
+//! The components of the entities of a scene.
 //!
 //! | entity | components |
 //! |---|---|
@@ -7,7 +7,7 @@
 //! | light | [`PointLight`], [`SpotLight`] or [`DirectionalLight`], [`Placement`] |
 //! | camera | [`View`](super::View), [`Projection`](super::Projection), [`Lens`](super::Lens) |
 //!
-//! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the picture follows.
+//! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the renderer follows.
 
 use super::placement::Placement;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -17,40 +17,40 @@ use bevy_ecs::prelude::{Component, Entity, Resource, World};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// The surface of an object, in its own space; its [`Placement`] says where that is.
+/// The surface of an object, in object space; its [`Placement`] positions it in the world.
 #[derive(Component, Clone, Debug)]
 #[require(Placement, MaterialSlots)]
 pub enum Shape {
-    /// About the origin; metres. Its placement must scale evenly.
+    /// Centred at the origin. Its placement must scale uniformly.
     Sphere {
-        /// Metres, positive.
+        /// Metres, above 0.
         radius: f64,
     },
-    /// Infinite, through the origin.
+    /// Infinite; contains the origin.
     Plane {
-        /// The direction of the front, any length but 0.
+        /// Normal of the front side; any length but 0.
         normal: DVec3,
     },
-    /// A parallelogram with a corner at the origin; its front looks along `edge_u` × `edge_v`.
+    /// A parallelogram with a corner at the origin; the normal of its front is `edge_u` × `edge_v`.
     Quad {
         /// From the corner to the one at `u = 1`, metres.
         edge_u: DVec3,
         /// From the corner to the one at `v = 1`, metres.
         edge_v: DVec3,
     },
-    /// A single triangle; its front is where its vertices run counter-clockwise.
+    /// A single triangle; its vertices are counter-clockwise as seen from the front.
     Triangle {
-        /// The corners, metres.
+        /// The vertices, metres.
         vertices: [DVec3; 3],
     },
-    /// Shared by all objects that use it, together with its tree.
+    /// A triangle mesh; objects with the same mesh share its kd-tree.
     Mesh(Arc<Mesh>),
-    /// Many spheres of one material. Its placement must scale evenly.
+    /// A group of spheres with one material. Its placement must scale uniformly.
     Spheres(Arc<Balls>),
 }
 
 impl Shape {
-    /// What people call it.
+    /// Name of the kind of shape, for the user interface.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sphere { .. } => "sphere",
@@ -64,7 +64,7 @@ impl Shape {
 }
 
 impl PartialEq for Shape {
-    /// Meshes and clouds are equal when they are the same one in memory.
+    /// Meshes and groups of spheres are equal if they are the same allocation.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Sphere { radius: a }, Self::Sphere { radius: b }) => a == b,
@@ -78,19 +78,20 @@ impl PartialEq for Shape {
     }
 }
 
-/// Many spheres, stored about their centre so that `f32` suffices.
+/// A group of spheres, stored relative to its centre so that `f32` suffices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Balls {
     /// Metres, relative to `center`.
     pub centers: Vec<Vec3>,
-    /// Metres, one a ball.
+    /// Metres, one per sphere.
     pub radii: Vec<f32>,
-    /// Metres: what is added to a centre to get its coordinates in the object's own space.
+    /// Metres: added to `centers`, it gives coordinates in object space.
     pub center: DVec3,
 }
 
 impl Balls {
-    /// One radius a centre.
+    /// - `centers`: object space, metres.
+    /// - `radii`: metres, one per centre.
     pub fn new(centers: &[DVec3], radii: impl IntoIterator<Item = f64>) -> Self {
         let (min, max) = centers
             .iter()
@@ -104,13 +105,13 @@ impl Balls {
     }
 }
 
-/// The material entities of an object, one a slot of its mesh; every other shape has one slot.
+/// The material entities of an object, one per slot of its mesh; all other shapes have one slot.
 ///
-/// A triangle whose slot is not listed uses the last one; with none at all it is plain grey.
+/// A triangle whose slot is not listed uses the last one; without any material it is grey.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
 pub struct MaterialSlots(pub Vec<Entity>);
 
-/// By entity, and by the texture itself.
+/// Parameters of materials in the world: parts by entity, textures by reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InWorld;
 
@@ -124,21 +125,21 @@ impl Params for InWorld {
 /// A material whose textures and parts are in the world.
 pub type Material = render::Material<InWorld>;
 
-/// What the surfaces that use this entity do to light.
+/// The material of the surfaces that use this entity.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct SurfaceMaterial(pub Material);
 
 impl SurfaceMaterial {
-    /// The material of an entity; `None` for one that is no material.
+    /// The material of an entity; `None` if it is not a material.
     pub fn of(world: &World, entity: Entity) -> Option<&Material> {
         world.get::<Self>(entity).map(|Self(material)| material)
     }
 }
 
-/// The material of surfaces that have none.
+/// The material of surfaces without one.
 pub const GREY: Material = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) };
 
-/// The textures that a material looks up.
+/// The textures of a material.
 pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
     material.params().into_iter().filter_map(|(_, param)| match param {
         Param::Reflectance(ColorParam::Texture(texture))
@@ -166,7 +167,7 @@ impl From<Vec3> for ColorParam {
 }
 
 impl PartialEq for ColorParam {
-    /// Textures are equal when they are the same one in memory.
+    /// Textures are equal if they are the same allocation.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Rgb(a), Self::Rgb(b)) => a == b,
@@ -176,7 +177,7 @@ impl PartialEq for ColorParam {
     }
 }
 
-/// A number, or the red channel of a texture.
+/// A number, or a texture, of which the red channel is used.
 #[derive(Clone, Debug)]
 pub enum ScalarParam {
     /// The same number everywhere.
@@ -192,7 +193,7 @@ impl From<f32> for ScalarParam {
 }
 
 impl PartialEq for ScalarParam {
-    /// Textures are equal when they are the same one in memory.
+    /// Textures are equal if they are the same allocation.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Number(a), Self::Number(b)) => a == b,
@@ -202,31 +203,31 @@ impl PartialEq for ScalarParam {
     }
 }
 
-/// A texture with the name and the description that a scene file has for it.
+/// A texture with its name and description in the scene file.
 #[derive(Clone, Debug)]
 pub struct SurfaceTexture {
     /// Its name in the scene file.
     pub name: String,
     /// Its description in the scene file.
     pub part: TextureSource,
-    /// The texture itself, ready to be looked up.
+    /// The texture itself.
     pub texture: render::Texture,
 }
 
-/// Shines evenly into all directions; to the path tracer it is a small glowing sphere or a point.
+/// Emits uniformly in all directions; rendered as an emissive sphere, or as a point if its radius is 0.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 #[require(Placement)]
 pub struct PointLight {
     /// Radiant intensity, W·sr⁻¹.
     pub intensity: Vec3,
-    /// Metres. With 0 it is a point: it casts hard shadows, and no ray ever hits it.
+    /// Metres. With 0 it is a point: its shadows are hard, and rays cannot hit it.
     pub radius: f64,
 }
 
-/// Shines from a point into a cone; no ray ever hits it.
+/// Emits from a point into a cone; rays cannot hit it.
 ///
-/// At the angle a from the axis it sends `intensity` · t², with t = (cos a − cos outer) / (cos inner − cos outer),
-/// clamped to 0..1.
+/// At the angle a from the axis its intensity is `intensity` · t², with t = (cos a − cos outer) / (cos inner − cos
+/// outer), clamped to 0..1.
 ///
 /// Source: glTF 2.0, KHR_lights_punctual.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
@@ -234,42 +235,41 @@ pub struct PointLight {
 pub struct SpotLight {
     /// Radiant intensity within the inner cone, W·sr⁻¹.
     pub intensity: Vec3,
-    /// Along the axis of the cone, away from its tip, in the light's own space: its [`Placement`] turns it. Any length
-    /// but 0.
+    /// Axis of the cone, away from its apex, in object space: its [`Placement`] rotates it. Any length but 0.
     pub direction: DVec3,
-    /// Degrees from the axis, from 0 to the outer angle; the intensity falls off from here on.
+    /// Degrees from the axis, 0 to the outer angle; the intensity falls off from here on.
     pub inner_angle_deg: f64,
     /// Degrees from the axis, above 0 and at most 90; no light beyond.
     pub outer_angle_deg: f64,
 }
 
-/// Shines from infinitely far away, parallel; no ray ever hits it. The air absorbs nothing of its light, as of the
-/// environment's.
+/// Emits parallel light from infinitely far away; rays cannot hit it. Like the light of the environment, it is not
+/// absorbed by the air.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 #[require(Placement)]
 pub struct DirectionalLight {
-    /// On a surface that faces the light, W·m⁻².
+    /// Irradiance of a surface that faces the light, W·m⁻².
     pub irradiance: Vec3,
-    /// Where the light goes, in the light's own space: its [`Placement`] turns it. Any length but 0.
+    /// Direction of propagation, in object space: its [`Placement`] rotates it. Any length but 0.
     pub direction: DVec3,
 }
 
-/// Where the mesh of an object came from, for saving and reloading it.
+/// Origin of the mesh of an object, for saving and reloading it.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct MeshOrigin {
     /// The file or the built-in mesh.
     pub source: MeshSource,
-    /// How its normals are found.
+    /// How its normals are computed.
     pub shading: MeshShading,
-    /// Share of the faces that were kept, 0..1.
+    /// Fraction of the faces that was kept, 0..1; `None`: not simplified.
     pub simplify: Option<f64>,
-    /// Materials come from the mesh's own file.
+    /// Whether the materials come from the file of the mesh.
     pub own_materials: bool,
 }
 
-/// The place of an entity in its scene file. What has none comes after, in the order of its entity.
+/// Position of an entity in its scene file. Entities without one come after all others, ordered by `Entity`.
 ///
-/// The picture's bits depend on the order of objects; this keeps them the same in every process.
+/// The order of objects affects the rounding of the image; this makes it the same in every process.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ordinal(pub u32);
 
@@ -278,14 +278,14 @@ pub struct Ordinal(pub u32);
 pub struct SceneEnvironment {
     /// Radiance by direction, W·m⁻²·sr⁻¹.
     pub light: render::Environment,
-    /// What the scene file says, for saving.
+    /// Its description, for saving.
     pub part: EnvironmentSource,
-    /// What the air absorbs, per metre; `light` has passed it already.
+    /// Absorption of the air per metre; `light` is not absorbed.
     pub air: Vec3,
 }
 
 impl PartialEq for SceneEnvironment {
-    /// Pictures are equal when they are the same one in memory.
+    /// Images are equal if they are the same allocation.
     fn eq(&self, other: &Self) -> bool {
         use render::Environment::{Black, Constant, Gradient, Image};
         if self.air != other.air {
@@ -305,7 +305,7 @@ impl PartialEq for SceneEnvironment {
     }
 }
 
-/// The size that the scene asks for, pixels. A window has a size of its own.
+/// Size of the film that the scene asks for, pixels. A window has its own size.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilmSize {
     /// Width in pixels.
@@ -320,10 +320,10 @@ impl Default for FilmSize {
     }
 }
 
-/// Light model, depth and seed.
+/// Integrator, maximum depth and seed.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rendering(pub RenderSettings);
 
-/// Exposure and tone curve; no sample depends on them.
+/// Exposure and tone curve; they do not affect the samples.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplaySettings(pub Display);

@@ -1,4 +1,4 @@
-//! A scene around a lone model: ground, sky, key light, and a camera that sees all of it.
+//! A default scene for a model: ground, sky, key light, and a camera that frames it.
 
 use super::file::{CameraPart, DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
 use super::meshes::LoadedMesh;
@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::render::Integrator;
 use glam::{DVec3, Vec3};
 
-/// Names of the parts, as a saved scene shows them.
+/// Names of the parts in a saved scene.
 const CLAY: &str = "clay";
 const KEY_LIGHT: &str = "key light";
 const GROUND: &str = "ground";
@@ -28,7 +28,7 @@ fn ground_material() -> MaterialPart {
     MaterialPart::Diffuse { albedo: ColorValue::rgb(0.45, 0.45, 0.43) }
 }
 
-/// For a light as large as the model and five radii away: about three times the light of the sky.
+/// For a light of the size of the model, five radii away: about three times the irradiance of the sky.
 fn key_material() -> MaterialPart {
     MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }
 }
@@ -44,7 +44,7 @@ fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
     }
 }
 
-/// - `side`: the signs of where the front is.
+/// - `side`: signs of the direction of the front.
 fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> ObjectPart {
     let center = 0.5 * (min + max);
     let radius = (0.5 * (max - min).length()).max(SceneFile::MIN_SIZE);
@@ -57,20 +57,20 @@ fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> Objec
     }
 }
 
-/// Adds sky and key light to a scene that has none.
+/// Adds a sky and a key light to a scene.
 pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
     let name = new_material(file, KEY_LIGHT, key_material());
     file.objects.push(key_light(name, bounds, DVec3::ONE));
     file.environment = sky();
 }
 
-/// Puts a ground below a scene.
+/// Adds a ground plane below a scene.
 pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
     let name = new_material(file, GROUND, ground_material());
     file.objects.push(ground(name, bounds));
 }
 
-/// Adds a material under a name that is new.
+/// Adds a material under a new name, which is returned.
 fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> String {
     let is_taken = |name: &String| file.materials.names().any(|known| known == name);
     let names = std::iter::once(wanted.to_owned()).chain((2..).map(|number: u64| format!("{wanted} {number}")));
@@ -81,8 +81,8 @@ fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> S
 
 /// The scene of a model that is opened by itself.
 ///
-/// All sizes follow from the model's box, so that a model of any unit looks the same. The camera stands in front of it,
-/// with the key light at its side.
+/// All sizes derive from the bounding box of the model, so that the unit of the model does not matter. The camera
+/// stands in front of it, with the key light to its side.
 pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspect: f64) -> SceneFile {
     let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
     let (min, max) = bounds(&loaded.mesh, up);
@@ -95,7 +95,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
     if loaded.slots.is_empty() {
         materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
     }
-    // Half a turn about the vertical, if the model looks the other way.
+    // Rotated half a turn about the vertical axis if the model faces the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
     SceneFile {
         camera: camera(min, max, side, aspect),
@@ -125,16 +125,16 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
     }
 }
 
-/// Leaves the light to the environment.
+/// Removes the key light: the environment lights the model alone.
 pub fn remove_key_light(file: &mut SceneFile) {
     file.objects.retain(|object| !matches!(object, ObjectPart::Sphere { name: Some(name), .. } if name == KEY_LIGHT));
     file.materials.0.retain(|(name, _)| name != KEY_LIGHT);
 }
 
-/// A three-quarter view from slightly above, as near as the box allows; `side` has the signs of where the front is.
+/// A three-quarter view from slightly above, as close as the box allows; `side`: signs of the direction of the front.
 pub fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
     const VFOV_DEG: f64 = 35.0;
-    /// Room around the box.
+    /// Margin around the box.
     const MARGIN: f64 = 1.12;
     let center = 0.5 * (min + max);
     let back = side * DVec3::new(0.6, 0.38, 1.0).normalize();
@@ -142,7 +142,7 @@ pub fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
     let up = back.cross(right);
     let tan_v = (0.5 * VFOV_DEG).to_radians().tan() / MARGIN;
     let tan_h = tan_v * aspect;
-    // Each corner asks for a distance from which it is still inside the picture; the largest one wins.
+    // The least distance at which a corner is inside the image; the maximum over all corners.
     let distance = (0..8)
         .map(|i| {
             let corner = DVec3::new(
@@ -156,7 +156,7 @@ pub fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
     CameraPart { vfov: VFOV_DEG, ..CameraPart::looking_at(center + distance * back, center) }
 }
 
-/// The box of the model once `up` points along +Y, metres.
+/// The bounding box of the model, metres, rotated so that `up` points along +Y.
 fn bounds(mesh: &Mesh, up: UpAxis) -> (DVec3, DVec3) {
     let used = mesh.triangles.iter().flatten().map(|&v| mesh.positions[v as usize].as_dvec3() + mesh.center);
     let (min, max) =

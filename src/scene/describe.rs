@@ -1,9 +1,9 @@
-//! From entities back to a scene file: the way of `spawn`, backwards.
+//! From entities back to a scene file: the inverse of `spawn`.
 //!
-//! What comes out says what the world holds, to the last bit: spawning it gives equal components in the same order.
-//! Three things have no words in a scene file and get some: meshes that came from no file are listed, to be written
-//! beside it; many spheres that were made by a program are listed one by one; surfaces without a material get a grey
-//! one. Comments and the spelling of a file that was read are not kept.
+//! The description is exact: spawning it gives equal components in the same order. Scene files cannot express three
+//! things: meshes that came from no file are listed, to be written beside the scene; groups of spheres made by a
+//! program are listed sphere by sphere; surfaces without a material get a grey one. Comments and formatting of the
+//! original file are lost.
 
 use super::camera::camera;
 use super::components::{
@@ -32,21 +32,21 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A scene in words, and what the words point at.
+/// A scene file for a world, with the data that it refers to.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Paths count from [`folder`](Self::folder).
+    /// Paths are relative to [`folder`](Self::folder).
     pub file: SceneFile,
-    /// The folder of the scene file that `file` is to be.
+    /// The folder that `file` is to be saved in.
     pub folder: PathBuf,
-    /// Meshes that came from no file: index of the object whose `source` has an empty name, and the mesh.
+    /// Meshes that came from no file: index of the object, whose `source` has an empty name, and the mesh.
     pub loose_meshes: Vec<(usize, Arc<Mesh>)>,
-    /// What could not be said.
+    /// What could not be expressed.
     pub losses: Vec<String>,
 }
 
 impl Description {
-    /// Of what `world` holds; `loaded` is the scene that was opened into it, if one was.
+    /// Describes the contents of `world`; `loaded`: the scene that was opened into it, if any.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let inputs = SceneInputs::of(world);
         let mut writer = Writer::new(loaded);
@@ -80,8 +80,8 @@ impl Description {
     }
 }
 
-/// The camera of a scene file that gives exactly these components: as it was written, if that is still true, else by
-/// the point it looks at, if that gives the same bits, else by its direction.
+/// The camera of a scene file that gives exactly these components: `written` if it still does, else with the point that
+/// it looks at if that gives the same bits, else with its direction.
 pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: Option<&CameraPart>) -> CameraPart {
     let same = |part: &CameraPart| camera(part) == (*view, *projection, *lens);
     if let Some(part) = written.filter(|part| same(part)) {
@@ -108,32 +108,32 @@ pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: O
     [upright, at].into_iter().find(same).unwrap_or(directed)
 }
 
-/// An object and what is known of it.
+/// An object with its components.
 struct Item {
     name: Option<String>,
     shape: Shape,
     placement: Placement,
     slots: Vec<Entity>,
     origin: Option<MeshOrigin>,
-    /// Its materials are those that the file of its mesh gives.
+    /// Whether its materials are those of the file of its mesh.
     own: bool,
 }
 
 #[derive(Default)]
 struct Writer<'a> {
     loaded: Option<&'a LoadedScene>,
-    /// What was loaded, by the address of the mesh and of the spheres, and by the name of the texture.
+    /// Loaded meshes and groups of spheres by address, and textures by name.
     loaded_meshes: HashMap<usize, &'a LoadedMesh>,
     loaded_balls: HashMap<usize, &'a ObjectPart>,
     loaded_textures: HashMap<&'a str, &'a TextureSource>,
-    /// Every material that gets a name, in order.
+    /// All materials with a name, in order.
     named: Vec<(Entity, String, Material)>,
     names: HashMap<Entity, String>,
-    /// The name of the grey material, once something needs it.
+    /// Name of the grey material, if anything uses it.
     grey: Option<String>,
-    /// Textures in use, in the order in which they are met.
+    /// Textures in use, in the order of first use.
     textures: Vec<(Arc<SurfaceTexture>, String)>,
-    /// Their names, by address.
+    /// Their names by address.
     texture_names: HashMap<usize, String>,
     taken_by_textures: Taken,
     loose_meshes: Vec<(usize, Arc<Mesh>)>,
@@ -174,7 +174,7 @@ impl<'a> Writer<'a> {
         inputs.objects.iter().map(item).collect()
     }
 
-    /// Whether the slots of a mesh still hold what its file gave them.
+    /// Whether the slots of a mesh still hold the materials of its file.
     fn has_own_materials(&self, world: &World, shape: &Shape, slots: &[Entity]) -> bool {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
@@ -195,7 +195,7 @@ impl<'a> Writer<'a> {
             })
     }
 
-    /// Gives every material a name of its own, but for those that come with the file of a mesh.
+    /// Gives each material a unique name, except those that come with the file of a mesh.
     fn name_materials(&mut self, world: &mut World, objects: &[Item]) {
         let own: HashSet<Entity> = objects.iter().filter(|item| item.own).flat_map(|item| item.slots.clone()).collect();
         let mut needed: HashSet<Entity> =
@@ -225,7 +225,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The name of a material; that of a grey one where there is none.
+    /// The name of a material, or of the grey one.
     fn material_name(&mut self, entity: Option<Entity>) -> String {
         if let Some(name) = entity.and_then(|entity| self.names.get(&entity)) {
             return name.clone();
@@ -249,7 +249,7 @@ impl<'a> Writer<'a> {
         if let Some(name) = self.texture_names.get(&address(texture)) {
             return name.clone();
         }
-        // Names of the file that nothing uses any more stay taken: they are written as well.
+        // Unused names of the file stay taken, since they are written too.
         if self.loaded_textures.get(&*texture.name).is_some_and(|part| **part != texture.part) {
             self.taken_by_textures.names.insert(texture.name.clone());
         }
@@ -259,7 +259,7 @@ impl<'a> Writer<'a> {
         name
     }
 
-    /// Those of the file in its order, whether used or not, then all others.
+    /// The textures of the file in its order, used or not, then all others.
     fn textures(&self) -> Named<TextureSource> {
         let of_file = self.loaded.map(|loaded| loaded.file.textures.0.clone()).unwrap_or_default();
         let mut textures = of_file;
@@ -271,7 +271,7 @@ impl<'a> Writer<'a> {
         Named(textures)
     }
 
-    /// Pictures that materials of a mesh name are found from the folder that the program runs in.
+    /// The textures of a mesh's own materials have paths relative to the working directory: makes them absolute.
     fn with_path_from_folder(&self, texture: &SurfaceTexture) -> TextureSource {
         let mut part = texture.part.clone();
         if let TextureSource::Image { file, .. } = &mut part {
@@ -312,7 +312,7 @@ impl<'a> Writer<'a> {
         let index = self.n_objects;
         self.n_objects += 1;
         let name = item.name.clone();
-        // A point of its own says where an object is that is neither turned nor scaled.
+        // Shapes with a position of their own need no transform if they are neither rotated nor scaled.
         let plain = item.placement == Placement::at(item.placement.translation);
         let (point, transform) = match plain {
             true => (item.placement.translation, TransformPart::default()),
@@ -332,7 +332,7 @@ impl<'a> Writer<'a> {
                 let material = self.material_name(item.slots.first().copied());
                 ObjectPart::Quad { name, corner: point, edge_u: *edge_u, edge_v: *edge_v, material, transform }
             }
-            // Its corners count from the first, so a transform moves it without rounding.
+            // Its vertices are relative to the first, so that a transform moves it without rounding.
             Shape::Triangle { vertices } => {
                 let material = self.material_name(item.slots.first().copied());
                 ObjectPart::Triangle { name, vertices: *vertices, material, transform: whole }
@@ -414,12 +414,12 @@ impl MapParams<InWorld, InFile> for Writer<'_> {
 #[derive(Default)]
 struct Taken {
     names: HashSet<String>,
-    /// The number that is tried next for a name; smaller ones are taken.
+    /// The next number to try for a name; smaller ones are taken.
     next: HashMap<String, u64>,
 }
 
 impl Taken {
-    /// `wanted`, or with the first number that makes it new.
+    /// `wanted`, with the first number that makes it unique if it is taken.
     fn free_name(&mut self, wanted: &str) -> String {
         if self.names.insert(wanted.to_owned()) {
             return wanted.to_owned();

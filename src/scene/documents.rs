@@ -1,4 +1,4 @@
-//! The glTF files of a scene while it is loaded: each is read once, and each of its meshes made once.
+//! The glTF files of a scene while it is loaded: each file is read once, and each of its meshes is built once.
 
 use super::gltf::images::part_of_model;
 use super::gltf::{BuiltMesh, Document, GltfError, GltfProblem, Located, MeshKey, Posed, ReadOptions, Surfaces};
@@ -12,29 +12,29 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A picture with a warning, or why there is none.
+/// An image with an optional warning, or why it could not be read.
 type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 
-/// Files that are open, by path.
+/// Open files, by path.
 #[derive(Debug, Default)]
 pub(super) struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
-    /// Vertices and indices that were made.
+    /// Number of vertices and indices that were built.
     made: AtomicU64,
-    /// Pictures that were decoded and not taken yet, by path.
+    /// Images that were decoded and not yet taken, by path.
     decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
 }
 
-/// A file that is open.
+/// An open file.
 #[derive(Debug)]
 pub(super) struct Opened {
     pub document: Document,
-    /// What was read for it, and what that was before.
+    /// All files that were read for it, each with its stamp from before it was read.
     pub files: Vec<(PathBuf, Stamp)>,
-    /// By the bits of the moment.
+    /// By the bits of the time.
     posed: Mutex<HashMap<Option<u64>, Arc<Posed>>>,
-    /// By what paths of the scene call the model.
+    /// By the path of the model in texture paths.
     surfaces: Mutex<HashMap<String, Arc<Surfaces>>>,
     meshes: Mutex<HashMap<(MeshKey, Option<u64>), Arc<BuiltMesh>>>,
 }
@@ -48,13 +48,13 @@ impl Documents {
         Self { options: ReadOptions { allow_outside, ..ReadOptions::default() }, ..Self::default() }
     }
 
-    /// The file at `path`, which is read when it is asked for first.
+    /// The file at `path`, read on first use.
     pub(super) fn open(&self, path: &Path) -> Result<Arc<Opened>, GltfError> {
         let mut open = lock(&self.open);
         if let Some(opened) = open.get(path) {
             return Ok(opened.clone());
         }
-        // Before it is read: what changes in the meantime is read again.
+        // Taken before reading, so that a change in the meantime is noticed.
         let before = stamp(path);
         let document = Document::read(path, self.options)?;
         let others = document.files()[1..].iter().map(|file| (file.clone(), stamp(file)));
@@ -70,7 +70,7 @@ impl Documents {
         Ok(opened)
     }
 
-    /// A mesh as its file shades it.
+    /// A mesh with the normals of its file.
     pub(super) fn mesh(&self, opened: &Opened, key: MeshKey, at: Option<f64>) -> Result<Arc<BuiltMesh>, Located> {
         let known = (key, at.map(f64::to_bits));
         if let Some(mesh) = lock(&opened.meshes).get(&known) {
@@ -87,7 +87,7 @@ impl Documents {
         Ok(lock(&opened.meshes).entry(known).or_insert(mesh).clone())
     }
 
-    /// A picture in a file of its own, or in one of these.
+    /// An image in a file of its own, or inside a model.
     pub(super) fn picture(&self, path: &Path) -> ReadPicture {
         let Some((model, number)) = part_of_model(path) else { return read_picture(path) };
         let failed = |error: GltfError| PictureError::Model(error.to_string());
@@ -96,7 +96,7 @@ impl Documents {
         picture_of_bytes(&bytes)
     }
 
-    /// Decodes many pictures at once, to be taken afterwards.
+    /// Decodes images in parallel, for [`take_picture`](Self::take_picture).
     pub(super) fn decode(&self, paths: Vec<PathBuf>) {
         paths.into_par_iter().for_each(|path| {
             let before = stamp(&part_of_model(&path).map_or_else(|| path.clone(), |(model, _)| model));
@@ -105,12 +105,12 @@ impl Documents {
         });
     }
 
-    /// A picture that was decoded, and what its file was before.
+    /// Removes and returns a decoded image, with the stamp of its file from before it was read.
     pub(super) fn take_picture(&self, path: &Path) -> Option<(Stamp, ReadPicture)> {
         lock(&self.decoded).remove(path)
     }
 
-    /// Makes many meshes at once; what is wrong with one is told when it is asked for by itself.
+    /// Builds meshes in parallel; errors are reported when a mesh is requested individually.
     pub(super) fn make(&self, wanted: &[(Arc<Opened>, MeshKey, Option<f64>)]) {
         wanted.par_iter().for_each(|(opened, key, at)| {
             let _ = self.mesh(opened, *key, *at);
@@ -128,7 +128,7 @@ impl Opened {
         Ok(lock(&self.posed).entry(key).or_insert(posed).clone())
     }
 
-    /// - `file`: what paths of the scene call the model.
+    /// - `file`: path of the model in texture paths.
     pub(super) fn surfaces(&self, file: &str) -> Result<Arc<Surfaces>, Located> {
         if let Some(surfaces) = lock(&self.surfaces).get(file) {
             return Ok(surfaces.clone());

@@ -1,22 +1,22 @@
-//! What can be wrong with what a user gave us, said so that they can mend it.
+//! Errors in the user's input, worded so that the user can correct them.
 
 use crate::printable;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// One thing that is wrong: where, what, what was expected, what to do.
+/// One problem: where, what, what was expected, and how to correct it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// The file, or the name of a built-in scene.
     pub file: Option<PathBuf>,
-    /// Line and column, both counted from 1.
+    /// Line and column, counted from 1.
     pub at: Option<(usize, usize)>,
     /// Lower case, no full stop.
     pub message: String,
 }
 
 impl fmt::Display for Problem {
-    /// One line, whatever the names in it hold.
+    /// One line; control characters in names are escaped.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(file) = &self.file {
             write!(f, "{}:", printable::escape(&file.to_string_lossy()))?;
@@ -31,18 +31,19 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Why a scene could not be had: at least one problem, in the order of the file.
+/// Why a scene could not be loaded: at least one problem, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct SceneError {
-    /// All that is wrong, in the order of the file.
+    /// All problems, in the order of the file.
     pub problems: Vec<Problem>,
 }
 
 impl SceneError {
-    /// Problems that are told one by one: nobody reads more, and each place is looked for in the whole text.
+    /// Number of problems that are reported: more are not useful, and each one is located by a search of the whole
+    /// text.
     pub(super) const MAX_TOLD: usize = 20;
 
-    /// These problems, and a last line that says how many more there are of them in `file`.
+    /// These problems, and a last line that gives the number of further problems in `file`.
     pub(super) fn of(mut problems: Vec<Problem>, untold: usize, file: Option<&Path>) -> Self {
         if untold > 0 {
             let problem = if untold == 1 { "problem" } else { "problems" };
@@ -52,12 +53,12 @@ impl SceneError {
         Self { problems }
     }
 
-    /// One problem without a place.
+    /// One problem without a location.
     pub fn new(message: impl Into<String>) -> Self {
         Self { problems: vec![Problem { file: None, at: None, message: message.into() }] }
     }
 
-    /// One problem with a whole file.
+    /// One problem that concerns a whole file.
     pub fn in_file(file: impl AsRef<Path>, message: impl Into<String>) -> Self {
         let file = Some(file.as_ref().to_path_buf());
         Self { problems: vec![Problem { file, at: None, message: message.into() }] }
@@ -71,7 +72,7 @@ impl SceneError {
 }
 
 impl fmt::Display for SceneError {
-    /// One line a problem.
+    /// One line per problem.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, problem) in self.problems.iter().enumerate() {
             if i > 0 {
@@ -83,18 +84,18 @@ impl fmt::Display for SceneError {
     }
 }
 
-/// ` (did you mean …?)` when one of `known` is close to `found`, else the list when it is short, else nothing.
+/// ` (did you mean …?)` if one of `known` is similar to `found`, else the list if it is short, else nothing.
 ///
-/// Names are compared in their order until `MOST_CELLS` are spent; those whose length alone rules them out are free.
+/// Names are compared in order until `MOST_CELLS` are used up; names excluded by their length alone cost nothing.
 pub fn suggestion<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     suggestion_within(found, known, &mut { MOST_CELLS })
 }
 
-/// Cells of tables of edit distances that one suggestion may fill in: 65,000 names of eight letters, or half a second at most
-/// for all the problems that are told.
+/// Cells of edit-distance tables that one suggestion may fill in: 65,000 names of eight letters, or at most half a
+/// second for all reported problems together.
 const MOST_CELLS: usize = 1 << 22;
 
-/// - `cells`: what may still be spent.
+/// - `cells`: remaining budget.
 fn suggestion_within<'a>(found: &str, known: impl IntoIterator<Item = &'a str>, cells: &mut usize) -> String {
     const SHORT_LIST: usize = 16;
     let (lower, length) = (found.to_lowercase(), found.chars().count());
@@ -158,7 +159,7 @@ mod tests {
         assert!(cells <= MOST_CELLS);
         assert_eq!(spent("a name that is three times as long as any of those").1, 0, "no table is filled in");
         assert_eq!(spent(&"m".repeat(1 << 20)), (String::new(), 0));
-        // Long names of about equal length.
+        // Long names of similar length.
         let (long, other) = ("a".repeat(1 << 20), "b".repeat(1 << 20));
         let mut cells = MOST_CELLS;
         assert_eq!(suggestion_within(&long, [other.as_str(); 40], &mut cells), "");

@@ -1,26 +1,25 @@
-//! How large a scene is: what "frame all" frames, and what the speed of flying is measured by.
+//! Size of a scene: what "frame all" frames, and the scale of the flying speed.
 
 use super::components::{Material, Shape};
 use super::inputs::{ObjectInput, SceneInputs};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
-/// A sphere around the finite things of a scene.
+/// A sphere around the finite objects of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extent {
     /// Centre of the sphere in the world, metres.
     pub center: DVec3,
-    /// Metres; 0 when there is nothing finite.
+    /// Metres; 0 if nothing is finite.
     pub radius: f64,
 }
 
-/// Boxes of meshes and clouds in their own space, found once and kept.
+/// Bounding boxes of meshes and groups of spheres in object space, cached.
 #[derive(Clone, Debug, Default)]
 pub struct ExtentCache(HashMap<usize, (Shape, (DVec3, DVec3))>);
 
 impl ExtentCache {
-    /// The extent of what can be seen, but for what lies far off; lights count only when there is nothing else, since
-    /// nobody goes to look at one.
+    /// The extent of the visible objects, without outliers; light sources count only if there is nothing else.
     pub fn extent(&mut self, inputs: &SceneInputs) -> Extent {
         let boxes = self.near_boxes(inputs);
         let around =
@@ -31,12 +30,12 @@ impl ExtentCache {
         }
     }
 
-    /// Corners of the boxes of what [`Self::extent`] counts, for framing.
+    /// Corners of the boxes that [`Self::extent`] includes, for framing.
     pub fn corners(&mut self, inputs: &SceneInputs) -> Vec<DVec3> {
         self.near_boxes(inputs).into_iter().flat_map(|(min, max)| corners_of(min, max)).collect()
     }
 
-    /// Corners of the box of one object in the world; none for infinite and broken ones.
+    /// Corners of the world-space box of one object; empty for infinite and invalid ones.
     pub fn corners_of(&mut self, object: &ObjectInput) -> Vec<DVec3> {
         self.world_box(object).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default()
     }
@@ -62,7 +61,7 @@ impl ExtentCache {
         near
     }
 
-    /// The box of an object in the world; `None` for infinite and broken ones.
+    /// The world-space bounding box of an object; `None` for infinite and invalid ones.
     fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
         let (min, max) = self.own_box(&object.shape)?;
         let world = object.placement.affine();
@@ -70,7 +69,7 @@ impl ExtentCache {
         box_of(corners).filter(|(min, max)| min.is_finite() && max.is_finite())
     }
 
-    /// The box of a shape in its own space; `None` for infinite and broken ones.
+    /// The object-space bounding box of a shape; `None` for infinite and invalid ones.
     pub fn own_box(&mut self, shape: &Shape) -> Option<(DVec3, DVec3)> {
         match shape {
             Shape::Plane { .. } => None,
@@ -92,8 +91,8 @@ impl ExtentCache {
     }
 }
 
-/// Drops the boxes that reach more than twice as far from the middle of things as half of all do: single things far
-/// off, and grounds that go on and on.
+/// Removes the boxes that reach more than twice as far from the median centre as the median box: distant single objects
+/// and very large grounds.
 fn leave_out_far(boxes: &mut Vec<(DVec3, DVec3)>) {
     let median = |mut values: Vec<f64>| {
         values.sort_unstable_by(f64::total_cmp);

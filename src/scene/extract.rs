@@ -1,7 +1,7 @@
 //! From the world to the flat snapshot that the workers read.
 //!
-//! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
-//! rebuilt on its own ([`SnapshotPart`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
+//! Placements are `f64`; the snapshot is `f32` relative to an [`origin`](Extraction::origin) near the camera. Each part
+//! is rebuilt on its own ([`SnapshotPart`]), and the kd-trees of meshes and groups of spheres are cached ([`Trees`]).
 
 use super::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
@@ -22,45 +22,45 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// What of a snapshot is to be made anew; each includes the ones before it.
+/// Which part of a snapshot to rebuild; each includes the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SnapshotPart {
     /// The camera alone.
     Camera,
-    /// Materials, textures, light table.
+    /// Materials, textures and the light table.
     Shading,
-    /// The tree over the objects.
+    /// The kd-tree over the objects.
     Geometry,
 }
 
-/// A snapshot and what is needed to renew it in parts.
+/// A snapshot and the data needed to update parts of it.
 pub struct Extraction {
-    /// Metres: the world point that is (0, 0, 0) of the snapshot.
+    /// Metres: the world-space position of the origin of the snapshot.
     pub origin: DVec3,
-    /// The snapshot about `origin`, with its tables.
+    /// The snapshot relative to `origin`, with its tables.
     pub prepared: Prepared,
     /// Objects and lights that were left out, and why.
     pub problems: Vec<String>,
     /// The entity of each object of the snapshot.
     pub entities: Vec<Entity>,
-    /// The entity of each light without size, in the order of [`Shading::delta_lights`].
+    /// The entity of each delta light, in the order of [`Shading::delta_lights`].
     pub delta_lights: Vec<Entity>,
     ids: HashMap<MaterialKey, MaterialId>,
     order: Vec<MaterialKey>,
 }
 
-/// Whose material it is.
+/// The source of a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum MaterialKey {
-    /// What has none.
+    /// The material of objects without one.
     Grey,
     Material(Entity),
-    /// The glow of a point light.
+    /// The emission of a point light.
     Light(Entity),
 }
 
 impl Extraction {
-    /// Everything anew. Objects whose tree is missing in `trees` are left out.
+    /// Builds everything. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
         let origin = origin_for(&camera_of(inputs).view);
         let mut materials = MaterialIds::default();
@@ -124,8 +124,8 @@ impl Extraction {
         }
     }
 
-    /// The entity of each material of the snapshot: of a material, or of the light that glows; `None` for what stands in
-    /// where an object has no material.
+    /// The entity of each material of the snapshot: the material itself, or the light that emits; `None` for the
+    /// material of objects without one.
     pub fn material_entities(&self) -> impl Iterator<Item = Option<Entity>> + '_ {
         self.order.iter().map(|key| match key {
             MaterialKey::Grey => None,
@@ -133,8 +133,8 @@ impl Extraction {
         })
     }
 
-    /// Takes the trees of meshes as they are in `trees` now. Every tree of a mesh gives the same hits, so every sample
-    /// stays what it is.
+    /// Replaces the trees of meshes by those in `trees`. All trees of a mesh give the same hits, so the samples do not
+    /// change.
     pub fn take_trees(&mut self, trees: &Trees) {
         let old = &self.prepared.geometry;
         let shapes = old.tree.shapes().iter().zip(&old.objects).map(|(shape, object)| {
@@ -150,8 +150,8 @@ impl Extraction {
         self.prepared = self.prepared.with_trees(Arc::new(geometry));
     }
 
-    /// Renews one part and keeps the rest. A camera that has gone far takes the origin along, which renews all;
-    /// returns true then.
+    /// Rebuilds one part and keeps the rest. If the camera has moved so far that the origin changes, everything is
+    /// rebuilt; returns true then.
     pub fn update(&mut self, part: SnapshotPart, inputs: &SceneInputs, trees: &Trees) -> bool {
         let camera = camera_of(inputs);
         let moved = origin_for(&camera.view) != self.origin;
@@ -171,12 +171,12 @@ impl Extraction {
     }
 }
 
-/// The origin for a camera: a corner of a grid whose cells are 512 to 1024 viewing distances wide.
+/// The origin for a camera: a corner of a grid with cells 512 to 1024 viewing distances wide.
 ///
-/// What lies at the viewing distance is then never further than 887 of them away, where `f32` rounds by
-/// 887 · 2⁻²⁴ of that distance: a fifteenth of a pixel of a picture 1000 pixels high that sees 45 degrees.
-/// The rule looks at the view alone, so that one view always gives the same bits, however it was reached; near the
-/// world's own origin it gives zero, and ordinary moves keep it.
+/// A point at the viewing distance is then at most 887 viewing distances away, where `f32` rounds by 887 · 2⁻²⁴ of that
+/// distance: a fifteenth of a pixel of an image 1000 pixels high with a field of view of 45 degrees. The origin depends
+/// on the view alone, so that a view always gives the same bits, however it was reached; near the origin of the world
+/// it is zero, and ordinary moves keep it.
 pub fn origin_for(view: &View) -> DVec3 {
     let cell = (512.0 * view.pivot_distance.clamp(1e-9, 1e12)).log2().ceil().exp2();
     let origin = (view.eye / cell).round() * cell;
@@ -207,7 +207,7 @@ fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: D
     }
 }
 
-/// The shape as the kernel wants it, about `origin`, or why it cannot be had.
+/// The shape for the kd-tree, relative to `origin`, or why it is invalid.
 fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
     let placement = &object.placement;
     let world = placement.affine();
@@ -227,7 +227,7 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
             kdtree::Shape::Sphere { center: point(DVec3::ZERO), radius }
         }
         Shape::Plane { normal } => {
-            // Normals go by the inverse transpose, and stay in front when the placement mirrors.
+            // Normals are transformed by the inverse transpose, which keeps them on the front side under reflections.
             let normal = (world.matrix3.inverse().transpose() * *normal).normalize_or_zero().as_vec3();
             if normal == Vec3::ZERO || !normal.is_finite() {
                 return Err("its normal has no length".to_owned());
@@ -262,7 +262,7 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
     Ok((shape, None))
 }
 
-/// How the texture of a lone sphere is turned.
+/// Rotation of the texture of a single sphere; `None`: none.
 fn turned(object: &ObjectInput) -> Option<Mat3> {
     let Shape::Sphere { .. } = object.shape else { return None };
     let m = object.placement.affine().matrix3;
@@ -275,13 +275,13 @@ fn has_area(u: Vec3, v: Vec3) -> bool {
     area.is_finite() && area > 0.0
 }
 
-/// A placement for coordinates that count from `center`, seen from `origin`.
+/// The transform from coordinates relative to `center` to ones relative to `origin`.
 fn about(world: DAffine3, center: DVec3, origin: DVec3) -> Affine3A {
     let translation = world.transform_point3(center) - origin;
     Affine3A::from_mat3_translation(world.matrix3.as_mat3(), translation.as_vec3())
 }
 
-/// Which materials a snapshot needs, numbered in the order in which they are first asked for.
+/// The materials that a snapshot needs, numbered in the order of first use.
 #[derive(Default)]
 struct MaterialIds {
     ids: HashMap<MaterialKey, MaterialId>,
@@ -297,13 +297,13 @@ impl MaterialIds {
     }
 }
 
-/// The shading under the materials that `table` lists; what they blend is added to it.
+/// The shading for the materials in `table`; materials that blends refer to are added to it.
 fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds, origin: DVec3) -> Shading {
     let by_entity: HashMap<Entity, &Material> = inputs.materials.iter().map(|m| (m.entity, &m.material)).collect();
     let lights: HashMap<Entity, LightKind> = inputs.lights.iter().map(|light| (light.entity, light.light)).collect();
     let mut textures = TextureTable::default();
     let mut materials = Vec::new();
-    // Blends add to the table while it is walked, so its length is asked anew each time.
+    // Blends add to the table during the loop.
     while materials.len() < table.order.len() {
         let key = table.order[materials.len()];
         materials.push(match key {
@@ -315,7 +315,7 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds, origin: DVec3) -> S
             MaterialKey::Light(entity) => render::Material::Emissive {
                 radiance: ColorInput::Constant(lights.get(&entity).map_or(
                     Vec3::ZERO,
-                    // A sphere of radiance L and radius r has the radiant intensity π r² L in every direction.
+                    // A sphere of radiance L and radius r has the radiant intensity π r² L in all directions.
                     |light| light.strength() * (1.0 / (PI * light.radius().powi(2))) as f32,
                 )),
             },
@@ -326,7 +326,7 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds, origin: DVec3) -> S
     Shading { air, delta_lights, ..Shading::new(materials, textures.textures, environment) }
 }
 
-/// A light that no ray can hit, about `origin`; `None` for one that is a sphere, and for what cannot shine.
+/// A delta light relative to `origin`; `None` for lights with a radius and for invalid ones.
 fn delta_light(LightInput { light, placement, .. }: &LightInput, origin: DVec3) -> Option<DeltaLight> {
     light.check(placement).ok()?;
     let position = (placement.translation - origin).as_vec3();
@@ -351,13 +351,13 @@ fn material_of(
     textures: &mut TextureTable,
     by_entity: &HashMap<Entity, &Material>,
 ) -> render::Material {
-    // What blends itself, or too much, is grey.
+    // Blends that are cyclic or have too many parts become grey.
     let is_unfit = matches!(material, Material::Blend { .. }) && !is_fit(material, by_entity);
     let material = if is_unfit { &GREY } else { material };
     material.map(&mut WorldToSnapshot { materials: table, textures }).simplified()
 }
 
-/// The tables of a snapshot, which get what a material refers to.
+/// The tables of a snapshot, to which the references of a material are added.
 struct WorldToSnapshot<'a> {
     materials: &'a mut MaterialIds,
     textures: &'a mut TextureTable,
@@ -383,11 +383,11 @@ impl MapParams<InWorld, InSnapshot> for WorldToSnapshot<'_> {
     }
 }
 
-/// Whether a blend ends in few enough plain materials, at most one of them emissive and then evenly blended.
+/// Whether a blend resolves to few enough plain materials, at most one of them emissive and then with constant weights.
 fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
     let (mut lobes, mut glowing, mut textured) = (0, 0, false);
     let mut open = vec![Some(blend)];
-    // A tree of so many leaves has fewer than twice as many nodes; more steps than that are a circle.
+    // A binary tree with n leaves has fewer than 2 n nodes; more steps mean a cycle.
     for _ in 0..2 * MAX_LOBES {
         match open.pop() {
             Some(Some(Material::Blend { weight, a, b })) => {
@@ -405,7 +405,7 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
     open.is_empty() && lobes <= MAX_LOBES && (glowing == 0 || glowing == 1 && !textured)
 }
 
-/// Whether a plain material adds light of its own.
+/// Whether a plain material is emissive.
 fn shines(material: &Material) -> bool {
     match material {
         Material::Emissive { .. } => true,

@@ -1,4 +1,4 @@
-//! A number that tells whether two loaded scenes show the same thing.
+//! A hash that tells whether two loaded scenes have the same contents.
 
 use super::components::{Shape, SurfaceTexture, textures_of};
 use super::describe::Description;
@@ -14,9 +14,9 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-/// 128 bits over everything that a scene's picture depends on: the scene itself, its meshes and its pictures.
+/// 128-bit hash of all inputs of a scene's image: the scene itself, its meshes and its images.
 ///
-/// Stays the same from run to run and from machine to machine; made to notice changes, not to withstand malice.
+/// The same in every run and on every machine; detects changes, but is not cryptographic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Fingerprint(pub u128);
 
@@ -33,7 +33,8 @@ impl Default for Fingerprint {
 }
 
 impl Fingerprint {
-    /// FNV-1a (Fowler, Noll and Vo 1991), 128 bits. The length is mixed in, so that parts cannot run into each other.
+    /// FNV-1a (Fowler, Noll and Vo 1991), 128 bits. The length is hashed too, so that different splits into parts
+    /// differ.
     #[must_use]
     pub fn with(mut self, bytes: impl IntoIterator<Item = u8>) -> Self {
         const PRIME: u128 = (1 << 88) + 0x13b;
@@ -76,7 +77,7 @@ impl Fingerprint {
 }
 
 impl LoadedScene {
-    /// The same for scenes that show the same thing, wherever their files lie.
+    /// Equal for scenes with the same contents, wherever their files are.
     pub fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
         for mesh in self.meshes.iter().flatten() {
@@ -90,7 +91,7 @@ impl LoadedScene {
         print
     }
 
-    /// Of what it shows, whatever it is seen from: see [`SceneContent`].
+    /// Of the contents without the camera and other view settings: see [`SceneContent`].
     pub fn content_fingerprint(&self) -> Fingerprint {
         let mut world = World::new();
         self.spawn(&mut world);
@@ -99,17 +100,17 @@ impl LoadedScene {
     }
 }
 
-/// What a scene shows, whatever it is seen from and however it is shown: for telling whether it has changed.
+/// The contents of a scene without camera, film, integrator and display: for telling whether it has changed.
 #[derive(Clone, Debug)]
 pub struct SceneContent {
-    /// Without camera, film, display, and without the names of files: what is in them counts.
+    /// Without camera, film, integrator, display and file names: the contents of the files count instead.
     file: SceneFile,
     meshes: Vec<Arc<Mesh>>,
     pictures: Vec<Arc<ImageTexture>>,
 }
 
 impl SceneContent {
-    /// Of what `world` holds, which `description` describes.
+    /// The contents of `world`, which `description` describes.
     pub fn of(world: &mut World, description: &Description) -> Self {
         let mut file = description.file.clone();
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
@@ -117,7 +118,7 @@ impl SceneContent {
         (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
         (file.integrator, file.max_depth) = (Integrator::default(), None);
         for object in &mut file.objects {
-            // Nor what format it has.
+            // The format does not count either.
             if let ObjectPart::Mesh { source, .. } = object
                 && source.file().is_some()
             {
@@ -156,7 +157,7 @@ impl SceneContent {
         Self { file, meshes, pictures }
     }
 
-    /// Looks at every vertex and every texel once, however often they are used: some milliseconds for a large mesh.
+    /// Hashes each vertex and each texel once, however often they are used: some milliseconds for a large mesh.
     pub fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
         let mut meshes: HashMap<*const Mesh, Fingerprint> = HashMap::new();

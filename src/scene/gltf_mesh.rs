@@ -1,4 +1,4 @@
-//! A mesh of a glTF file for `mesh(source: gltf(…))`, with the materials that the file gives it.
+//! A mesh of a glTF file for `mesh(source: gltf(…))`, with the materials of the file.
 
 use super::documents::Documents;
 use super::file::MaterialPart;
@@ -12,38 +12,38 @@ use crate::mesh::Mesh;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// A mesh before it is simplified and shaded, and the materials of its slots.
+/// A mesh before simplification and shading, and the materials of its slots.
 #[derive(Default)]
 pub(super) struct GltfBase {
     pub mesh: Mesh,
     pub slots: Vec<(String, MaterialPart)>,
-    /// Textures that `slots` name, and where their pictures lie.
+    /// The textures of `slots`, with the paths of their images.
     pub textures: Vec<(String, TextureSource, PathBuf)>,
     pub warnings: Vec<String>,
-    /// About `slots`.
+    /// Warnings about `slots`.
     pub material_warnings: Vec<String>,
-    /// What was read for it, and what that was then.
+    /// All files that were read for it, each with its stamp.
     pub files: Vec<(PathBuf, Stamp)>,
 }
 
-/// What is wanted of a file.
+/// Which mesh to build, and how.
 pub(super) struct GltfMesh<'a> {
     pub path: &'a Path,
-    /// All of its scene when not given.
+    /// `None`: all meshes of the scene of the file, as one.
     pub key: Option<MeshKey>,
-    /// Seconds.
+    /// Time in the animations, seconds; `None`: as stored.
     pub at: Option<f64>,
     pub shading: MeshShading,
     pub simplified: bool,
 }
 
 impl GltfMesh<'_> {
-    /// Reads it, or takes it from what was read.
+    /// Builds it, or returns the one in `documents`.
     pub(super) fn base(&self, documents: &Documents) -> Result<GltfBase, GltfError> {
         let opened = documents.open(self.path)?;
         let document = &opened.document;
         let wrong = |located: Located| document.error(located);
-        // Own materials name their pictures as they are found from the folder that the program runs in.
+        // The images of the file's own materials have paths relative to the working directory.
         let file = path_to_text(self.path);
         let surfaces = opened.surfaces(&file).map_err(wrong)?;
         let computed = ModelOptions::default().normals;
@@ -80,7 +80,7 @@ impl GltfMesh<'_> {
         Ok(base)
     }
 
-    /// Names of textures begin with that of the model: those of others may be the same.
+    /// The names of textures are prefixed with that of the model, since other models may use the same ones.
     fn add_materials(&self, base: &mut GltfBase, surfaces: &Surfaces, slots: &[usize], file: &str) {
         let own = |name: &str| format!("{file}: {name}");
         let mut known = HashSet::new();

@@ -1,8 +1,7 @@
-//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says
-//! them.
+//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file.
 //!
-//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it
-//! has no light at all, a camera where it has none, and a ground where it has neither.
+//! What the file lacks is added as for other models ([`super::default_scene`]): a sky and a key light if it has no
+//! light, a camera if it has none, and a ground if it has neither.
 
 use super::choice::ModelChoice;
 use super::default_scene;
@@ -19,21 +18,21 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A scene file that was made of a glTF file.
+/// A scene file made from a glTF file.
 pub(super) struct Generated {
     pub file: SceneFile,
     pub facts: GltfFacts,
     pub warnings: Vec<String>,
 }
 
-/// How the scene is to be made.
+/// Options of the scene.
 pub(super) struct Wish<'a> {
-    /// What paths of the scene call the model.
+    /// Path of the model in the scene file.
     pub file: &'a str,
     pub choice: &'a ModelChoice,
-    /// Width over height of the picture.
+    /// Width over height of the image.
     pub aspect: f64,
-    /// Whether an image takes the place of the environment.
+    /// Whether an image replaces the environment.
     pub is_lit: bool,
 }
 
@@ -173,7 +172,7 @@ impl Maker<'_> {
         format!("{}: {what}", self.path.display())
     }
 
-    /// What is not modelled, each thing once with the materials that ask for it.
+    /// Unsupported features, each one once with the materials that use it.
     fn notes(&self, materials: &[(&str, &[String])]) -> Vec<String> {
         const TOLD: usize = 6;
         let mut by_note: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
@@ -226,7 +225,7 @@ impl Maker<'_> {
         let depth = (center - camera.eye).dot(camera.forward);
         let (vfov, orthographic_height) = match camera.lens {
             Lens::Perspective(yfov) => (yfov, None),
-            // In perspective, as high as it is at the middle of the scene.
+            // In perspective, with the same height at the distance of the scene's centre.
             Lens::Orthographic(half) => (2.0 * (half / depth.max(half)).atan(), Some(2.0 * half)),
         };
         CameraPart {
@@ -277,7 +276,7 @@ impl Maker<'_> {
     }
 }
 
-/// Whether objects may stand like this.
+/// Whether an object may have this transform.
 fn is_placement(world: &DAffine3) -> bool {
     let determinant = world.matrix3.determinant().abs();
     world.is_finite()
@@ -295,7 +294,7 @@ fn transform(world: &DAffine3) -> TransformPart {
     TransformPart { matrix, ..TransformPart::default() }
 }
 
-/// By the corners of the mesh's box.
+/// Extends `bounds` by the corners of the mesh's box.
 fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
     let around = mesh.mesh.bounds();
     let (min, max) = (around.min.as_dvec3() + mesh.mesh.center, around.max.as_dvec3() + mesh.mesh.center);
@@ -306,7 +305,7 @@ fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
     }
 }
 
-/// Those that the materials name, in their order.
+/// The textures that the materials name, in order.
 fn textures_of(materials: &Named<super::file::MaterialPart>, all: &[(String, TextureSource)]) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
     Named(all.iter().filter(|(name, _)| names.contains(name)).cloned().collect())

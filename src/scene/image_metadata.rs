@@ -1,9 +1,8 @@
-//! What a picture says about itself, so that it can be opened again: which scene, seen from where, through which
-//! lens, developed how, from which samples.
+//! The metadata in an image with which it can be opened again: scene, camera, display settings and samples.
 //!
-//! The note is RON text: in a PNG the text chunk [`NOTE_KEY`] (iTXt), in an EXR the attribute of that name. Paths in it
-//! count from the picture. It also holds a fingerprint of the scene, so that a scene that has changed since is noticed;
-//! a scene with changes that were never saved is written into the note as a whole.
+//! It is RON text: in a PNG in the text chunk [`NOTE_KEY`] (iTXt), in an EXR in the attribute of that name. Paths are
+//! relative to the image. It also holds a fingerprint of the scene, so that later changes of the scene are noticed; a
+//! scene with unsaved changes is stored in the metadata as a whole.
 
 use super::bounds::{check_film_size, check_max_depth};
 use super::camera::camera;
@@ -20,44 +19,44 @@ use std::error::Error;
 use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
-/// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
+/// Name of the metadata in an image: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
 
-/// The attribute that makes a picture a film.
+/// The attribute that marks an EXR image as a film.
 pub const FILM_KEY: &str = "firstlight.film";
 
-/// A newer program that writes something else counts this up.
+/// Format version; increased by incompatible changes.
 pub(super) const FORMAT: u32 = 1;
 
-/// Why a picture has no metadata to open it by, or leads to no scene; the words follow its path.
+/// Why the metadata of an image cannot be used, or its scene not be found; the text follows the path of the image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetadataError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// What stands before the pixels of the PNG or EXR is truncated, damaged or too long.
+    /// The part before the pixels of the PNG or EXR is truncated, damaged or too long.
     #[error("cannot be read: {0}")]
     Damaged(#[source] Box<dyn Error + Send + Sync>),
-    /// The file begins as neither format does.
+    /// The file is in neither format.
     #[error("is neither a PNG nor an OpenEXR image")]
     Format,
-    /// The picture was not made by this program, or has lost its metadata.
+    /// The image was not made by this program, or has lost its metadata.
     #[error("it has no embedded firstlight scene: only pictures rendered by firstlight can be opened")]
     Missing,
-    /// The metadata is not what this program writes.
+    /// The metadata has invalid syntax.
     #[error("its firstlight metadata cannot be parsed: {0}")]
     Syntax(#[source] Box<dyn Error + Send + Sync>),
-    /// The metadata is of a format that this version does not know.
+    /// The metadata has a newer format version.
     #[error("it was made by {program}, whose metadata format is not supported by this version")]
     Newer {
         /// Name and version of the program that wrote it.
         program: String,
     },
-    /// The metadata holds values that nothing is rendered from.
+    /// The metadata holds values out of range.
     #[error("its firstlight metadata is invalid: {0}")]
     Invalid(String),
-    /// The file of the scene is neither where it was nor beside the picture.
+    /// The scene file is neither at its path nor in the folder of the image.
     #[error("its scene {} was not found: put it next to the picture", .0.display())]
     NoScene(PathBuf),
 }
@@ -68,49 +67,49 @@ impl From<MetadataError> for String {
     }
 }
 
-/// What is in a picture's note.
+/// The metadata of an image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageMetadata {
-    /// Version of the format that the metadata is written in.
+    /// Format version of the metadata.
     pub format: u32,
-    /// Name and version.
+    /// Name and version of the program.
     pub program: String,
-    /// Which scene the picture shows.
+    /// The scene of the image.
     pub scene: ImageScene,
-    /// Of the scene, without camera, film and display.
+    /// Fingerprint of the contents of the scene, as of `SceneContent`.
     pub fingerprint: String,
-    /// From where the scene is seen, and through which lens.
+    /// View, projection and lens.
     pub camera: CameraPart,
     /// Size and pixel filter.
     pub film: FilmPart,
-    /// The light model.
+    /// The integrator.
     pub integrator: Integrator,
-    /// Longest path in segments; `None` is unbounded.
+    /// Maximum length of paths in segments; `None`: unlimited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
     /// Exposure and tone curve.
     pub display: DisplayPart,
     /// Seed of the random numbers.
     pub seed: u32,
-    /// The number of each pixel's first sample.
+    /// Index of the first sample of each pixel.
     pub first_sample: u32,
-    /// Samples of each pixel, or the mean over all.
+    /// Samples per pixel, or the mean over all pixels.
     pub spp: u32,
-    /// How samples are spread over the pixels.
+    /// How samples are distributed over the pixels.
     #[serde(default, skip_serializing_if = "is_uniform")]
     pub allocation: SampleAllocation,
-    /// Some pixels have more samples: it was stopped in the middle of a pass, and cannot be made again to the last bit.
+    /// Some pixels have more samples: the image was stopped in the middle of a pass and cannot be reproduced exactly.
     #[serde(default)]
     pub uneven: bool,
-    /// What has denoised the pixels, which are then no longer what the samples say; `None`: nothing has.
+    /// Name of the denoiser, if the pixels are denoised.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub denoised: Option<String>,
-    /// The scene itself, where it had changes that its file has not; paths as in that file.
+    /// The scene itself, if it had unsaved changes; paths are relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
 }
 
-/// Which scene a picture shows. Paths count from the picture, with `/` between their parts.
+/// The scene of an image. Paths are relative to the image, with `/` as separator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImageScene {
@@ -118,54 +117,54 @@ pub enum ImageScene {
     Builtin(String),
     /// A scene file, by path.
     Scene(String),
-    /// A model, framed as the program does.
+    /// A model, in the default scene.
     Model {
         /// Path of the model.
         path: String,
-        /// `y` or `z`, where it was asked for.
+        /// `y` or `z`, if it was given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         up: Option<char>,
     },
-    /// Nothing that was opened: see `text`.
+    /// Not from a file: see `text`.
     None,
 }
 
-/// Which samples are in a picture.
+/// The samples of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSamples {
-    /// The number of each pixel's first sample.
+    /// Index of the first sample of each pixel.
     pub first: u32,
     /// Samples that each pixel has at least.
     pub spp: u32,
-    /// Some pixels have more.
+    /// Whether some pixels have more.
     pub uneven: bool,
 }
 
 impl ImageMetadata {
-    /// Reads the note of a PNG or EXR picture.
+    /// Reads the metadata of a PNG or EXR image.
     ///
     /// # Errors
-    /// When the picture cannot be read or has no note.
+    /// If the image cannot be read or has no metadata.
     pub fn read(path: &Path) -> Result<Self, MetadataError> {
         Self::read_within(path, &Limits::of_this_process())
     }
 
-    /// The same with limits of one's own.
+    /// Like [`Self::read`], with the given limits.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Like [`Self::read`].
     pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, MetadataError> {
         Self::from_note(&note_of(path, limits)?)
     }
 
-    /// The text of the note.
+    /// Its text.
     pub fn to_note(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new().depth_limit(2).indentor("  ").extensions(Extensions::IMPLICIT_SOME);
-        // Plain structs, numbers and strings can always be written.
+        // Serialising plain data cannot fail.
         options().to_string_pretty(self, pretty).expect("a note is plain data")
     }
 
-    /// The note of the same picture when it is not at `from` but at `to`.
+    /// The metadata for an image that is moved from `from` to `to`: adapts its paths.
     pub fn moved(mut self, from: &Path, to: &Path) -> Self {
         let folder = |path: &Path| absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
         let moved = |path: &str| relative_path(&folder(to), &folder(from).join(text_to_path(path)));
@@ -176,10 +175,10 @@ impl ImageMetadata {
         self
     }
 
-    /// The metadata that is written as this text; the inverse of [`Self::to_note`].
+    /// Parses the text; the inverse of [`Self::to_note`].
     ///
     /// # Errors
-    /// When the text is no note that this program knows.
+    /// If the syntax, the format version or a value is invalid.
     pub fn from_note(text: &str) -> Result<Self, MetadataError> {
         let shot: Self = options().from_str(text).map_err(|error| MetadataError::Syntax(Box::new(error)))?;
         if shot.format > FORMAT {
@@ -189,7 +188,7 @@ impl ImageMetadata {
         Ok(shot)
     }
 
-    /// Whether the program could have written it: the same limits as those of scene files.
+    /// Checks the values against the limits of scene files.
     fn check(&self) -> Result<(), String> {
         if let Err(problems) = self.camera.components() {
             return Err(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "));
@@ -209,12 +208,12 @@ impl ImageMetadata {
         }
     }
 
-    /// The scene that the picture at `path` shows, if it is there.
+    /// The source of the scene of the image at `path`; `None` if it was not opened from a file.
     ///
     /// # Errors
-    /// When its file is not there.
+    /// If its file does not exist.
     pub fn source(&self, path: &Path) -> Result<Option<SceneSource>, MetadataError> {
-        // Its paths count from where it lies, not from a link that leads there.
+        // Paths are relative to the image file, not to a symbolic link to it.
         let lies_at = if path.is_symlink() { absolute(path) } else { path.to_path_buf() };
         let folder = lies_at.parent().unwrap_or(Path::new(""));
         let find = |relative: &str| {
@@ -231,7 +230,7 @@ impl ImageMetadata {
         })
     }
 
-    /// The axis of a model that was asked to point up; `None` where none was asked for.
+    /// The up axis that was given for a model; `None`: none was given.
     pub fn up(&self) -> Option<UpAxis> {
         match self.scene {
             ImageScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),
@@ -240,7 +239,8 @@ impl ImageMetadata {
         }
     }
 
-    /// What makes samples of the other picture useless for this one, if anything; in words that follow "a different".
+    /// Why the samples of the other image cannot be combined with those of this one, if so; the text follows "a
+    /// different".
     pub fn differs_from(&self, other: &Self) -> Option<&'static str> {
         let seen = |shot: &Self| {
             let (view, projection, lens) = camera(&shot.camera);
@@ -266,7 +266,7 @@ impl ImageMetadata {
         checks.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
     }
 
-    /// Sets view, film and display of a scene file to those of the picture.
+    /// Sets camera, film, integrator, depth and display of a scene file to those of the image.
     pub fn apply(&self, file: &mut SceneFile) {
         file.camera = self.camera.clone();
         file.film = self.film;
@@ -284,7 +284,7 @@ fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// The note among the attributes of an OpenEXR picture.
+/// The metadata among the attributes of an OpenEXR image.
 pub(crate) fn note_in(meta: &exr::meta::MetaData) -> Option<String> {
     let mut notes = meta
         .headers
@@ -296,20 +296,20 @@ pub(crate) fn note_in(meta: &exr::meta::MetaData) -> Option<String> {
     }
 }
 
-/// Any text as that of an attribute: its bytes in UTF-8, where the library's own way knows no more than Latin-1.
+/// Text as an attribute, in UTF-8; the constructors of the library support only Latin-1.
 pub(crate) fn exr_text(text: &str) -> AttributeValue {
     AttributeValue::Text(Text::from_slice_unchecked(text.as_bytes()))
 }
 
-/// The way back; what is no UTF-8 was written as Latin-1.
+/// The inverse of [`exr_text`]; text that is not valid UTF-8 is read as Latin-1.
 pub(crate) fn string_of(text: &Text) -> String {
     let bytes = text.as_slice();
     str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
 }
 
-/// The text of the note, within the limits.
+/// The text of the metadata, within the limits.
 fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
-    // A film carries a note too, and is the longest of all pictures.
+    // A film has metadata too, and may be longer than other images.
     let longest = FileKind::Film.limit(limits).max(FileKind::Image.limit(limits));
     let mut file = InputFile::open_within(path, FileKind::Image, longest)?;
     let mut start = [0; 8];
@@ -324,7 +324,7 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
         let info = decoder.info();
         let mut chunk =
             info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(MetadataError::Missing)?.clone();
-        // A few kilobytes may claim to unpack to gigabytes.
+        // A few kilobytes could decompress to gigabytes.
         chunk.decompress_text_with_limit(most).map_err(unreadable)?;
         return chunk.get_text().map_err(unreadable);
     }
@@ -336,17 +336,17 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
 
 /// The header of an EXR image, within the limits.
 fn exr_header(file: InputFile, limits: &Limits) -> Result<exr::meta::MetaData, MetadataError> {
-    /// Of all that stands before the pixels beside the note: of a film, some fifty bytes for each block of pixels; names of
-    /// objects and materials.
+    /// Limit for the part before the pixels, without the metadata: for a film, about fifty bytes per block of pixels,
+    /// and the names of objects and materials.
     const HEADER_BYTES: u64 = 64 << 20;
     let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
     exr::meta::MetaData::read_from_buffered(header, false).map_err(|error| MetadataError::Damaged(Box::new(error)))
 }
 
-/// Names of the channels of an EXR image, in their order.
+/// Names of the channels of an EXR image, in order.
 ///
 /// # Errors
-/// When the file cannot be read, or is something else.
+/// If the file cannot be read or is not an EXR image.
 pub fn exr_channels(path: &Path) -> Result<Vec<String>, MetadataError> {
     let limits = Limits::of_this_process();
     let longest = FileKind::Film.limit(&limits).max(FileKind::Image.limit(&limits));

@@ -1,8 +1,8 @@
-//! The only way in which the program reads a file: a regular file, no longer than the limit of its kind, within a
-//! deadline, and until somebody wants to stop.
+//! The only way in which the program reads files: regular files, with a maximum length by kind, a deadline, and
+//! cancellation.
 //!
-//! Pipes, devices, sockets and folders are refused at once: a pipe would be waited for, and a device may never end.
-//! `tests/source/gates.rs` looks for any other way. Start reading at [`InputFile::open`].
+//! Pipes, devices, sockets and folders are rejected without waiting: a pipe could block, and a device may be endless.
+//! `tests/source/gates.rs` enforces that there is no other way. Start reading at [`InputFile::open`].
 
 use super::limits::Limits;
 use std::fs::{File, Metadata};
@@ -10,7 +10,7 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What a file is for, which decides how long it may be.
+/// The purpose of a file, which determines its maximum length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// The text of a scene.
@@ -19,52 +19,52 @@ pub enum FileKind {
     Model,
     /// A material library (MTL).
     Library,
-    /// A texture, a picture of an environment, or a reference.
+    /// A texture, an environment image, or a reference image.
     Image,
-    /// A film to go on with.
+    /// A film to resume.
     Film,
-    /// What a session was asked for.
+    /// A recording of the commands of a session.
     Recording,
-    /// What the program remembers, and other small files of its own.
+    /// Settings and other small files of the program.
     Settings,
 }
 
-/// Why a file could not be read. The words follow the path.
+/// Why a file could not be read. The text follows the path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The system reports an error.
+    /// An error of the operating system.
     #[error("cannot be read: {}", plain_io(.0))]
     Io(#[source] io::Error),
-    /// The path is that of a folder.
+    /// The path is a folder.
     #[error("cannot be read: it is a folder")]
     Folder,
-    /// The path leads to what the text says: a pipe, a socket or a device.
+    /// The path is what the text says: a pipe, a socket or a device.
     #[error("cannot be read: it is not a regular file, but {0}")]
     NotRegular(&'static str),
     /// The file is longer than files of its kind may be.
     #[error("is larger than {limit} bytes, the limit for {}: {}", kind.plural(), Limits::advice())]
     TooLong {
-        /// What the file is for.
+        /// The purpose of the file.
         kind: FileKind,
-        /// Bytes that it may have.
+        /// The limit in bytes.
         limit: u64,
     },
-    /// The file is to be text and is not UTF-8.
+    /// The file must be text and is not UTF-8.
     #[error("cannot be read: line {line} is not UTF-8 text")]
     NotText {
-        /// The first line that is not, counted from 1.
+        /// The first invalid line, counted from 1.
         line: usize,
     },
-    /// Reading did not end before the deadline.
+    /// Reading took longer than the deadline.
     #[error("cannot be read: reading took longer than {} s", DEADLINE.as_secs())]
     TooSlow,
-    /// The caller's `stop` said so.
+    /// The caller's `stop` returned true.
     #[error("reading was cancelled")]
     Stopped,
 }
 
 impl ReadError {
-    /// Whether the same may succeed later, or on another machine.
+    /// Whether the error may be temporary, or specific to this machine.
     pub fn may_pass(&self) -> bool {
         match self {
             Self::Io(error) => may_pass(error.kind()),
@@ -74,7 +74,7 @@ impl ReadError {
     }
 }
 
-/// Whether what the system says may be otherwise later: what is not there, is no folder or is not allowed will not.
+/// Whether an I/O error may be temporary: a missing file, a missing folder or missing rights are not.
 pub(super) fn may_pass(kind: ErrorKind) -> bool {
     !matches!(
         kind,
@@ -93,18 +93,18 @@ pub(super) fn may_pass(kind: ErrorKind) -> bool {
     )
 }
 
-/// No file takes longer, unless what it lies on hangs.
+/// Longer reads mean a hanging file system or device.
 const DEADLINE: Duration = Duration::from_secs(600);
 
-/// Bytes between two looks at the clock and at whether to stop.
+/// Bytes between two checks of the deadline and of `stop`.
 const PORTION: usize = 1 << 20;
 
-/// A regular file that is open for reading, and gives no more than its limit.
+/// A regular file, open for reading, that gives no more than its limit.
 pub struct InputFile<'a> {
     file: File,
     kind: FileKind,
     limit: u64,
-    /// When it was opened.
+    /// At the time of opening; bytes.
     length: u64,
     position: u64,
     until: Instant,
@@ -112,7 +112,7 @@ pub struct InputFile<'a> {
 }
 
 impl FileKind {
-    /// Bytes that a file of this kind may have.
+    /// Maximum length in bytes.
     pub fn limit(self, limits: &Limits) -> u64 {
         match self {
             Self::Scene => limits.scene_bytes,
@@ -139,21 +139,21 @@ impl FileKind {
 }
 
 impl InputFile<'static> {
-    /// Opens a file of this kind within the limits of this process; never waits.
+    /// Opens a file of this kind within the limits of this process; never blocks.
     ///
     /// # Errors
-    /// When it is not there, no regular file, or too long.
+    /// If it does not exist, is not a regular file, or is too long.
     pub fn open(path: &Path, kind: FileKind) -> Result<Self, ReadError> {
         Self::open_within(path, kind, kind.limit(&Limits::of_this_process()))
     }
 
-    /// The same with a limit of the caller's own, bytes.
+    /// Like [`Self::open`], with the given limit in bytes.
     ///
     /// # Errors
-    /// As [`Self::open`].
+    /// Like [`Self::open`].
     pub fn open_within(path: &Path, kind: FileKind, limit: u64) -> Result<Self, ReadError> {
-        // Asked by name first, for opening some devices already does something; and again of what was opened, which
-        // may be another by then.
+        // Checked by name before opening, since opening some devices has side effects; and again afterwards, since the
+        // file may have been replaced.
         check_regular(&std::fs::metadata(path).map_err(ReadError::Io)?)?;
         let mut options = std::fs::OpenOptions::new();
         options.read(true);
@@ -161,7 +161,7 @@ impl InputFile<'static> {
         {
             use rustix::fs::OFlags;
             use std::os::unix::fs::OpenOptionsExt;
-            // Should it have become a pipe, opening does not wait for a writer.
+            // If it has become a pipe, opening does not wait for a writer.
             options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
         }
         let file = options.open(path).map_err(ReadError::Io)?;
@@ -176,31 +176,31 @@ impl InputFile<'static> {
 }
 
 impl<'a> InputFile<'a> {
-    /// Asks `stop` once for every portion, and reads no further when it says so.
+    /// Calls `stop` once per megabyte; if it returns true, reading fails.
     pub fn stopping(self, stop: &'a dyn Fn() -> bool) -> InputFile<'a> {
         InputFile { stop: Some(stop), ..self }
     }
 
-    /// Bytes that it had when it was opened.
+    /// Its length at the time of opening, bytes.
     pub fn length(&self) -> u64 {
         self.length
     }
 
-    /// All of it.
+    /// The whole contents.
     ///
     /// # Errors
-    /// When it cannot be read to its end, is too long, or reading is stopped.
+    /// If reading fails, the file is too long, or `stop` returned true.
     pub fn bytes(mut self) -> Result<Vec<u8>, ReadError> {
-        // A file may claim any length; what it has is found by reading.
+        // The reported length can be wrong; reading determines the real one.
         let mut bytes = Vec::with_capacity(self.length.min(64 << 20) as usize);
         self.read_to_end(&mut bytes)?;
         Ok(bytes)
     }
 
-    /// All of it as text, without a byte order mark.
+    /// The whole contents as text, without a byte order mark.
     ///
     /// # Errors
-    /// As [`Self::bytes`], and when it is not UTF-8.
+    /// Like [`Self::bytes`], and if it is not UTF-8.
     pub fn text(self) -> Result<String, ReadError> {
         let text = String::from_utf8(self.bytes()?).map_err(|error| {
             let good = error.utf8_error().valid_up_to();
@@ -220,7 +220,7 @@ impl<'a> InputFile<'a> {
         if Instant::now() >= self.until {
             return Err(ReadError::TooSlow);
         }
-        // One byte more than the limit tells whether it has grown beyond it.
+        // One byte more than the limit shows whether it has grown beyond it.
         let room = usize::try_from(self.limit.saturating_sub(self.position).saturating_add(1)).unwrap_or(usize::MAX);
         let portion = bytes.len().min(room).min(PORTION);
         let n = self.file.read(&mut bytes[..portion]).map_err(ReadError::Io)?;
@@ -232,7 +232,7 @@ impl<'a> InputFile<'a> {
     }
 }
 
-/// What some editors put in front of UTF-8 text.
+/// Some editors put it in front of UTF-8 text.
 pub const BYTE_ORDER_MARK: char = '\u{feff}';
 
 fn check_regular(info: &Metadata) -> Result<(), ReadError> {
@@ -273,7 +273,7 @@ impl Seek for InputFile<'_> {
 }
 
 impl From<io::Error> for ReadError {
-    /// Gives back what [`InputFile`] said, where it was passed through a reader.
+    /// Returns the original error of [`InputFile`] if it was passed through a reader.
     fn from(error: io::Error) -> Self {
         match error.downcast::<Self>() {
             Ok(own) => own,
@@ -282,7 +282,7 @@ impl From<io::Error> for ReadError {
     }
 }
 
-/// What went wrong with a file, in plain words.
+/// An I/O error in plain words.
 pub fn plain_io(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "no such file".to_owned(),
@@ -338,7 +338,7 @@ mod tests {
         let opened = open(100).unwrap();
         std::fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(&[7]).unwrap();
         assert!(matches!(opened.bytes(), Err(ReadError::TooLong { .. })));
-        // Decoders go back and forth.
+        // Decoders seek in both directions.
         let mut opened = open(101).unwrap();
         for _ in 0..3 {
             opened.seek(SeekFrom::Start(0)).unwrap();

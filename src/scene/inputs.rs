@@ -1,4 +1,4 @@
-//! What the picture depends on, copied out of the world in a fixed order.
+//! All data that the image depends on, copied from the world in a fixed order.
 
 use super::bad_value::BadValue;
 use super::components::{
@@ -12,37 +12,37 @@ use bevy_ecs::prelude::{Entity, Or, Query, Res, With, World};
 use bevy_ecs::system::{SystemParam, SystemState};
 use std::collections::HashSet;
 
-/// All that a snapshot is built from. Cheap to copy: meshes, clouds and pictures are shared.
+/// All inputs of a snapshot. Cheap to clone: meshes, groups of spheres and images are shared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneInputs {
     /// All objects.
     pub objects: Vec<ObjectInput>,
-    /// Those that the objects use, directly or in a blend.
+    /// The materials that the objects use, directly or in a blend.
     pub materials: Vec<MaterialInput>,
-    /// All lights that are no objects.
+    /// All lights that are not objects.
     pub lights: Vec<LightInput>,
     /// The first camera.
     pub camera: Option<CameraInput>,
-    /// Light from infinitely far away, and what the air absorbs.
+    /// The environment and the absorption of the air.
     pub environment: SceneEnvironment,
 }
 
-/// What the picture depends on of an object.
+/// The data of an object that the image depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectInput {
     /// The entity in the world.
     pub entity: Entity,
     /// Its `Name`, if it has one.
     pub name: Option<String>,
-    /// Its surface in its own space.
+    /// Its surface in object space.
     pub shape: Shape,
-    /// Where it stands in the world.
+    /// From object space to the world.
     pub placement: Placement,
     /// Its material entities, by slot.
     pub slots: Vec<Entity>,
 }
 
-/// What the picture depends on of a material.
+/// The data of a material that the image depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialInput {
     /// The entity in the world.
@@ -53,25 +53,25 @@ pub struct MaterialInput {
     pub material: Material,
 }
 
-/// What the picture depends on of a light that is no object.
+/// The data of a light that the image depends on; for lights that are not objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightInput {
     /// The entity in the world.
     pub entity: Entity,
     /// Its `Name`, if it has one.
     pub name: Option<String>,
-    /// Its kind and numbers.
+    /// Kind and parameters.
     pub light: LightKind,
-    /// Where it stands in the world.
+    /// Its position and orientation in the world.
     pub placement: Placement,
 }
 
-/// What the picture depends on of a camera.
+/// The data of a camera that the image depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraInput {
     /// The entity in the world.
     pub entity: Entity,
-    /// Where it stands and looks.
+    /// Its position and orientation.
     pub view: View,
     /// Its field of view.
     pub projection: Projection,
@@ -81,7 +81,7 @@ pub struct CameraInput {
 
 impl CameraInput {
     /// # Errors
-    /// When no picture can be taken with it.
+    /// If one of its components is invalid.
     pub fn check(&self) -> Result<(), BadValue> {
         self.view.check()?;
         self.projection.check()?;
@@ -93,10 +93,10 @@ type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 
 type LightParts = (Option<&'static PointLight>, Option<&'static SpotLight>, Option<&'static DirectionalLight>);
 
-/// Whether an entity is a light that is no object.
+/// Matches lights that are not objects.
 pub type WithLight = Or<(With<PointLight>, With<SpotLight>, With<DirectionalLight>)>;
 
-/// Read access to everything that the picture depends on.
+/// Read access to all data that the image depends on.
 #[derive(SystemParam)]
 pub struct SceneQueries<'w, 's> {
     objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
@@ -107,7 +107,7 @@ pub struct SceneQueries<'w, 's> {
 }
 
 impl SceneQueries<'_, '_> {
-    /// Copies of everything that the picture depends on, in the order of the scene file.
+    /// Copies all data that the image depends on, in the order of the scene file.
     pub fn collect(&self) -> SceneInputs {
         let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
         let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
@@ -144,12 +144,12 @@ impl SceneQueries<'_, '_> {
         }
     }
 
-    /// The light around everything; none when the resource is missing.
+    /// The environment; the default if the resource is missing.
     pub fn environment(&self) -> SceneEnvironment {
         self.environment.as_deref().cloned().unwrap_or_default()
     }
 
-    /// The materials that objects name, and those that these are blended of.
+    /// The materials of the objects, and the parts of their blends.
     fn used_materials(&self, objects: &[ObjectInput]) -> HashSet<Entity> {
         let mut used = HashSet::new();
         let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
@@ -174,7 +174,7 @@ impl SceneInputs {
     }
 }
 
-/// The order of the file first, then of entities: the same in every process that does the same.
+/// By the order in the file, then by entity: deterministic across processes.
 fn order(rank: Option<&Ordinal>, entity: Entity) -> (u32, Entity) {
     (rank.map_or(u32::MAX, |rank| rank.0), entity)
 }

@@ -1,7 +1,8 @@
-//! What a scene holds, as a person would list it: objects, materials with who uses them, and everything that emits light.
+//! The contents of a scene as lists for the user interface: objects, materials with their users, and everything that
+//! emits light.
 //!
-//! Made when somebody looks at a list, and only again when the scene has changed; numbers and colours are read from the
-//! world when they are shown, since they change more often than what there is.
+//! Created when a list is shown, and again only after the scene has changed; values are read from the world on display,
+//! since they change more often than the lists.
 
 use super::components::{Material, Ordinal, Shape, SurfaceMaterial};
 use super::inputs::SceneInputs;
@@ -10,18 +11,18 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Everything in the order of the scene file.
+/// All lists, in the order of the scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inventory {
-    /// Objects, and lights that are none.
+    /// Objects, and lights that are not objects.
     pub objects: Vec<ObjectEntry>,
-    /// Also those that nothing uses.
+    /// All materials, used or not.
     pub materials: Vec<MaterialEntry>,
-    /// Everything that emits light, the environment aside.
+    /// Everything that emits light, except the environment.
     pub lights: Vec<LightEntry>,
 }
 
-/// A line of the list of objects.
+/// An entry of the list of objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectEntry {
     /// The entity in the world.
@@ -32,34 +33,34 @@ pub struct ObjectEntry {
     pub kind: &'static str,
 }
 
-/// A line of the list of materials.
+/// An entry of the list of materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialEntry {
     /// The entity in the world.
     pub entity: Entity,
-    /// Its name, or that of what uses it.
+    /// Its name, or that of its user.
     pub label: String,
     /// The objects that use it, directly or in a blend, each once.
     pub users: Vec<Entity>,
-    /// Blends that have it as a part.
+    /// The blends that have it as a part.
     pub blends: Vec<Entity>,
 }
 
-/// A line of the list of lights.
+/// An entry of the list of lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightEntry {
-    /// What stands in the scene and can be selected.
+    /// The object or light; can be selected.
     pub entity: Entity,
     /// Its name, or its kind and a number.
     pub label: String,
-    /// As in [`LightKind::name`](super::LightKind::name), or the kind of light that its shape makes it.
+    /// As in [`LightKind::name`](super::LightKind::name), or by the shape of the emissive object.
     pub kind: &'static str,
-    /// The emissive material, which may be a part of a blend; none for a light that is no object.
+    /// The emissive material, which may be a part of a blend; `None` for a light that is not an object.
     pub material: Option<Entity>,
 }
 
 impl Inventory {
-    /// `inputs`: of the same world.
+    /// - `inputs`: those of `world`.
     pub fn of(world: &World, inputs: &SceneInputs) -> Self {
         let mut users: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
         let mut parts: BTreeMap<Entity, BTreeSet<Entity>> = BTreeMap::new();
@@ -107,13 +108,13 @@ impl Inventory {
         Self { materials: materials.collect(), objects, lights }
     }
 
-    /// The line of a material; `None` for an entity that is none.
+    /// The entry of a material; `None` if the entity is not a material.
     pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
         self.materials.iter().find(|entry| entry.entity == entity)
     }
 }
 
-/// As lists show it.
+/// As shown in lists.
 fn shown(name: &Option<String>) -> Option<String> {
     name.as_ref().map(|name| printable::name(name).into_owned())
 }
@@ -125,7 +126,7 @@ pub fn users_of(world: &World, inputs: &SceneInputs, material: Entity) -> Vec<En
     inputs.objects.iter().filter(|object| object.slots.iter().any(&mut uses)).map(|object| object.entity).collect()
 }
 
-/// A material and, if it is a blend, all that it is blended of.
+/// A material and, if it is a blend, all of its parts, recursively.
 fn parts_of(world: &World, material: Entity) -> BTreeSet<Entity> {
     let (mut found, mut open) = (BTreeSet::new(), vec![material]);
     while let Some(entity) = open.pop() {
@@ -140,7 +141,7 @@ fn parts_of(world: &World, material: Entity) -> BTreeSet<Entity> {
 
 /// All materials of the world with their names, in the order of the scene file.
 fn materials_of(world: &World) -> Vec<(Entity, Option<String>)> {
-    // Before the first frame of a session nothing is known of any component, and there is nothing to list.
+    // Before the first frame of a session no component is registered, and there is nothing to list.
     let Some(mut query) = world.try_query::<(Entity, Option<&Ordinal>, Option<&Name>, &SurfaceMaterial)>() else {
         return Vec::new();
     };

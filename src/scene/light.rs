@@ -1,4 +1,4 @@
-//! Lights that are no objects, of whatever kind: between scene file and world, and what they must be.
+//! Lights that are not objects: conversion between scene file and world, and validation.
 
 use super::bad_value::BadValue;
 use super::bounds::{check_cone, check_light, check_light_radius};
@@ -10,24 +10,24 @@ use super::view::unit_direction;
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
-/// A light that is no object. Each kind is a component of its own; an entity that has several is the first of these.
+/// A light that is not an object. Each kind is a component; if an entity has several, the first in this order counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
-    /// Shines evenly from a point or a small sphere.
+    /// Emits uniformly from a point or a small sphere.
     Point(PointLight),
-    /// Shines from a point into a cone.
+    /// Emits from a point into a cone.
     Spot(SpotLight),
-    /// Shines from infinitely far away, parallel.
+    /// Emits parallel light from infinitely far away.
     Directional(DirectionalLight),
 }
 
 impl LightKind {
-    /// The light that an entity is; `None` for what is none.
+    /// The light of an entity; `None` if it has none.
     pub fn of(world: &World, entity: Entity) -> Option<Self> {
         Self::first(world.get(entity), world.get(entity), world.get(entity))
     }
 
-    /// What counts of the components of one entity.
+    /// The first of the components of an entity.
     pub(super) fn first(
         point: Option<&PointLight>,
         spot: Option<&SpotLight>,
@@ -38,7 +38,7 @@ impl LightKind {
             .or(directional.map(|&light| Self::Directional(light)))
     }
 
-    /// Makes an entity this light and no other. What is so already is not touched.
+    /// Gives an entity this light and removes all others. Does not trigger change detection if nothing changes.
     pub fn put(this: Option<Self>, world: &mut World, entity: Entity) {
         if Self::of(world, entity) == this {
             return;
@@ -53,7 +53,7 @@ impl LightKind {
         }
     }
 
-    /// What people call it.
+    /// Name of the kind of light, for the user interface.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Point(_) => "point light",
@@ -62,7 +62,7 @@ impl LightKind {
         }
     }
 
-    /// Radiant intensity, W·sr⁻¹, or for a directional light its irradiance, W·m⁻².
+    /// Radiant intensity, W·sr⁻¹; for directional lights the irradiance, W·m⁻².
     pub fn strength(&self) -> Vec3 {
         match self {
             Self::Point(light) => light.intensity,
@@ -71,7 +71,7 @@ impl LightKind {
         }
     }
 
-    /// The same light with another [`Self::strength`].
+    /// The light with another [`Self::strength`].
     #[must_use]
     pub fn with_strength(self, strength: Vec3) -> Self {
         match self {
@@ -81,7 +81,7 @@ impl LightKind {
         }
     }
 
-    /// Radius of the sphere that it is to the renderer, metres; 0 for what rays cannot hit.
+    /// Radius of the emissive sphere, metres; 0 for delta lights, which rays cannot hit.
     pub fn radius(&self) -> f64 {
         match self {
             Self::Point(light) => light.radius,
@@ -89,7 +89,7 @@ impl LightKind {
         }
     }
 
-    /// Where it shines, unit, in the world; `None` for a light that shines everywhere, and where there is no direction.
+    /// Direction of emission, unit vector in the world; `None` for point lights, and if the direction is degenerate.
     pub fn direction(&self, placement: &Placement) -> Option<DVec3> {
         let own = match self {
             Self::Point(_) => return None,
@@ -100,10 +100,10 @@ impl LightKind {
     }
 
     /// # Errors
-    /// When nothing can shine like this.
+    /// If a parameter is out of range, or the direction is degenerate.
     pub fn check(&self, placement: &Placement) -> Result<(), BadValue> {
         match self {
-            // A sphere may be of any size that `f32` knows, and has the checks of all that emits.
+            // Spheres of any radius that is a normal `f32` get the checks of emissive objects.
             Self::Point(light) if light.radius > 0.0 && (light.radius as f32).is_normal() => {}
             Self::Point(light) => check_light("intensity", light.intensity).and(check_light_radius(light.radius))?,
             Self::Spot(light) => {
@@ -121,7 +121,7 @@ impl LightKind {
         Ok(())
     }
 
-    /// The light and the place that a scene file means.
+    /// The light of a scene file and its placement.
     pub(super) fn from_part(part: &LightPart) -> (Self, Placement) {
         match part {
             LightPart::Point { position, intensity, radius, .. } => {
@@ -145,9 +145,9 @@ impl LightKind {
         }
     }
 
-    /// How a scene file says it.
+    /// The light as in a scene file.
     pub(super) fn to_part(self, name: Option<String>, placement: &Placement) -> LightPart {
-        // A point of its own says where a light is that is not turned.
+        // Lights with a position need no transform if they are not rotated.
         let (position, transform) = match *placement == Placement::at(placement.translation) {
             true => (placement.translation, TransformPart::default()),
             false => (DVec3::ZERO, placement.to_part()),

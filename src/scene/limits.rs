@@ -1,28 +1,28 @@
-//! How much a file of unknown origin may ask for, and where one number raises all of it.
+//! Limits for files of unknown origin, and the variable that scales all of them.
 
 use crate::printable::name;
 
-/// Bytes of a picture file beside its pixels and its note: profiles, thumbnails, tables.
+/// Bytes of an image file besides its pixels and its metadata: profiles, thumbnails, tables.
 const BESIDE: u64 = 64 << 20;
 
-/// What is refused for its size. `docs/stability.md` says what each number means in memory.
+/// Sizes above which files are rejected. `docs/stability.md` gives the memory that corresponds to each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a model; loading takes up to about 25 bytes of memory for each.
+    /// Bytes of a model; loading takes up to about 25 bytes of memory per byte.
     pub model_bytes: u64,
     /// Bytes of a material library.
     pub library_bytes: u64,
-    /// Bytes of the text of a scene; reading takes up to about 25 bytes of memory for each.
+    /// Bytes of the text of a scene; reading takes up to about 25 bytes of memory per byte.
     pub scene_bytes: u64,
-    /// Pixels of a picture; decoding takes up to 32 bytes of memory for each.
+    /// Pixels of an image; decoding takes up to 32 bytes of memory per pixel.
     pub picture_pixels: u64,
-    /// Pixels of a film that is read; that takes up to 700 bytes of memory for each.
+    /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
-    /// Bytes of the note that a picture carries.
+    /// Bytes of the metadata in an image.
     pub note_bytes: u64,
-    /// Bytes of a recording; reading takes up to about 10 bytes of memory for each.
+    /// Bytes of a recording; reading takes up to about 10 bytes of memory per byte.
     pub recording_bytes: u64,
-    /// Bytes of settings, of the views of a scene, and of other small files of the program's own.
+    /// Bytes of settings, saved views and other small files of the program.
     pub settings_bytes: u64,
 }
 
@@ -30,7 +30,7 @@ impl Limits {
     /// The environment variable that multiplies all limits.
     pub const VARIABLE: &str = "FIRSTLIGHT_LIMITS";
 
-    /// What fits a machine of today.
+    /// The default limits, for current desktop computers.
     pub const USUAL: Self = Self {
         model_bytes: 1 << 30,
         library_bytes: 16 << 20,
@@ -42,12 +42,12 @@ impl Limits {
         settings_bytes: 1 << 20,
     };
 
-    /// The usual limits times the number in [`Self::VARIABLE`], where there is one.
+    /// The default limits times the number in [`Self::VARIABLE`], if it is set.
     pub fn of_this_process() -> Self {
         Self::USUAL.times(std::env::var(Self::VARIABLE).ok().and_then(|text| factor_of(&text)).unwrap_or(1.0))
     }
 
-    /// What is wrong with [`Self::VARIABLE`], where it says something that is no factor.
+    /// A warning if [`Self::VARIABLE`] is set to an invalid value.
     pub fn misunderstood() -> Option<String> {
         let text = std::env::var_os(Self::VARIABLE)?;
         let text = text.to_string_lossy();
@@ -56,7 +56,9 @@ impl Limits {
         })
     }
 
-    /// - `factor`: positive and finite; anything else counts as 1.
+    /// Scales all limits.
+    ///
+    /// - `factor`: positive and finite; any other value counts as 1.
     pub fn times(self, factor: f64) -> Self {
         let factor = if is_factor(factor) { factor } else { 1.0 };
         // The conversion saturates.
@@ -73,20 +75,20 @@ impl Limits {
         }
     }
 
-    /// Bytes of a picture file: the most pixels, not compressed, and all that may stand beside them.
+    /// Bytes of an image file: the maximum number of pixels, uncompressed, plus metadata and other data.
     pub fn picture_bytes(&self) -> u64 {
         const BYTES_A_PIXEL: u64 = 16;
         self.picture_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
     }
 
-    /// Bytes of a film, likewise.
+    /// Bytes of a film file, likewise.
     pub fn film_bytes(&self) -> u64 {
-        /// Of some thirty channels of four bytes, and what packing may add.
+        /// About thirty channels of four bytes, and the overhead of compression.
         const BYTES_A_PIXEL: u64 = 160;
         self.film_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
     }
 
-    /// What to do about a refusal.
+    /// How to raise the limits.
     pub(crate) fn advice() -> String {
         format!("set {}=2 in the environment to double all limits", Self::VARIABLE)
     }

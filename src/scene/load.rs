@@ -1,4 +1,4 @@
-//! From a name or a path to everything a scene needs: text, meshes, pictures, trees. Runs on any thread.
+//! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::choice::ModelChoice;
@@ -26,22 +26,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// How to load.
+/// Options for loading.
 #[derive(Clone, Copy, Default)]
 pub struct LoadOptions<'a> {
-    /// For models; guessed from how the model would stand when not given.
+    /// For models; `None`: guessed from the stability of the model on the ground.
     pub up: Option<UpAxis>,
-    /// An image that takes the place of the scene's own environment.
+    /// An image that replaces the environment of the scene.
     pub environment: Option<&'a Path>,
-    /// Width over height of the picture that a model is framed for; 16:9 when not given.
+    /// Width over height of the image for which a model is framed; `None`: 16:9.
     pub aspect: Option<f64>,
-    /// Of a glTF model.
+    /// Camera, time and variant of a glTF model.
     pub choice: Option<&'a ModelChoice>,
-    /// Large meshes get trees that are built in a hurry ([`super::trees::Trees::hasty`]), for a first picture.
+    /// Whether large meshes first get trees that are faster to build ([`super::trees::Trees::hasty`]), for a quick
+    /// first image.
     pub hasty: bool,
-    /// What was read before: of it is taken what has not changed on disk.
+    /// The previous state of the scene: files that have not changed on disk are not read again.
     pub known: Option<&'a LoadedScene>,
-    /// Told what is being done now.
+    /// Called with a description of each step.
     pub progress: Option<&'a (dyn Fn(&str) + Sync)>,
 }
 
@@ -57,10 +58,10 @@ impl LoadOptions<'_> {
     }
 }
 
-/// Reads a scene and all it points at, and builds its trees.
+/// Reads a scene and all files that it refers to, and builds its trees.
 ///
 /// # Errors
-/// When the scene, or a file that it cannot be without, is missing or wrong; see [`SceneError`].
+/// If the scene, or a file that it requires, is missing or invalid; see [`SceneError`].
 pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     if let SceneSource::Picture(path) = source {
         return load_picture(path, options);
@@ -105,7 +106,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
                 kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
             let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             if options.environment.is_some() {
-                // The image has lights of its own.
+                // The image contains its own light sources.
                 default_scene::remove_key_light(&mut file);
             }
             let mut scene = LoadedScene::empty(source, file, folder);
@@ -133,7 +134,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     Ok(scene)
 }
 
-/// The scene that a picture shows, seen as the picture shows it.
+/// The scene of an image, with the camera of the image.
 fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     let failed = |error: MetadataError| SceneError::in_file(path, error);
     let shot = ImageMetadata::read(path).map_err(failed)?;
@@ -142,7 +143,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     let mut scene = match (&shot.text, source) {
         (Some(text), source) => {
             let start = Instant::now();
-            // Its paths count from where the scene lies.
+            // Its paths are relative to the folder of the scene.
             let source = source.unwrap_or_else(|| SceneSource::Picture(path.to_path_buf()));
             let folder = match &source {
                 SceneSource::Builtin(_) => PathBuf::new(),
@@ -175,7 +176,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     Ok(scene)
 }
 
-/// Loads what the objects, textures and environment of a checked file point at.
+/// Loads the files that the objects, textures and environment of a checked file refer to.
 fn resolve(
     source: &SceneSource,
     file: SceneFile,
@@ -191,7 +192,7 @@ fn resolve(
     }
     let title = PathBuf::from(source.title());
     let (mut problems, mut untold) = (Vec::new(), 0);
-    // An error inside a file that the scene points at names that file; the scene's line is told beside it.
+    // An error inside a referenced file names that file, after the location in the scene.
     let mut note = |path: String, error: &SceneError| {
         for problem in &error.problems {
             if problems.len() < SceneError::MAX_TOLD {
@@ -255,7 +256,7 @@ fn resolve(
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
         if let Err(error) = scene.add_picture(&file, &path, options, documents) {
-            // A model is worth seeing without a picture that is lost.
+            // A model is still useful if an image is missing.
             match text {
                 Some(_) => note(place, &error),
                 None => scene.warnings.push(format!("{error}; the texture is omitted")),
@@ -271,7 +272,7 @@ fn resolve(
 }
 
 impl LoadedScene {
-    /// Looks through the camera that was asked for; what only glTF models have is told.
+    /// Selects the chosen camera; warns about choices that only glTF models support.
     fn choose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
         if choice.at.is_some() || choice.variant.is_some() {
             self.warnings.push(format!("{}: only glTF models have moments and variants", self.source.title()));
@@ -286,9 +287,9 @@ impl LoadedScene {
         Ok(())
     }
 
-    /// Makes an image the environment, whatever the scene itself has.
+    /// Uses an image as the environment instead of that of the scene.
     fn light_by(&mut self, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
-        // The paths of a scene count from its folder; those of a scene without one, from the current folder.
+        // Paths are relative to the folder of the scene, or to the working directory if it has none.
         let is_here = self.folder.as_os_str().is_empty();
         let file = if is_here { path_to_text(path) } else { relative_path(&self.folder, path) };
         self.add_picture(&file, path, options, &Documents::default())?;
@@ -316,7 +317,7 @@ impl LoadedScene {
             return Ok(());
         }
         options.say(&format!("loading {name}"));
-        // Also where it cannot be read: it may come to be.
+        // Also if it cannot be read, since it may appear later.
         self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
         let read = ahead.map_or_else(|| documents.picture(path), |(_, read)| read);
         let (picture, warning) = read.map_err(|reason| SceneError::in_file(path, reason))?;
@@ -325,7 +326,7 @@ impl LoadedScene {
         Ok(())
     }
 
-    /// Decodes the pictures that are not known yet, side by side.
+    /// Decodes the images that are not known yet in parallel.
     fn decode_ahead<'f>(&self, files: impl Iterator<Item = &'f str>, options: &LoadOptions, documents: &Documents) {
         let is_new = |(file, path): &(&str, PathBuf)| {
             let on_disk = file_of(path);
@@ -336,7 +337,8 @@ impl LoadedScene {
         documents.decode(paths.into_iter().collect());
     }
 
-    /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
+    /// Loads the images of the materials of mesh files. A missing one gives a warning: many models come without their
+    /// images.
     fn add_mesh_pictures(&mut self, options: &LoadOptions, documents: &Documents) {
         let textures = self.meshes_with_own_materials().flat_map(|mesh| &mesh.textures);
         let named = |(_, source, path): &(String, TextureSource, PathBuf)| match source {
@@ -351,7 +353,7 @@ impl LoadedScene {
         }
     }
 
-    /// Every file that this scene was read from.
+    /// All files that this scene was read from.
     pub fn files(&self) -> Vec<PathBuf> {
         let own = match &self.source {
             SceneSource::Scene(path) | SceneSource::Model(path) => Some(path.clone()),
@@ -365,13 +367,13 @@ impl LoadedScene {
         files
     }
 
-    /// The mesh of a model, if its files are still the same.
+    /// The mesh of a model, if its files have not changed.
     fn fresh_model(&self) -> Option<LoadedMesh> {
         self.meshes.iter().flatten().find(|mesh| mesh.is_fresh()).cloned()
     }
 
     fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
-        // Trees go by what they were built over, so those of what has not changed are found again.
+        // Trees are keyed by their geometry, so those of unchanged geometry are reused.
         if let Some(known) = options.known {
             self.trees = known.trees.clone();
         }
@@ -393,12 +395,12 @@ impl LoadedScene {
     }
 }
 
-/// What is part of a model changes with it.
+/// The file on disk: for an image inside a model, the model.
 fn file_of(path: &Path) -> PathBuf {
     part_of_model(path).map_or_else(|| path.to_owned(), |(model, _)| model)
 }
 
-/// A picture that was read before, if its file is still the same.
+/// An image that was read before, if its file has not changed.
 fn known_picture<'a>(
     options: &LoadOptions<'a>,
     name: &str,
@@ -413,17 +415,17 @@ fn known_picture<'a>(
     known.pictures.get(name)
 }
 
-/// What tells one mesh from another: where it comes from, and what is made of it.
+/// Identity of a mesh: source, shading and bits of the simplification ratio.
 type MeshKey = (MeshSource, MeshShading, Option<u64>);
 
-/// What was read before, by what it was read for.
+/// The data that was read before, by the objects that it was read for.
 struct Known<'a> {
     scene: &'a LoadedScene,
     meshes: HashMap<MeshKey, usize>,
     balls: HashMap<BallsKey, usize>,
 }
 
-/// First centre, steps, radii and other centres, bit by bit.
+/// First centre, steps, radii and other centres, as bits.
 #[derive(PartialEq, Eq, Hash)]
 enum BallsKey {
     Grid([u64; 4], Vec<(u32, [u64; 3])>),
@@ -471,7 +473,7 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// The mesh of an object that asks for the same, if its files are still the same.
+    /// The mesh of an equal object, if its files have not changed.
     fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
         let key = Self::mesh_key(wanted)?;
         let is_builtin = matches!(key.0, MeshSource::Builtin(_));
@@ -479,13 +481,13 @@ impl<'a> Known<'a> {
         ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
     }
 
-    /// The spheres of an object that has the same.
+    /// The spheres of an equal object.
     fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
         self.scene.balls[*self.balls.get(&Self::balls_key(wanted)?)?].clone()
     }
 }
 
-/// The text of a scene file, within its limit.
+/// The text of a scene file, within its length limit.
 fn read_text(path: &Path) -> Result<String, SceneError> {
     InputFile::open(path, FileKind::Scene)
         .and_then(InputFile::text)

@@ -1,4 +1,4 @@
-//! A scene that was read, with all that it points at.
+//! A scene that was read, with all data that it refers to.
 
 use super::choice::ModelChoice;
 use super::components::Balls;
@@ -14,40 +14,40 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A scene with everything it needs, ready to be spawned into a world.
+/// A scene with all its data, ready to be spawned into a world.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
     /// What was opened.
     pub source: SceneSource,
-    /// The scene as its file says it; of a model, the scene that is made around it.
+    /// The scene as in its file; for a model, the scene that was made for it.
     pub file: SceneFile,
-    /// What the paths in `file` count from.
+    /// The folder that the paths in `file` are relative to.
     pub folder: PathBuf,
-    /// One an object of `file`, `None` for what is not a mesh.
+    /// One per object of `file`; `None` for objects that are not meshes.
     pub(super) meshes: Vec<Option<LoadedMesh>>,
-    /// One an object of `file`, `None` for what is not a cloud.
+    /// One per object of `file`; `None` for objects that are not groups of spheres.
     pub(super) balls: Vec<Option<Arc<Balls>>>,
     /// By the path in `file`.
     pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
-    /// Where they lie, and what they were when they were read.
+    /// Their files, each with its stamp at the time of reading.
     pub(super) picture_files: HashMap<String, (PathBuf, Stamp)>,
     /// Trees of its meshes and of its groups of spheres.
     pub trees: Trees,
-    /// What a person should know of it, one sentence each.
+    /// Warnings for the user, one sentence each.
     pub warnings: Vec<String>,
-    /// Which axis of a model was asked to point up.
+    /// The up axis that was given for a model.
     pub up: Option<UpAxis>,
-    /// The image that took the place of the scene's own environment.
+    /// The image that replaced the environment of the scene.
     pub environment: Option<PathBuf>,
-    /// What of a model was asked for.
+    /// The given camera, time and variant of a model.
     pub choice: ModelChoice,
-    /// What the glTF file has that was opened by itself.
+    /// The contents of a glTF file that was opened by itself.
     pub facts: Option<GltfFacts>,
-    /// What the picture said that this was opened by.
+    /// The metadata of the image that was opened.
     pub shot: Option<ImageMetadata>,
-    /// Reading and parsing.
+    /// Time for reading and parsing.
     pub load_seconds: f64,
-    /// Building trees.
+    /// Time for building trees.
     pub build_seconds: f64,
 }
 
@@ -73,12 +73,12 @@ impl LoadedScene {
         }
     }
 
-    /// Memory of the pictures of its textures and environment, bytes.
+    /// Memory of the images of its textures and environment, bytes.
     pub fn picture_bytes(&self) -> usize {
         self.pictures.values().map(|picture| picture.bytes()).sum()
     }
 
-    /// Meshes of objects that say nothing of materials and so take those of the mesh's file.
+    /// Meshes of objects that name no material and so use those of the mesh file.
     pub(super) fn meshes_with_own_materials(&self) -> impl Iterator<Item = &LoadedMesh> {
         let objects = self.file.objects.iter().zip(&self.meshes);
         objects

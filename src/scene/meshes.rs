@@ -1,4 +1,4 @@
-//! The meshes that a scene names: from files or made by the program, shaded as asked, with their own materials.
+//! The meshes of a scene: from files or built in, shaded as specified, with the materials of their files.
 
 use super::documents::Documents;
 use super::error::SceneError;
@@ -18,10 +18,10 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Edges of glTF meshes that are shaded anew are hard beyond this angle, radians.
+/// Crease angle for recomputed normals of glTF meshes, radians: edges are hard beyond it.
 const CREASE: f32 = std::f32::consts::FRAC_PI_3;
 
-/// What `builtin("…")` may name.
+/// The names for `builtin("…")`.
 pub const BUILTIN_NAMES: &[&str] = &[
     "asteroid",
     "blob-in-bowl",
@@ -35,7 +35,7 @@ pub const BUILTIN_NAMES: &[&str] = &[
     "torus",
 ];
 
-/// The mesh of that name, and the crease angle, radians, beyond which its edges are hard.
+/// The mesh of that name, and its crease angle in radians; `None` smooths every edge.
 fn builtin_mesh(name: &str) -> Option<(Mesh, Option<f32>)> {
     let sharp = Some(40_f32.to_radians());
     Some(match name {
@@ -53,22 +53,22 @@ fn builtin_mesh(name: &str) -> Option<(Mesh, Option<f32>)> {
     })
 }
 
-/// A mesh and the materials that its own file gives its slots.
+/// A mesh and the materials that its file assigns to its slots.
 #[derive(Clone, Debug)]
 pub struct LoadedMesh {
     pub mesh: Arc<Mesh>,
-    /// One a slot; empty when the file has none.
+    /// One per slot; empty if the file has no materials.
     pub slots: Vec<(String, MaterialPart)>,
-    /// Textures that `slots` name, and where their pictures lie.
+    /// The textures of `slots`, with the paths of their images.
     pub textures: Vec<(String, TextureSource, PathBuf)>,
     pub warnings: Vec<String>,
-    /// About `slots`, for those who use them.
+    /// Warnings about `slots`, for objects that use them.
     pub material_warnings: Vec<String>,
-    /// What was read for it, and what that was then.
+    /// All files that were read for it, each with its stamp.
     pub files: Vec<(PathBuf, Stamp)>,
 }
 
-/// Reads or makes a mesh, then simplifies and shades it as asked.
+/// Reads or generates a mesh, then simplifies and shades it.
 pub fn load_mesh(
     source: &MeshSource,
     shading: MeshShading,
@@ -102,24 +102,24 @@ pub fn load_mesh(
     }
 }
 
-/// A mesh before it is simplified and shaded, for making it anew in another way without reading it again.
+/// A mesh before simplification and shading, so that both can be changed without reading it again.
 #[derive(Clone, Debug)]
 pub struct MeshBase {
     source: MeshSource,
-    /// Of the file, normals are kept or not.
+    /// Determines whether the normals of the file are kept.
     shading: MeshShading,
     simplified: bool,
     folder: PathBuf,
     mesh: Mesh,
-    /// Radians beyond which an edge is hard in automatic shading.
+    /// Crease angle of automatic shading, radians; `None` smooths every edge.
     crease: Option<f32>,
 }
 
 impl MeshBase {
-    /// Reads or makes what `load_mesh` would begin with.
+    /// Reads or generates the mesh: the first step of `load_mesh`.
     ///
     /// # Errors
-    /// When there is no such mesh, or its file cannot be read.
+    /// If there is no such mesh, or its file cannot be read.
     pub fn read(
         source: &MeshSource,
         shading: MeshShading,
@@ -150,20 +150,20 @@ impl MeshBase {
         Ok(Self { source, shading, simplified: simplify.is_some(), folder, mesh, crease })
     }
 
-    /// Whether this is what would be read.
+    /// Whether [`Self::read`] would give the same for these arguments.
     pub fn serves(&self, source: &MeshSource, shading: MeshShading, simplify: Option<f64>, folder: &Path) -> bool {
         (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
     }
 
-    /// Simplified and shaded, as `load_mesh` ends.
+    /// Simplifies and shades the mesh: the last step of `load_mesh`.
     ///
     /// # Errors
-    /// When it cannot be simplified as asked.
+    /// If it cannot be simplified by this ratio.
     pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
         finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
     }
 
-    /// The mesh that [`Self::finish`] begins with.
+    /// The mesh before [`Self::finish`].
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -178,11 +178,11 @@ fn finish(
 ) -> Result<Mesh, SceneError> {
     let (had_tangents, is_gltf) = (!mesh.tangents.is_empty(), matches!(source, MeshSource::Gltf { .. }));
     let mesh = simplified(mesh, simplify)?;
-    // A glTF mesh without normals is flat.
+    // glTF meshes without normals have flat shading.
     if is_gltf && shading == MeshShading::Auto && simplify.is_none() {
         return Ok(mesh);
     }
-    // Normals that reading gave are those that were asked for.
+    // The normals of an imported mesh are already the specified ones.
     let keeps = shading != MeshShading::Flat && source.file().is_some() && !mesh.normals.is_empty();
     let mesh = if keeps { mesh } else { shaded(mesh, shading, crease) };
     Ok(if had_tangents && mesh.tangents.is_empty() { mesh.with_tangents() } else { mesh })
@@ -194,7 +194,7 @@ fn read_file(
     shading: MeshShading,
     simplify: Option<f64>,
 ) -> Result<LoadedMesh, SceneError> {
-    // Before it is read: what changes in the meantime is read again.
+    // Taken before reading, so that a change in the meantime is noticed.
     let before = stamp(path);
     let format = source.file().map_or(ModelFormat::Obj, |(format, _)| format);
     let (mut imported, crease) = read_base(path, format, shading, simplify.is_some())?;
@@ -206,20 +206,20 @@ fn read_file(
     let (slots, textures) = (Vec::new(), Vec::new());
     let (warnings, material_warnings) = (imported.warnings, imported.material_warnings);
     let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files };
-    // A file without any material leaves the choice to whoever uses it.
+    // If the file has no materials, the slots stay empty.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
         for material in &imported.materials {
             let part = loaded.material(material);
             loaded.slots.push((material.name.clone(), part));
         }
-        // Materials may share a picture.
+        // Materials may share an image.
         let mut known = HashSet::new();
         loaded.textures.retain(|(name, ..)| known.insert(name.clone()));
     }
     Ok(loaded)
 }
 
-/// The file as simplification wants it, and the crease angle of normals that are still to be computed.
+/// The mesh as simplification needs it, and the crease angle for normals that are still to be computed.
 fn read_base(
     path: &Path,
     format: ModelFormat,
@@ -237,7 +237,7 @@ fn read_base(
         MeshShading::Smooth if !simplify => ModelNormals::OfPositions,
         MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
     })?;
-    // Normals that were computed would hold simplification back at every crease; they are computed after it.
+    // Computed normals would prevent simplification at creases: they are computed afterwards.
     if shading == MeshShading::Auto && simplify && !imported.normals_from_file {
         imported.mesh = read(ModelNormals::Ignore)?.mesh;
     }
@@ -255,7 +255,7 @@ fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
     }
 }
 
-/// `crease`: radians beyond which an edge is hard in automatic shading; `None` smooths every edge.
+/// - `crease`: crease angle of automatic shading, radians; `None` smooths every edge.
 fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
     match shading {
         MeshShading::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
@@ -265,13 +265,13 @@ fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
 }
 
 impl LoadedMesh {
-    /// Whether the files that it was read from are still the same.
+    /// Whether the files that it was read from have not changed.
     pub fn is_fresh(&self) -> bool {
         self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)
     }
 
-    /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
-    /// diffuse, and all others have a highlight if the file gives it a strength.
+    /// Converts an MTL material: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are diffuse,
+    /// and all others have a highlight if the file gives its strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
         let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         if let Some(pbr) = &material.pbr {
@@ -311,7 +311,7 @@ impl LoadedMesh {
         }
     }
 
-    /// A material of MTL's PBR extension.
+    /// Converts a material of the PBR extension of MTL.
     fn pbr_material(&mut self, material: &ImportedMaterial, pbr: &PbrMaterial) -> MaterialPart {
         let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         let color = share(material.diffuse.unwrap_or(Vec3::splat(0.8)));
@@ -360,7 +360,7 @@ impl LoadedMesh {
         layers
     }
 
-    /// A texture of numbers in place of colours, by its name.
+    /// Adds a texture that holds data instead of colours, and returns its name.
     fn data(&mut self, file: Option<&PathBuf>) -> Option<String> {
         let file = file?;
         let path = file.display().to_string();
@@ -389,10 +389,10 @@ impl LoadedMesh {
     }
 }
 
-/// The share of light that an MTL material's highlight returns, and its exponent; `None` where nobody would see it.
+/// Albedo and exponent of the highlight of an MTL material; `None` if it would be invisible.
 ///
-/// The file gives the strength of its peak: Kd cos + Ks cosⁿ. Ours are given by the light that they return in all, so
-/// that the peak is (n + 1) / 2 times that share, in the same measure.
+/// MTL gives the strength of the peak: Kd cos + Ks cosⁿ. Here the strength is the albedo of the highlight; its peak is
+/// (n + 1) / 2 times the albedo, in the same units.
 fn highlight_of(material: &ImportedMaterial) -> Option<(f32, f32)> {
     const LEAST: f32 = 1.0 / 256.0;
     if matches!(material.illumination_model, Some(0 | 1)) {
@@ -428,7 +428,7 @@ mod tests {
         };
         for (strength, exponent) in [(0.3, 9.0), (0.8, 30.0), (1.0, 100.0)] {
             let (share, shininess) = highlight_of(&material(strength, exponent, Some(2))).unwrap();
-            // What `render::phong` makes of it at its peak, against Lambert's albedo of the same strength.
+            // The peak of `render::phong`, relative to a Lambertian surface of the same strength.
             assert!((share * (shininess + 1.0) / 2.0 - strength).abs() < 1e-6, "{strength} {exponent}");
         }
         assert_eq!(highlight_of(&material(0.8, 30.0, Some(1))), None, "matte by its illumination model");

@@ -1,4 +1,4 @@
-//! The note of a picture to come.
+//! The metadata of an image that is not finished yet.
 
 use super::describe::Description;
 use super::file::{DisplayPart, FilmPart};
@@ -12,7 +12,7 @@ use bevy_ecs::prelude::World;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// All that a note needs of a world; made at once, finished later, when the film is there.
+/// All data of a world that the metadata needs; created at once, completed when the film is finished.
 #[derive(Clone, Debug)]
 pub struct MetadataDraft {
     source: Option<SceneSource>,
@@ -26,16 +26,16 @@ pub struct MetadataDraft {
     prints: OnceLock<Prints>,
 }
 
-/// What takes a look at everything in the scene: some seconds where a million objects are.
+/// Data that depends on the whole scene: some seconds for a million objects.
 #[derive(Clone, Copy, Debug)]
 struct Prints {
     content: Fingerprint,
-    /// The scene is another than the one that was opened, and can be said in words.
+    /// Whether the scene differs from the one that was opened, and can be described.
     has_changed: bool,
 }
 
 impl MetadataDraft {
-    /// Of what `world` shows; `loaded` is the scene that was opened into it.
+    /// From the contents of `world`; `loaded`: the scene that was opened into it.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let description = Description::of(world, loaded);
         let settings = world.get_resource::<super::Rendering>().map(|rendering| rendering.0).unwrap_or_default();
@@ -51,18 +51,18 @@ impl MetadataDraft {
         }
     }
 
-    /// Does now what takes long about [`note`](Self::note).
+    /// Computes the slow part of [`note`](Self::note) now.
     pub fn prepare(&self) {
         self.prints();
     }
 
-    /// The same, for a draft of the same scene seen from elsewhere.
+    /// Reuses the slow part of another draft of the same scene, seen by another camera.
     pub fn prepared_as(mut self, other: &Self) -> Self {
         self.prints = other.prints.clone();
         self
     }
 
-    /// The note of a picture that will lie at `path`, of a film of this size and so many samples.
+    /// The metadata of an image at `path`, with a film of this size (width, height; pixels) and these samples.
     pub fn note(&self, path: &Path, size: (u32, u32), samples: ImageSamples, display: DisplayPart) -> String {
         let folder = absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
         let relative = |path: &Path| relative_path(&folder, path);
@@ -104,8 +104,8 @@ impl MetadataDraft {
         *self.prints.get_or_init(|| {
             let content = self.content.fingerprint();
             let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
-            // What was opened has an environment that its file does not name, or was itself written into a picture.
-            // Nor does its file say which moment or variant of a model is shown.
+            // The file does not name a replaced environment, nor the time or variant of a model; and a scene that was
+            // stored in an image has no file.
             let is_own = |it: &LoadedScene| {
                 it.environment.is_some()
                     || it.choice.at.is_some()

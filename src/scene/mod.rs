@@ -1,8 +1,8 @@
 //! The scene as a bevy_ecs world: components, the scene file, importers, built-in scenes, and the flat snapshot
 //! that the renderer works on.
 //!
-//! The way of a scene: text or model → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`] (entities)
-//! → [`Extraction`] (a [`crate::render::Prepared`] about an origin near the camera).
+//! The stages of a scene: text or model → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`]
+//! (entities) → [`Extraction`] (a [`crate::render::Prepared`] relative to an origin near the camera).
 
 mod bad_value;
 pub(crate) mod bounds;

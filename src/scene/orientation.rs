@@ -1,23 +1,22 @@
-//! Which side of a model is its front, where its file does not say? The one to which it holds its head.
+//! Guesses which side of a model is its front if the file does not say: the side of the head.
 //!
-//! Models are made to be seen along one of two directions: most from +Z, which is also what a model with Z up becomes
-//! whose front was -Y, and some from -Z. Of these two, a creature or a figure tells: what is high on it, the head, is
-//! in front of the middle of its skin, and the tail, the back and a shell are behind. What has no head stays as its
-//! file has it.
+//! Models are usually made to be seen from +Z, which is also where the front -Y of a model with Z up ends up, and
+//! sometimes from -Z. Creatures and figures tell which of the two: their upper part, the head, is in front of the
+//! centre of their surface; tail, back and shell are behind it. Models without a head are not rotated.
 
 use super::source::UpAxis;
 use crate::mesh::Mesh;
 use glam::DVec3;
 
-/// The head begins here: a share of the height from above.
+/// Height of the head, as a fraction of the height of the model.
 const HEAD: f64 = 1.0 / 3.0;
-/// A lean of less than this share of the depth is an accident.
+/// Smaller offsets, as a fraction of the depth, are ignored.
 const LEAN: f64 = 1.0 / 20.0;
 
 /// Whether the front is at -Z once `up` points along +Y.
 ///
-/// That is believed when the centre of the skin of the upper third lies off the centre of all of it by at least a
-/// twentieth of the depth, and more towards -Z than to either side: what leans sideways leans without a meaning.
+/// True if the centroid of the surface of the upper third is offset from that of the whole surface by at least a
+/// twentieth of the depth towards -Z, and more towards -Z than to either side.
 pub fn faces_away(mesh: &Mesh, up: UpAxis) -> bool {
     let point = |vertex: u32| {
         let p = mesh.positions[vertex as usize].as_dvec3();
@@ -41,7 +40,7 @@ pub fn faces_away(mesh: &Mesh, up: UpAxis) -> bool {
     -lean.z > lean.x.abs() && -lean.z > LEAN * (max.z - min.z)
 }
 
-/// Area and moment of a skin of even thickness.
+/// Area and first moment of a surface. Both have a factor of 2, which cancels in the centroid.
 #[derive(Default)]
 struct Skin {
     area: f64,
@@ -49,7 +48,7 @@ struct Skin {
 }
 
 impl Skin {
-    /// A flat convex polygon.
+    /// Adds a planar convex polygon.
     fn add(&mut self, polygon: &[DVec3]) {
         for pair in polygon.get(1..).unwrap_or_default().windows(2) {
             let (a, b, c) = (polygon[0], pair[0], pair[1]);
@@ -64,7 +63,7 @@ impl Skin {
     }
 }
 
-/// The part of a triangle that lies above a level.
+/// The part of a triangle above a height.
 fn above(triangle: &[DVec3; 3], level: f64) -> Vec<DVec3> {
     let mut part = Vec::with_capacity(4);
     for i in 0..3 {
@@ -84,7 +83,7 @@ mod tests {
     use super::*;
     use crate::mesh::procedural::{cuboid, icosphere};
 
-    /// Blocks: middle and size of each.
+    /// Blocks: centre and size of each.
     fn blocks(parts: &[(DVec3, DVec3)], up: UpAxis, turned: bool) -> Mesh {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         for &(center, size) in parts {
@@ -100,7 +99,7 @@ mod tests {
         Mesh::from_f64(&positions, triangles).unwrap()
     }
 
-    /// It looks along +Z: a body on four legs, a neck, a head, a tail.
+    /// It faces +Z: a body on four legs, a neck, a head, a tail.
     fn horse() -> Vec<(DVec3, DVec3)> {
         let mut parts = vec![
             (DVec3::new(0.0, 1.2, 0.0), DVec3::new(0.5, 0.5, 1.6)),
@@ -121,7 +120,7 @@ mod tests {
             assert!(!faces_away(&blocks(&horse(), up, false), up));
             assert!(faces_away(&blocks(&horse(), up, true), up));
         }
-        // A figure that stands upright: arms to the sides, and a nose that makes the difference.
+        // An upright figure: arms to the sides, and a nose that decides.
         let figure = [
             (DVec3::new(0.0, 1.1, 0.0), DVec3::new(0.5, 0.8, 0.25)),
             (DVec3::new(0.0, 1.7, 0.1), DVec3::new(0.3, 0.35, 0.4)),
@@ -137,7 +136,7 @@ mod tests {
         for mesh in [cuboid(DVec3::new(1.0, 2.0, 3.0)), icosphere(8)] {
             assert!(!faces_away(&mesh, UpAxis::Y) && !faces_away(&mesh, UpAxis::Z));
         }
-        // A head to the side, and a little back: as likely a handle.
+        // A head to the side and slightly back: as likely a handle.
         let sideways: Vec<_> = horse()
             .into_iter()
             .map(|(p, s)| (DVec3::new(p.z, p.y, p.x - 0.2 * p.z), DVec3::new(s.z, s.y, s.x)))

@@ -1,8 +1,8 @@
-//! The files of one command, compared by what they are before work begins: nothing that is read is written over, no
-//! two outputs are one file, and no film is lost.
+//! The input and output files of one command, compared by identity before work begins: no input is overwritten, no two
+//! outputs are the same file, and no film is lost.
 //!
-//! A command tells [`Files`] what it reads and writes, each as soon as it is known; the files of a scene once it is
-//! loaded. What is refused here has not been touched.
+//! A command registers its inputs and outputs in [`Files`] as soon as they are known; the files of a scene once it is
+//! loaded. A rejected file has not been modified.
 
 use super::relative::absolute;
 use super::whole_file::{Replace, WholeFile, check_replaceable, check_writable};
@@ -10,7 +10,7 @@ use super::write_error::WriteError;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What a command reads and writes.
+/// The inputs and outputs of a command.
 #[derive(Debug, Default)]
 pub struct Files {
     replace: Replace,
@@ -22,14 +22,14 @@ pub struct Files {
 enum Use {
     Read,
     Written,
-    /// A film that is gone on with.
+    /// A film that is resumed.
     Both,
 }
 
-/// Why a file cannot be had.
+/// Why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// One file stands for two things in the command.
+    /// One file is used twice in the command.
     #[error("{0}")]
     Collision(String),
     /// The output may not be replaced, or cannot be written.
@@ -37,7 +37,7 @@ pub enum FilesError {
     Unwritable(#[from] WriteError),
 }
 
-/// What makes two paths one file.
+/// Two paths with the same identity are the same file.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Identity {
     #[cfg(unix)]
@@ -59,20 +59,20 @@ impl Identity {
 }
 
 impl Files {
-    /// No files yet; outputs may take the place of what `replace` says.
+    /// No files; `replace`: what outputs may overwrite.
     pub fn new(replace: Replace) -> Self {
         Self { replace, ..Self::default() }
     }
 
-    /// What outputs may take the place of.
+    /// What outputs may overwrite.
     pub fn replace(&self) -> Replace {
         self.replace
     }
 
-    /// A file that is read. To read one twice is no harm.
+    /// Registers an input. The same file may be read more than once.
     ///
     /// # Errors
-    /// When it is written as well.
+    /// If it is also an output.
     pub fn read(&mut self, path: &Path) -> Result<(), FilesError> {
         let id = Identity::of(path);
         match self.known.get(&id) {
@@ -85,27 +85,27 @@ impl Files {
         }
     }
 
-    /// The same of many.
+    /// Registers several inputs.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Like [`Self::read`].
     pub fn read_all(&mut self, paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FilesError> {
         paths.into_iter().try_for_each(|path| self.read(&path))
     }
 
-    /// A file that is written.
+    /// Registers an output.
     ///
     /// # Errors
-    /// When it is read as well, is another output too, or cannot be written.
+    /// If it is also an input or another output, or cannot be written.
     pub fn write(&mut self, path: &Path) -> Result<(), FilesError> {
         self.add_output(path, Use::Written)?;
         check_writable(path, self.replace).map_err(FilesError::Unwritable)
     }
 
-    /// Files in one folder, of which only the first is tried.
+    /// Registers outputs in one folder; only the first one is tested for writing.
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// Like [`Self::write`].
     pub fn write_all(&mut self, paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FilesError> {
         for (i, path) in paths.into_iter().enumerate() {
             if i == 0 {
@@ -118,27 +118,27 @@ impl Files {
         Ok(())
     }
 
-    /// A file that is written by no other process until this one is done with it.
+    /// Registers an output that no other process can write until this one has finished.
     ///
-    /// - `replace`: films say themselves what they may take the place of.
+    /// - `replace`: what a film may overwrite.
     ///
     /// # Errors
-    /// As [`Self::write`], and when another process has it.
+    /// Like [`Self::write`], and if another process has claimed it.
     pub fn claim(&mut self, path: &Path, replace: Replace) -> Result<WholeFile, FilesError> {
         self.add_output(path, Use::Written)?;
         WholeFile::claim(path, replace).map_err(FilesError::Unwritable)
     }
 
-    /// A film that is read, gone on with, and written again; by no other process in between.
+    /// Registers a film that is read, resumed and written again; no other process can write it in the meantime.
     ///
     /// # Errors
-    /// As [`Self::claim`].
+    /// Like [`Self::claim`].
     pub fn go_on(&mut self, path: &Path) -> Result<WholeFile, FilesError> {
         self.add_output(path, Use::Both)?;
         WholeFile::claim(path, Replace::Anything).map_err(FilesError::Unwritable)
     }
 
-    /// Outputs that take the place of a file that was there.
+    /// Outputs that replace an existing file.
     pub fn replaced(&self) -> &[PathBuf] {
         &self.replaced
     }
@@ -196,14 +196,14 @@ mod tests {
             assert!(matches!(files.write(spelling), Err(FilesError::Collision(_))), "{spelling:?}");
             assert!(matches!(files.write_all([spelling.clone()]), Err(FilesError::Collision(_))), "{spelling:?}");
             assert!(matches!(files.claim(spelling, Replace::Anything), Err(FilesError::Collision(_))), "{spelling:?}");
-            // Also when the input is known later: the meshes of a scene.
+            // Also if the input is registered later, like the meshes of a scene.
             let mut files = Files::new(Replace::Anything);
             files.write(spelling).unwrap();
             assert!(
                 files.read(&root.join("in.obj")).unwrap_err().to_string().contains("is also an input of this command")
             );
         }
-        // A slash at the end makes no other file of it.
+        // A trailing slash does not make it another file.
         for folder_like in ["in.obj/", "in.obj/.", "new.obj/"] {
             let path = PathBuf::from(format!("{}/{folder_like}", root.display()));
             let mut files = Files::new(Replace::Anything);
@@ -212,7 +212,7 @@ mod tests {
                 [files.write(&path), files.claim(&path, Replace::Anything).map(drop), files.write_all([path])];
             assert!(refused.iter().all(Result::is_err), "{folder_like}: {refused:?}");
         }
-        // What is not there yet.
+        // Files that do not exist yet.
         let mut files = Files::default();
         files.write(&root.join("new.png")).unwrap();
         let error = files.write(&root.join("sub/../new.png")).unwrap_err();

@@ -1,5 +1,4 @@
-//! Materials that the file of a mesh brings: what becomes of them without their pictures, and whether they are still as
-//! the file has them.
+//! Materials from the file of a mesh: fallbacks for missing textures, and whether they are unchanged.
 
 use super::components::{ColorParam, InWorld, ScalarParam, SurfaceTexture};
 use super::file::{InFile, MaterialPart};
@@ -9,9 +8,9 @@ use crate::render::{MapParams, Material, Param};
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
 
-/// The material with a plain value for each texture that could not be had; a warning has told of it.
+/// The material with a plain value for each missing texture; a warning has been given for those.
 ///
-/// - `is_there`: whether there is a texture of this name.
+/// - `is_there`: whether a texture of this name exists.
 pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str) -> bool) -> MaterialPart {
     let mut part = part.clone();
     let plain = Material::<InFile>::principled(ColorValue::grey(0.5));
@@ -47,7 +46,7 @@ pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str)
     part
 }
 
-/// Names of the textures that a material uses.
+/// Names of the textures of a material.
 pub(super) fn texture_names(part: &MaterialPart) -> Vec<String> {
     let mut names = Vec::new();
     rename_textures(&mut part.clone(), |name| {
@@ -57,7 +56,7 @@ pub(super) fn texture_names(part: &MaterialPart) -> Vec<String> {
     names
 }
 
-/// Gives the textures that a material uses other names.
+/// Renames the textures of a material.
 pub(super) fn rename_textures(part: &mut MaterialPart, mut to: impl FnMut(&str) -> String) {
     for (_, param) in part.params_mut() {
         match param {
@@ -71,11 +70,11 @@ pub(super) fn rename_textures(part: &mut MaterialPart, mut to: impl FnMut(&str) 
     }
 }
 
-/// A material of the world by the names of its textures, where these are as the file of the mesh has them.
+/// Converts a material of the world to texture names, for textures that are unchanged since the mesh file.
 pub(super) struct ByTextureName<'a>(pub &'a HashMap<&'a str, &'a TextureSource>);
 
 impl ByTextureName<'_> {
-    /// No texture has an empty name.
+    /// The empty name, which no texture has, stands for a changed one.
     fn name(&self, texture: &SurfaceTexture) -> String {
         let is_same = self.0.get(texture.name.as_str()).is_some_and(|source| **source == texture.part);
         if is_same { texture.name.clone() } else { String::new() }
@@ -97,7 +96,7 @@ impl MapParams<InWorld, InFile> for ByTextureName<'_> {
         }
     }
 
-    /// Files of meshes have no blends.
+    /// Mesh files have no blends.
     fn material(&mut self, _: &Entity) -> String {
         String::new()
     }

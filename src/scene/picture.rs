@@ -1,4 +1,4 @@
-//! Picture files as textures: decoded once, linear, within limits.
+//! Image files as textures: decoded once, within limits.
 
 use super::gltf::images::{part_of_model, picture_of};
 use super::input_file::{FileKind, InputFile, ReadError};
@@ -9,35 +9,35 @@ use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
-/// Pixels along one side at most.
+/// Maximum width and height, pixels.
 const MAX_SIDE: u32 = 32_768;
-/// Bytes that the decoder may take for each pixel of the largest picture.
+/// Bytes that the decoder may allocate per pixel of the largest image.
 const BYTES_A_PIXEL: u64 = 16;
 
-/// Why a picture cannot be read; the words follow its path.
+/// Why an image cannot be read; the text follows its path.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The model that it is a part of cannot be read.
+    /// The model that contains it cannot be read.
     #[error("{0}")]
     Model(String),
-    /// The file begins as no picture that can be read does.
+    /// Not a supported image format.
     #[error("unsupported image format: use PNG, JPEG, WebP, HDR or EXR")]
     Format,
-    /// The picture has more pixels than the limits allow.
+    /// The image has more pixels than the limits allow.
     #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
     TooLarge {
         /// Width in pixels.
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// Pixels that a picture may have.
+        /// Pixels that an image may have.
         limit: u64,
     },
-    /// The picture is truncated or damaged, or of a kind that its format has and the decoder has not.
+    /// The image is truncated or damaged, or uses a feature that the decoder does not support.
     #[error("cannot be decoded: {0}")]
     Decode(#[from] image::ImageError),
 }
@@ -48,19 +48,19 @@ impl From<PictureError> for String {
     }
 }
 
-/// Reads PNG, JPEG, WebP, HDR or EXR, each kept in its own depth. Returns a warning beside the picture when
-/// some of its numbers had to be left out.
+/// Reads PNG, JPEG, WebP, HDR or EXR, each in its own bit depth. Also returns a warning if invalid values were
+/// replaced.
 ///
 /// # Errors
-/// As [`read_picture_within`].
+/// Like [`read_picture_within`].
 pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), PictureError> {
     read_picture_within(path, &Limits::of_this_process())
 }
 
-/// The same of bytes that are part of another file.
+/// Like [`read_picture`], from bytes inside another file.
 ///
 /// # Errors
-/// As [`read_picture_within`].
+/// Like [`read_picture_within`].
 pub(super) fn picture_of_bytes(bytes: &[u8]) -> Result<(ImageTexture, Option<String>), PictureError> {
     let limits = Limits::of_this_process();
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(ReadError::from)?;
@@ -68,10 +68,10 @@ pub(super) fn picture_of_bytes(bytes: &[u8]) -> Result<(ImageTexture, Option<Str
     texture(reader, &limits)
 }
 
-/// The same within limits of the caller's choice.
+/// Like [`read_picture`], with the given limits.
 ///
 /// # Errors
-/// When the file cannot be read, is none of these formats, is too large or cannot be decoded.
+/// If the file cannot be read, is in none of these formats, is too large or cannot be decoded.
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
     if let Some((model, number)) = part_of_model(path) {
         let bytes = picture_of(&model, number).map_err(|error| PictureError::Model(error.to_string()))?;
@@ -94,7 +94,7 @@ fn texture<R: BufRead + Seek>(
     Ok((ImageTexture { width, height, texels }, warning))
 }
 
-/// The pixels in their own depth, and how many of them were no colour and are black now.
+/// The pixels in their own bit depth, and the number of pixels that were invalid colours and are now black.
 pub(crate) fn texels_of(picture: DynamicImage) -> (Texels, usize) {
     let texels = match picture {
         DynamicImage::ImageLuma8(pixels) => Texels::U8 { channels: 1, data: pixels.into_raw() },
@@ -116,7 +116,7 @@ pub(crate) fn texels_of(picture: DynamicImage) -> (Texels, usize) {
     (texels, 0)
 }
 
-/// A picture of whatever format its first bytes tell, not decoded yet.
+/// A reader for an image whose format is detected from its first bytes; nothing is decoded yet.
 pub(crate) fn picture_reader(
     path: &Path,
     limits: &Limits,
@@ -136,12 +136,12 @@ fn limits_of_decoder(limits: &Limits) -> image::Limits {
     of_decoder
 }
 
-/// The pixels, if there are no more than the limit.
+/// Decodes the image if it has no more pixels than the limit.
 pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<DynamicImage, PictureError> {
-    // A few bytes can claim any size, so it is asked for before anything is decoded.
+    // A few bytes can claim any size: it is checked before decoding.
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
@@ -162,13 +162,13 @@ mod tests {
         image::RgbImage::from_raw(2, 1, vec![0, 188, 255, 255, 0, 0]).unwrap().save(&path).unwrap();
         let (picture, warning) = read_picture(&path).unwrap();
         assert_eq!((picture.width, picture.height, warning), (2, 1, None));
-        // Byte 188 is the usual stand-in for half the light.
+        // Byte 188 is close to half the linear value.
         assert!(picture.linear(0).abs_diff_eq(Vec3::new(0.0, 0.5029, 1.0), 1e-3), "{}", picture.linear(0));
         assert_eq!(picture.linear(1), Vec3::X);
         assert_eq!(picture.bytes(), 6, "in its own depth");
     }
 
-    /// A few hundred bytes that would take gigabytes are refused by their size; devices and pipes are not opened.
+    /// A few hundred bytes that would decode to gigabytes are rejected by their size; devices and pipes are not opened.
     #[test]
     fn pictures_beyond_the_limit_are_refused_before_they_are_decoded() {
         let dir = tempfile::tempdir().unwrap();

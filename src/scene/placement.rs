@@ -1,10 +1,10 @@
-//! Where an object stands: from its own space to the world, in `f64`.
+//! Transforms of objects from object space to the world, in `f64`.
 
 use super::file::{ScalePart, TransformPart};
 use bevy_ecs::prelude::Component;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// From the object's own space to the world. A point is first scaled and turned by `linear`, then moved.
+/// From object space to the world: `linear` is applied first, then `translation`.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placement {
     /// Metres.
@@ -13,17 +13,17 @@ pub struct Placement {
     pub linear: Linear,
 }
 
-/// The part of a placement that keeps the origin.
+/// The linear part of a placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Linear {
-    /// Scaled along the object's own axes, then turned.
+    /// Scaled along the axes of object space, then rotated.
     Turned {
-        /// Degrees about X, then Y, then Z, the axes standing still.
+        /// Degrees about the fixed axes X, then Y, then Z.
         rotation_deg: DVec3,
         /// Factors; negative ones mirror.
         scale: DVec3,
     },
-    /// Anything else, shear included.
+    /// Any other matrix, including shear.
     Matrix(DMat3),
 }
 
@@ -34,12 +34,12 @@ impl Default for Linear {
 }
 
 impl Placement {
-    /// At a point, neither turned nor scaled.
+    /// At a point, without rotation or scale.
     pub fn at(translation: DVec3) -> Self {
         Self { translation, linear: Linear::default() }
     }
 
-    /// What a scene file's transform means.
+    /// The placement that a transform in a scene file describes.
     pub fn from_part(part: &TransformPart) -> Self {
         if let Some([x, y, z]) = part.matrix {
             let row = |row: [f64; 4]| DVec3::new(row[0], row[1], row[2]);
@@ -53,7 +53,7 @@ impl Placement {
         }
     }
 
-    /// How a scene file says this placement.
+    /// The placement as in a scene file.
     pub fn to_part(&self) -> TransformPart {
         let differs = |value: DVec3, from: DVec3| (value != from).then_some(value);
         match self.linear {
@@ -74,7 +74,7 @@ impl Placement {
         }
     }
 
-    /// The linear part as a matrix, from the object's own space to the world.
+    /// The linear part as a matrix.
     pub fn linear(&self) -> DMat3 {
         match self.linear {
             Linear::Turned { rotation_deg, scale } => {
@@ -89,16 +89,16 @@ impl Placement {
         }
     }
 
-    /// The whole map from the object's own space to the world.
+    /// The whole transform.
     pub fn affine(&self) -> DAffine3 {
         DAffine3 { matrix3: self.linear(), translation: self.translation }
     }
 
-    /// The factor by which every length grows, if it is the same in all directions.
+    /// The scale factor, if it is the same in all directions.
     pub fn even_scale(&self) -> Option<f64> {
         let linear = self.linear();
         let squared = linear.x_axis.length_squared();
-        // Rounding of a rotation disturbs products of axes by a few parts in 10¹⁶.
+        // Rounding in a rotation changes dot products of the axes by a few parts in 10¹⁶.
         let slack = 1e-12 * squared;
         let even = [linear.y_axis, linear.z_axis].iter().all(|axis| (axis.length_squared() - squared).abs() <= slack);
         let square = [(linear.x_axis, linear.y_axis), (linear.y_axis, linear.z_axis), (linear.z_axis, linear.x_axis)]
@@ -108,7 +108,7 @@ impl Placement {
     }
 }
 
-/// Sine and cosine, exact at right angles.
+/// Sine and cosine; exact for multiples of 90 degrees.
 fn sin_cos_deg(angle: f64) -> (f64, f64) {
     match angle.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),
@@ -130,7 +130,7 @@ mod tests {
             translation: DVec3::new(10.0, 0.0, 0.0),
             linear: Linear::Turned { rotation_deg: DVec3::new(90.0, 90.0, 0.0), scale: DVec3::new(1.0, 2.0, 3.0) },
         };
-        // (0, 1, 0) → scaled (0, 2, 0) → about X (0, 0, 2) → about Y (2, 0, 0) → moved (12, 0, 0).
+        // (0, 1, 0) → scaled (0, 2, 0) → about X (0, 0, 2) → about Y (2, 0, 0) → translated (12, 0, 0).
         let point = placement.affine().transform_point3(DVec3::Y);
         assert!(point.abs_diff_eq(DVec3::new(12.0, 0.0, 0.0), 1e-12), "{point}");
     }

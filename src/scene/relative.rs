@@ -1,14 +1,14 @@
-//! Paths as a file says them that lies somewhere else, and as text: those that are no UTF-8 too, without loss.
+//! Paths relative to another file, and lossless conversion of paths to text, even if they are not UTF-8.
 
 use std::path::{Component, Path, PathBuf};
 
-/// A path in words that lead back to it ([`text_to_path`]): itself, if it is UTF-8. Of any other, the bytes that are
-/// not are written as letters of their own, U+EF80 to U+EFFF, as OPTU-8 does (and bytes that would be such letters too).
+/// A path as text that converts back ([`text_to_path`]): unchanged if it is UTF-8. Bytes that are not UTF-8 become the
+/// characters U+EF80 to U+EFFF, like in OPTU-8 (as do bytes that encode such characters).
 pub fn path_to_text(path: &Path) -> String {
     bytes_to_text(path.as_os_str().as_encoded_bytes())
 }
 
-/// The same of a name in a file whose bytes are those of the system.
+/// The same for a name in a file with system-specific bytes.
 pub fn bytes_to_text(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len());
     let letter =
@@ -26,7 +26,7 @@ pub fn bytes_to_text(bytes: &[u8]) -> String {
     text
 }
 
-/// The path that [`path_to_text`] gave the words for.
+/// The inverse of [`path_to_text`].
 pub fn text_to_path(text: &str) -> PathBuf {
     if !text.contains(is_byte) {
         return PathBuf::from(text);
@@ -44,43 +44,43 @@ pub fn text_to_path(text: &str) -> PathBuf {
         }
         PathBuf::from(std::ffi::OsString::from_vec(bytes))
     }
-    // Names are no bytes there.
+    // There, names are not bytes.
     #[cfg(not(unix))]
     PathBuf::from(text)
 }
 
-/// Stands for the byte 0x80.
+/// Represents the byte 0x80.
 const FIRST_LETTER: u32 = 0xef80;
 
 fn is_byte(c: char) -> bool {
     (FIRST_LETTER..FIRST_LETTER + 0x80).contains(&(c as u32))
 }
 
-/// For fields that are written as text: `#[serde(with = "path_text")]`.
+/// For fields that are serialised as text: `#[serde(with = "path_text")]`.
 pub mod path_text {
     use super::{path_to_text, text_to_path};
     use serde::{Deserialize, Deserializer, Serializer};
     use std::path::{Path, PathBuf};
 
-    /// Writes a path as the text of [`path_to_text`].
+    /// Writes a path like [`path_to_text`].
     pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&path_to_text(path))
     }
 
-    /// Reads a path from the text of [`path_to_text`].
+    /// Reads a path like [`text_to_path`].
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
         String::deserialize(deserializer).map(|text| text_to_path(&text))
     }
 }
 
-/// The path with everything that leads to it, links resolved as far as they lead.
+/// The absolute path; symbolic links are resolved as far as possible.
 pub fn absolute(path: &Path) -> PathBuf {
     if let Ok(path) = path.canonicalize() {
         return path;
     }
-    /// As many as systems follow.
+    /// The limit of common systems.
     const MAX_LINKS: usize = 40;
-    // It need not be there yet; its folder is.
+    // The file need not exist yet, but its folder does.
     let mut absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     for _ in 0..MAX_LINKS {
         match (std::fs::read_link(&absolute), absolute.parent()) {
@@ -94,8 +94,7 @@ pub fn absolute(path: &Path) -> PathBuf {
     }
 }
 
-/// How to get from `folder` to `path`, with `/` between the parts; the whole path where they share no more than the
-/// root.
+/// `path` relative to `folder`, with `/` as separator; the absolute path if they have only the root in common.
 pub fn relative_path(folder: &Path, path: &Path) -> String {
     let (folder, path) = (absolute(folder), absolute(path));
     let (from, to): (Vec<Component>, Vec<Component>) = (folder.components().collect(), path.components().collect());

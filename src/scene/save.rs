@@ -1,4 +1,4 @@
-//! Scenes to disk: the world as a scene file that reads back as exactly this world.
+//! Saving: writes the world as a scene file that reads back as exactly this world.
 
 use super::describe::Description;
 use super::file::{ObjectPart, SceneFile};
@@ -12,31 +12,31 @@ use super::write_error::WriteError;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 
-/// What was written, and what a person should know about it.
+/// The result of saving.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SavedScene {
     /// The text of the file.
     pub text: String,
-    /// One sentence each.
+    /// Remarks for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Writes what `world` holds as a scene file; `loaded` is the scene that was opened into it, if one was.
+/// Writes the contents of `world` as a scene file; `loaded`: the scene that was opened into it, if any.
 ///
-/// Appears whole or not at all. Meshes and pictures are named by their paths from the new file; meshes that came from
-/// no file are written beside it. The text is read back and compared before it takes the place of an older file.
+/// Writes atomically. Paths of meshes and images are relative to the new file; meshes that came from no file are
+/// written beside it. The text is parsed and compared before it replaces an older file.
 ///
 /// # Errors
-/// When the world holds what no scene file may say, or the file cannot be written.
+/// If the world holds values that a scene file must not have, or the file cannot be written.
 pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) -> Result<SavedScene, WriteError> {
     Description::of(world, loaded).save(path)
 }
 
 impl Description {
-    /// See [`save_scene`].
+    /// Like [`save_scene`].
     ///
     /// # Errors
-    /// As [`save_scene`].
+    /// Like [`save_scene`].
     pub fn save(self, path: &Path) -> Result<SavedScene, WriteError> {
         save(self, path)
     }
@@ -55,7 +55,7 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, WriteEr
         let name = loop {
             number += 1;
             let name = format!("{stem}-mesh-{number}.obj");
-            // A file that is there may be another mesh of this scene: it is replaced by nothing but itself.
+            // An existing file may hold another mesh of this scene: it is never replaced by a different one.
             match save_new_obj(&folder.join(text_to_path(&name)), mesh, &extras)
                 .map_err(|error| WriteError::Mesh(Box::new(error)))?
             {
@@ -82,14 +82,14 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, WriteEr
     Ok(SavedScene { text, notes })
 }
 
-/// Rewrites every path in `file` that counts from the folder `from` so that it counts from `to`.
+/// Makes all paths in `file` that are relative to the folder `from` relative to `to`.
 fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
     let here = Path::new(".");
     let or_here = |folder: &Path| if folder.as_os_str().is_empty() { here.to_path_buf() } else { folder.to_path_buf() };
     let (from, to) = (or_here(from), or_here(to));
     let same = absolute(&from) == absolute(&to);
     let moved = |path: &mut String| {
-        // What was written relative to the same folder stays as it was written.
+        // Relative paths stay unchanged if the folder is the same.
         if !(path.is_empty() || same && Path::new(path.as_str()).is_relative()) {
             *path = relative_path(&to, &from.join(text_to_path(path)));
         }
@@ -97,7 +97,7 @@ fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
     each_path(file, moved);
 }
 
-/// Every path of a file that a scene names.
+/// Calls `change` for each path in a scene file.
 pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
     for object in &mut file.objects {
         if let ObjectPart::Mesh { source, .. } = object {
@@ -114,7 +114,7 @@ pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
     }
 }
 
-/// Whether a scene file has comments outside of its strings.
+/// Whether a scene file has comments outside of strings.
 fn has_comments(text: &str) -> bool {
     let mut in_string = false;
     let mut chars = text.chars().peekable();

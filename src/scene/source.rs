@@ -1,4 +1,4 @@
-//! What is opened, and how it stands.
+//! What can be opened, and the up axis of models.
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::error::{SceneError, suggestion};
@@ -13,26 +13,26 @@ pub enum SceneSource {
     Builtin(String),
     /// A scene file (RON).
     Scene(PathBuf),
-    /// A model of any [`ModelFormat`], to be framed.
+    /// A model of any [`ModelFormat`], in a default scene.
     Model(PathBuf),
-    /// A picture that was made by this program (PNG, EXR), for the scene that it shows, as it shows it.
+    /// An image rendered by this program (PNG, EXR): opens its scene with its camera.
     Picture(PathBuf),
 }
 
-/// Which axis of a model points up.
+/// The up axis of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpAxis {
-    /// +Y, as in scenes.
+    /// +Y, as in scene files.
     Y,
     /// +Z, as in many CAD programs.
     Z,
 }
 
 impl SceneSource {
-    /// What a word on the command line means: a built-in name, unless a file of that name exists.
+    /// Parses an argument of the command line: a built-in name, unless a file of that name exists.
     ///
     /// # Errors
-    /// When it is neither a built-in scene nor a file that can be opened here.
+    /// If it is neither a built-in scene nor a file of a supported kind.
     pub fn parse(word: impl AsRef<OsStr>) -> Result<Self, SceneError> {
         let path = Path::new(word.as_ref());
         let word = &*word.as_ref().to_string_lossy();
@@ -67,7 +67,7 @@ impl SceneSource {
         }
     }
 
-    /// The file that is opened, if it is one.
+    /// The file to open, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Builtin(_) => None,
@@ -75,7 +75,7 @@ impl SceneSource {
         }
     }
 
-    /// What messages and titles call it.
+    /// Its name in messages and window titles.
     pub fn title(&self) -> String {
         match self {
             Self::Builtin(name) => name.clone(),

@@ -1,5 +1,4 @@
-//! Where textures, meshes and the light of the environment come from: what a scene file says of them, and what the world
-//! keeps to save them again.
+//! Sources of textures, meshes and the environment: their description in scene files, which the world keeps for saving.
 
 use super::model::ModelFormat;
 use super::value::Rgb;
@@ -12,21 +11,21 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum EnvironmentSource {
-    /// No light from outside.
+    /// No light.
     #[default]
     Black,
     /// The same radiance from every direction, W·m⁻²·sr⁻¹.
     Constant(Rgb),
     /// A gradient of radiance between three directions, W·m⁻²·sr⁻¹.
     Gradient {
-        /// From straight above (+Y).
+        /// From directly above (+Y).
         zenith: Rgb,
         /// From just above the horizon.
         horizon: Rgb,
         /// From everywhere below the horizon.
         ground: Rgb,
     },
-    /// Equirectangular, HDR, EXR, PNG or JPEG.
+    /// An equirectangular image (HDR, EXR, PNG or JPEG).
     Image {
         /// Path of the image, relative to the scene file.
         file: String,
@@ -43,9 +42,10 @@ pub enum EnvironmentSource {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TextureSource {
-    /// `squares` along u and v of the surface (0..1), or a metre on an infinite plane; (0, 0) lies in colour `a`.
+    /// A checkerboard: `squares` along u and v of the surface (0..1), or per metre on an infinite plane; (0, 0) has
+    /// colour `a`.
     Checker {
-        /// Colour of squares whose whole coordinates have an even sum.
+        /// Colour of the squares whose integer coordinates have an even sum.
         a: Rgb,
         /// Colour of the others.
         b: Rgb,
@@ -59,60 +59,60 @@ pub enum TextureSource {
         #[serde(default, skip_serializing_if = "is_default")]
         rotate: f64,
     },
-    /// A picture from a file.
+    /// An image from a file.
     Image {
-        /// Path of the picture, relative to the scene file.
+        /// Path of the image, relative to the scene file.
         file: String,
         /// Factors of u and v before rotation.
         #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
         stretch: DVec2,
-        /// How often the picture fits along u and v.
+        /// Number of repetitions along u and v.
         #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
         repeat: DVec2,
-        /// Shift along u and v in widths and heights of the picture, after rotation and scale.
+        /// Shift along u and v in widths and heights of the image, after rotation and scale.
         #[serde(default, skip_serializing_if = "is_default")]
         offset: DVec2,
         /// Degrees.
         #[serde(default, skip_serializing_if = "is_default")]
         rotate: f64,
-        /// What the texture shows beside the picture.
+        /// The texture outside of the image.
         #[serde(default, skip_serializing_if = "is_default")]
         wrap: Wrap,
-        /// The same along v, where it differs.
+        /// The same along v, if it differs.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         wrap_v: Option<Wrap>,
         /// Bilinear between texels, or the nearest texel.
         #[serde(default = "yes")]
         smooth: bool,
-        /// What the numbers of the picture mean.
+        /// How the values of the image are interpreted.
         #[serde(default, skip_serializing_if = "is_default")]
         encoding: Encoding,
-        /// The channel that is looked up; the colour when not given.
+        /// The channel to use; `None`: the colour.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         channel: Option<Channel>,
-        /// Colours are multiplied with it.
+        /// Factor of the colours.
         #[serde(default = "white", skip_serializing_if = "is_white")]
         tint: Rgb,
-        /// Which texture coordinates of a mesh: 0 or 1.
+        /// Set of texture coordinates of the mesh: 0 or 1.
         #[serde(default, skip_serializing_if = "is_default")]
         uv_set: u8,
-        /// Colours are multiplied with those of the vertices.
+        /// Whether colours are multiplied by the vertex colours.
         #[serde(default, skip_serializing_if = "is_default")]
         vertex_colors: bool,
     },
-    /// The colours of the vertices of a mesh, white where it has none.
+    /// The vertex colours of a mesh; white if it has none.
     VertexColors {
-        /// The channel that is looked up; the colour when not given.
+        /// The channel to use; `None`: the colour.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         channel: Option<Channel>,
-        /// Colours are multiplied with it.
+        /// Factor of the colours.
         #[serde(default = "white", skip_serializing_if = "is_white")]
         tint: Rgb,
     },
 }
 
 impl TextureSource {
-    /// A picture as it is, once across the surface.
+    /// An image with default settings, once across the surface.
     pub fn image(file: String) -> Self {
         Self::Image {
             file,
@@ -132,35 +132,35 @@ impl TextureSource {
     }
 }
 
-/// Where the triangles of a mesh come from.
+/// The source of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum MeshSource {
-    /// Wavefront OBJ, relative to the scene file.
+    /// A Wavefront OBJ file; path relative to the scene file.
     Obj(String),
-    /// PLY, likewise.
+    /// A PLY file, likewise.
     Ply(String),
-    /// STL, likewise.
+    /// An STL file, likewise.
     Stl(String),
-    /// glTF 2.0, likewise.
+    /// A glTF 2.0 file.
     Gltf {
         /// Path of the model, relative to the scene file.
         file: String,
-        /// The number of the mesh in the file, from 0; all of its scene as one mesh when not given.
+        /// Index of the mesh in the file, from 0; `None`: the whole scene of the file as one mesh.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         mesh: Option<u32>,
-        /// The number of the node whose skin or weights move the vertices.
+        /// Index of the node whose skin or morph weights deform the mesh.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         node: Option<u32>,
-        /// Seconds into the animations; what the file stores when not given.
+        /// Time in the animations; `None`: the pose stored in the file.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         at: Option<Seconds>,
     },
-    /// A mesh that the program makes.
+    /// A built-in mesh, by name.
     Builtin(String),
 }
 
-/// A moment, finite. Equal moments have equal bits.
+/// A time in seconds, finite. Equality compares the bits.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Seconds(pub f64);
@@ -180,7 +180,7 @@ impl std::hash::Hash for Seconds {
 }
 
 impl MeshSource {
-    /// A model of this format.
+    /// A model file of this format.
     pub fn model(format: ModelFormat, file: String) -> Self {
         match format {
             ModelFormat::Obj => Self::Obj(file),
@@ -190,7 +190,7 @@ impl MeshSource {
         }
     }
 
-    /// A model of the format that its name tells, else OBJ.
+    /// A model file of the format given by its extension, else OBJ.
     pub fn of_file(file: String) -> Self {
         Self::model(ModelFormat::of(Path::new(&file)).unwrap_or(ModelFormat::Obj), file)
     }
@@ -214,7 +214,7 @@ impl MeshSource {
         }
     }
 
-    /// The path, or the name of what the program makes.
+    /// The path, or the name of the built-in mesh.
     pub fn name(&self) -> &str {
         match self {
             Self::Obj(name) | Self::Ply(name) | Self::Stl(name) | Self::Builtin(name) => name,
@@ -223,16 +223,16 @@ impl MeshSource {
     }
 }
 
-/// How the shading normals of a mesh are found.
+/// How the shading normals of a mesh are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshShading {
-    /// Normals of the file where it has them, else smooth.
+    /// The normals of the file if it has them, else smooth ones.
     #[default]
     Auto,
-    /// Area-weighted vertex normals, whatever the file says.
+    /// Area-weighted vertex normals, even if the file has normals.
     Smooth,
-    /// No vertex normals: every triangle is shaded with its own.
+    /// No vertex normals: each triangle is shaded with its geometric normal.
     Flat,
 }
 

@@ -23,8 +23,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl LoadedScene {
-    /// Puts this scene in the place of whatever scene `world` holds. The seed of [`Rendering`] stays, unless a picture
-    /// that was opened brings its own.
+    /// Replaces the scene in `world`, if any, by this one. The seed of [`Rendering`] stays unless an opened image
+    /// brings its own.
     pub fn spawn(&self, world: &mut World) {
         clear(world);
         let mut ordinals = (0..).map(Ordinal);
@@ -39,7 +39,7 @@ impl LoadedScene {
             }
         }
 
-        // Entities first, so that blends can name materials that come later.
+        // Entities are created first, so that blends can refer to later materials.
         let mut materials: HashMap<&str, Entity> = HashMap::new();
         for (name, _) in self.file.materials.iter() {
             materials.insert(name, world.spawn((Name::new(name.to_owned()), next())).id());
@@ -134,10 +134,10 @@ impl LoadedScene {
         }
     }
 
-    /// `None` when its picture could not be had.
+    /// The surface of an object and its placement.
     fn shape(&self, i: usize, object: &ObjectPart) -> (Shape, Placement) {
         let placement = Placement::from_part(object.transform());
-        // A shape that has a point of its own is stored about that point, so that turning it turns it in place.
+        // Shapes with a position are stored relative to it, so that rotating the object keeps it in place.
         let at = |point: DVec3| Placement { translation: placement.affine().transform_point3(point), ..placement };
         match object {
             ObjectPart::Sphere { center, radius, .. } => (Shape::Sphere { radius: *radius }, at(*center)),
@@ -160,7 +160,8 @@ impl LoadedScene {
     }
 }
 
-/// A texture as a scene file describes it; `None` where its `picture` cannot be had.
+/// The texture that a scene file describes; `None` if `picture`, which is called with the path of its image, returns
+/// `None`.
 pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
     let placed = |pattern, scale: DVec2, offset: DVec2, rotate| Texture {
         uv_matrix: Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate)),
@@ -198,7 +199,7 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
     })
 }
 
-/// Removes whatever belongs to a scene.
+/// Removes all entities of the current scene.
 fn clear(world: &mut World) {
     type OfAScene = Or<(With<Shape>, With<SurfaceMaterial>, WithLight, With<View>)>;
     let old: Vec<Entity> = world.query_filtered::<Entity, OfAScene>().iter(world).collect();
@@ -207,7 +208,7 @@ fn clear(world: &mut World) {
     }
 }
 
-/// The material of a file, for the world.
+/// Converts a material of a scene file for the world.
 pub(super) fn material(
     part: &MaterialPart,
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
@@ -217,7 +218,7 @@ pub(super) fn material(
     SurfaceMaterial(part.map(&mut FileToWorld { textures, materials }))
 }
 
-/// The textures and materials of a file by their names.
+/// The textures and materials of a file by name.
 struct FileToWorld<'a> {
     textures: &'a HashMap<&'a str, Arc<SurfaceTexture>>,
     materials: &'a HashMap<&'a str, Entity>,

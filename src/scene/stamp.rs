@@ -1,12 +1,12 @@
-//! How a file is known to be another than the one that was read.
+//! Detects changes of files since they were read.
 
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Time of modification and length; `None` when the file is not there.
+/// Modification time and length in bytes; `None` if the file does not exist.
 pub type Stamp = Option<(SystemTime, u64)>;
 
-/// The stamp that a file has now.
+/// The current stamp of a file.
 pub fn stamp(path: &Path) -> Stamp {
     let info = std::fs::metadata(path).ok()?;
     Some((info.modified().ok()?, info.len()))

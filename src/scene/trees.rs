@@ -1,4 +1,4 @@
-//! Trees of meshes and clouds, made once and kept.
+//! Cache of the kd-trees of meshes and of the trees of groups of spheres.
 
 use super::components::{Balls, Shape};
 use super::inputs::SceneInputs;
@@ -7,19 +7,19 @@ use crate::mesh::Mesh;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// Trees of meshes and clouds, by the address of what they were built from.
+/// Trees by the address of the mesh or group of spheres they were built from.
 #[derive(Clone, Debug, Default)]
 pub struct Trees {
     pub(super) meshes: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
     pub(super) balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
-    /// What no tree can be built of, and why.
+    /// Shapes without a tree because they are invalid, and why.
     unfit: HashMap<usize, (Shape, String)>,
-    /// Meshes whose tree was built in a hurry: the same hits, found more slowly.
+    /// Meshes with a tree of the quick preset: equal hits, slower traversal.
     hasty: HashSet<usize>,
 }
 
 impl Trees {
-    /// Whether there is nothing to build for this shape.
+    /// Whether nothing has to be built for this shape.
     pub fn has(&self, shape: &Shape) -> bool {
         if shared(shape).is_some_and(|key| self.unfit.contains_key(&key)) {
             return true;
@@ -31,21 +31,21 @@ impl Trees {
         }
     }
 
-    /// Builds the tree of a mesh or a cloud, if it has none yet.
+    /// Builds the tree of a mesh or a group of spheres, unless it has one.
     ///
     /// # Errors
-    /// When the mesh has no triangles, an index out of range or a number that is not finite.
+    /// If the mesh has no triangles, an index out of range or a coordinate that is not finite.
     pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
         self.add_by(shape, BuildPreset::Best)
     }
 
-    /// The same in a hurry, for a first picture: a large mesh gets a tree that is built several times as fast, and
-    /// gives the same hits more slowly. [`Self::hasty`] names it.
+    /// Like [`Self::add`], but for a quick first image: the tree of a large mesh is built several times as fast and
+    /// gives the same hits with slower traversal. [`Self::hasty`] lists such meshes.
     ///
     /// # Errors
-    /// As for [`Self::add`].
+    /// Like [`Self::add`].
     pub fn add_hastily(&mut self, shape: &Shape) -> Result<(), String> {
-        /// The best tree of fewer triangles is there within a frame or two.
+        /// Below this, the best tree is built within a frame or two.
         const LARGE: usize = 10_000;
         let is_large = matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() >= LARGE);
         self.add_by(shape, if is_large { BuildPreset::Quick } else { BuildPreset::Best })
@@ -74,35 +74,35 @@ impl Trees {
         Ok(())
     }
 
-    /// What has a tree that was built in a hurry.
+    /// The meshes with a tree of the quick preset, in ascending order of size.
     pub fn hasty(&self) -> Vec<Shape> {
         let meshes = self.meshes.iter().filter(|(key, _)| self.hasty.contains(key));
         let mut meshes: Vec<Arc<Mesh>> = meshes.map(|(_, (mesh, _))| mesh.clone()).collect();
-        // The largest is waited for the longest.
+        // The largest takes the longest to rebuild.
         meshes.sort_by_key(|mesh| mesh.triangles.len());
         meshes.into_iter().map(Shape::Mesh).collect()
     }
 
-    /// Remembers that no tree can be built, so that nobody tries again.
+    /// Records that no tree can be built, so that it is not tried again.
     pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
         if let Some(key) = shared(shape) {
             self.unfit.insert(key, (shape.clone(), reason));
         }
     }
 
-    /// Why no tree could be built of this shape, if so.
+    /// Why this shape has no tree.
     pub(super) fn reason(&self, shape: &Shape) -> String {
         let reason = shared(shape).and_then(|key| self.unfit.get(&key));
         reason.map_or("its kd-tree is not built yet".to_owned(), |(_, reason)| reason.clone())
     }
 
-    /// Memory of all trees; of clouds, that of the spheres in them.
+    /// Memory of all trees, bytes; for groups of spheres, of the spheres only.
     pub fn bytes(&self) -> usize {
         self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
             + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
     }
 
-    /// Takes over all trees of `other`, but for hasty ones of what has a better one.
+    /// Adds all trees of `other`, except quick ones for which there already is a tree.
     pub fn extend(&mut self, other: Self) {
         self.unfit.extend(other.unfit);
         for (key, tree) in other.meshes {
@@ -118,7 +118,7 @@ impl Trees {
         self.balls.extend(other.balls);
     }
 
-    /// Forgets the trees that no object uses any more.
+    /// Removes the trees of shapes that no object uses.
     pub fn keep_used(&mut self, inputs: &SceneInputs) {
         let used: HashSet<usize> = inputs.objects.iter().filter_map(|o| shared(&o.shape)).collect();
         self.meshes.retain(|key, _| used.contains(key));

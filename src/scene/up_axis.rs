@@ -1,13 +1,13 @@
-//! Which way is up in a model whose file does not say? The way in which it would stand.
+//! Guesses the up axis of a model if the file does not say: the one on which the model would stand.
 
 use super::source::UpAxis;
 use crate::mesh::Mesh;
 use glam::{DVec2, DVec3};
 
-/// Y, as most OBJ files have it, unless the model would fall over that way and stands on its lower Z side.
+/// Y, as in most OBJ files, unless the model would tip over that way and stands on its lower Z side.
 ///
-/// A thing stands when the centre of its surface lies above the convex hull of its lowest 2 %. To be believed, the
-/// hull must also be more than twice as large on the Z side as on the Y side.
+/// A model stands if the centroid of its surface is above the convex hull of its lowest 2 %. For Z, this hull must also
+/// have more than twice the relative area of that of Y.
 pub fn guess_up(mesh: &Mesh) -> UpAxis {
     let corners: Vec<DVec3> =
         mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
@@ -25,14 +25,14 @@ pub fn guess_up(mesh: &Mesh) -> UpAxis {
     if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
 }
 
-/// How a thing stands on one of its sides.
+/// Stability of a model on one of its sides.
 struct Stand {
     stable: bool,
-    /// Area of the hull of what touches the ground, over that of the box's floor.
+    /// Area of the hull of the lowest points over the area of the floor of the bounding box.
     support: f64,
 }
 
-/// The centre of a skin of even thickness.
+/// The centroid of the surface; `None` if its area is 0.
 fn surface_center(corners: &[DVec3]) -> Option<DVec3> {
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
     for triangle in corners.chunks_exact(3) {
@@ -44,7 +44,7 @@ fn surface_center(corners: &[DVec3]) -> Option<DVec3> {
     (total > 0.0).then(|| sum / total)
 }
 
-/// Counter-clockwise, by Andrew's monotone chain.
+/// Convex hull, counter-clockwise, by Andrew's monotone chain.
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
@@ -58,7 +58,7 @@ fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
             }
             chain.push(point);
         }
-        // The last point begins the other chain.
+        // The last point is the first of the other chain.
         chain.pop();
         chain
     };

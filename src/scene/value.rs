@@ -1,4 +1,4 @@
-//! Small values of a scene file that may be written in more than one way.
+//! Values of a scene file with more than one notation.
 
 use glam::Vec3;
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// A colour, linear Rec. 709: `0.5` for a grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
+/// A colour, linear Rec. 709: `0.5` for grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ColorValue {
     /// A colour, linear Rec. 709.
@@ -16,7 +16,7 @@ pub enum ColorValue {
     Texture(String),
 }
 
-/// A number, or the name of a texture whose red channel is taken.
+/// A number, or the name of a texture whose red channel is used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScalarValue {
     /// The same number everywhere.
@@ -65,13 +65,13 @@ impl From<Rgb> for Vec3 {
     }
 }
 
-/// Reads whatever stands there and lets the types below take what they know.
+/// Deserialises any value, of which the types below accept some kinds.
 struct AnyValue {
     textures: bool,
     colours: bool,
 }
 
-/// As `f32`. What is finite and beyond its range would become infinite, and is refused.
+/// As `f32`. A finite value beyond its range is an error instead of infinity.
 fn narrow<E: Error>(value: f64) -> Result<f32, E> {
     let narrow = value as f32;
     if value.is_finite() && narrow.is_infinite() {
@@ -195,12 +195,12 @@ impl Serialize for ScalarValue {
     }
 }
 
-/// Things with names, in the order of the file; a name given twice is refused, not silently replaced.
+/// A map that keeps the order of the file; duplicate names are an error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named<T>(pub Vec<(String, T)>);
 
 impl<T> Named<T> {
-    /// The thing of this name.
+    /// The value of this name.
     pub fn get(&self, name: &str) -> Option<&T> {
         self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
@@ -210,12 +210,12 @@ impl<T> Named<T> {
         self.0.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Whether there is nothing.
+    /// Whether it has no entries.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// All names and things, in the order of the file.
+    /// All names and values, in the order of the file.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &T)> {
         self.0.iter().map(|(name, value)| (name.as_str(), value))
     }

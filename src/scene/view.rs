@@ -1,8 +1,8 @@
-//! Where the picture is seen from: the three components of a camera entity.
+//! The three components of a camera entity.
 //!
-//! [`View`] is the pose, [`Projection`] the field of view, [`Lens`] what is sharp. All are in the scene's own frame
-//! (metres, right-handed, Y up) and f64, so that a camera far from the origin moves as smoothly as one at it.
-//! How a person moves a view is in `frame::navigation`; what the renderer makes of it is `render::Camera`.
+//! [`View`] is the pose, [`Projection`] the field of view, [`Lens`] aperture and focus. All are in world space (metres,
+//! right-handed, Y up) and `f64`, so that a camera far from the origin moves as smoothly as one at the origin. The
+//! interactive moves of a view are in `frame::navigation`; the camera of the renderer is `render::Camera`.
 
 use super::units::LEAST_SINE;
 use bevy_ecs::prelude::Component;
@@ -12,23 +12,23 @@ use thiserror::Error;
 
 /// The pose of a camera.
 ///
-/// `forward` and `up` are unit and perpendicular; every constructor and every function of `frame::navigation` keeps
-/// them so. The pivot is the point on the view axis that orbiting turns about; it is not seen in the picture, so a
-/// change of `pivot_distance` alone restarts nothing.
+/// `forward` and `up` are unit vectors and perpendicular; all constructors and all functions of `frame::navigation`
+/// preserve this. The pivot is the point on the view axis about which the view orbits; it does not affect the image, so
+/// a change of `pivot_distance` alone does not restart it.
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
 #[require(Projection, Lens)]
 pub struct View {
     /// Centre of the lens in the world, metres.
     pub eye: DVec3,
-    /// Direction of the view, unit.
+    /// View direction, unit vector.
     pub forward: DVec3,
-    /// What is up in the picture, unit and perpendicular to `forward`.
+    /// Up direction of the image, unit vector, perpendicular to `forward`.
     pub up: DVec3,
     /// Metres along `forward` from the camera to the pivot; positive and finite.
     pub pivot_distance: f64,
 }
 
-/// Why there is no such view.
+/// Why a view is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ViewError {
     /// A vector has a NaN or infinite coordinate.
@@ -50,27 +50,27 @@ pub enum ViewError {
     /// The up vector is zero.
     #[error("camera: `up` is zero; give the direction that is up in the picture, for example (0, 1, 0)")]
     NoUp,
-    /// The up vector lies along the direction of the view.
+    /// The up vector is parallel to the view direction.
     #[error(
         "camera: `up` {up} lies along the view direction {forward}; choose an `up` that points elsewhere, for example {suggestion}"
     )]
     UpAlongView {
         /// The up vector.
         up: DVec3,
-        /// Direction of the view, unit.
+        /// View direction, unit vector.
         forward: DVec3,
-        /// An axis that would do.
+        /// A valid axis.
         suggestion: DVec3,
     },
 }
 
 impl View {
-    /// A view from `camera` with `look_at` in the middle of the picture and as the pivot.
+    /// A view from `eye` with `look_at` in the centre of the image and as the pivot.
     ///
-    /// `up` need not be unit, nor perpendicular to the view direction, but must not lie along it.
+    /// `up` need not be a unit vector or perpendicular to the view direction, but must not be parallel to it.
     ///
     /// # Errors
-    /// When a number is not finite, the two points are the same, or `up` is zero or along the view direction.
+    /// If a number is not finite, the two points are equal, or `up` is zero or parallel to the view direction.
     pub fn look_at(eye: DVec3, look_at: DVec3, up: DVec3) -> Result<Self, ViewError> {
         for (name, value) in [("eye", eye), ("look_at", look_at), ("up", up)] {
             if !value.is_finite() {
@@ -78,7 +78,8 @@ impl View {
             }
         }
         let towards = look_at - eye;
-        // Lengths are taken of a copy scaled to about 1: squaring tiny or huge coordinates would leave the range of f64.
+        // Lengths are computed on a copy scaled to about 1, since squares of tiny or huge coordinates would leave the
+        // range of `f64`.
         let (forward, scale) = direction(towards).ok_or(ViewError::NoDirection { eye })?;
         let pivot_distance = (towards / scale).length() * scale;
         if !pivot_distance.is_finite() {
@@ -86,86 +87,86 @@ impl View {
         }
         let (up_dir, _) = direction(up).ok_or(ViewError::NoUp)?;
         if forward.cross(up_dir).length() < LEAST_SINE {
-            // The axis least like the view direction, so that the advice cannot fail in turn.
+            // The axis that is least parallel to the view direction, so that it is always valid.
             let suggestion = if forward.y.abs() > forward.z.abs() { DVec3::Z } else { DVec3::Y };
             return Err(ViewError::UpAlongView { up, forward, suggestion });
         }
         Ok(Self { eye, forward, up: up_dir, pivot_distance }.orthonormalized())
     }
 
-    /// Unit, to the right in the picture.
+    /// Unit vector to the right in the image.
     pub fn right(&self) -> DVec3 {
         self.forward.cross(self.up)
     }
 
-    /// The point that orbiting turns about.
+    /// The point about which the view orbits.
     pub fn pivot(&self) -> DVec3 {
         self.eye + self.forward * self.pivot_distance
     }
 
-    /// The same view with rounding taken out of its axes; `forward` keeps its direction.
+    /// The view with its axes made orthonormal; `forward` keeps its direction.
     ///
-    /// Precondition: `up` is not along `forward`.
+    /// Precondition: `up` is not parallel to `forward`.
     pub fn orthonormalized(self) -> Self {
         let forward = self.forward.normalize();
         let right = forward.cross(self.up).normalize();
-        // Twice: where `up` was nearly along `forward`, the first `right` has lost digits, the second has not.
+        // Twice: if `up` is nearly parallel to `forward`, the first `right` has lost digits.
         let up = right.cross(forward).normalize();
         let right = forward.cross(up).normalize();
         Self { forward, up: right.cross(forward), ..self }
     }
 
-    /// Whether no number of it is NaN or infinite.
+    /// Whether all of its numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.eye.is_finite() && self.forward.is_finite() && self.up.is_finite() && self.pivot_distance.is_finite()
     }
 }
 
-/// The unit vector along `v`, whatever its length; `None` where it has none or is not finite.
+/// The unit vector along `v`, whatever its length; `None` if it is zero or not finite.
 ///
-/// Where the square of the length is a normal number, the same bits as `normalize`.
+/// If the squared length is a normal number, the result is bitwise equal to `normalize`.
 pub(crate) fn unit_direction(v: DVec3) -> Option<DVec3> {
     let squared = v.length_squared();
     if squared.is_normal() { Some(v.normalize()) } else { direction(v).map(|(unit, _)| unit) }
 }
 
-/// The unit vector along `v` and the largest of its coordinates, or `None` for the zero vector.
+/// The unit vector along `v` and its largest absolute coordinate; `None` if it is zero or not finite.
 fn direction(v: DVec3) -> Option<(DVec3, f64)> {
     let scale = v.abs().max_element();
-    // The largest of numbers is not told of one that is none.
+    // `max_element` may ignore a NaN.
     (scale > 0.0 && v.is_finite()).then(|| ((v / scale).normalize(), scale))
 }
 
 impl Default for View {
-    /// From 5 m in front of the origin, looking at it.
+    /// 5 m in front of the origin, looking at it.
     fn default() -> Self {
         Self { eye: DVec3::new(0.0, 0.0, 5.0), forward: DVec3::NEG_Z, up: DVec3::Y, pivot_distance: 5.0 }
     }
 }
 
-/// How much of the scene the picture takes in.
+/// The projection of a camera: perspective or orthographic.
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
 pub struct Projection {
-    /// Vertical field of view in perspective, degrees, in `(0, 180)`.
+    /// Vertical field of view of a perspective projection, degrees, in `(0, 180)`.
     pub vfov_deg: f64,
-    /// Height of what an orthographic camera sees, metres; `None` sees in perspective. Its rays are parallel, and begin in
-    /// the plane through the camera that faces along the view.
+    /// Height of the image of an orthographic projection, metres; `None`: perspective. Orthographic rays are parallel
+    /// to the view direction and start in the plane through the camera perpendicular to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orthographic_height: Option<f64>,
 }
 
 impl Projection {
-    /// In perspective, with a vertical field of view in degrees.
+    /// Perspective, with a vertical field of view in degrees.
     pub fn perspective(vfov_deg: f64) -> Self {
         Self { vfov_deg, orthographic_height: None }
     }
 
-    /// Half the height of what the picture takes in at a depth along the view; both metres.
+    /// Half the height of the visible region at a depth along the view direction; both metres.
     pub fn half_height(&self, depth: f64) -> f64 {
         self.orthographic_height.map_or_else(|| self.tan_half_vfov() * depth, |height| 0.5 * height)
     }
 
-    /// Tangent of half the vertical field of view in perspective: half the picture's height at distance 1.
+    /// Tangent of half the vertical field of view of a perspective projection.
     pub fn tan_half_vfov(&self) -> f64 {
         (0.5 * self.vfov_deg).to_radians().tan()
     }
@@ -177,23 +178,23 @@ impl Default for Projection {
     }
 }
 
-/// A thin lens: everything in the plane at `focus_distance` is sharp, the rest blurs with `radius`.
+/// A thin lens: the plane at `focus_distance` is in focus, blur increases with `radius`.
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
 pub struct Lens {
     /// Radius of the aperture, metres, at least 0; 0 is a pinhole.
     pub radius: f64,
     /// Metres along the view axis to the focal *plane*; positive, may be infinite.
     pub focus_distance: f64,
-    /// Off: the picture is a pinhole's, and `radius` waits to be switched on again.
+    /// If false, the camera is a pinhole and `radius` has no effect.
     pub enabled: bool,
-    /// Straight edges of the aperture; below 3 it is round.
+    /// Number of straight edges of the aperture; below 3 it is round.
     pub blades: u32,
-    /// Counter-clockwise seen from behind the camera.
+    /// Counter-clockwise as seen from behind the camera.
     pub blade_rotation_deg: f64,
 }
 
 impl Lens {
-    /// No blur, with the focal plane where it would be when somebody opens the aperture.
+    /// A pinhole; `focus_distance` takes effect when the aperture is opened.
     pub fn pinhole(focus_distance: f64) -> Self {
         Self { radius: 0.0, focus_distance, enabled: false, blades: 0, blade_rotation_deg: 0.0 }
     }
@@ -203,7 +204,7 @@ impl Lens {
         Self { radius, enabled: radius > 0.0, ..Self::pinhole(focus_distance) }
     }
 
-    /// The radius that the picture shows: 0 while depth of field is off.
+    /// The radius for rendering: 0 if depth of field is off.
     pub fn effective_radius(&self) -> f64 {
         if self.enabled { self.radius } else { 0.0 }
     }

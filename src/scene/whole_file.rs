@@ -1,11 +1,11 @@
-//! Files that appear whole or not at all: written under a temporary name in the same folder, then renamed. Everything
-//! that the program writes goes through here.
+//! Atomic writing of files: under a temporary name in the same folder, then renamed. The program writes all of its
+//! files in this way.
 //!
-//! - A symbolic link is followed and kept; what it leads to is replaced.
-//! - What is no regular file, or is read-only, is refused; so is a film, unless [`Replace`] allows it.
-//! - The temporary file is locked while it is written. One that a killed process left behind is not, and the next who
-//!   writes the same output takes it over.
-//! - A file that is claimed ([`WholeFile::claim`]) has one writer at a time, from the claim to the end of writing.
+//! - A symbolic link is followed and kept; its target is replaced.
+//! - Files that are not regular or are read-only are rejected; so are films, unless [`Replace`] allows them.
+//! - The temporary file is locked while it is written. One left by a killed process is not, and the next writer of the
+//!   same output reuses it.
+//! - A claimed file ([`WholeFile::claim`]) has one writer at a time, from the claim to the end of writing.
 
 use super::Fingerprint;
 use super::image_metadata::FILM_KEY;
@@ -21,28 +21,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{NamedTempFile, TempPath};
 
-/// What a file may take the place of.
+/// Which existing files an output may replace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Replace {
-    /// Of any file but a film: its samples took long and are nowhere else.
+    /// Any file but a film, whose samples took long to compute and exist nowhere else.
     #[default]
     AllButFilms,
-    /// Of any file, films included.
+    /// Any file, including films.
     Anything,
 }
 
-/// A file that is being written, and has not taken its name yet. Dropped, it leaves nothing behind.
+/// A file that is being written and does not have its final name yet. If it is dropped, the temporary file is removed.
 pub struct WholeFile {
     out: BufWriter<File>,
     part: TempPath,
-    /// As it was asked for.
+    /// The path as given.
     path: PathBuf,
-    /// Where that leads.
+    /// The path with all links resolved.
     target: PathBuf,
     in_progress: InProgress,
 }
 
-/// The temporary files of this process, and whether the program is about to end without them.
+/// The temporary files of this process, and whether the program is about to exit without finishing them.
 static PARTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 
@@ -50,7 +50,7 @@ fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Knows of one temporary file for as long as it lives.
+/// Registers a temporary file in `PARTS` during its lifetime.
 struct InProgress(PathBuf);
 
 impl InProgress {
@@ -70,45 +70,44 @@ impl Drop for InProgress {
     }
 }
 
-/// For a program that ends while other threads write: no file takes its name any more, and those in progress are taken
-/// away.
+/// For exiting while other threads write: no file is renamed any more, and all temporary files are removed.
 pub fn give_up() {
     GIVEN_UP.store(true, Ordering::SeqCst);
     for part in std::mem::take(&mut *parts()) {
-        // One that has just taken its name is whole.
+        // A file that has just been renamed is complete.
         let _ = std::fs::remove_file(part);
     }
 }
 
-/// Finds out whether a file can be written here, without leaving anything behind.
+/// Checks whether a file can be written, without leaving anything behind.
 ///
 /// # Errors
-/// When the path names no file that may be written or replaced.
+/// If the file cannot be written or may not be replaced.
 pub fn check_writable(path: &Path, replace: Replace) -> Result<(), WriteError> {
     WholeFile::begin(path, replace).map(drop)
 }
 
-/// The same as far as the file itself is asked, if it is there; its folder is not tried.
+/// Like [`check_writable`], but checks only the file itself if it exists, not its folder.
 ///
 /// # Errors
-/// When it may not be replaced.
+/// If it may not be replaced.
 pub fn check_replaceable(path: &Path, replace: Replace) -> Result<(), WriteError> {
     check_target(path, &absolute(path), replace)
 }
 
-/// Writes a whole file; one that was there stays until the new one is complete. Films are not replaced.
+/// Writes a file atomically; an existing one stays until the new one is complete. Films are not replaced.
 ///
 /// # Errors
-/// When it cannot be written or replaced.
+/// If it cannot be written or replaced.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     file.write_all(bytes).map_err(|error| unwritable(path, error))?;
     file.finish()
 }
 
-/// Whether a file says of itself that it is a film, whole or damaged.
+/// Whether a file is marked as a film, complete or damaged.
 pub fn is_film(path: &Path) -> bool {
-    /// The attribute comes soon after those that every picture has.
+    /// The attribute follows soon after those of every EXR image.
     const LOOKED_AT: u64 = 1 << 16;
     let mut start = Vec::new();
     let read = InputFile::open_within(path, FileKind::Film, u64::MAX)
@@ -118,7 +117,7 @@ pub fn is_film(path: &Path) -> bool {
     read.is_ok() && start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) && start.windows(name.len()).any(|part| part == name)
 }
 
-/// Whether a path ends in `/` or `/.`: paths leave that out when they are compared, the system does not.
+/// Whether a path ends in `/` or `/.`: comparisons of paths ignore that, the operating system does not.
 fn is_named_as_folder(path: &Path) -> bool {
     let name = path.as_os_str().as_encoded_bytes();
     let is_separator = |byte: &u8| std::path::is_separator(char::from(*byte));
@@ -130,22 +129,24 @@ fn is_named_as_folder(path: &Path) -> bool {
 }
 
 impl WholeFile {
+    /// Starts writing a file.
+    ///
     /// # Errors
-    /// As [`check_writable`].
+    /// Like [`check_writable`].
     pub fn begin(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
-        // Somebody may have claimed it.
+        // It may be claimed.
         let claimed = part_name(&target, None);
         if let Ok(file) = OpenOptions::new().read(true).open(&claimed) {
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => return Err(busy(path)),
-                // Left behind by a process that was killed.
+                // Left by a killed process.
                 Ok(()) if is_at(&file, &claimed) => drop(std::fs::remove_file(&claimed)),
                 _ => {}
             }
         }
-        /// Processes that write one output at the same moment.
+        /// Maximum number of processes that write one output at the same time.
         const WRITERS: u32 = 64;
         let mut begun = (0..WRITERS).map(|number| open_part(&target, Some(number)));
         match begun.find(|part| !matches!(part, Ok(None))) {
@@ -158,11 +159,10 @@ impl WholeFile {
         }
     }
 
-    /// The same for a file that one process at a time may work on: nobody else can begin to write it until this is
-    /// finished or dropped.
+    /// Like [`Self::begin`], exclusively: no other process can write the file until this is finished or dropped.
     ///
     /// # Errors
-    /// As [`check_writable`], and when another process has claimed the file.
+    /// Like [`check_writable`], and if another process has claimed the file.
     pub fn claim(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
@@ -174,45 +174,46 @@ impl WholeFile {
     }
 
     fn new(part: NamedTempFile, path: &Path, target: PathBuf) -> Self {
-        // Without the name: messages are about the file that was asked for.
+        // Without the temporary name, since messages give the path of the caller.
         let (file, part) = part.into_parts();
         let in_progress = InProgress::of(&part);
         Self { out: BufWriter::with_capacity(1 << 16, file), part, path: path.to_path_buf(), target, in_progress }
     }
 
-    /// The file that was asked for.
+    /// The path as given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Takes the place of whatever had the name.
+    /// Renames the file, replacing an existing one.
     ///
     /// # Errors
-    /// When it cannot be completed.
+    /// If it cannot be completed.
     pub fn finish(self) -> Result<(), WriteError> {
         self.finish_open().map(drop)
     }
 
-    /// The same for what goes on being written; locked, so that no other process begins to write it.
+    /// Like [`Self::finish`], for a file that is written further: it stays locked, so that no other process can write
+    /// it.
     ///
     /// # Errors
-    /// When it cannot be completed.
+    /// If it cannot be completed.
     pub fn finish_open(self) -> Result<File, WriteError> {
         let (path, target) = (self.path.clone(), self.target.clone());
         let (file, part) = self.complete()?;
         if let Ok(old) = std::fs::metadata(&target) {
-            // Not all disks keep them, and the file is whole without.
+            // Not all file systems support permissions; the file is complete without them.
             let _ = file.set_permissions(old.permissions());
         }
         part.persist(&target).map_err(|error| unwritable(&path, error.error))?;
         Ok(file)
     }
 
-    /// Takes the first of `names` that is free: never over a file that is there, even one that another program makes
-    /// at the same moment. Answers with the name; `None` when all are taken.
+    /// Gives the file the first unused name of `names`; never replaces a file, even one created by another program at
+    /// the same time. Returns the name; `None` if all are used.
     ///
     /// # Errors
-    /// When it cannot be completed.
+    /// If it cannot be completed.
     pub fn finish_new(self, names: impl Iterator<Item = PathBuf>) -> Result<Option<PathBuf>, WriteError> {
         let (_file, mut part) = self.complete()?;
         for path in names {
@@ -244,7 +245,7 @@ impl Write for WholeFile {
     }
 }
 
-/// A failure to write a file that was begun.
+/// The error for a file that could not be completed.
 pub fn unwritable(path: &Path, reason: impl Error + Send + Sync + 'static) -> WriteError {
     WriteError::Failed { path: path.to_path_buf(), source: Box::new(reason) }
 }
@@ -253,12 +254,12 @@ fn busy(path: &Path) -> WriteError {
     WriteError::Busy(path.to_path_buf())
 }
 
-/// Whether what is there may be replaced.
+/// Checks whether the existing file may be replaced.
 fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), WriteError> {
     if is_named_as_folder(path) {
         return Err(WriteError::FolderName(path.to_path_buf()));
     }
-    // All links have been followed.
+    // All valid links have been followed.
     if target.is_symlink() {
         return Err(WriteError::BrokenLink(path.to_path_buf()));
     }
@@ -273,7 +274,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Writ
     if info.permissions().readonly() {
         return Err(read_only());
     }
-    // Nothing is written by this: the system is asked what it would allow.
+    // Opened only to check the permissions; nothing is written.
     match OpenOptions::new().write(true).open(target) {
         Ok(file) if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) => return Err(busy(path)),
         Err(error) if error.kind() == ErrorKind::PermissionDenied => return Err(read_only()),
@@ -285,7 +286,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Writ
     Ok(())
 }
 
-/// The name under which `target` is written: that of the claim, or of the writer with this number.
+/// Temporary name for `target`: that of a claim, or that of the writer with this number.
 fn part_name(target: &Path, number: Option<u32>) -> PathBuf {
     let name = target.file_name().unwrap_or_default().as_encoded_bytes();
     let hash = Fingerprint::default().with(name.iter().copied()).0 as u64;
@@ -293,7 +294,7 @@ fn part_name(target: &Path, number: Option<u32>) -> PathBuf {
     target.with_file_name(format!(".firstlight-{hash:016x}{number}.part"))
 }
 
-/// Makes or takes over the temporary file of that name, empty and locked; `None` when somebody else has it.
+/// Creates or reuses the temporary file of that name, empty and locked; `None` if another process uses it.
 fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempFile>> {
     let name = part_name(target, number);
     let folder = name.parent().unwrap_or(Path::new(".")).to_path_buf();
@@ -303,21 +304,21 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
         #[cfg(unix)]
         {
             use std::os::unix::fs::OpenOptionsExt;
-            // As any new file: the user's mask decides.
+            // As for any new file: restricted by the umask of the user.
             options.mode(0o666);
         }
         options
     };
-    /// It is gone again when its owner ends between opening and locking; not for ever.
+    /// The file may disappear between opening and locking if its owner finishes.
     const ATTEMPTS: u32 = 100;
     for _ in 0..ATTEMPTS {
-        // A link that somebody has laid here would lead elsewhere.
+        // A symbolic link planted here would lead elsewhere.
         if std::fs::symlink_metadata(&name).is_ok_and(|info| !info.is_file()) {
             return Ok(None);
         }
         let file = match new_file().open(&name) {
             Ok(file) => file,
-            // Somebody else's, in a folder that many share.
+            // Another user's, in a shared folder.
             Err(error) if error.kind() == ErrorKind::PermissionDenied && name.exists() => return Ok(None),
             Err(error) => return Err(error),
         };
@@ -330,10 +331,10 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
                 builder.prefix(name.file_name().unwrap_or_default()).rand_bytes(0);
                 return builder.make_in(folder, |_| file.take().ok_or_else(taken)).map(Some);
             }
-            // It was renamed or removed in between.
+            // It was renamed or removed in the meantime.
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Ok(None),
-            // Some disks know no locks: a name that nobody else has, then.
+            // Some file systems have no locks: uses a random name instead.
             Err(TryLockError::Error(_)) => {
                 drop(file);
                 let _ = std::fs::remove_file(&name);
@@ -346,19 +347,19 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
     Ok(None)
 }
 
-/// Removes what killed processes have left of earlier writers of the same output, from this number on.
+/// Removes the temporary files that killed writers of the same output left, from this number on.
 fn remove_left_over(target: &Path, from: u32, to: u32) {
     for number in from..to {
         let name = part_name(target, Some(number));
         let Ok(file) = OpenOptions::new().read(true).open(&name) else { return };
         if file.try_lock().is_ok() && is_at(&file, &name) {
-            // Whoever may not remove it may leave it.
+            // Without permission to remove it, it stays.
             let _ = std::fs::remove_file(&name);
         }
     }
 }
 
-/// Whether the name still leads to the file that was opened by it.
+/// Whether the name still refers to the opened file.
 fn is_at(file: &File, name: &Path) -> bool {
     #[cfg(unix)]
     {
@@ -368,14 +369,14 @@ fn is_at(file: &File, name: &Path) -> bool {
     }
     #[cfg(not(unix))]
     {
-        // A file that is open keeps its name there.
+        // There, an open file keeps its name.
         let _ = file;
         name.exists()
     }
 }
 
 fn cannot_begin(path: &Path, target: &Path, error: io::Error) -> WriteError {
-    // As it was asked for, not where links lead.
+    // The path as given, not with resolved links.
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -386,7 +387,7 @@ fn cannot_begin(path: &Path, target: &Path, error: io::Error) -> WriteError {
         ErrorKind::NotFound if !lies_in.is_dir() => format!("there is no folder {}", folder.display()),
         ErrorKind::StorageFull => "the disk is full".to_owned(),
         ErrorKind::ReadOnlyFilesystem => format!("{} is on a read-only file system", folder.display()),
-        // Some folders that the system makes up answer `not found` to whoever wants to write.
+        // Some virtual folders report `not found` for writing.
         _ => format!("no permission to create files in {}", folder.display()),
     };
     WriteError::Begin { path: path.to_path_buf(), reason, source: error }
@@ -431,7 +432,7 @@ mod tests {
             (names(folder.path()), std::fs::read(&path).unwrap()),
             (vec!["a.txt".to_owned()], b"whole".to_vec())
         );
-        // Two at once: each has a file of its own, and the last one counts.
+        // Two concurrent writers: each has its own temporary file, and the last to finish wins.
         let mut living = WholeFile::begin(&path, Replace::AllButFilms).unwrap();
         living.write_all(b"living").unwrap();
         write_whole(&path, b"quicker").unwrap();
@@ -455,7 +456,7 @@ mod tests {
         claim.write_all(b"mine").unwrap();
         claim.finish().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
-        // What goes on being written stays claimed under its own name.
+        // A file that is written further stays claimed under its final name.
         let open = WholeFile::claim(&path, Replace::Anything).unwrap().finish_open().unwrap();
         assert!(write_whole(&path, b"yours").unwrap_err().to_string().contains("is being written"));
         drop(open);
@@ -471,7 +472,7 @@ mod tests {
         let root = folder.path();
         std::fs::create_dir(root.join("far")).unwrap();
         symlink("far/b.txt", root.join("a.txt")).unwrap();
-        // First what is not there yet, then what is.
+        // First a target that does not exist yet, then an existing one.
         for text in ["one", "two"] {
             write_whole(&root.join("a.txt"), text.as_bytes()).unwrap();
             assert_eq!(std::fs::read_to_string(root.join("far/b.txt")).unwrap(), text);
@@ -509,7 +510,7 @@ mod tests {
             let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err().to_string();
             assert!(error.contains("no permission to create files in /proc"), "{error}");
         }
-        // However deep a library has wrapped it.
+        // However deeply a library has wrapped it.
         #[derive(Debug, thiserror::Error)]
         #[error("wrapped")]
         struct Wrapped(#[source] io::Error);

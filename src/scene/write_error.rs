@@ -1,4 +1,4 @@
-//! Why a file is not written. Every message names the file, and what to do about it where something can be done.
+//! Errors of writing files. Every message names the file, and the remedy if there is one.
 
 use super::error::SceneError;
 use super::image_metadata::MetadataError;
@@ -8,113 +8,113 @@ use std::error::Error;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
-/// Why a file is not written; one that was there before is as it was.
+/// Why a file was not written; an existing file is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The path ends in a separator, which only the path of a folder may.
+    /// The path ends in a separator, as for folders.
     #[error("{}: is the name of a folder: expected a file name", .0.display())]
     FolderName(PathBuf),
-    /// The path is that of a folder.
+    /// The path is a folder.
     #[error("{}: is a folder: expected a file name", .0.display())]
     Folder(PathBuf),
-    /// The path leads to a pipe, a socket or a device.
+    /// The path is a pipe, a socket or a device.
     #[error("{}: is not a regular file and is not replaced: choose another name", .0.display())]
     NotRegular(PathBuf),
-    /// The file is there and may not be written.
+    /// The file exists and is read-only.
     #[error("{}: is read-only and is not replaced: choose another name", .0.display())]
     ReadOnly(PathBuf),
-    /// The path is that of a symbolic link that leads nowhere.
+    /// The path is a broken symbolic link.
     #[error("{}: cannot be written: the symbolic link is broken", .0.display())]
     BrokenLink(PathBuf),
-    /// Another process writes the file.
+    /// Another process is writing the file.
     #[error("{}: is being written by another process: wait for it to end, or choose another name", .0.display())]
     Busy(PathBuf),
-    /// The file is a film, and films are not to be replaced.
+    /// The file is a film, and films may not be replaced.
     #[error("{}: is a film whose samples would be lost: choose another name, or use --overwrite", .0.display())]
     Film(PathBuf),
-    /// The file is a film whose samples the new one does not have.
+    /// The file is a film with samples that the new one does not have.
     #[error("{}: a film {film} would be lost: choose another name, or use --overwrite", path.display())]
     OtherFilm {
         /// The file.
         path: PathBuf,
-        /// What is different about the film, as words that follow "a film".
+        /// How the film differs; the text follows "a film".
         film: String,
     },
-    /// The file is there and is not a recording.
+    /// The file exists and is not a recording.
     #[error("{}: exists and is not a recording: choose another name", .0.display())]
     NotRecording(PathBuf),
-    /// The name asks for a format that images are not written in.
+    /// The extension is not that of a supported format.
     #[error("{}: unsupported output format .{extension}: use .png or .exr", path.display())]
     Format {
         /// The file.
         path: PathBuf,
-        /// What its name ends in, lower case.
+        /// The extension, lower case.
         extension: String,
     },
-    /// The name asks for no format.
+    /// The name has no extension.
     #[error("{}: missing file extension: use .png or .exr", .0.display())]
     NoExtension(PathBuf),
-    /// No number is free for another file of this name.
+    /// All numbers for new files of this name are used.
     #[error("{}: all numbers are in use: move some of the pictures", .0.display())]
     NoFreeName(PathBuf),
-    /// The error of the film cannot be written before it can be estimated.
+    /// The error image cannot be written before the error can be estimated.
     #[error("{}: the error is unknown until every pixel has two samples", .0.display())]
     ErrorUnknown(PathBuf),
-    /// The folder of the file cannot be made.
+    /// The folder of the file cannot be created.
     #[error("{}: cannot create the folder: {source}", folder.display())]
     NoFolder {
         /// The folder.
         folder: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// No file can be made in the folder.
+    /// No file can be created in the folder.
     #[error("{}: cannot be written: {reason}", path.display())]
     Begin {
         /// The file.
         path: PathBuf,
-        /// What is in the way.
+        /// The reason.
         reason: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file was begun and could not be completed.
+    /// The file was started and could not be completed.
     #[error("{}: cannot be written: {}", path.display(), reason(&**source))]
     Failed {
         /// The file.
         path: PathBuf,
-        /// What the system, the encoder or the lack of memory says.
+        /// Error of the operating system or the encoder, or lack of memory.
         source: Box<dyn Error + Send + Sync>,
     },
-    /// There is no memory for the file.
+    /// There is not enough memory to write the file.
     #[error(transparent)]
     Memory(#[from] NoRoom),
     /// The image cannot be encoded.
     #[error("{0}")]
     Encode(#[source] Box<dyn Error + Send + Sync>),
-    /// The metadata of a film is not what this program writes.
+    /// The metadata of a film is invalid.
     #[error(transparent)]
     Metadata(#[from] MetadataError),
-    /// The scene holds what no scene file may say.
+    /// The scene holds values that scene files must not have.
     #[error("{}: cannot be saved: {source}", path.display())]
     Scene {
         /// The scene file.
         path: PathBuf,
-        /// What it may not say.
+        /// The invalid values.
         source: SceneError,
     },
-    /// The scene would read back as another one.
+    /// The saved scene would read back differently.
     #[error("{}: cannot be saved: the saved scene would differ; this is a bug in firstlight", .0.display())]
     WouldDiffer(PathBuf),
-    /// A mesh beside the scene file is not written.
+    /// A mesh beside the scene file cannot be written.
     #[error("{0}")]
     Mesh(#[source] Box<dyn Error + Send + Sync>),
 }
 
 impl WriteError {
-    /// Whether the same may succeed later, or on another machine: another process has the file, a disk is full or cannot be
-    /// reached, or there is no memory.
+    /// Whether the error may be temporary, or specific to this machine: the file is in use, the disk is full or
+    /// unreachable, or memory is short.
     pub fn may_pass(&self) -> bool {
         match self {
             Self::Busy(_) | Self::Memory(_) => true,
@@ -134,7 +134,7 @@ impl From<WriteError> for String {
     }
 }
 
-/// What the system says. Libraries wrap it in words of their own.
+/// The kind of I/O error, which libraries may have wrapped.
 fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
     let mut cause = Some(error);
     let kind = std::iter::from_fn(|| {
@@ -145,7 +145,7 @@ fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
     kind.flatten().next()
 }
 
-/// What a failure to write says to people.
+/// The message for a failure to write.
 fn reason(error: &(dyn Error + 'static)) -> String {
     match io_kind(error) {
         Some(ErrorKind::StorageFull) => "the disk is full".to_owned(),

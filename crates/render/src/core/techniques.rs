@@ -19,7 +19,7 @@ pub struct Techniques {
     pub light_selection: bool,
     /// Paths are also traced from the lights if there are specular casters; off: from the camera only.
     pub caustics: bool,
-    /// Plan for caustics, if [`Self::caustics`] is set; `None`: the choice of a pilot, see [`crate::caustic_plan`].
+    /// Plan for caustics, if [`Self::caustics`] is set; `None`: the choice of a pilot, see [`crate::CausticChoice`].
     pub caustic_plan: Option<CausticPlan>,
     /// Russian roulette by throughput; off: for very long paths only.
     pub roulette: bool,
