@@ -48,7 +48,7 @@ pub struct OpenArgs {
     /// Camera of a glTF model to look through, by name [default: the first].
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Moment of a glTF model's animations, in seconds [default: the stored pose].
+    /// Moment of the animation, in seconds [default: that of the scene file; the stored pose of a glTF model].
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
     pub at: Option<f64>,
     /// Variant of a glTF model's materials, by name.

@@ -9,10 +9,11 @@ use firstlight::frame::{PictureLayer, f_number, f_stop};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
+use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Rendering, SceneInputs,
-    SceneSource, Shape,
+    self, Animation, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Rendering,
+    SceneInputs, SceneSource, Shape,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -62,7 +63,9 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     let can_be_seen = prepared.camera.check().is_ok() && settings.check().is_ok();
     let caustics = (prepared.features().caustics && can_be_seen)
         .then(|| caustic_choice(prepared, &settings, (film.width, film.height)));
-    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults, caustics };
+    let animation = world.get_resource::<Animation>().cloned();
+    let told =
+        Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults, caustics, animation };
     if args.json { print(told.json()) } else { print(told.text()) }
 }
 
@@ -78,6 +81,8 @@ struct Told<'a> {
     faults: BTreeMap<*const Mesh, Faults>,
     /// How they are looked for, where there may be some.
     caustics: Option<CausticChoice>,
+    /// What moves.
+    animation: Option<Animation>,
 }
 
 const NOT_MODELLED: [&str; 5] = ["spectra", "polarisation", "motion blur", "participating media", "lens aberrations"];
@@ -130,6 +135,9 @@ impl Told<'_> {
         }
         if let Some(caustics) = self.caustics {
             row("caustics", caustics.to_string());
+        }
+        if let Some(animation) = &self.animation {
+            animation_rows(&scene.file.animation, animation, &mut row);
         }
         if let Some(facts) = &scene.facts {
             facts_rows(facts, &mut row);
@@ -187,6 +195,7 @@ impl Told<'_> {
             "not_used": self.features(false),
             "not_modelled": NOT_MODELLED,
             "caustics": self.caustics.map(caustics_json),
+            "animation": self.animation.as_ref().map(|animation| animation_json(&scene.file.animation, animation)),
             "model": scene.facts.as_ref().map(facts_json),
             "warnings": scene.warnings,
             "problems": extraction.problems,
@@ -275,6 +284,52 @@ fn caustics_json(choice: CausticChoice) -> serde_json::Value {
         "light_path_stride": plan.light_path_stride, "guided": plan.guided, "cost": cost, "variance_saved": gain,
         "text": choice.to_string(),
     })
+}
+
+/// What moves, for people.
+fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl FnMut(&str, String)) {
+    let (length, fps) = (number(animation.length()), number(animation.fps));
+    let n_frames = animation.n_frames();
+    let frames = counted(n_frames as usize, "frame", "frames");
+    row("animation", format!("{length} s, {frames} at {fps} per second, shown at {} s", number(part.at)));
+    for (what, track) in part.tracks.iter().map(|track| (moved(track), track)) {
+        let keys = counted(track.keys().len(), "key", "keys");
+        let span = match track.keys() {
+            [(start, _), .., (end, _)] => format!(", {} to {} s", number(*start), number(*end)),
+            _ => String::new(),
+        };
+        row("", format!("{what}: {keys}, {}{span}", track.interpolation().name()));
+    }
+}
+
+/// `translate of ball`.
+fn moved(track: &TrackPart) -> String {
+    let (property, name) = match track {
+        TrackPart::Camera { property, .. } => (property.name(), "camera"),
+        TrackPart::Object { property, name, .. } => (property.name(), name.as_str()),
+        TrackPart::Light { property, name, .. } => (property.name(), name.as_str()),
+        TrackPart::Material { property, name, .. } => (property.name(), name.as_str()),
+    };
+    format!("{property} of {}", printable::name(name))
+}
+
+/// The same for machines.
+fn animation_json(part: &AnimationPart, animation: &Animation) -> serde_json::Value {
+    let tracks: Vec<_> = (part.tracks.iter())
+        .map(|track| {
+            let times: Vec<f64> = track.keys().iter().map(|(time, _)| *time).collect();
+            serde_json::json!({ "of": moved(track), "interpolation": track.interpolation().name(), "keys_s": times })
+        })
+        .collect();
+    serde_json::json!({
+        "length_s": animation.length(), "fps": animation.fps, "frames": animation.n_frames(), "at_s": part.at,
+        "shutter": part.shutter, "shutter_s": part.shutter_seconds, "tracks": tracks,
+    })
+}
+
+/// A number of a scene file, with three digits behind the point at most.
+fn number(value: f64) -> String {
+    ((value * 1e3).round() / 1e3).to_string()
 }
 
 /// What a glTF file has, for people.

@@ -25,6 +25,12 @@ const MOST_LENS_RADIUS: f64 = 1e6;
 /// Stops of exposure, up or down. Beyond this, every image is black or white.
 pub const MOST_STOPS: f32 = 64.0;
 
+/// Seconds, for every time of an animation: twelve days.
+pub(crate) const MOST_SECONDS: f64 = 1e6;
+
+/// Keys of an animation in all.
+pub(crate) const MOST_KEYS: usize = 1_000_000;
+
 /// A number for a message: very large and very small ones in scientific notation.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
@@ -90,6 +96,47 @@ pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue>
         return Err(BadValue::out_of_range("inner_angle", number(inner_deg), rule));
     }
     Ok(())
+}
+
+/// A moment of an animation.
+pub(crate) fn check_moment(field: &'static str, seconds: f64) -> Result<(), BadValue> {
+    if (0.0..=MOST_SECONDS).contains(&seconds) {
+        return Ok(());
+    }
+    let rule = format!("lie between 0 and {MOST_SECONDS:e} s");
+    Err(BadValue::out_of_range(field, number(seconds), rule))
+}
+
+/// A length of time of an animation.
+pub(crate) fn check_span(field: &'static str, seconds: f64) -> Result<(), BadValue> {
+    if seconds > 0.0 && seconds <= MOST_SECONDS {
+        return Ok(());
+    }
+    let rule = format!("lie above 0 and at most at {MOST_SECONDS:e} s");
+    Err(BadValue::out_of_range(field, number(seconds), rule))
+}
+
+/// Frames per second.
+pub(crate) fn check_fps(fps: f64) -> Result<(), BadValue> {
+    let good = (1e-3..=1e4).contains(&fps);
+    if good { Ok(()) } else { Err(BadValue::out_of_range("fps", number(fps), "lie between 0.001 and 10000")) }
+}
+
+/// Share of the time of a frame during which the shutter is open.
+pub(crate) fn check_shutter_share(share: f64) -> Result<(), BadValue> {
+    if (0.0..=1.0).contains(&share) {
+        return Ok(());
+    }
+    let rule = "lie between 0 and 1: it is a share of the time of a frame (`shutter_seconds` is in seconds)";
+    Err(BadValue::out_of_range("shutter", number(share), rule))
+}
+
+/// Seconds during which the shutter is open.
+pub(crate) fn check_shutter_seconds(seconds: f64) -> Result<(), BadValue> {
+    if (0.0..=3600.0).contains(&seconds) {
+        return Ok(());
+    }
+    Err(BadValue::out_of_range("shutter_seconds", number(seconds), "lie between 0 and 3600 s"))
 }
 
 /// The unit vector along `vector`, which may have any finite length but 0.

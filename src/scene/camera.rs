@@ -1,4 +1,4 @@
-//! The camera that a scene file describes.
+//! The camera that a scene file describes, and the way back.
 
 use super::file::CameraPart;
 use super::units::lens_radius_of;
@@ -50,4 +50,32 @@ pub(super) fn unit(vector: DVec3) -> DVec3 {
 /// The vector scaled to length 1; NaN if it has no direction, like `normalize`.
 fn along(vector: DVec3) -> DVec3 {
     unit_direction(vector).unwrap_or(DVec3::NAN)
+}
+
+/// The camera of a scene file that gives exactly these components: `written` if it still does, else with the point that
+/// it looks at if that gives the same bits, else with its direction.
+pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: Option<&CameraPart>) -> CameraPart {
+    let same = |part: &CameraPart| camera(part) == (*view, *projection, *lens);
+    if let Some(part) = written.filter(|part| same(part)) {
+        return part.clone();
+    }
+    let at = CameraPart {
+        up: view.up,
+        vfov: projection.vfov_deg,
+        orthographic_height: projection.orthographic_height,
+        lens_radius: (lens.radius != 0.0).then_some(lens.radius),
+        focus_distance: Some(lens.focus_distance),
+        depth_of_field: (lens.enabled != (lens.radius > 0.0)).then_some(lens.enabled),
+        blades: lens.blades,
+        blade_rotation: lens.blade_rotation_deg,
+        ..CameraPart::looking_at(view.eye, view.pivot())
+    };
+    let upright = CameraPart { up: DVec3::Y, ..at.clone() };
+    let directed = CameraPart {
+        look_at: None,
+        forward: Some(view.forward),
+        pivot_distance: Some(view.pivot_distance),
+        ..at.clone()
+    };
+    [upright, at].into_iter().find(same).unwrap_or(directed)
 }

@@ -122,6 +122,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
             key_light(KEY_LIGHT.to_owned(), (min, max), side),
         ],
         lights: Vec::new(),
+        animation: Default::default(),
     }
 }
 

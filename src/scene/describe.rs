@@ -5,13 +5,14 @@
 //! program are listed sphere by sphere; surfaces without a material get a grey one. Comments and formatting of the
 //! original file are lost.
 
-use super::camera::camera;
+use super::animation::{Animation, Moment, Moved, rest_camera};
+use super::camera::camera_part;
 use super::components::{
     Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use super::file::{
-    CameraPart, DisplayPart, FilmPart, InFile, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile, TransformPart,
+    DisplayPart, FilmPart, InFile, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile, TransformPart,
 };
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
@@ -22,7 +23,6 @@ use super::relative::path_to_text;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::units::radians;
 use super::value::{ColorValue, Rgb, ScalarValue};
-use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
 use crate::render::{Environment, MapParams};
 use bevy_ecs::name::Name;
@@ -50,19 +50,31 @@ impl Description {
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let inputs = SceneInputs::of(world);
         let mut writer = Writer::new(loaded);
-        let objects = writer.objects(world, &inputs);
-        writer.name_materials(world, &objects);
+        let animation = world.get_resource::<Animation>().cloned();
+        let moved = Moved::of(animation.as_ref(), &inputs);
+        let objects = writer.objects(world, &inputs, &moved);
+        writer.name_materials(world, &objects, &moved);
         let parts = objects.iter().map(|object| writer.object(object)).collect();
         let materials = writer.materials();
+        let at = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+        let animation_part = animation.as_ref().map_or_else(Default::default, |animation| {
+            moved.part((animation, at), &inputs, &writer.names, &mut writer.losses)
+        });
         let environment = writer.environment(&inputs.environment);
         let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default().0;
-        let lights = inputs.lights.iter().map(|light| light.light.to_part(light.name.clone(), &light.placement));
+        let lights = inputs.lights.iter().map(|light| {
+            let name = moved.name(light.entity).cloned().or_else(|| light.name.clone());
+            light.light.to_part(name, &light.placement)
+        });
         let (view, projection, lens) =
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
-            camera: camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
+            camera: match &animation {
+                Some(animation) => rest_camera(animation, at, &view, &projection, &lens),
+                None => camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
+            },
             cameras: loaded.map(|loaded| loaded.file.cameras.clone()).unwrap_or_default(),
             film: FilmPart { width, height, filter: rendering.filter },
             integrator: rendering.integrator,
@@ -74,38 +86,11 @@ impl Description {
             materials,
             objects: parts,
             lights: lights.collect(),
+            animation: animation_part,
         };
         let folder = loaded.map(|loaded| loaded.folder.clone()).unwrap_or_default();
         Self { file, folder, loose_meshes: writer.loose_meshes, losses: writer.losses }
     }
-}
-
-/// The camera of a scene file that gives exactly these components: `written` if it still does, else with the point that
-/// it looks at if that gives the same bits, else with its direction.
-pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: Option<&CameraPart>) -> CameraPart {
-    let same = |part: &CameraPart| camera(part) == (*view, *projection, *lens);
-    if let Some(part) = written.filter(|part| same(part)) {
-        return part.clone();
-    }
-    let at = CameraPart {
-        up: view.up,
-        vfov: projection.vfov_deg,
-        orthographic_height: projection.orthographic_height,
-        lens_radius: (lens.radius != 0.0).then_some(lens.radius),
-        focus_distance: Some(lens.focus_distance),
-        depth_of_field: (lens.enabled != (lens.radius > 0.0)).then_some(lens.enabled),
-        blades: lens.blades,
-        blade_rotation: lens.blade_rotation_deg,
-        ..CameraPart::looking_at(view.eye, view.pivot())
-    };
-    let upright = CameraPart { up: DVec3::Y, ..at.clone() };
-    let directed = CameraPart {
-        look_at: None,
-        forward: Some(view.forward),
-        pivot_distance: Some(view.pivot_distance),
-        ..at.clone()
-    };
-    [upright, at].into_iter().find(same).unwrap_or(directed)
 }
 
 /// An object with its components.
@@ -157,13 +142,14 @@ impl<'a> Writer<'a> {
         writer
     }
 
-    fn objects(&self, world: &mut World, inputs: &SceneInputs) -> Vec<Item> {
+    fn objects(&self, world: &mut World, inputs: &SceneInputs, moved: &Moved) -> Vec<Item> {
         let item = |object: &super::inputs::ObjectInput| {
             let origin = world.get::<MeshOrigin>(object.entity).cloned();
             let own = origin.as_ref().is_some_and(|origin| origin.own_materials)
+                && !object.slots.iter().any(|&slot| moved.has_material(slot))
                 && self.has_own_materials(world, &object.shape, &object.slots);
             Item {
-                name: object.name.clone().filter(|name| !name.is_empty()),
+                name: moved.name(object.entity).or(object.name.as_ref()).filter(|name| !name.is_empty()).cloned(),
                 shape: object.shape.clone(),
                 placement: object.placement,
                 slots: object.slots.clone(),
@@ -196,7 +182,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Gives each material a unique name, except those that come with the file of a mesh.
-    fn name_materials(&mut self, world: &mut World, objects: &[Item]) {
+    fn name_materials(&mut self, world: &mut World, objects: &[Item], moved: &Moved) {
         let own: HashSet<Entity> = objects.iter().filter(|item| item.own).flat_map(|item| item.slots.clone()).collect();
         let mut needed: HashSet<Entity> =
             objects.iter().filter(|item| !item.own).flat_map(|item| item.slots.clone()).collect();
@@ -216,7 +202,7 @@ impl<'a> Writer<'a> {
         }
         let mut taken = Taken::default();
         for (_, entity, name, material) in all {
-            if own.contains(&entity) && !needed.contains(&entity) {
+            if own.contains(&entity) && !needed.contains(&entity) && !moved.has_material(entity) {
                 continue;
             }
             let name = taken.free_name(if name.is_empty() { "material" } else { &name });

@@ -3,6 +3,7 @@
 //! Placements are `f64`; the snapshot is `f32` relative to an [`origin`](Extraction::origin) near the camera. Each part
 //! is rebuilt on its own ([`SnapshotPart`]), and the kd-trees of meshes and groups of spheres are cached ([`Trees`]).
 
+use super::animation::Animation;
 use super::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
 use super::light::LightKind;
@@ -62,7 +63,10 @@ enum MaterialKey {
 impl Extraction {
     /// Builds everything. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
-        let origin = origin_for(&camera_of(inputs).view);
+        Self::about(origin_for(&camera_of(inputs).view), inputs, trees)
+    }
+
+    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees) -> Self {
         let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
@@ -169,6 +173,38 @@ impl Extraction {
         self.prepared = self.prepared.with_camera(camera_in(&camera, self.origin));
         false
     }
+}
+
+impl Extraction {
+    /// The snapshot at another moment, about the same origin, with the same numbers of objects and materials as far as
+    /// all can be seen then. What is the same at both moments is shared: see [`SnapshotPart`].
+    ///
+    /// - `inputs`: those that this was made of.
+    /// - `seconds`: the moment.
+    pub fn at(&self, animation: &Animation, inputs: &SceneInputs, trees: &Trees, seconds: f64) -> Prepared {
+        let then = animation.inputs_at(inputs, seconds);
+        if then.objects != inputs.objects || !same_shapes(&then.lights, &inputs.lights) {
+            return Self::about(self.origin, &then, trees).prepared;
+        }
+        let mut prepared = self.prepared.clone();
+        if then.lights != inputs.lights || then.materials != inputs.materials {
+            let mut materials = MaterialIds { ids: self.ids.clone(), order: self.order.clone() };
+            prepared = prepared.with_shading(Arc::new(shading_of(&then, &mut materials, self.origin)));
+        }
+        if then.camera != inputs.camera {
+            prepared = prepared.with_camera(camera_in(&camera_of(&then), self.origin));
+        }
+        prepared
+    }
+}
+
+/// Whether the same lights are spheres of the same place and size.
+fn same_shapes(a: &[LightInput], b: &[LightInput]) -> bool {
+    let shape = |light: &LightInput| {
+        let radius = light.light.radius();
+        light.light.check(&light.placement).map(|()| (radius > 0.0).then_some((radius, light.placement.translation)))
+    };
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| shape(a) == shape(b))
 }
 
 /// The origin for a camera: a corner of a grid with cells 512 to 1024 viewing distances wide.

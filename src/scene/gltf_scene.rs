@@ -156,6 +156,7 @@ impl Maker<'_> {
             materials: named,
             objects,
             lights: self.lights(&assembly.lights, &mut warnings),
+            animation: Default::default(),
         };
         if !has_light && !self.wish.is_lit {
             warnings.push(self.told("has no light: an environment and a key light are added"));

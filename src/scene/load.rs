@@ -1,5 +1,6 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
+use super::bounds::check_moment;
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::choice::ModelChoice;
 use super::components::{Balls, Shape};
@@ -274,8 +275,20 @@ fn resolve(
 impl LoadedScene {
     /// Selects the chosen camera; warns about choices that only glTF models support.
     fn choose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
-        if choice.at.is_some() || choice.variant.is_some() {
-            self.warnings.push(format!("{}: only glTF models have moments and variants", self.source.title()));
+        if choice.variant.is_some() {
+            self.warnings.push(format!("{}: only glTF models have variants", self.source.title()));
+        }
+        match choice.at {
+            Some(at) if self.file.animation.tracks.is_empty() => {
+                self.warnings
+                    .push(format!("{} has no animation: {at} s shows what any moment does", self.source.title()));
+            }
+            Some(at) => {
+                let wrong = |bad| SceneError::in_file(self.source.title(), bad);
+                check_moment("--at", at).map_err(wrong)?;
+                self.file.animation.at = at;
+            }
+            None => {}
         }
         let Some(wanted) = &choice.camera else { return Ok(()) };
         let Some((_, camera)) = self.file.cameras.iter().find(|(name, _)| name == wanted) else {

@@ -4,6 +4,7 @@
 //! The stages of a scene: text or model → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`]
 //! (entities) → [`Extraction`] (a [`crate::render::Prepared`] relative to an origin near the camera).
 
+pub mod animation;
 mod bad_value;
 pub(crate) mod bounds;
 mod builtin;
@@ -54,15 +55,17 @@ mod view;
 pub mod whole_file;
 mod write_error;
 
+pub use animation::{Animation, Moment, show_moment};
 pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
+pub use camera::camera_part;
 pub use choice::ModelChoice;
 pub use components::{
     Balls, ColorParam, DirectionalLight, DisplaySettings, FilmSize, GREY, InWorld, Material, MaterialSlots, MeshOrigin,
     Ordinal, PointLight, Rendering, ScalarParam, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, SurfaceTexture,
 };
-pub use describe::{Description, camera_part};
+pub use describe::Description;
 pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
 pub use extract::{Extraction, SnapshotPart, origin_for};

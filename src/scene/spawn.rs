@@ -1,11 +1,12 @@
 //! From a loaded scene to entities.
 
+use super::animation::{Animation, Entities, Moment, of_part, place};
 use super::camera::{camera, unit};
 use super::components::{
     ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
-use super::file::{InFile, MaterialPart, ObjectPart};
+use super::file::{AnimationPart, InFile, MaterialPart, ObjectPart};
 use super::inputs::WithLight;
 use super::light::LightKind;
 use super::loaded::LoadedScene;
@@ -49,6 +50,7 @@ impl LoadedScene {
         }
 
         let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
+        let mut objects: HashMap<&str, Entity> = HashMap::new();
         for (i, object) in self.file.objects.iter().enumerate() {
             let slots = match (object.material(), &self.meshes[i]) {
                 _ if object.slot_materials().is_some() => {
@@ -71,6 +73,7 @@ impl LoadedScene {
             let mut entity = world.spawn((shape, placement, MaterialSlots(slots), next()));
             if let Some(name) = object.name() {
                 entity.insert(Name::new(name.to_owned()));
+                objects.insert(name, entity.id());
             }
             if let ObjectPart::Mesh { source, shading, simplify, material, materials, .. } = object {
                 entity.insert(MeshOrigin {
@@ -81,6 +84,7 @@ impl LoadedScene {
                 });
             }
         }
+        let mut entities = Entities { objects, materials, ..Entities::default() };
         for part in &self.file.lights {
             let (light, placement) = LightKind::from_part(part);
             let mut entity = world.spawn((placement, next()));
@@ -89,10 +93,25 @@ impl LoadedScene {
             }
             let entity = entity.id();
             LightKind::put(Some(light), world, entity);
+            entities.lights.extend(part.name().map(|name| (name, entity)));
         }
         let (view, projection, lens) = camera(&self.file.camera);
         world.spawn((view, projection, lens, Name::new("camera"), next()));
         self.insert_resources(world);
+        self.animate(world, &entities);
+    }
+
+    /// Shows the moment that the file asks for, where it has tracks.
+    fn animate(&self, world: &mut World, entities: &Entities) {
+        let part = &self.file.animation;
+        if *part == AnimationPart::default() {
+            world.remove_resource::<Animation>();
+            world.insert_resource(Moment::default());
+            return;
+        }
+        world.insert_resource(of_part(part, &self.file.camera, entities));
+        world.insert_resource(Moment(part.at));
+        place(world, part.at);
     }
 
     fn insert_resources(&self, world: &mut World) {

@@ -1,5 +1,6 @@
 //! Everything that comes from a file or goes into one.
 
+mod animation;
 mod bad_input;
 mod bad_values;
 mod draco;

@@ -1,7 +1,7 @@
 //! Checks the values of a scene file before anything is built from them.
 
-use super::parts::{CameraPart, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
-use crate::render::{MAX_LOBES, Param};
+use super::parts::{CameraPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
+use crate::render::{MAX_LOBES, Param, ParamRef};
 use crate::scene::bounds::{
     check_cone, check_film_size, check_light_radius, check_max_depth, coordinate_rule, is_coordinate, is_size, number,
     size_rule, triple,
@@ -46,12 +46,13 @@ pub fn check(file: &SceneFile, most: usize) -> Found {
     for (i, light) in file.lights.iter().enumerate() {
         check.lamp(&format!("lights/{i}"), light);
     }
+    check.animation();
     check.found
 }
 
-struct Check<'a> {
-    file: &'a SceneFile,
-    materials: HashMap<&'a str, &'a MaterialPart>,
+pub(super) struct Check<'a> {
+    pub(super) file: &'a SceneFile,
+    pub(super) materials: HashMap<&'a str, &'a MaterialPart>,
     textures: HashSet<&'a str>,
     /// Maximum number of listed problems; others are only counted.
     most: usize,
@@ -59,7 +60,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn wrong(&mut self, path: &str, message: impl Into<String>) {
+    pub(super) fn wrong(&mut self, path: &str, message: impl Into<String>) {
         if self.found.told.len() < self.most {
             self.found.told.push((path.to_owned(), message.into()));
         } else {
@@ -68,7 +69,7 @@ impl Check<'_> {
     }
 
     /// Reports a name that is not `known`. Similar names are searched only if the message will be listed.
-    fn misnamed<'k>(&mut self, path: &str, what: String, name: &str, known: impl Iterator<Item = &'k str>) {
+    pub(super) fn misnamed<'k>(&mut self, path: &str, what: String, name: &str, known: impl Iterator<Item = &'k str>) {
         let hint = if self.found.told.len() < self.most { suggestion(name, known) } else { String::new() };
         self.wrong(path, what + &hint);
     }
@@ -146,50 +147,16 @@ impl Check<'_> {
         let path = format!("materials/{name}");
         for (field, param) in material.params() {
             let path = format!("{path}/{field}");
-            match param {
-                Param::Reflectance(color) | Param::Map(color) => self.share(&path, field, color),
-                Param::Radiance(ColorValue::Rgb(rgb)) | Param::Factor(ColorValue::Rgb(rgb)) => {
-                    self.light(&path, Rgb(*rgb));
-                }
-                Param::Radiance(ColorValue::Texture(texture)) | Param::Factor(ColorValue::Texture(texture)) => {
-                    self.texture_name(&path, texture);
-                }
-                Param::Number(value) => self.finite(&path, f64::from(*value)),
-                Param::Cutoff(Some(value)) if !(0.0..=1.0).contains(value) => {
-                    self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
-                }
-                Param::Share(scalar) => self.scalar(&path, field, scalar),
-                Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
-                    self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
-                }
-                Param::Exponent(value) if !(value.is_finite() && *value >= 0.0) => {
-                    let message = format!("`{field}` is {value}, but must be 0 or positive: 20 is dull, 200 sharp");
+            if let Param::Part(part) = param {
+                self.material_name(&path, part);
+                if self.reaches(part, name) {
+                    let message =
+                        format!("material `{name}` contains itself: a blend must end in materials that are not blends");
                     self.wrong(&path, message);
+                    return;
                 }
-                Param::Thickness(value) if !(value.is_finite() && *value >= 0.0) => {
-                    self.wrong(&path, format!("`{field}` is {value}, but must be finite and at least 0"));
-                }
-                Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
-                    self.wrong(&path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
-                }
-                Param::Absorption(absorption) => self.light(&path, *absorption),
-                Param::Part(part) => {
-                    self.material_name(&path, part);
-                    if self.reaches(part, name) {
-                        let message = format!(
-                            "material `{name}` contains itself: a blend must end in materials that are not blends"
-                        );
-                        self.wrong(&path, message);
-                        return;
-                    }
-                }
-                Param::ConstantShare(_)
-                | Param::Thickness(_)
-                | Param::Exponent(_)
-                | Param::Ior(_)
-                | Param::Flag(_)
-                | Param::Cutoff(_) => {}
             }
+            self.param(&path, field, param);
         }
         if let MaterialPart::Blend { weight, .. } = material {
             let (lobes, glowing) = self.lobes(name);
@@ -200,6 +167,45 @@ impl Check<'_> {
             } else if glowing == 1 && matches!(weight, ScalarValue::Texture(_)) {
                 self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
             }
+        }
+    }
+
+    /// One number or colour of a material.
+    pub(super) fn param(&mut self, path: &str, field: &str, param: ParamRef<'_, InFile>) {
+        match param {
+            Param::Reflectance(color) | Param::Map(color) => self.share(path, field, color),
+            Param::Radiance(ColorValue::Rgb(rgb)) | Param::Factor(ColorValue::Rgb(rgb)) => {
+                self.light(path, Rgb(*rgb));
+            }
+            Param::Radiance(ColorValue::Texture(texture)) | Param::Factor(ColorValue::Texture(texture)) => {
+                self.texture_name(path, texture);
+            }
+            Param::Number(value) => self.finite(path, f64::from(*value)),
+            Param::Cutoff(Some(value)) if !(0.0..=1.0).contains(value) => {
+                self.wrong(path, format!("`{field}` is {value}, but must lie in 0..1"));
+            }
+            Param::Share(scalar) => self.scalar(path, field, scalar),
+            Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
+                self.wrong(path, format!("`{field}` is {value}, but must lie in 0..1"));
+            }
+            Param::Exponent(value) if !(value.is_finite() && *value >= 0.0) => {
+                let message = format!("`{field}` is {value}, but must be 0 or positive: 20 is dull, 200 sharp");
+                self.wrong(path, message);
+            }
+            Param::Thickness(value) if !(value.is_finite() && *value >= 0.0) => {
+                self.wrong(path, format!("`{field}` is {value}, but must be finite and at least 0"));
+            }
+            Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
+                self.wrong(path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
+            }
+            Param::Absorption(absorption) => self.light(path, *absorption),
+            Param::Part(_)
+            | Param::ConstantShare(_)
+            | Param::Thickness(_)
+            | Param::Exponent(_)
+            | Param::Ior(_)
+            | Param::Flag(_)
+            | Param::Cutoff(_) => {}
         }
     }
 
@@ -400,7 +406,7 @@ impl Check<'_> {
         }
     }
 
-    fn material_name(&mut self, path: &str, name: &str) {
+    pub(super) fn material_name(&mut self, path: &str, name: &str) {
         if !self.materials.contains_key(name) {
             self.misnamed(path, format!("material `{name}` is not defined"), name, self.file.materials.names());
         }

@@ -4,13 +4,16 @@
 //! values and limits (`check`), and, in the loader, the files that the scene refers to. Metres, right-handed, Y up,
 //! linear Rec. 709 colours, degrees for angles; paths relative to the scene file.
 
+mod animation;
 mod check;
+mod check_animation;
 mod locate;
 mod parts;
 mod syntax;
 
 pub use super::bounds::check_film_size;
 pub use super::value::Named;
+pub use animation::{AnimationPart, TrackPart};
 pub use locate::locate;
 pub use parts::{
     CameraPart, DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, SceneFile,

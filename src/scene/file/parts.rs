@@ -1,5 +1,6 @@
 //! The parts of a scene file, as written. Values and limits are checked in `check`.
 
+use super::animation::AnimationPart;
 use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve};
 use crate::scene::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::scene::value::{ColorValue, Named, Rgb, ScalarValue};
@@ -45,6 +46,9 @@ pub struct SceneFile {
     /// Lights that are no objects; all other emitters are objects with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightPart>,
+    /// What moves, and when.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub animation: AnimationPart,
 }
 
 /// A thin-lens camera.

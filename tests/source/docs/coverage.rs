@@ -5,8 +5,11 @@ use super::page::{expect_none, files, read};
 use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
-const GRAMMAR: [(&str, &[&str]); 8] = [
+const GRAMMAR: [(&str, &[&str]); 11] = [
     ("src/scene/file/parts.rs", &[]),
+    ("src/scene/file/animation.rs", &["AnimationPart", "TrackPart"]),
+    ("src/scene/animation/key.rs", &["Interpolation"]),
+    ("src/scene/animation/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
     ("src/scene/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
     ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
@@ -59,9 +62,10 @@ fn snake_case(name: &str) -> String {
 
 #[test]
 fn every_word_of_the_scene_file_is_described() {
-    let book: String = ["scene-file", "scene-textures", "scene-materials", "scene-principled", "scene-objects"]
-        .map(|name| read(&format!("docs/{name}.md")).text)
-        .concat();
+    let book: String =
+        ["scene-file", "scene-textures", "scene-materials", "scene-principled", "scene-objects", "scene-animation"]
+            .map(|name| read(&format!("docs/{name}.md")).text)
+            .concat();
     let words = grammar_words();
     assert!(words.len() > 80 && words.contains("pivot_distance") && words.contains("ball_grid"), "{words:?}");
     // In code, alone or with its value: `name`, `name(…)`.

@@ -1,0 +1,123 @@
+//! The animation of a world in words: names for what moves, and what of it can be said.
+
+use super::written::to_part;
+use super::{Animation, Channel};
+use crate::scene::file::AnimationPart;
+use crate::scene::inputs::SceneInputs;
+use crate::scene::placement::{Linear, Placement};
+use bevy_ecs::prelude::Entity;
+use glam::DVec3;
+use std::collections::{HashMap, HashSet};
+
+/// What of a world moves.
+#[derive(Default)]
+pub(in crate::scene) struct Moved {
+    /// Of objects and lights that move: names that nothing else of their kind has.
+    names: HashMap<Entity, String>,
+    materials: HashSet<Entity>,
+}
+
+impl Moved {
+    pub(in crate::scene) fn of(animation: Option<&Animation>, inputs: &SceneInputs) -> Self {
+        let channels: Vec<Channel> =
+            animation.iter().flat_map(|it| it.tracks.iter().map(|track| track.channel)).collect();
+        let mut moved = Self::default();
+        for channel in &channels {
+            if let Channel::Material(entity, _) = channel {
+                moved.materials.insert(*entity);
+            }
+        }
+        let is_object = |entity: Entity| channels.iter().any(|c| matches!(c, Channel::Object(of, _) if *of == entity));
+        let is_light = |entity: Entity| channels.iter().any(|c| matches!(c, Channel::Light(of, _) if *of == entity));
+        if channels.iter().any(|c| matches!(c, Channel::Object(..))) {
+            let names = inputs.objects.iter().map(|object| (object.entity, object.name.as_deref()));
+            moved.give_names("object", names.collect(), is_object);
+        }
+        if channels.iter().any(|c| matches!(c, Channel::Light(..))) {
+            let names = inputs.lights.iter().map(|light| (light.entity, light.name.as_deref()));
+            moved.give_names("light", names.collect(), is_light);
+        }
+        moved
+    }
+
+    /// Names of things of a kind, of which some move.
+    fn give_names(&mut self, what: &str, things: Vec<(Entity, Option<&str>)>, moves: impl Fn(Entity) -> bool) {
+        let mut uses: HashMap<String, usize> = HashMap::new();
+        for name in things.iter().filter_map(|(_, name)| *name) {
+            *uses.entry(name.to_owned()).or_default() += 1;
+        }
+        for (entity, name) in things.into_iter().filter(|(entity, _)| moves(*entity)) {
+            let name = name.filter(|name| !name.is_empty());
+            let own = match name {
+                Some(name) if uses[name] == 1 => name.to_owned(),
+                _ => {
+                    let wanted = name.unwrap_or(what);
+                    let mut free = (2_u64..).map(|number| format!("{wanted} {number}"));
+                    free.find(|name| !uses.contains_key(name)).expect("numbers do not end")
+                }
+            };
+            uses.entry(own.clone()).or_insert(1);
+            self.names.insert(entity, own);
+        }
+    }
+
+    /// The name that an object or light needs because it moves.
+    pub(in crate::scene) fn name(&self, entity: Entity) -> Option<&String> {
+        self.names.get(&entity)
+    }
+
+    /// Whether a material changes in time.
+    pub(in crate::scene) fn has_material(&self, entity: Entity) -> bool {
+        self.materials.contains(&entity)
+    }
+
+    /// How a scene file says it. What has lost its property in the meantime is added to `losses`.
+    ///
+    /// - `at`: the moment that is shown, seconds.
+    /// - `materials`: their names in the file.
+    pub(in crate::scene) fn part(
+        &self,
+        (animation, at): (&Animation, f64),
+        inputs: &SceneInputs,
+        materials: &HashMap<Entity, String>,
+        losses: &mut Vec<String>,
+    ) -> AnimationPart {
+        to_part(animation, at, |channel| {
+            let name = match channel {
+                Channel::Camera(_) => return None,
+                Channel::Object(entity, _) | Channel::Light(entity, _) => self.names.get(&entity)?.clone(),
+                Channel::Material(entity, _) => materials.get(&entity)?.clone(),
+            };
+            match has_property(channel, inputs) {
+                Some(false) => {
+                    let property = channel.property();
+                    losses
+                        .push(format!("the keys of `{property}` are left out: `{name}` has no `{property}` any more"));
+                    None
+                }
+                _ => Some(name),
+            }
+        })
+    }
+}
+
+/// Whether the property can be set; `None` for what is not seen.
+fn has_property(channel: Channel, inputs: &SceneInputs) -> Option<bool> {
+    use super::ObjectProperty::{Rotate, Scale};
+    Some(match channel {
+        Channel::Camera(_) => true,
+        Channel::Object(entity, property) => {
+            let object = inputs.objects.iter().find(|object| object.entity == entity)?;
+            let is_matrix = matches!(object.placement, Placement { linear: Linear::Matrix(_), .. });
+            !(is_matrix && matches!(property, Rotate | Scale))
+        }
+        Channel::Light(entity, property) => {
+            let light = inputs.lights.iter().find(|light| light.entity == entity)?;
+            property.set(&mut light.light.clone(), &mut light.placement.clone(), DVec3::ONE).is_some()
+        }
+        Channel::Material(entity, property) => {
+            let material = inputs.materials.iter().find(|material| material.entity == entity)?;
+            property.set(&mut material.material.clone(), DVec3::ONE).is_some()
+        }
+    })
+}

@@ -1,0 +1,164 @@
+//! What is seen at a moment.
+
+use super::{Animation, CameraProperty, Channel};
+use crate::scene::camera::{camera, camera_part};
+use crate::scene::components::{Shape, SurfaceMaterial};
+use crate::scene::file::CameraPart;
+use crate::scene::inputs::{CameraInput, SceneInputs};
+use crate::scene::light::LightKind;
+use crate::scene::placement::Placement;
+use crate::scene::view::{Lens, Projection, View};
+use bevy_ecs::component::Mutable;
+use bevy_ecs::prelude::{Component, Entity, Resource, World};
+use std::collections::HashMap;
+
+/// The moment that a world shows, seconds.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moment(pub f64);
+
+impl Animation {
+    /// What the snapshot is made of at a moment. It does not depend on the moment that `inputs` are of.
+    pub fn inputs_at(&self, inputs: &SceneInputs, seconds: f64) -> SceneInputs {
+        let mut inputs = inputs.clone();
+        let objects: HashMap<Entity, usize> = of_entities(inputs.objects.iter().map(|object| object.entity));
+        let lights: HashMap<Entity, usize> = of_entities(inputs.lights.iter().map(|light| light.entity));
+        let materials: HashMap<Entity, usize> = of_entities(inputs.materials.iter().map(|material| material.entity));
+        for track in &self.tracks {
+            match track.channel {
+                Channel::Camera(_) => {}
+                Channel::Object(entity, property) => {
+                    if let Some(object) = objects.get(&entity).map(|&i| &mut inputs.objects[i]) {
+                        object.placement = property.set(object.placement, track.at(seconds));
+                    }
+                }
+                Channel::Light(entity, property) => {
+                    if let Some(light) = lights.get(&entity).map(|&i| &mut inputs.lights[i]) {
+                        property.set(&mut light.light, &mut light.placement, track.at(seconds));
+                    }
+                }
+                Channel::Material(entity, property) => {
+                    if let Some(material) = materials.get(&entity).map(|&i| &mut inputs.materials[i]) {
+                        property.set(&mut material.material, track.at(seconds));
+                    }
+                }
+            }
+        }
+        if let (true, Some(seen)) = (self.moves_camera(), &mut inputs.camera) {
+            let (view, projection, lens) = camera(&self.camera_at(seconds));
+            *seen = CameraInput { entity: seen.entity, view, projection, lens };
+        }
+        inputs
+    }
+
+    fn moves_camera(&self) -> bool {
+        self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
+    }
+
+    /// The camera at a moment, as a scene file says it.
+    pub fn camera_at(&self, seconds: f64) -> CameraPart {
+        let mut part = self.camera.clone();
+        for track in &self.tracks {
+            if let Channel::Camera(property) = track.channel {
+                property.set(&mut part, track.at(seconds));
+            }
+        }
+        part
+    }
+}
+
+fn of_entities(entities: impl Iterator<Item = Entity>) -> HashMap<Entity, usize> {
+    entities.enumerate().map(|(i, entity)| (entity, i)).collect()
+}
+
+/// Shows another moment: changes the components that are different then, and no others.
+pub fn show_moment(world: &mut World, seconds: f64) {
+    keep_changes(world);
+    place(world, seconds);
+}
+
+/// Shows the first moment of a world whose camera is not that of any moment yet.
+pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
+    let Some(animation) = world.remove_resource::<Animation>() else { return };
+    for track in &animation.tracks {
+        let value = track.at(seconds);
+        match track.channel {
+            Channel::Camera(_) => {}
+            Channel::Object(entity, property) => {
+                // What has been deleted may be undone later.
+                if let (Some(_), Some(&placement)) = (world.get::<Shape>(entity), world.get::<Placement>(entity)) {
+                    put(world, entity, property.set(placement, value));
+                }
+            }
+            Channel::Light(entity, property) => {
+                let (light, placement) = (LightKind::of(world, entity), world.get::<Placement>(entity).copied());
+                if let (Some(mut light), Some(mut placement)) = (light, placement) {
+                    property.set(&mut light, &mut placement, value);
+                    LightKind::put(Some(light), world, entity);
+                    put(world, entity, placement);
+                }
+            }
+            Channel::Material(entity, property) => {
+                if let Some(mut material) = world.get::<SurfaceMaterial>(entity).cloned() {
+                    property.set(&mut material.0, value);
+                    put(world, entity, material);
+                }
+            }
+        }
+    }
+    let seen = SceneInputs::of(world).camera.filter(|_| animation.moves_camera());
+    if let Some(CameraInput { entity, .. }) = seen {
+        let (view, projection, lens) = camera(&animation.camera_at(seconds));
+        put(world, entity, view);
+        put(world, entity, projection);
+        put(world, entity, lens);
+    }
+    world.insert_resource(Moment(seconds));
+    world.insert_resource(animation);
+}
+
+/// What somebody has changed of the camera since a moment was shown becomes what it is between its keys.
+fn keep_changes(world: &mut World) {
+    let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves_camera()) else {
+        return;
+    };
+    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    let (written, expected) = (animation.clone(), camera(&animation.camera_at(shown)));
+    let Some(CameraInput { view, projection, lens, .. }) = SceneInputs::of(world).camera else { return };
+    if expected != (view, projection, lens) {
+        world.resource_mut::<Animation>().camera = rest_camera(&written, shown, &view, &projection, &lens);
+    }
+}
+
+/// The camera of a scene file under its tracks: as it was written, with what is different now.
+pub(in crate::scene) fn rest_camera(
+    animation: &Animation,
+    seconds: f64,
+    view: &View,
+    projection: &Projection,
+    lens: &Lens,
+) -> CameraPart {
+    let written = animation.camera_at(seconds);
+    let mut part = camera_part(view, projection, lens, Some(&written));
+    if animation.tracks.iter().any(|track| track.channel == Channel::Camera(CameraProperty::FStop)) {
+        (part.lens_radius, part.f_stop) = (None, written.f_stop);
+    }
+    let aims = |part: &CameraPart| (part.look_at.is_some(), part.forward.is_some());
+    if !animation.moves_camera() || aims(&part) == aims(&written) {
+        return part;
+    }
+    // Keys need the words that they were written for.
+    match written.look_at {
+        Some(_) => CameraPart { look_at: Some(view.pivot()), forward: None, pivot_distance: None, ..part },
+        None => {
+            CameraPart { look_at: None, forward: Some(view.forward), pivot_distance: Some(view.pivot_distance), ..part }
+        }
+    }
+}
+
+fn put<T: Component<Mutability = Mutable> + PartialEq>(world: &mut World, entity: Entity, value: T) {
+    if let Some(mut old) = world.get_mut::<T>(entity)
+        && *old != value
+    {
+        *old = value;
+    }
+}

@@ -1,0 +1,167 @@
+//! The section `animation` of a scene file: keys in time for whatever moves.
+
+use crate::scene::animation::{
+    CameraProperty, Interpolation, Key, KeyValue, LightProperty, MaterialProperty, ObjectProperty,
+};
+use glam::DVec3;
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+
+/// What moves, and when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AnimationPart {
+    /// The moment that is shown when the scene is opened, seconds.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub at: f64,
+    /// Frames per second: frame i is at i / fps.
+    #[serde(default = "default_fps")]
+    pub fps: f64,
+    /// Seconds from the first frame to the end; up to the last key when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub duration: Option<f64>,
+    /// Share of the time of a frame during which the shutter is open, half before the moment and half after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<f64>,
+    /// In place of `shutter`: seconds during which it is open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter_seconds: Option<f64>,
+    /// One for each number, colour or transform that changes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tracks: Vec<TrackPart>,
+}
+
+impl Default for AnimationPart {
+    fn default() -> Self {
+        Self { at: 0.0, fps: default_fps(), duration: None, shutter: None, shutter_seconds: None, tracks: Vec::new() }
+    }
+}
+
+/// The values of one property at given times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TrackPart {
+    /// Of the camera.
+    Camera {
+        /// As in `camera`.
+        property: CameraProperty,
+        /// What is between two keys.
+        #[serde(default, skip_serializing_if = "is_default")]
+        interpolation: Interpolation,
+        /// Pairs of seconds and a value, in the order of time.
+        keys: Vec<Key>,
+    },
+    /// Of an object.
+    Object {
+        /// Name of the object, which no other object has.
+        name: String,
+        /// As in a transform.
+        property: ObjectProperty,
+        /// What is between two keys.
+        #[serde(default, skip_serializing_if = "is_default")]
+        interpolation: Interpolation,
+        /// Pairs of seconds and a value, in the order of time.
+        keys: Vec<Key>,
+    },
+    /// Of a light that is no object.
+    Light {
+        /// Name of the light, which no other light has.
+        name: String,
+        /// As in the light.
+        property: LightProperty,
+        /// What is between two keys.
+        #[serde(default, skip_serializing_if = "is_default")]
+        interpolation: Interpolation,
+        /// Pairs of seconds and a value, in the order of time.
+        keys: Vec<Key>,
+    },
+    /// Of a material.
+    Material {
+        /// Name of the material.
+        name: String,
+        /// As in the material.
+        property: MaterialProperty,
+        /// What is between two keys.
+        #[serde(default, skip_serializing_if = "is_default")]
+        interpolation: Interpolation,
+        /// Pairs of seconds and a value, in the order of time.
+        keys: Vec<Key>,
+    },
+}
+
+impl TrackPart {
+    /// Its keys, in the order of the file.
+    pub fn keys(&self) -> &[Key] {
+        match self {
+            Self::Camera { keys, .. }
+            | Self::Object { keys, .. }
+            | Self::Light { keys, .. }
+            | Self::Material { keys, .. } => keys,
+        }
+    }
+
+    /// What is between two keys.
+    pub fn interpolation(&self) -> Interpolation {
+        match self {
+            Self::Camera { interpolation, .. }
+            | Self::Object { interpolation, .. }
+            | Self::Light { interpolation, .. }
+            | Self::Material { interpolation, .. } => *interpolation,
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for KeyValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberOrThree;
+        impl<'de> Visitor<'de> for NumberOrThree {
+            type Value = KeyValue;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("the value of a key: a number or (x, y, z)")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<KeyValue, E> {
+                Ok(KeyValue::Number(value))
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<KeyValue, E> {
+                Ok(KeyValue::Number(value as f64))
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<KeyValue, E> {
+                Ok(KeyValue::Number(value as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<KeyValue, A::Error> {
+                let mut three = [0.0; 3];
+                for (i, number) in three.iter_mut().enumerate() {
+                    *number = seq.next_element()?.ok_or_else(|| A::Error::invalid_length(i, &self))?;
+                }
+                match seq.next_element::<f64>()? {
+                    Some(_) => Err(A::Error::invalid_length(4, &self)),
+                    None => Ok(KeyValue::Three(DVec3::from_array(three))),
+                }
+            }
+        }
+        deserializer.deserialize_any(NumberOrThree)
+    }
+}
+
+impl Serialize for KeyValue {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number(number) => serializer.serialize_f64(*number),
+            Self::Three(three) => three.serialize(serializer),
+        }
+    }
+}
+
+fn default_fps() -> f64 {
+    24.0
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
