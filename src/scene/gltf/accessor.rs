@@ -1,7 +1,7 @@
-//! Numbers out of buffers: every component type, normalised or not, with strides and sparse parts.
+//! Reads accessors: all component types, normalised or not, with strides and sparse parts.
 //!
-//! Whatever a file says of counts and offsets is held against the bytes that are there before anything is allocated;
-//! sums are taken in 128 bits.
+//! Counts and offsets are checked against the available bytes before anything is allocated; sums are computed in 128
+//! bits.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.6 (binary data storage).
 
@@ -9,7 +9,7 @@ use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use super::json;
 
-/// The type of a component, with the number that the format gives it.
+/// The type of a component, with its number in the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Component {
     I8,
@@ -61,7 +61,7 @@ impl Component {
         }
     }
 
-    /// `None` for what is no whole number without a sign.
+    /// `None` for signed and floating-point types.
     #[inline]
     fn whole(self, bytes: &[u8]) -> Option<u32> {
         match self {
@@ -73,7 +73,7 @@ impl Component {
     }
 }
 
-/// Rows and columns; columns of a matrix begin at multiples of four bytes.
+/// Number of rows and columns; columns of a matrix are aligned to four bytes.
 fn shape_of(kind: &str) -> Result<(usize, usize), GltfProblem> {
     Ok(match kind {
         "SCALAR" => (1, 1),
@@ -90,7 +90,7 @@ fn shape_of(kind: &str) -> Result<(usize, usize), GltfProblem> {
     })
 }
 
-/// Elements that were found to lie within their bytes.
+/// Elements that have been checked to lie within their bytes.
 struct Elements<'a> {
     /// `None`: all zeros.
     bytes: Option<&'a [u8]>,
@@ -98,7 +98,7 @@ struct Elements<'a> {
     count: usize,
     component: Component,
     normalized: bool,
-    /// Of each component within an element.
+    /// Byte offset of each component within an element.
     offsets: Vec<usize>,
 }
 
@@ -116,17 +116,17 @@ impl Document {
         self.root.accessors.get(index as usize).ok_or((place("accessors", index), problem))
     }
 
-    /// Number of components of an element.
+    /// Number of components per element.
     pub(super) fn n_components(&self, index: u32) -> Result<usize, Located> {
         let accessor = self.accessor(index)?;
         let (rows, columns) = shape_of(&accessor.kind).map_err(|problem| (place("accessors", index), problem))?;
         Ok(rows * columns)
     }
 
-    /// All elements as numbers, `N` a piece.
+    /// All elements as floats, `N` components each.
     ///
     /// # Errors
-    /// When an element has another number of components, does not lie in its buffer, or is not finite.
+    /// If an element has another number of components, is outside of its buffer, or is not finite.
     pub(super) fn floats<const N: usize>(&self, index: u32) -> Result<Vec<[f32; N]>, Located> {
         let values = self.raw_floats(index)?;
         match values.iter().position(|value| !value.iter().all(|number| number.is_finite())) {
@@ -135,7 +135,7 @@ impl Document {
         }
     }
 
-    /// The same with zeros for elements that are not finite, and how many those are.
+    /// Like [`Self::floats`], but elements that are not finite become zero; also returns their number.
     pub(super) fn floats_or_zero<const N: usize>(&self, index: u32) -> Result<(Vec<[f32; N]>, usize), Located> {
         let mut values: Vec<[f32; N]> = self.raw_floats(index)?;
         let mut wrong = 0;
@@ -173,15 +173,15 @@ impl Document {
         Ok(values)
     }
 
-    /// All elements of an accessor of whole numbers, one a piece.
+    /// All elements of an accessor of integers, one component each.
     ///
     /// # Errors
-    /// As [`Self::floats`], and for other component types than those of indices.
+    /// Like [`Self::floats`], and for component types that indices cannot have.
     pub(super) fn indices(&self, index: u32) -> Result<Vec<u32>, Located> {
         self.whole::<1>(index).map(|list| list.into_iter().map(|[value]| value).collect())
     }
 
-    /// All elements of an accessor of whole numbers, `N` a piece.
+    /// All elements of an accessor of integers, `N` components each.
     pub(super) fn whole<const N: usize>(&self, index: u32) -> Result<Vec<[u32; N]>, Located> {
         let accessor = self.accessor(index)?;
         let here = |problem| (place("accessors", index), problem);
@@ -250,7 +250,7 @@ impl Document {
             let within = place("bufferViews", view);
             return Err((None, GltfProblem::Bounds { needed, within, found: bytes.len() as u64 }));
         }
-        // A stride of nothing, or one that overlaps, would make a few bytes into any number of elements.
+        // With a stride of 0, or one shorter than an element, a few bytes could stand for any number of elements.
         if count > 1 && stride < length as u64 {
             let found = stride.to_string();
             let expected = "at least the size of an element";
@@ -261,7 +261,8 @@ impl Document {
         Ok(Elements { bytes: Some(bytes), stride, count, component, normalized: false, offsets })
     }
 
-    /// Which elements of an accessor are replaced, each within its count, and by what.
+    /// The sparse part of an accessor, if any: the indices that are replaced, each within its count, and the new
+    /// elements.
     fn sparse(&self, index: u32, accessor: &json::Accessor) -> Result<Option<(Vec<u32>, Elements<'_>)>, Located> {
         let Some(sparse) = &accessor.sparse else { return Ok(None) };
         let inside = |part: &str| format!("{}.sparse.{part}", place("accessors", index));

@@ -1,6 +1,6 @@
-//! Animations at a moment: the transforms and the weights of nodes.
+//! Animations at a given time: transforms and morph weights of nodes.
 //!
-//! All animations of a file are applied together; where two move the same property of a node, the first counts.
+//! All animations of a file are applied together; if two animate the same property of a node, the first one counts.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.11 and appendix C (animation sampler interpolation modes).
 
@@ -9,7 +9,7 @@ use super::error::{GltfProblem, Located, place};
 use glam::{DQuat, DVec3};
 use std::collections::HashMap;
 
-/// What animations say of the transform of a node; `None` leaves what the file stores.
+/// The animated transform of a node; `None`: as stored in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct NodePose {
     pub translation: Option<DVec3>,
@@ -17,11 +17,11 @@ pub(super) struct NodePose {
     pub scale: Option<DVec3>,
 }
 
-/// What animations say of all nodes.
+/// The animated state of all nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Pose {
     nodes: HashMap<u32, NodePose>,
-    /// Of morph targets, by node.
+    /// Morph weights by node.
     weights: HashMap<u32, Vec<f64>>,
 }
 
@@ -43,16 +43,16 @@ enum Interpolation {
 }
 
 impl Document {
-    /// Seconds at which the last animation ends, if there is any.
+    /// The time at which the last animation ends, seconds; `None` without animations.
     pub(super) fn animation_length(&self) -> Option<f64> {
         let inputs = self.root.animations.iter().flat_map(|animation| &animation.samplers);
         let ends = inputs.filter_map(|sampler| self.floats::<1>(sampler.input).ok()?.last().copied());
         ends.map(|[end]| f64::from(end)).reduce(f64::max)
     }
 
-    /// The pose of all nodes; that which is stored when no time is given.
+    /// The pose of all nodes; without a time, the stored one.
     ///
-    /// - `at`: seconds; before the first key and after the last one, those count.
+    /// - `at`: seconds; clamped to the range of the keys.
     pub(super) fn pose(&self, at: Option<f64>) -> Result<Pose, Located> {
         let mut pose = Pose::default();
         let Some(at) = at else { return Ok(pose) };
@@ -103,7 +103,7 @@ impl Document {
                         let value = value.map_err(|e| e.or(&here))?;
                         pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
                     }
-                    // What comes later is another animation of the same property; other paths belong to extensions.
+                    // A later animation of the same property, or a path that belongs to an extension.
                     _ => {}
                 }
             }
@@ -118,7 +118,7 @@ impl Document {
     }
 }
 
-/// What is wrong, with its place where that is known.
+/// A problem, with its location if known.
 enum Wrong {
     Located(Located),
     Length { found: usize, expected: usize },
@@ -140,7 +140,9 @@ fn widened<const N: usize>(values: &[[f32; N]]) -> Vec<[f64; N]> {
     values.iter().map(|value| value.map(f64::from)).collect()
 }
 
-/// The values at a moment, `group` of them.
+/// The values at a time, `group` of them.
+///
+/// - `turns`: whether they are rotations.
 fn sampled<const N: usize>(
     times: &[f64],
     values: &[[f64; N]],
@@ -154,7 +156,7 @@ fn sampled<const N: usize>(
     if values.len() != expected || group == 0 {
         return Err(Wrong::Length { found: values.len(), expected: expected.max(times.len() * parts) });
     }
-    // Of a spline: 0 the incoming tangent, 1 the value, 2 the outgoing tangent.
+    // Parts of a spline key: 0 incoming tangent, 1 value, 2 outgoing tangent.
     let value = |key: usize, part: usize, i: usize| values[(key * parts + part) * group + i];
     let middle = parts / 2;
     let next = times.partition_point(|&t| t <= at);
@@ -186,7 +188,7 @@ fn sampled<const N: usize>(
     Ok((0..group).map(mix).collect())
 }
 
-/// Between two turns on the shorter way; both are four numbers.
+/// Spherical linear interpolation along the shorter arc; `N` must be 4.
 fn slerp<const N: usize>(p: [f64; N], q: [f64; N], t: f64) -> [f64; N] {
     let four = |v: [f64; N]| DQuat::from_xyzw(v[0], v[1], v[2], v[3]);
     let (p, q) = (four(p), four(q));
@@ -201,7 +203,7 @@ fn slerp<const N: usize>(p: [f64; N], q: [f64; N], t: f64) -> [f64; N] {
     cos = cos.abs().min(1.0);
     let angle = cos.acos();
     let sin = angle.sin();
-    // Near each other the arc is a line.
+    // For small angles, the arc is nearly straight.
     let (a, b) = if sin < 1e-9 { (1.0 - t, t) } else { (((1.0 - t) * angle).sin() / sin, (t * angle).sin() / sin) };
     let mixed = (p * a + q * b).to_array();
     std::array::from_fn(|k| mixed[k])
@@ -229,7 +231,7 @@ mod tests {
 
     #[test]
     fn splines_follow_any_cubic() {
-        // f = t³ with its own derivatives at the keys 1 and 3.
+        // f = t³ with its exact derivatives at the keys 1 and 3.
         let (f, d) = (|t: f64| t * t * t, |t: f64| 3.0 * t * t);
         let values = [[d(1.0)], [f(1.0)], [d(1.0)], [d(3.0)], [f(3.0)], [d(3.0)]];
         for t in [1.0, 1.2, 2.0, 2.9, 3.0] {

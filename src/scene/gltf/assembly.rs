@@ -1,4 +1,4 @@
-//! The scene of a glTF file at a moment: which meshes stand where, lights and cameras.
+//! The scene of a glTF file at a given time: placed meshes, lights and cameras.
 
 use super::animation::Pose;
 use super::cameras::GltfCamera;
@@ -8,43 +8,43 @@ use super::lights::GltfLight;
 use super::nodes::Tree;
 use glam::DAffine3;
 
-/// Which mesh of a file, and whose pose it has.
+/// A mesh of a file in the pose of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::scene) struct MeshKey {
     pub mesh: u32,
-    /// The node whose skin or weights move its vertices.
+    /// The node whose skin or morph weights deform it.
     pub node: Option<u32>,
 }
 
 /// A mesh in the world.
 #[derive(Clone, Debug)]
 pub(in crate::scene) struct PlacedMesh {
-    /// Of the node, else of the mesh.
+    /// Name of the node, else of the mesh.
     pub name: Option<String>,
     pub key: MeshKey,
     pub world: DAffine3,
 }
 
-/// A light in the world: it shines along −z of its coordinates.
+/// A light in the world; its axis is −z of its own coordinates.
 #[derive(Clone, Debug)]
 pub(in crate::scene) struct PlacedLight {
-    /// Of the node, else of the light.
+    /// Name of the node, else of the light.
     pub name: Option<String>,
     pub light: GltfLight,
     pub world: DAffine3,
 }
 
-/// What a file shows.
+/// The contents of the scene of a file.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Assembly {
     pub meshes: Vec<PlacedMesh>,
     pub lights: Vec<PlacedLight>,
     pub cameras: Vec<GltfCamera>,
-    /// What was left out, one sentence each.
+    /// Omissions, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// The nodes of a file at a moment.
+/// The nodes of a file at a given time.
 #[derive(Debug)]
 pub(in crate::scene) struct Posed {
     pub(super) pose: Pose,
@@ -52,22 +52,22 @@ pub(in crate::scene) struct Posed {
 }
 
 impl Document {
-    /// The nodes of the file.
+    /// The posed nodes of the file.
     ///
-    /// - `at`: seconds; without it, what the file stores.
+    /// - `at`: seconds; `None`: as stored in the file.
     ///
     /// # Errors
-    /// When the nodes are no trees, or an animation is wrong.
+    /// If the nodes do not form trees, or an animation is invalid.
     pub(in crate::scene) fn posed(&self, at: Option<f64>) -> Result<Posed, Located> {
         let pose = self.pose(at)?;
         let tree = self.placed_nodes(&pose)?;
         Ok(Posed { pose, tree })
     }
 
-    /// Everything that the scene of the file shows.
+    /// All contents of the scene of the file.
     ///
     /// # Errors
-    /// When a node names what does not exist.
+    /// If a node refers to something that does not exist.
     pub(in crate::scene) fn assembly(&self, posed: &Posed) -> Result<Assembly, Located> {
         let mut found = Assembly { cameras: self.cameras(&posed.tree)?, ..Assembly::default() };
         for &node in &posed.tree.scene {
@@ -84,7 +84,7 @@ impl Document {
             let is_weighed = json.weights.is_some() || posed.pose.weights(node).is_some();
             let moves = json.skin.is_some() || (has_targets && is_weighed);
             let key = MeshKey { mesh, node: moves.then_some(node) };
-            // Joints lead a skinned mesh to the world.
+            // The joints of a skin transform to the world already.
             let world = if json.skin.is_some() { DAffine3::IDENTITY } else { world };
             for instance in self.instances(node)? {
                 if found.meshes.len() as u64 >= self.most_elements() {

@@ -1,4 +1,4 @@
-//! The whole scene of a file as one mesh, for what takes a model as a mesh.
+//! The whole scene of a file as one mesh, for uses that need a single mesh.
 
 use super::assembly::MeshKey;
 use super::document::{Document, ReadOptions};
@@ -12,10 +12,10 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::Path;
 
-/// Everything that the scene of a file shows, as it stores it, in the coordinates of the world.
+/// All meshes of the scene of a file, as stored, in world coordinates.
 ///
 /// # Errors
-/// When the file cannot be read, or has nothing with area.
+/// If the file cannot be read, or has no surface area.
 pub(in crate::scene) fn load_gltf_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, Box<GltfError>> {
     let read = ReadOptions { max_bytes: options.max_bytes, ..ReadOptions::default() };
     let document = Document::read(path, read).map_err(Box::new)?;
@@ -40,7 +40,7 @@ impl Document {
                 let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
                 let mesh = match self.built_mesh(placed.key.mesh, node, &options.normals) {
                     Ok(mesh) => Some(mesh),
-                    // Points and lines.
+                    // Only points and lines.
                     Err((place, problem @ GltfProblem::NoTriangles)) => {
                         warnings.push(format!("{place}: {problem}, and is left out"));
                         None
@@ -58,7 +58,7 @@ impl Document {
             }
             let place = |p: &Vec3| placed.world.transform_point3(p.as_dvec3() + mesh.center);
             positions.extend(mesh.positions.iter().map(place));
-            // Normals by the cofactors: the inverse transposed but for a factor.
+            // Normals are transformed by the cofactor matrix: the inverse transpose up to a factor.
             let m = placed.world.matrix3;
             let is_mirrored = m.determinant() < 0.0;
             let sign = if is_mirrored { -1.0 } else { 1.0 };

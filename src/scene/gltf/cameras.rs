@@ -1,31 +1,31 @@
-//! The cameras of the scene, in the order of its nodes. They look along −z of their node.
+//! The cameras of the scene, in the order of the nodes. A camera looks along −z of its node.
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use super::nodes::Tree;
 use glam::DVec3;
 
-/// What of the world a camera sees.
+/// The projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
     /// Vertical field of view, radians.
     Perspective(f64),
-    /// Half of the height of the view, metres.
+    /// Half the height of the visible region, metres.
     Orthographic(f64),
 }
 
 /// A camera of a glTF file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GltfCamera {
-    /// Of its node, else its own, else its number; no two have the same.
+    /// Name of the node, else of the camera, else its index; unique.
     pub name: String,
-    /// Where it stands, metres.
+    /// Position, metres.
     pub eye: DVec3,
-    /// Unit vector.
+    /// View direction, unit vector.
     pub forward: DVec3,
-    /// Unit vector.
+    /// Up direction, unit vector.
     pub up: DVec3,
-    /// What of the world it sees.
+    /// Its projection.
     pub lens: Lens,
 }
 

@@ -1,4 +1,4 @@
-//! The file itself: a GLB with its chunks, or a JSON text.
+//! The container: a GLB with its chunks, or a JSON text.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", chapter 4 (GLB file format).
 
@@ -9,15 +9,17 @@ const HEADER: usize = 12;
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// Where in the bytes of a file its JSON text and its own buffer lie.
+/// Byte ranges of the JSON text and of the embedded buffer.
 #[derive(Debug, PartialEq)]
 pub(super) struct Chunks {
     pub json: Range<usize>,
     pub binary: Option<Range<usize>>,
 }
 
+/// Finds the chunks.
+///
 /// # Errors
-/// When the bytes are those of another format or version, or fewer than their lengths say.
+/// If the format or version is another one, or the file is shorter than its lengths say.
 pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfProblem> {
     if !bytes.starts_with(b"glTF") {
         let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
@@ -42,7 +44,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfProblem> {
     }
     let end = length as usize;
     let (mut at, mut json, mut binary) = (HEADER, None, None);
-    // What is left over may be padding.
+    // The remaining bytes may be padding.
     while at + 8 <= end {
         let (Some(size), Some(kind)) = (number(at), number(at + 4)) else { break };
         let start = at + 8;
@@ -55,7 +57,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfProblem> {
             (JSON, false) => json = Some(range),
             (_, false) => return Err(GltfProblem::NoJson),
             (BIN, true) if binary.is_none() => binary = Some(range),
-            // Chunks of other kinds are to be skipped.
+            // Chunks of unknown types must be skipped.
             _ => {}
         }
         at = stop as usize;

@@ -1,7 +1,7 @@
-//! A glTF file that is read and whose bytes are at hand: JSON text, buffers, views into them.
+//! A glTF file with its data: JSON text, buffers, and views into them.
 //!
-//! Reading opens the file and the buffers that it names, nothing else; meshes, materials and nodes are asked for
-//! afterwards, in files of their own beside this one. Start reading at [`Document::read`].
+//! Reading opens only the file and its buffers; meshes, materials and nodes are read on request, by the modules beside
+//! this one. Start reading at [`Document::read`].
 
 use super::container::chunks;
 use super::error::{GltfError, GltfProblem, Located, place};
@@ -17,7 +17,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Extensions that are understood, or that may be ignored without harm where the file requires them.
+/// Extensions that are supported, or that may be ignored even if the file requires them.
 pub(super) const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -41,12 +41,12 @@ pub(super) const SUPPORTED: &[&str] = &[
     "KHR_xmp_json_ld",
 ];
 
-/// How to read.
+/// Options for reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// Files of this computer outside of the model's folder may be read.
+    /// Whether local files outside of the model's folder may be read.
     pub allow_outside: bool,
-    /// Bytes that the file and all of its buffers may have together.
+    /// Maximum total size of the file and all of its buffers, bytes.
     pub max_bytes: u64,
 }
 
@@ -56,7 +56,7 @@ impl Default for ReadOptions {
     }
 }
 
-/// Bytes that are shared.
+/// A range of shared bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Bytes {
     data: Arc<Vec<u8>>,
@@ -75,13 +75,13 @@ pub struct Document {
     pub(super) path: PathBuf,
     pub(super) options: ReadOptions,
     pub(super) root: Root,
-    /// Of a fallback without bytes: `None`.
+    /// `None` for the fallback buffer of a compression extension, which has no bytes.
     buffers: Vec<Option<Bytes>>,
-    /// Views that were compressed, by index.
+    /// Decompressed views, by index.
     pub(super) decoded: HashMap<u32, Vec<u8>>,
-    /// Every byte of the buffers.
+    /// Total size of the buffers, bytes.
     n_bytes: u64,
-    /// The file and those that hold its buffers.
+    /// The file and the files of its buffers.
     pub(super) files: Vec<PathBuf>,
 }
 
@@ -89,17 +89,17 @@ impl Document {
     /// Reads a file and its buffers.
     ///
     /// # Errors
-    /// When it is no glTF 2.0 file, or one of its buffers cannot be had.
+    /// If it is not a glTF 2.0 file, or one of its buffers cannot be read.
     pub fn read(path: &Path, options: ReadOptions) -> Result<Self, GltfError> {
         let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes).and_then(InputFile::bytes);
         let bytes = bytes.map_err(|error| GltfError::at(path, (String::new(), error.into())))?;
         Self::of_bytes(path, bytes, options)
     }
 
-    /// The same of bytes that are at hand; `path` is where they would lie.
+    /// Like [`Self::read`], from bytes in memory; `path`: where they would be stored.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Like [`Self::read`].
     pub fn of_bytes(path: &Path, bytes: Vec<u8>, options: ReadOptions) -> Result<Self, GltfError> {
         let whole = |problem: GltfProblem| GltfError::at(path, (String::new(), problem));
         let found = chunks(&bytes).map_err(whole)?;
@@ -135,7 +135,7 @@ impl Document {
         &self.path
     }
 
-    /// Every file that was read: itself, then those of its buffers.
+    /// All files that were read: the file itself, then those of its buffers.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
     }
@@ -144,14 +144,14 @@ impl Document {
         GltfError::at(&self.path, located)
     }
 
-    /// The most elements that an accessor without bytes of its own may have: a vertex has bytes somewhere.
+    /// Maximum number of elements of an accessor without a view: real vertices have data in some buffer.
     pub(super) fn most_elements(&self) -> u64 {
         const ALWAYS: u64 = 1 << 20;
         let decoded: u64 = self.decoded.values().map(|bytes| bytes.len() as u64).sum();
         (self.n_bytes + decoded).max(ALWAYS.min(self.most_numbers()))
     }
 
-    /// Vertices and indices of all meshes together at most: a few bytes could ask for the same ones again and again.
+    /// Maximum number of vertices and indices of all meshes: a few bytes could refer to the same data many times.
     pub(in crate::scene) fn most_numbers(&self) -> u64 {
         const BYTES_A_NUMBER: u64 = 8;
         self.options.max_bytes / BYTES_A_NUMBER
@@ -199,7 +199,7 @@ impl Document {
         Ok(())
     }
 
-    /// The bytes of a URI, and the file that they were read from.
+    /// The bytes of a URI, and the file that they were read from, if any.
     fn read_uri(&self, uri: &str, room: u64) -> Result<(Vec<u8>, Option<PathBuf>), GltfProblem> {
         match resolve(uri, self.folder(), self.options.allow_outside)? {
             Uri::Data(data) => Ok((data, None)),
@@ -212,12 +212,12 @@ impl Document {
         }
     }
 
-    /// That of the model.
+    /// The folder of the model.
     pub(super) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Decodes the views that are compressed.
+    /// Decompresses the compressed views.
     fn decode(&mut self) -> Result<(), Located> {
         for i in 0..self.root.buffer_views.len() {
             let view = &self.root.buffer_views[i];
@@ -237,7 +237,7 @@ impl Document {
         Ok(())
     }
 
-    /// The bytes of a view, and its stride where it has one.
+    /// The bytes of a view, and its stride if it has one.
     pub(super) fn view(&self, index: u32) -> Result<(&[u8], Option<u64>), Located> {
         let here = |problem| (place("bufferViews", index), problem);
         let view = self.root.buffer_views.get(index as usize);
@@ -264,7 +264,7 @@ impl Document {
     }
 }
 
-/// Without a byte order mark, and without the padding that some exporters write as zeros.
+/// Removes the byte order mark and the zero padding that some exporters write.
 fn trimmed(json: &[u8]) -> &[u8] {
     let mut json = json.strip_prefix("\u{feff}".as_bytes()).unwrap_or(json);
     while let Some(rest) = json.strip_suffix(b"\0") {

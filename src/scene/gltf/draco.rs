@@ -1,8 +1,8 @@
-//! `KHR_draco_mesh_compression`: the triangles and attributes of a primitive in one compressed stream.
+//! `KHR_draco_mesh_compression`: the triangles and attributes of a primitive as one compressed stream.
 //!
-//! Streams are decoded while the file is read. Their numbers become views and accessors of their own, which take the place of
-//! those that the primitive names: nothing else knows of the compression. The crate `draco-core` reads the streams, within
-//! a limit of memory.
+//! Streams are decoded while the file is read. The result is stored as new views and accessors, which replace those of
+//! the primitive, so that no other code handles the compression. The crate `draco-core` decodes the streams within a
+//! memory limit.
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
@@ -14,23 +14,23 @@ use std::collections::BTreeMap;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
-/// The extension of a primitive.
+/// The extension object of a primitive.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Compressed {
     buffer_view: u32,
-    /// The number of each attribute in the stream.
+    /// Id of each attribute in the stream.
     attributes: BTreeMap<String, u32>,
 }
 
-/// Where a stream belongs to.
+/// A stream and the primitive that it belongs to.
 struct Job {
     mesh: usize,
     primitive: usize,
     compressed: Compressed,
 }
 
-/// Numbers as an accessor has them, side by side.
+/// Packed values in the format of an accessor.
 struct Values {
     component_type: u32,
     kind: &'static str,
@@ -38,15 +38,15 @@ struct Values {
     bytes: Vec<u8>,
 }
 
-/// What a stream holds.
+/// The contents of a stream.
 struct Decoded {
-    /// Three numbers a triangle.
+    /// Three indices per triangle.
     indices: Values,
     attributes: Vec<(String, Values)>,
 }
 
 impl Document {
-    /// Decodes all streams, and lets their primitives name what came of them.
+    /// Decodes all streams and makes their primitives refer to the results.
     pub(super) fn decode_draco(&mut self) -> Result<(), Located> {
         let mut jobs = Vec::new();
         for (mesh, json) in self.root.meshes.iter_mut().enumerate() {
@@ -89,7 +89,7 @@ impl Document {
         Ok(())
     }
 
-    /// As a view and an accessor of their own; the number of the accessor.
+    /// Adds a view and an accessor for the values; returns the index of the accessor.
     fn add(&mut self, values: Values, normalized: bool) -> u32 {
         let Values { component_type, kind, count, bytes } = values;
         let view = self.root.buffer_views.len() as u32;
@@ -113,9 +113,9 @@ fn at(mesh: usize, primitive: usize) -> String {
     format!("{}.{}", place("meshes", mesh), place("primitives", primitive))
 }
 
-/// - `most_bytes`: of the decoded attributes.
+/// - `most_bytes`: maximum size of the decoded attributes.
 fn decoded(bytes: &[u8], compressed: &Compressed, most_bytes: u64) -> Result<Decoded, GltfProblem> {
-    /// Bytes of a triangle's indices.
+    /// Bytes of the indices of a triangle.
     const FACE: u64 = 12;
     let limits = DecodeLimits::default()
         .with_max_points(u64::from(u32::MAX))
@@ -138,7 +138,7 @@ fn decoded(bytes: &[u8], compressed: &Compressed, most_bytes: u64) -> Result<Dec
     Ok(Decoded { indices, attributes: attributes.collect::<Result<_, GltfProblem>>()? })
 }
 
-/// One element a point.
+/// One element per point.
 fn values(attribute: &PointAttribute, n_points: usize) -> Result<Values, GltfProblem> {
     let component_type = match attribute.data_type() {
         DataType::Int8 => 5120,

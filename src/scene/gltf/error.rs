@@ -1,4 +1,4 @@
-//! Why a glTF file could not be opened: which file, which part of it, what was expected.
+//! Errors of glTF files: which file, which part of it, what was expected.
 
 use crate::mesh::MeshError;
 use crate::printable::name;
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {}{problem}", path.display(), if place.is_empty() { String::new() } else { format!("{place}: ") })]
 pub struct GltfError {
-    /// The file, or a file that it names.
+    /// The file, or a file that it refers to.
     pub path: PathBuf,
-    /// The part of it, as `accessors[3]`; empty for the file as a whole.
+    /// The part of it, such as `accessors[3]`; empty for the file as a whole.
     pub place: String,
-    /// What is wrong there.
+    /// The problem there.
     #[source]
     pub problem: GltfProblem,
 }
@@ -25,7 +25,7 @@ impl GltfError {
     }
 }
 
-/// A part of the file, and what is wrong there.
+/// A part of the file and its problem.
 pub(in crate::scene) type Located = (String, GltfProblem);
 
 /// `list[index]`.
@@ -33,35 +33,35 @@ pub(super) fn place(list: &str, index: impl std::fmt::Display) -> String {
     format!("{list}[{index}]")
 }
 
-/// What is wrong with a glTF file.
+/// A problem of a glTF file.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfProblem {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The first bytes are neither those of a GLB nor JSON.
+    /// The file is neither a GLB nor JSON.
     #[error("is no glTF file: expected `glTF` or a JSON text at its beginning")]
     NotGltf,
-    /// The version of the container or of the asset is another.
+    /// The version of the container or of the asset is not supported.
     #[error("glTF version {0} is not supported: expected 2; export it again as glTF 2.0")]
     Version(String),
-    /// The file ends before what its lengths promise.
+    /// The file is shorter than its lengths say.
     #[error("the file is truncated: {what} needs {needed} bytes, but {found} are there")]
     Truncated {
-        /// What is cut.
+        /// The truncated part.
         what: &'static str,
         /// Bytes that it needs.
         needed: u64,
-        /// Bytes that are there.
+        /// Bytes that are present.
         found: u64,
     },
-    /// The chunk of a GLB with the JSON text is not the first.
+    /// The first chunk of a GLB is not the JSON text.
     #[error("the first chunk of a GLB must be JSON")]
     NoJson,
-    /// The JSON text is not what the format asks for.
+    /// The JSON text is invalid.
     #[error("the JSON text is wrong: {0}")]
     Json(String),
-    /// An index points at nothing.
+    /// An index is out of range.
     #[error("names {list}[{index}], but there are {count}")]
     Index {
         /// The list.
@@ -71,48 +71,48 @@ pub enum GltfProblem {
         /// Length of the list.
         count: usize,
     },
-    /// A range of bytes does not lie within what it is part of.
+    /// A byte range exceeds its container.
     #[error("needs {needed} bytes, but {within} has {found}")]
     Bounds {
-        /// Bytes from the beginning of `within` that would be needed.
+        /// Bytes needed, from the beginning of `within`.
         needed: u128,
-        /// What it is part of.
+        /// The container.
         within: String,
-        /// Bytes that are there.
+        /// Bytes that are present.
         found: u64,
     },
-    /// A number of elements for which the file has no bytes.
+    /// The file has too few bytes for a number of elements.
     #[error("{count} elements are more than a file of this size can have")]
     Count {
         /// The number.
         count: u64,
     },
-    /// The file asks for more memory than models may.
+    /// The meshes of the file exceed the memory limit for models.
     #[error("its meshes have more than {limit} vertices and indices together: {}", Limits::advice())]
     TooLarge {
-        /// The most that is read.
+        /// Maximum number of vertices and indices.
         limit: u64,
     },
-    /// A word or number that the format does not know.
+    /// A keyword or number is not in the format.
     #[error("{what} is `{}`: expected {expected}", name(found))]
     Value {
-        /// What it is.
+        /// The property.
         what: &'static str,
-        /// What the file has.
+        /// The value in the file.
         found: String,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
-    /// Something that must be there is not.
+    /// A required property is missing.
     #[error("{0} is missing")]
     Missing(&'static str),
     /// A number is NaN or infinite.
     #[error("element {element} has a number that is NaN or infinite")]
     NotFinite {
-        /// Its place in the accessor.
+        /// Its index in the accessor.
         element: u64,
     },
-    /// An index of a primitive names no vertex.
+    /// A vertex index of a primitive is out of range.
     #[error("index {index} is out of range: there are {count} vertices")]
     Vertex {
         /// The index.
@@ -120,71 +120,71 @@ pub enum GltfProblem {
         /// Number of vertices.
         count: usize,
     },
-    /// A stream of compressed triangles is damaged, or holds what glTF has no use for.
+    /// A Draco stream is damaged or unsupported by glTF.
     #[error("the Draco stream cannot be used: {}", name(_0))]
     Draco(String),
-    /// Two lists that belong together have different lengths.
+    /// Two corresponding lists have different lengths.
     #[error("{what} has {found} elements: expected {expected}")]
     Length {
-        /// What it is.
+        /// The list.
         what: String,
-        /// Elements that it has.
+        /// Its number of elements.
         found: u64,
-        /// Elements that it must have.
+        /// The required number.
         expected: u64,
     },
-    /// The nodes are no tree.
+    /// The nodes do not form trees.
     #[error("is named as a child more than once, or is its own descendant: the nodes must be trees")]
     NotTree,
-    /// A file that the model names may not be read.
+    /// The model refers to a file that may not be read.
     #[error(
         "`{}` is {why}: only files in the folder of the model and below are read; \
          --allow-outside reads others on this computer as well, never the network",
         name(uri)
     )]
     Outside {
-        /// What the file says.
+        /// The URI in the file.
         uri: String,
-        /// In what way it is outside.
+        /// In which way it is outside.
         why: &'static str,
     },
-    /// A data URI that is none.
+    /// A data URI is invalid.
     #[error("its data URI is wrong: {0}")]
     DataUri(&'static str),
     /// Another file cannot be read.
     #[error("`{}` {error}", name(file))]
     File {
-        /// The file, as the model names it.
+        /// The file, as in the model.
         file: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: ReadError,
     },
-    /// An extension without which the file has no meaning.
+    /// A required extension is not supported.
     #[error("needs the extension `{}`, which is not supported: {advice}", name(extension))]
     Extension {
         /// Its name.
         extension: String,
-        /// What to do.
+        /// What the user can do.
         advice: &'static str,
     },
-    /// Compressed bytes that do not decode.
+    /// Compressed data is invalid.
     #[error("the compressed data is wrong: {0}")]
     Compressed(&'static str),
-    /// The file has nothing with area.
+    /// The file has no surface area.
     #[error("has no triangles")]
     NoTriangles,
-    /// What was asked for by name is not there.
+    /// There is nothing of the given name.
     #[error("there is no {what} `{}`{}", name(asked), known(names))]
     Name {
-        /// What kind of thing.
+        /// Kind of the missing item.
         what: &'static str,
-        /// The name that was asked for.
+        /// The given name.
         asked: String,
-        /// Those that are there.
+        /// The existing names.
         names: Vec<String>,
     },
-    /// The triangles are no mesh.
+    /// The triangles do not form a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }

@@ -1,37 +1,37 @@
-//! What a glTF file has, in numbers and names, for those who ask.
+//! Summary of the contents of a glTF file, for reports.
 
 use super::assembly::Assembly;
 use super::document::{Document, SUPPORTED};
 use super::surfaces::Surfaces;
 use serde_json::Value;
 
-/// What a glTF file has.
+/// Summary of the contents of a glTF file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GltfFacts {
     /// Names of the cameras, in order.
     pub cameras: Vec<String>,
     /// Names and kinds of the lights, in order.
     pub lights: Vec<String>,
-    /// Names of the variants of materials, in order.
+    /// Names of the material variants, in order.
     pub variants: Vec<String>,
     /// Names of the animations, in order.
     pub animations: Vec<String>,
-    /// Seconds at which the last animation ends.
+    /// Time at which the last animation ends, seconds.
     pub animation_length: Option<f64>,
-    /// Meshes in the file.
+    /// Number of meshes in the file.
     pub meshes: usize,
-    /// Meshes in the scene, each as often as it is placed.
+    /// Number of placed meshes in the scene.
     pub instances: usize,
     /// Extensions that the file uses, in order.
     pub extensions: Vec<String>,
-    /// Those of them that nothing here knows.
+    /// Extensions among them that are not supported.
     pub unknown_extensions: Vec<String>,
-    /// What of its materials is not modelled: name of the material, and what.
+    /// Unsupported features of its materials: name of the material, and the feature.
     pub notes: Vec<(String, String)>,
 }
 
 impl Document {
-    /// Names of the variants of materials.
+    /// Names of the material variants.
     pub(in crate::scene) fn variants(&self) -> Vec<String> {
         let list = self.root.extensions.get("KHR_materials_variants").and_then(|extension| extension.get("variants"));
         let named = |(i, variant): (usize, &Value)| {

@@ -1,12 +1,12 @@
-//! Pictures that are part of a model: in a view of its bytes, or in a data URI.
+//! Images inside a model: in a buffer view or a data URI.
 
 use super::document::{Document, ReadOptions};
 use super::error::{GltfError, GltfProblem, Located, place};
 use super::uri::{Uri, resolve};
 use std::path::{Path, PathBuf};
 
-/// The model and the number of the picture that a path means, as `model.glb#3`; `None` for other paths, and where there
-/// is a file of that very name.
+/// Model and image index of a path such as `model.glb#3`; `None` for other paths, and if a file of exactly that name
+/// exists.
 pub(in crate::scene) fn part_of_model(path: &Path) -> Option<(PathBuf, u32)> {
     let text = path.to_str()?;
     let (model, number) = text.rsplit_once('#')?;
@@ -17,10 +17,10 @@ pub(in crate::scene) fn part_of_model(path: &Path) -> Option<(PathBuf, u32)> {
 }
 
 impl Document {
-    /// The bytes of a picture that is part of the file, as its format encodes them.
+    /// The encoded bytes of an image inside the file.
     ///
     /// # Errors
-    /// When there is none of this number, or it is a file of its own.
+    /// If there is no such image, or it is a separate file.
     pub(in crate::scene) fn picture_bytes(&self, number: u32) -> Result<Vec<u8>, Located> {
         let here = |problem| (place("images", number), problem);
         let count = self.root.images.len();
@@ -37,10 +37,10 @@ impl Document {
     }
 }
 
-/// The bytes of a picture of a model that is not open.
+/// The encoded bytes of an image inside a model that is not open.
 ///
 /// # Errors
-/// When the model cannot be read or has no such picture.
+/// If the model cannot be read or has no such image.
 pub(in crate::scene) fn picture_of(model: &Path, number: u32) -> Result<Vec<u8>, GltfError> {
     let document = Document::read(model, ReadOptions::default())?;
     document.picture_bytes(number).map_err(|located| document.error(located))

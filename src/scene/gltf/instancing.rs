@@ -1,4 +1,4 @@
-//! Many copies of a node's mesh: `EXT_mesh_gpu_instancing`.
+//! Instances of a node's mesh: `EXT_mesh_gpu_instancing`.
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
@@ -8,8 +8,7 @@ use serde_json::Value;
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
 impl Document {
-    /// From the coordinates of the mesh to those of the node, once for each copy; the mesh itself without the
-    /// extension.
+    /// One transform per instance, from mesh to node coordinates; the identity alone without the extension.
     pub(super) fn instances(&self, node: u32) -> Result<Vec<DAffine3>, Located> {
         let json = self.node(node)?;
         let Some(extension) = json.extensions.get(NAME) else { return Ok(vec![DAffine3::IDENTITY]) };

@@ -1,7 +1,7 @@
-//! The JSON of a glTF file as typed structs: the core of glTF 2.0, with extensions kept as they are written.
+//! The JSON of a glTF file as typed structs: the core of glTF 2.0; extensions are kept as JSON values.
 //!
-//! Nothing is checked here but the types: indices may point anywhere, and whoever follows one checks it
-//! ([`super::document::Document`]). Members that are not named here are skipped, as the text of the format asks.
+//! Only the types are checked: indices may be out of range and are checked when they are used
+//! ([`super::document::Document`]). Unknown members are skipped, as the specification requires.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", chapter 5 (properties reference).
 
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Extensions of an object, by name.
 pub(super) type Extensions = Map<String, Value>;
 
-/// The whole of it.
+/// The root object.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Root {
@@ -55,7 +55,7 @@ pub(super) struct Scene {
 pub(super) struct Node {
     pub name: Option<String>,
     pub children: Vec<u32>,
-    /// Column by column.
+    /// Column-major.
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
     /// x, y, z, w.
@@ -82,7 +82,7 @@ pub(super) struct Primitive {
     pub attributes: BTreeMap<String, u32>,
     pub indices: Option<u32>,
     pub material: Option<u32>,
-    /// 0 points, 1 to 3 lines, 4 triangles, 5 strip, 6 fan; triangles when not given.
+    /// 0 points, 1 to 3 lines, 4 triangles, 5 strip, 6 fan; default: triangles.
     pub mode: Option<u32>,
     pub targets: Vec<BTreeMap<String, u32>>,
     pub extensions: Extensions,
@@ -160,7 +160,7 @@ pub(super) struct Pbr {
     pub metallic_roughness_texture: Option<TextureRef>,
 }
 
-/// The use of a texture: with `scale` for normals.
+/// A reference to a texture; `scale` is for normal maps.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct TextureRef {
@@ -216,7 +216,7 @@ pub(super) struct Perspective {
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Orthographic {
-    /// Half of the height of the view, metres.
+    /// Half the height of the visible region, metres.
     pub ymag: f64,
 }
 

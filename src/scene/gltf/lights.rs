@@ -1,6 +1,6 @@
-//! Lights of `KHR_lights_punctual`, and which nodes have them.
+//! Lights of `KHR_lights_punctual` and the nodes that have them.
 //!
-//! They shine along −z of their node. Numbers are taken as radiometric ones: candela as W·sr⁻¹, lux as W·m⁻².
+//! Their axis is −z of the node. Photometric units are read as radiometric ones: candela as W·sr⁻¹, lux as W·m⁻².
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
@@ -24,9 +24,9 @@ pub(in crate::scene) enum LightKind {
 pub(in crate::scene) struct GltfLight {
     pub name: Option<String>,
     pub kind: LightKind,
-    /// Colour times intensity: W·sr⁻¹, of directional lights W·m⁻².
+    /// Colour times intensity: W·sr⁻¹; of directional lights, W·m⁻².
     pub intensity: Vec3,
-    /// Beyond it the light is not to reach; a path tracer has no use for that.
+    /// Whether it has a maximum range, which is not physical and is ignored.
     pub has_range: bool,
 }
 

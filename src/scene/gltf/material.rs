@@ -1,4 +1,4 @@
-//! Materials as plain numbers: the core of glTF and its ratified extensions, with the textures that they use.
+//! Materials as plain values: the core of glTF and its ratified extensions, with their textures.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.9, and the `KHR_materials_*` and `KHR_texture_transform` extensions.
 
@@ -10,7 +10,7 @@ use glam::{DVec2, Vec3};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// The use of a picture. Coordinates are those of glTF, with v downwards.
+/// A use of an image. Texture coordinates as in glTF, with v downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TextureUse {
     pub image: u32,
@@ -27,12 +27,12 @@ pub(super) struct TextureUse {
 pub(super) enum Alpha {
     #[default]
     Opaque,
-    /// There where alpha is at least this.
+    /// Visible where alpha is at least this.
     Mask(f32),
     Blend,
 }
 
-/// Everything that a file says of a material, with the defaults of the format.
+/// All parameters of a material, with the defaults of the format.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct GltfMaterial {
     pub name: Option<String>,
@@ -41,7 +41,7 @@ pub(super) struct GltfMaterial {
     pub base_color_texture: Option<TextureUse>,
     pub metallic: f32,
     pub roughness: f32,
-    /// Green roughness, blue metallic.
+    /// Green: roughness; blue: metallic.
     pub metallic_roughness_texture: Option<TextureUse>,
     pub normal_texture: Option<TextureUse>,
     pub normal_scale: f32,
@@ -59,7 +59,7 @@ pub(super) struct GltfMaterial {
     pub specular_color_texture: Option<TextureUse>,
     pub transmission: f32,
     pub transmission_texture: Option<TextureUse>,
-    /// 0 is a thin wall.
+    /// 0: a thin wall.
     pub thickness: f32,
     pub attenuation_color: Vec3,
     /// Metres.
@@ -72,7 +72,7 @@ pub(super) struct GltfMaterial {
     pub iridescence: f32,
     pub iridescence_texture: Option<TextureUse>,
     pub iridescence_ior: f32,
-    /// Thickness of the film, nanometres: the first where its texture is 0, the second where it is 1 or there is none.
+    /// Thickness of the film, nanometres: where its texture is 0, and where it is 1 or there is no texture.
     pub iridescence_thickness: [f32; 2],
     pub iridescence_thickness_texture: Option<TextureUse>,
     pub sheen_color: Vec3,
@@ -83,11 +83,11 @@ pub(super) struct GltfMaterial {
     /// Radians.
     pub anisotropy_rotation: f32,
     pub anisotropy_texture: Option<TextureUse>,
-    /// What is not modelled, in words that follow the name of the material.
+    /// Unsupported features; the text follows the name of the material.
     pub notes: Vec<String>,
 }
 
-/// Reads numbers out of an extension; what is not there or no number is the default.
+/// Reads values from an extension object; missing and invalid ones get the default.
 struct Fields<'a>(Option<&'a Value>);
 
 impl Fields<'_> {
@@ -112,10 +112,10 @@ impl Fields<'_> {
 }
 
 impl Document {
-    /// The material of this number; the format's default for `None`.
+    /// The material of this index; `None`: the default material of the format.
     ///
     /// # Errors
-    /// When it names a texture, picture or sampler that does not exist.
+    /// If it refers to a texture, image or sampler that does not exist.
     pub(super) fn material(&self, index: Option<u32>) -> Result<GltfMaterial, Located> {
         let default = super::json::Material::default();
         let json = match index {
@@ -162,7 +162,7 @@ impl Document {
             },
             double_sided: json.double_sided,
             unlit: json.extensions.contains_key("KHR_materials_unlit"),
-            // 0 stands for a surface that reflects everything, and is not modelled.
+            // 0 means a perfect reflector, which is not supported.
             ior: Some(extension("ior").number("ior", 1.5)).filter(|ior| *ior >= 1.0).unwrap_or(1.5),
             specular: unit(specular.number("specularFactor", 1.0)),
             specular_texture: texture(specular.texture("specularTexture").as_ref())?,
@@ -214,7 +214,7 @@ impl Document {
         Ok(material)
     }
 
-    /// `None` for a texture in a format that is not read; that is noted.
+    /// `None` if the image format is not supported; a note is added then.
     fn texture_use(&self, reference: &TextureRef, notes: &mut Vec<String>) -> Result<Option<TextureUse>, Located> {
         let missing = |list, index, count| (String::new(), GltfProblem::Index { list, index, count });
         let index = reference.index;
@@ -268,7 +268,7 @@ impl Document {
         }))
     }
 
-    /// Whether the surface of a material turns with its tangents.
+    /// Whether a material depends on tangents.
     pub(super) fn needs_tangents(&self, index: Option<u32>) -> bool {
         let json = index.and_then(|index| self.root.materials.get(index as usize));
         json.is_some_and(|json| {
@@ -280,7 +280,7 @@ impl Document {
     }
 }
 
-/// Extensions of a material that nothing here knows.
+/// Notes about the unsupported extensions of a material.
 fn unknown(extensions: &Extensions) -> Vec<String> {
     let known = |name: &str| super::document::SUPPORTED.contains(&name);
     let unknown = extensions.keys().filter(|name| !known(name));

@@ -1,4 +1,4 @@
-//! From the triangles of a file to a checked [`Mesh`], with tangents where a material needs them.
+//! From the triangles of a file to a checked [`Mesh`], with tangents if a material needs them.
 
 use super::animation::Pose;
 use super::assembly::{MeshKey, Posed};
@@ -14,17 +14,17 @@ use glam::Vec4;
 #[derive(Debug)]
 pub(in crate::scene) struct BuiltMesh {
     pub mesh: Mesh,
-    /// One a slot.
+    /// One per slot.
     pub keys: Vec<SlotKey>,
-    /// What was left out or replaced, one sentence each.
+    /// Omissions and replacements, one sentence each.
     pub warnings: Vec<String>,
 }
 
 impl Document {
-    /// The mesh of this key, posed.
+    /// The posed mesh of this key.
     ///
     /// # Errors
-    /// As [`Self::built_mesh`].
+    /// Like [`Self::built_mesh`].
     pub(in crate::scene) fn mesh_of(
         &self,
         key: MeshKey,
@@ -34,11 +34,11 @@ impl Document {
         self.built_mesh(key.mesh, key.node.map(|node| (node, &posed.tree, &posed.pose)), normals)
     }
 
-    /// The mesh `index`, as the node has it that is posed: with its weights and its skin. Without a node, with the
-    /// weights of the mesh.
+    /// The mesh `index`, deformed by the morph weights and the skin of `node`; without a node, by the weights of the
+    /// mesh.
     ///
     /// # Errors
-    /// When it has no triangles, or something in it is wrong.
+    /// If it has no triangles or is invalid.
     pub(super) fn built_mesh(
         &self,
         index: u32,
@@ -87,7 +87,7 @@ impl Document {
         if needs.contains(&true) && *normals != ModelNormals::Ignore && !mesh.normals.is_empty() {
             let own = matches!(normals, ModelNormals::FileOrComputed { .. }) && from_file;
             if own && triangles.tangents.len() == mesh.positions.len() {
-                // Vertices of other materials may have none, and nobody asks for them.
+                // Vertices of materials that need no tangents may have none.
                 let unit = |(tangent, normal): (&Vec4, &glam::Vec3)| match tangent.truncate() {
                     glam::Vec3::ZERO => normal.any_orthonormal_vector().extend(1.0),
                     _ => *tangent,

@@ -1,16 +1,16 @@
-//! Decoding of `EXT_meshopt_compression`: attributes, triangles and sequences of indices, with their filters.
+//! Decoding of `EXT_meshopt_compression`: attributes, triangles and index sequences, with their filters.
 //!
-//! Sizes are checked against what the encodings can reach before anything is allocated; no input panics.
+//! Sizes are checked against the maximum compression ratio before anything is allocated; no input causes a panic.
 //!
 //! Source: Khronos and Arseny Kapoulkine, "EXT_meshopt_compression", appendices A (bitstream) and B (filters).
 
 use super::error::GltfProblem;
 use serde::Deserialize;
 
-/// Of the extension.
+/// Name of the extension.
 pub(super) const NAME: &str = "EXT_meshopt_compression";
 
-/// What the extension says of a view.
+/// The extension object of a view.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct View {
@@ -23,14 +23,14 @@ pub(super) struct View {
     filter: Option<String>,
 }
 
-/// The bytes of a view.
+/// The decoded bytes of a view.
 ///
 /// # Errors
-/// When the data is not what the extension says.
+/// If the data is invalid.
 pub(super) fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
     let wrong = GltfProblem::Compressed;
     let decoded = view.count.checked_mul(view.byte_stride).ok_or(GltfProblem::Count { count: view.count })?;
-    // Two bits stand for a group of sixteen bytes, one byte for a triangle.
+    // A group of 16 bytes takes at least two bits, a triangle one byte.
     const MOST: u64 = 128;
     if decoded > (data.len() as u64).saturating_mul(MOST) {
         return Err(GltfProblem::Count { count: view.count });
@@ -62,10 +62,10 @@ pub(super) fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
     Ok(bytes)
 }
 
-/// Elements of a group.
+/// Elements per group.
 const GROUP: usize = 16;
 
-/// Whole elements; deltas of each of their bytes are packed group by group.
+/// Decodes attributes: the deltas of each byte of the elements are packed in groups.
 fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     const HEADER: u8 = 0xa0;
     const SHORTEST_TAIL: usize = 32;
@@ -101,7 +101,7 @@ fn take<'a>(data: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
     Some(head)
 }
 
-/// A group: zeros, two or four bits each with whole bytes where those are all ones, or bytes.
+/// A group of zeros, of two or four bits each (all ones: a full byte follows), or of bytes.
 fn unpacked(data: &mut &[u8], mode: u8) -> Option<[u8; GROUP]> {
     let bits = match mode {
         0 => return Some([0; GROUP]),
@@ -113,7 +113,7 @@ fn unpacked(data: &mut &[u8], mode: u8) -> Option<[u8; GROUP]> {
     let (each, mask) = (8 / bits, (1 << bits) - 1);
     let mut group = [0; GROUP];
     for (i, value) in group.iter_mut().enumerate() {
-        // The first stands in the highest bits.
+        // The first one is in the highest bits.
         *value = (packed[i / each] >> (8 - bits * (i % each + 1))) & mask;
         if *value == mask {
             *value = take(data, 1)?[0];
@@ -129,7 +129,7 @@ fn narrowed(list: &[u32], stride: usize) -> Vec<u8> {
     }
 }
 
-/// A number of seven bits a byte.
+/// A variable-length integer with seven bits per byte.
 fn variable(data: &mut &[u8]) -> Option<u32> {
     let mut value = 0;
     for shift in [0, 7, 14, 21, 28] {
@@ -146,7 +146,7 @@ fn zigzag(value: u32) -> u32 {
     (value >> 1) ^ (value & 1).wrapping_neg()
 }
 
-/// The last sixteen of something.
+/// The last 16 values.
 struct Recent<T> {
     list: [T; 16],
     next: usize,
@@ -162,13 +162,13 @@ impl<T: Copy + Default> Recent<T> {
         self.next = self.next.wrapping_add(1);
     }
 
-    /// The last one for 1, the one before it for 2.
+    /// The last value for 1, the one before for 2.
     fn back(&self, n: usize) -> T {
         self.list[self.next.wrapping_sub(n) & 15]
     }
 }
 
-/// Indices of triangles; most name an edge of one of the last triangles.
+/// Decodes triangle indices; most triangles share an edge with one of the last ones.
 fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
     const HEADER: u8 = 0xe1;
     const TABLE: usize = 16;
@@ -217,7 +217,7 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
         }
         let codes = [if code == 0xff { 15 } else { 0 }, more >> 4, more & 15];
         let mut corners = [0; 3];
-        // New vertices are numbered first, then those that are written out follow.
+        // New vertices come first, then the explicit ones.
         for (corner, &code) in corners.iter_mut().zip(&codes) {
             *corner = match code {
                 0 => fresh(&mut next),
@@ -244,7 +244,7 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
     data.is_empty().then_some(out)
 }
 
-/// Indices that follow one of two others.
+/// Decodes indices as deltas to one of two previous values.
 fn sequence(data: &[u8], count: usize) -> Option<Vec<u32>> {
     const HEADER: u8 = 0xd1;
     const TAIL: usize = 4;
@@ -264,7 +264,7 @@ fn sequence(data: &[u8], count: usize) -> Option<Vec<u32>> {
     data.is_empty().then_some(out)
 }
 
-/// Unit vectors as two coordinates on an octahedron, with the length of 1 in the third.
+/// Decodes unit vectors in octahedral coordinates; the third component holds the encoding of 1.
 fn octahedral(bytes: &mut [u8], stride: usize) {
     let size = stride / 4;
     let most = if size == 1 { 127.0 } else { 32767.0 };
@@ -290,7 +290,7 @@ fn octahedral(bytes: &mut [u8], stride: usize) {
     }
 }
 
-/// Turns without their largest component, which two bits of the fourth number name.
+/// Decodes unit quaternions without their largest component, whose index is in two bits of the fourth number.
 fn quaternion(bytes: &mut [u8]) {
     for element in bytes.chunks_exact_mut(8) {
         let get = |i: usize| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]);
@@ -305,7 +305,7 @@ fn quaternion(bytes: &mut [u8]) {
     }
 }
 
-/// Numbers as 24 bits of mantissa and 8 of exponent.
+/// Decodes numbers with a mantissa of 24 bits and an exponent of 8 bits.
 fn exponential(bytes: &mut [u8]) {
     for four in bytes.chunks_exact_mut(4) {
         let value = i32::from_le_bytes([four[0], four[1], four[2], four[3]]);
@@ -328,7 +328,7 @@ mod tests {
         (0..17_u8).map(|i| [9, i / 8, i.wrapping_mul(7), i.wrapping_mul(91) ^ 0x5a]).collect()
     }
 
-    /// An encoder that takes `mode` for every group that it can, raw bytes otherwise.
+    /// An encoder that uses `mode` for every group that allows it, else raw bytes.
     fn encode(elements: &[[u8; 4]], modes: [u8; 4]) -> Vec<u8> {
         let mut out = vec![0xa0];
         let first = elements[0];
@@ -380,9 +380,9 @@ mod tests {
 
     #[test]
     fn triangles_follow_edges_and_vertices() {
-        // A new triangle by the table, one on its edge with a new vertex, one written out.
+        // A new triangle by the table, one on its edge with a new vertex, and an explicit one.
         let mut data = vec![0xe1, 0xf0, 0x10, 0xff];
-        // Corners 7, 0 and 2: all written as steps from the one before, beginning at 0.
+        // Vertices 7, 0 and 2: each as the difference to the previous one, starting at 0.
         data.extend([0xff, 14, 13, 4]);
         data.extend([0; 16]);
         let decoded = decode(&view("TRIANGLES", None, 9, 4), &data).unwrap();
@@ -396,7 +396,7 @@ mod tests {
 
     #[test]
     fn sequences_step_from_one_of_two_numbers() {
-        // +5 by the first, +100 by the second, -1 by the first.
+        // +5 to the first, +100 to the second, -1 to the first.
         let data = [0xd1, 5 << 2, 0x91, 0x03, 1 << 1, 0, 0, 0, 0];
         let decoded = decode(&view("INDICES", None, 3, 2), &data).unwrap();
         assert_eq!(decoded, [5, 0, 100, 0, 4, 0]);
@@ -421,7 +421,7 @@ mod tests {
         quaternion(&mut bytes);
         let turn: Vec<f32> = bytes.chunks(2).map(|b| f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).collect();
         assert!((turn.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-3);
-        // 1022 has 2 in its low bits: the third is the largest, and its neighbours follow it around.
+        // 1022 has 2 in its low bits: the third component is the largest, and the others follow cyclically.
         assert!(turn[1] > 0.6 && turn[2] > 0.6 && turn[0] == 0.0 && turn[3] == 0.0, "{turn:?}");
         let mut bytes = ((-3_i32 << 24) | (0x00ff_ffff & -20)).to_le_bytes().to_vec();
         exponential(&mut bytes);

@@ -1,12 +1,11 @@
-//! Reading glTF 2.0, text and binary: nodes, meshes, materials, lights, cameras, skins and animations, as plain
+//! Reading of glTF 2.0, text and binary: nodes, meshes, materials, lights, cameras, skins and animations, as plain
 //! structs.
 //!
-//! The JSON text is parsed into structs of its own (`json`), for it is the extensions that matter, and a file of
-//! unknown origin must not make anything panic. Whatever an index, a count or an offset says is checked where it is
-//! followed. No file is read that the model does not name, and none outside of its folder unless that is allowed
-//! (`uri`).
+//! The JSON text is parsed into our own structs (`json`), since extensions matter and untrusted files must not cause
+//! panics. Indices, counts and offsets are checked where they are used. Only files that the model refers to are read,
+//! and none outside of its folder unless that is allowed (`uri`).
 //!
-//! What becomes of it in a scene is in `scene/gltf_scene`. Start reading at [`Document::read`].
+//! The conversion to a scene is in `scene/gltf_scene`. Start reading at [`Document::read`].
 
 mod accessor;
 mod animation;

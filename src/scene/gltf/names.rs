@@ -1,4 +1,4 @@
-//! Names that are used once.
+//! Unique names.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,12 +6,12 @@ use std::collections::{HashMap, HashSet};
 #[derive(Debug, Default)]
 pub(super) struct Names {
     names: HashSet<String>,
-    /// The number that is tried next for a name; smaller ones are taken.
+    /// The next number to try for a name; smaller ones are taken.
     next: HashMap<String, u64>,
 }
 
 impl Names {
-    /// `wanted`, or with the first number that makes it new.
+    /// `wanted`, with the first number that makes it unique if it is taken.
     pub(super) fn free(&mut self, wanted: &str) -> String {
         if self.names.insert(wanted.to_owned()) {
             return wanted.to_owned();

@@ -1,7 +1,6 @@
-//! The tree of nodes, flattened: every node of the scene with its placement in the world.
+//! The node hierarchy, flattened: all nodes of the scene with their world transforms.
 //!
-//! Trees may be of any depth, so they are walked with a list of what is still to do. Transforms are multiplied in
-//! `f64`.
+//! Trees may be arbitrarily deep, so they are traversed with an explicit stack. Transforms are multiplied in `f64`.
 
 use super::animation::Pose;
 use super::document::Document;
@@ -12,7 +11,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4};
 /// The nodes of a file, posed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Tree {
-    /// Those of the scene that is shown, parents before their children.
+    /// The nodes of the displayed scene, parents before children.
     pub scene: Vec<u32>,
     /// From the coordinates of each node of the file to the world, metres.
     pub worlds: Vec<DAffine3>,
@@ -25,8 +24,8 @@ impl Document {
         self.root.nodes.get(index as usize).ok_or((place("nodes", index), problem))
     }
 
-    /// The roots of the scene that is shown: those of the default scene, of the first scene, or all nodes that are
-    /// nobody's children.
+    /// The roots of the displayed scene: those of the default scene, else of the first scene, else all nodes without a
+    /// parent.
     fn roots(&self, parents: &[Option<u32>]) -> Result<Vec<u32>, Located> {
         let scenes = &self.root.scenes;
         match self.root.scene.map_or(0, |scene| scene) {
@@ -44,7 +43,7 @@ impl Document {
         }
     }
 
-    /// Checks that the nodes are trees, and gives the parent of each.
+    /// Checks that no node has two parents, and returns the parent of each.
     fn parents(&self) -> Result<Vec<Option<u32>>, Located> {
         let count = self.root.nodes.len();
         let mut parents = vec![None; count];
@@ -62,13 +61,13 @@ impl Document {
         Ok(parents)
     }
 
-    /// Every node of the scene in the order of the tree; and where each node of the file is, be it part of the scene
-    /// or not.
+    /// All nodes of the scene in traversal order, and the world transform of every node of the file, in the scene or
+    /// not.
     pub(super) fn placed_nodes(&self, pose: &Pose) -> Result<Tree, Located> {
         let parents = self.parents()?;
         let count = parents.len();
         let mut worlds = vec![DAffine3::IDENTITY; count];
-        // Every node has one parent at most: what is not below a root is on a circle.
+        // Every node has at most one parent: nodes that cannot be reached from a root are on a cycle.
         let mut seen = vec![false; count];
         let mut todo: Vec<(u32, DAffine3)> = (0..count as u32)
             .filter(|&node| parents[node as usize].is_none())
@@ -103,7 +102,7 @@ impl Document {
         Ok(Tree { scene, worlds })
     }
 
-    /// From the node's coordinates to its parent's.
+    /// From the coordinates of the node to those of its parent.
     fn local(&self, index: u32, pose: &Pose) -> Result<DAffine3, Located> {
         let node = self.node(index)?;
         let here =
@@ -121,7 +120,7 @@ impl Document {
         let translation = posed.translation.or(node.translation.map(DVec3::from)).unwrap_or(DVec3::ZERO);
         let scale = posed.scale.or(node.scale.map(DVec3::from)).unwrap_or(DVec3::ONE);
         let rotation = posed.rotation.or(node.rotation.map(DQuat::from_array)).unwrap_or(DQuat::IDENTITY);
-        // Nearly all are of unit length but for their last digits.
+        // Usually of unit length up to rounding.
         let length = rotation.length();
         if !(length > 0.0 && length.is_finite()) {
             return Err(here("the rotation", rotation.to_string(), "a quaternion of length 1"));

@@ -1,8 +1,8 @@
-//! The primitives of a mesh as one list of triangles, morphed and skinned as asked.
+//! The primitives of a mesh as one list of triangles, with morph targets and skin applied.
 //!
-//! Strips and fans become triangles; points and lines have no area and are counted. Primitives that share their
-//! vertices share them here too. A primitive without normals is flat, as the format asks. Texture coordinates are
-//! turned around: v grows downwards in glTF and upwards here.
+//! Strips and fans become triangles; points and lines are only counted. Vertices that primitives share stay shared. A
+//! primitive without normals is flat-shaded, as the specification requires. Texture coordinates are flipped: v points
+//! down in glTF and up here.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.7.2 (meshes).
 
@@ -13,52 +13,52 @@ use super::skin::Joints;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::collections::{BTreeMap, HashMap};
 
-/// How the vertices of a mesh are moved.
+/// How the vertices of a mesh are deformed.
 #[derive(Default)]
 pub(super) struct Deformation<'a> {
-    /// Of the morph targets; missing ones are 0.
+    /// Weights of the morph targets; missing ones are 0.
     pub weights: &'a [f64],
     pub joints: Option<Joints>,
 }
 
-/// What tells one slot from another: its material, and its materials by variant.
+/// Identity of a slot: its material, and its materials by variant.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(in crate::scene) struct SlotKey {
-    /// The default material where there is none.
+    /// `None`: the default material.
     pub material: Option<u32>,
-    /// Material by number of the variant.
+    /// Material by index of the variant.
     pub variants: BTreeMap<u32, u32>,
 }
 
-/// The triangles of a mesh. Lists of vertices are empty, or as long as `positions`.
+/// The triangles of a mesh. Lists of vertex attributes are empty or as long as `positions`.
 #[derive(Debug, Default)]
 pub(super) struct Triangles {
     pub positions: Vec<DVec3>,
-    /// Unit length; zero where the file has none.
+    /// Unit vectors; zero if missing in the file.
     pub normals: Vec<Vec3>,
     pub uvs: Vec<Vec2>,
     pub uvs2: Vec<Vec2>,
     /// Linear RGBA.
     pub colors: Vec<[f32; 4]>,
-    /// Unit length with the sign of the bitangent; all zero where the file has none.
+    /// Unit vectors with the sign of the bitangent; all zero if missing in the file.
     pub tangents: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
-    /// One a triangle.
+    /// One per triangle.
     pub slots: Vec<u16>,
     pub keys: Vec<SlotKey>,
-    /// Triangles of each slot that have a tangent at every corner, whatever it is.
+    /// Whether each slot has tangents at all corners of all of its triangles.
     pub has_tangents: Vec<bool>,
-    /// Primitives without area.
+    /// Number of primitives of points or lines.
     pub points_or_lines: usize,
-    /// Triangles that used a vertex twice.
+    /// Number of triangles that used a vertex twice.
     pub degenerate: usize,
-    /// Normals, tangents and texture coordinates that were no numbers.
+    /// Number of normals, tangents and texture coordinates that were not finite.
     pub not_finite: usize,
-    /// Whether some triangles had no normals and others had.
+    /// Whether some triangles had normals and others had none.
     pub flat_parts: bool,
 }
 
-/// The vertices that one or more primitives use.
+/// The vertices of one or more primitives.
 #[derive(Default)]
 struct Vertices {
     positions: Vec<DVec3>,
@@ -80,12 +80,12 @@ impl Document {
     /// All triangles of a mesh.
     ///
     /// # Errors
-    /// When an accessor is wrong or lists that belong together differ in length.
+    /// If an accessor is invalid or corresponding lists have different lengths.
     pub(super) fn triangles(&self, mesh: u32, deformation: &Deformation) -> Result<Triangles, Located> {
         let json = self.mesh(mesh)?;
         let mut found = Triangles::default();
         let mut slots: HashMap<SlotKey, u16> = HashMap::new();
-        // Where the vertices of a set of attributes begin, and how many there are.
+        // First vertex and number of vertices of each set of attributes.
         let mut known: HashMap<(&BTreeMap<String, u32>, &[BTreeMap<String, u32>]), (u32, u32)> = HashMap::new();
         for (i, primitive) in json.primitives.iter().enumerate() {
             let here = || format!("{}.{}", place("meshes", mesh), place("primitives", i));
@@ -117,7 +117,7 @@ impl Document {
                 Some(accessor) => self.indices(accessor)?,
                 None => (0..count).collect(),
             };
-            // The largest number of each type restarts a strip elsewhere and is not allowed here.
+            // The maximum of an index type means primitive restart in other APIs and is not allowed in glTF.
             if let Some(&index) = indices.iter().find(|&&index| index >= count) {
                 return Err((format!("{}.indices", here()), GltfProblem::Vertex { index, count: count as usize }));
             }
@@ -146,7 +146,7 @@ impl Document {
             let last = indices.len().saturating_sub(2);
             match mode {
                 4 => (0..indices.len() / 3).for_each(|t| add([corner(3 * t), corner(3 * t + 1), corner(3 * t + 2)])),
-                // Every other triangle of a strip is turned around.
+                // Every other triangle of a strip is reversed.
                 5 => (0..last).for_each(|t| add([corner(t), corner(t + 1 + t % 2), corner(t + 2 - t % 2)])),
                 _ => (0..last).for_each(|t| add([corner(t + 1), corner(t + 2), corner(0)])),
             }
@@ -270,7 +270,7 @@ impl Document {
             };
             vertices.positions[i] = map.transform_point3(vertices.positions[i]);
             if let Some(normal) = normals.get_mut(i) {
-                // The cofactors: the inverse transposed but for a factor, and there for flat maps too.
+                // The cofactor matrix: the inverse transpose up to a factor, but also defined for singular matrices.
                 let m = map.matrix3;
                 let cofactors = glam::DMat3::from_cols(
                     m.y_axis.cross(m.z_axis),
@@ -289,7 +289,7 @@ impl Document {
     }
 }
 
-/// Material by number of the variant.
+/// Material by index of the variant.
 pub(super) fn variants_of(primitive: &json::Primitive) -> BTreeMap<u32, u32> {
     let mut variants = BTreeMap::new();
     let mappings = primitive.extensions.get("KHR_materials_variants").and_then(|extension| extension.get("mappings"));
@@ -306,7 +306,7 @@ pub(super) fn variants_of(primitive: &json::Primitive) -> BTreeMap<u32, u32> {
 
 impl Triangles {
     fn append(&mut self, vertices: Vertices) {
-        /// Keeps a list empty, or as long as the positions.
+        /// Extends an attribute list, which stays empty or as long as the positions.
         fn join<T: Clone>(list: &mut Vec<T>, before: usize, more: Vec<T>, count: usize, filler: T) {
             if list.is_empty() && more.is_empty() {
                 return;
@@ -325,7 +325,7 @@ impl Triangles {
         self.not_finite += vertices.not_finite;
     }
 
-    /// What is used stays in its order.
+    /// Removes unused vertices; the others keep their order.
     fn leave_out_unused(&mut self) {
         let mut used = vec![false; self.positions.len()];
         self.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
@@ -354,8 +354,8 @@ impl Triangles {
         self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = numbers[*vertex as usize]);
     }
 
-    /// Gives triangles without a normal at any corner vertices of their own, with their own normal; where no vertex has
-    /// a normal, the mesh has none.
+    /// Duplicates the vertices of triangles with a missing normal and gives them the geometric normal; if all normals
+    /// are missing, the mesh gets none.
     fn split_flat_parts(&mut self) {
         if self.normals.iter().all(|&normal| normal == Vec3::ZERO) {
             self.normals.clear();

@@ -1,13 +1,13 @@
-//! Skins: vertices that follow joints.
+//! Skinning: vertices that follow joints.
 //!
-//! Source: Khronos, "glTF 2.0 Specification", §3.7.3 (skins). The node that has a skinned mesh does not place it:
-//! joints lead to the world.
+//! Source: Khronos, "glTF 2.0 Specification", §3.7.3 (skins). The transform of the node of a skinned mesh is ignored:
+//! joints transform to the world.
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 
-/// From the coordinates of a mesh to the world, for each joint of a skin.
+/// Transform from mesh coordinates to the world for each joint of a skin.
 pub(super) struct Joints(Vec<DAffine3>);
 
 impl Document {
@@ -40,9 +40,9 @@ impl Document {
 }
 
 impl Joints {
-    /// The map of a vertex: the joints' maps, mixed by its weights; `None` where it names a joint that is not there.
+    /// The transform of a vertex: the weighted mean of those of its joints; `None` if a joint does not exist.
     ///
-    /// - `influences`: joints and weights; those of no vertex need add up to 1.
+    /// - `influences`: joints and weights, which need not sum to 1.
     pub(super) fn mixed(&self, influences: impl Iterator<Item = (u32, f32)>) -> Option<DAffine3> {
         let mut mixed = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut total = 0.0;
@@ -56,7 +56,7 @@ impl Joints {
             total += weight;
         }
         if total == 0.0 {
-            // It follows nothing.
+            // No joint has an influence.
             return Some(DAffine3::IDENTITY);
         }
         Some(DAffine3 { matrix3: mixed.matrix3 * (1.0 / total), translation: mixed.translation / total })

@@ -1,7 +1,7 @@
-//! What the materials of a glTF file become in a scene, and the textures that they use.
+//! Conversion of the materials of a glTF file and their textures to those of a scene.
 //!
 //! Clear solid glass becomes `glass` or `rough_glass`, everything else `principled`. Factors become the tint of a
-//! texture; the transform of texture coordinates is written for a v that grows upwards.
+//! texture; texture transforms are converted to v pointing up.
 
 use super::document::Document;
 use super::error::Located;
@@ -16,12 +16,12 @@ use crate::scene::value::{ColorValue, Rgb, ScalarValue};
 use glam::{DVec2, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// The materials of a file, as a scene file writes them.
+/// The materials of a file, as in scene files.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Surfaces {
-    /// One a material of the file, and the default material at the end; names are used once.
+    /// One per material of the file, and the default material last; names are unique.
     pub materials: Vec<Surface>,
-    /// By name; names are used once.
+    /// By name; names are unique.
     pub textures: Vec<(String, TextureSource)>,
 }
 
@@ -30,32 +30,32 @@ pub(in crate::scene) struct Surfaces {
 pub(in crate::scene) struct Surface {
     pub name: String,
     pub part: MaterialPart,
-    /// What of it is not modelled.
+    /// Unsupported features.
     pub notes: Vec<String>,
     pub emits: bool,
-    /// It has a map of occlusion, which paths find themselves.
+    /// Whether it has an occlusion map, which path tracing does not need.
     pub has_occlusion: bool,
 }
 
 impl Surfaces {
-    /// The number of a material here; `None` is the default one.
+    /// The index of a material here; `None`: the default one.
     pub(in crate::scene) fn index(&self, material: Option<u32>) -> usize {
         let default = self.materials.len().saturating_sub(1);
         material.map_or(default, |material| (material as usize).min(default))
     }
 }
 
-/// Makes textures as they are asked for, each once.
+/// Converts textures on request, each once.
 struct Textures<'a> {
     document: &'a Document,
-    /// What paths of the scene call the model.
+    /// Path of the model in texture paths.
     file: &'a str,
     names: Names,
     list: Vec<(String, TextureSource)>,
     known: HashMap<String, String>,
 }
 
-/// What a texture is looked up for.
+/// How a texture is used.
 struct Role {
     what: &'static str,
     channel: Option<Channel>,
@@ -79,7 +79,7 @@ impl Textures<'_> {
     fn of(&mut self, used: &TextureUse, role: Role) -> Result<String, Located> {
         let (image, file) = self.document.image_file(used.image, self.file)?;
         let mut source = TextureSource::image(file);
-        /// A picture that is stretched without end has one color, and is never quite that.
+        /// Smallest scale: with 0, an image would be stretched to a single colour, and the transform would be singular.
         const LEAST: f64 = 1e-9;
         let (sin, cos) = used.rotation.sin_cos();
         let scaled = used.scale.y;
@@ -99,7 +99,7 @@ impl Textures<'_> {
             ..
         } = &mut source
         {
-            // With v upwards: the turn stays, and the origin moves to the other end of v.
+            // With v up, the rotation stays the same and the origin moves to the other end of v.
             let size = |scale: f64| if scale.abs() < LEAST { LEAST } else { scale };
             *stretch = DVec2::new(size(used.scale.x), size(used.scale.y));
             *rotate = used.rotation.to_degrees();
@@ -107,7 +107,7 @@ impl Textures<'_> {
             if used.rotation == 0.0 && used.scale == DVec2::ONE && used.offset == DVec2::ZERO {
                 (*rotate, *offset) = (0.0, DVec2::ZERO);
             }
-            // Without a turn both mean the same.
+            // Without rotation both are equivalent.
             if used.rotation == 0.0 {
                 std::mem::swap(stretch, repeat);
             }
@@ -123,7 +123,7 @@ impl Textures<'_> {
         Ok(self.add(&format!("{image} {}", role.what), source))
     }
 
-    /// A number times a channel.
+    /// A factor times a channel.
     fn scalar(
         &mut self,
         factor: f32,
@@ -141,7 +141,7 @@ impl Textures<'_> {
         }
     }
 
-    /// A colour times an sRGB picture.
+    /// A factor times an sRGB image.
     fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> Result<ColorValue, Located> {
         match texture {
             Some(used) if factor != Vec3::ZERO => {
@@ -154,7 +154,7 @@ impl Textures<'_> {
         }
     }
 
-    /// A map of directions; `None` where there is none.
+    /// A map of vectors; `None` if there is none.
     fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Result<Option<ColorValue>, Located> {
         let Some(used) = texture else { return Ok(None) };
         let (channel, encoding) = (None, Encoding::Linear);
@@ -162,7 +162,7 @@ impl Textures<'_> {
         Ok(Some(ColorValue::Texture(self.of(used, role)?)))
     }
 
-    /// Base colour, and the share of the surface that is there.
+    /// Base colour and coverage (alpha).
     fn base(&mut self, material: &GltfMaterial, vertex_colors: bool) -> Result<(ColorValue, ScalarValue), Located> {
         let [r, g, b, alpha] = material.base_color;
         let (rgb, tint) = (Vec3::new(r, g, b), Rgb(Vec3::splat(alpha)));
@@ -196,10 +196,10 @@ impl Textures<'_> {
 impl Document {
     /// All materials.
     ///
-    /// - `file`: what paths of the scene call the model.
+    /// - `file`: path of the model in texture paths.
     ///
     /// # Errors
-    /// When a material names what does not exist, or a picture may not be read.
+    /// If a material refers to something that does not exist, or an image may not be read.
     pub(in crate::scene) fn surfaces(&self, file: &str) -> Result<Surfaces, Located> {
         let colored = self.materials_with_vertex_colors();
         let mut textures =
@@ -237,7 +237,7 @@ impl Document {
         colored
     }
 
-    /// The name of a picture, and the path by which a scene names it: pictures within the model are `MODEL#NUMBER`.
+    /// Name of an image, and its path in a scene: `MODEL#INDEX` for images inside the model.
     pub(super) fn image_file(&self, image: u32, file: &str) -> Result<(String, String), Located> {
         let json = &self.root.images[image as usize];
         let named = json.name.clone().filter(|name| !name.is_empty());
@@ -246,7 +246,7 @@ impl Document {
             let found = found.map_err(|problem| (super::error::place("images", image), problem))?;
             if let Uri::File(path) = found {
                 let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-                // Paths count from the scene, which may lie elsewhere than the model.
+                // Paths are relative to the scene, which may be in another folder than the model.
                 let folder = std::path::Path::new(file).parent().unwrap_or(std::path::Path::new(""));
                 return Ok((named.or(stem).unwrap_or_default(), path_to_text(&folder.join(path))));
             }
@@ -309,7 +309,7 @@ fn surface(
     (*opacity, *opacity_cutoff) = (alpha, cutoff);
     *two_sided = material.double_sided;
     if material.unlit {
-        // It shows its colour and reflects nothing.
+        // It only emits its colour.
         *base_color = ColorValue::grey(0.0);
         *specular = ScalarValue::Number(0.0);
         (*metallic, *roughness) = (ScalarValue::Number(0.0), ScalarValue::Number(1.0));
@@ -360,7 +360,7 @@ fn surface(
     Ok(part)
 }
 
-/// A solid that only refracts and reflects has surfaces of its own, which are exact.
+/// Solids that only refract and reflect have exact materials of their own.
 fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
     let is_plain = material.base_color[..3] == [1.0; 3]
         && material.base_color_texture.is_none()
@@ -391,9 +391,9 @@ fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
     })
 }
 
-/// The coefficient that leaves `attenuationColor` after `attenuationDistance`, per metre.
+/// The absorption coefficient that leaves `attenuationColor` after `attenuationDistance`, per metre.
 fn absorption_of(material: &GltfMaterial) -> Vec3 {
-    /// What is black after some distance is nearly so.
+    /// Black has an infinite coefficient; this is nearly black.
     const LEAST: f32 = 1e-6;
     let distance = material.attenuation_distance;
     if !(distance > 0.0 && distance.is_finite()) {

@@ -1,23 +1,23 @@
-//! Where a glTF file may point: data URIs, and files in its own folder and below.
+//! Resolves the URIs in a glTF file: data URIs, and files in its own folder and below.
 
 use super::error::GltfProblem;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::{Component, Path, PathBuf};
 
-/// What a URI is.
+/// A resolved URI.
 pub(super) enum Uri {
-    /// The bytes themselves.
+    /// Embedded data.
     Data(Vec<u8>),
-    /// A file, relative to the folder of the model; absolute only where that is allowed.
+    /// A file, relative to the folder of the model; absolute only if that is allowed.
     File(PathBuf),
 }
 
-/// - `folder`: that of the model.
-/// - `outside`: whether files of this computer outside of `folder` may be read.
+/// - `folder`: folder of the model.
+/// - `outside`: whether local files outside of `folder` may be read.
 ///
 /// # Errors
-/// When it leaves the folder, names the network or is no URI.
+/// If it leaves the folder, refers to the network or is not a valid URI.
 pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, GltfProblem> {
     if let Some(data) = uri.strip_prefix("data:") {
         return data_uri(data).map(Uri::Data);
@@ -25,7 +25,7 @@ pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, Gl
     let refused = |why| Err(GltfProblem::Outside { uri: uri.to_owned(), why });
     let mut text = uri;
     if let Some((scheme, rest)) = uri.split_once(':') {
-        // A single letter is a drive, and belongs to a path.
+        // A single letter is a drive, which belongs to a path.
         if scheme.eq_ignore_ascii_case("file") {
             if !outside {
                 return refused("a file: URI");
@@ -53,7 +53,7 @@ pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, Gl
     if leaves || decoded.split(['/', '\\']).any(|part| part == "..") {
         return refused("a path out of the folder");
     }
-    // A link may lead out of the folder too.
+    // A symbolic link may leave the folder too.
     if let (Ok(real), Ok(root)) = (folder.join(&path).canonicalize(), real_folder(folder).canonicalize())
         && !real.starts_with(root)
     {
@@ -71,7 +71,7 @@ fn is_scheme(word: &str) -> bool {
         && word.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
 }
 
-/// `%20` and the like as bytes; what is not such a thing, or would not be UTF-8 or hold a zero, stays as it is.
+/// Decodes `%20` and the like; sequences that are invalid, not UTF-8 or zero stay unchanged.
 fn percent_decoded(text: &str) -> String {
     let bytes = text.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
@@ -93,7 +93,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
 }
 
-/// What follows `data:`.
+/// Decodes the text after `data:`.
 fn data_uri(data: &str) -> Result<Vec<u8>, GltfProblem> {
     let (head, body) = data.split_once(',').ok_or(GltfProblem::DataUri("there is no comma in it"))?;
     if !head.ends_with(";base64") {

@@ -1,4 +1,4 @@
-//! From numbered vertices to a mesh, for formats whose triangles name vertices by one number.
+//! From indexed vertices to a mesh, for formats with one index per vertex.
 
 use super::error::{ModelError, ModelProblem, Place};
 use super::imported::{ModelNormals, ModelOptions, has_area, with_normals};
@@ -7,23 +7,23 @@ use crate::mesh::{Mesh, Welding};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::path::Path;
 
-/// Vertices, and triangles that name them; every number is that of a vertex.
+/// Vertices and triangles that index them; all indices are in range.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Indexed {
     /// Finite, in the coordinates of the file.
     pub positions: Vec<DVec3>,
-    /// Unit length, zero where missing; empty, or one a position.
+    /// Unit vectors, zero if missing; empty, or one per position.
     pub normals: Vec<Vec3>,
-    /// Finite; empty, or one a position.
+    /// Finite; empty, or one per position.
     pub uvs: Vec<Vec2>,
-    /// Linear Rec. 709 with alpha; empty, or one a position.
+    /// Linear Rec. 709 with alpha; empty, or one per position.
     pub colors: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The mesh, and whether all of its normals are the file's.
+/// The mesh, and whether all of its normals are from the file.
 ///
-/// Vertices that no triangle uses are left out, as are triangles that use a vertex twice.
+/// Unused vertices and triangles that use a vertex twice are removed.
 pub(in crate::scene) fn assemble(
     path: &Path,
     mut model: Indexed,
@@ -49,7 +49,8 @@ pub(in crate::scene) fn assemble(
     let (mesh, from_file) = match options.normals {
         ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &model.normals, crease_angle),
         ModelNormals::OfPositions => {
-            // A vertex has one normal and one texture coordinate: seams are doubled vertices.
+            // Vertices at the same position are welded: at seams they are duplicated for their normals or texture
+            // coordinates.
             let welding = Welding::of_f64(&model.positions);
             (mesh.with_normals_of_vertices(|vertex| welding.place[vertex as usize]), false)
         }
@@ -60,7 +61,7 @@ pub(in crate::scene) fn assemble(
 }
 
 impl Indexed {
-    /// What is used stays in its order.
+    /// Removes unused vertices; the others keep their order.
     fn leave_out_unused(&mut self) {
         let mut used = vec![false; self.positions.len()];
         self.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);

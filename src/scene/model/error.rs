@@ -1,4 +1,4 @@
-//! Why a model could not be loaded: which file, which place in it, what was expected.
+//! Errors of model files: which file, which location in it, what was expected.
 
 use crate::mesh::MeshError;
 use crate::scene::gltf::error::GltfError;
@@ -23,9 +23,9 @@ pub enum ModelError {
     File {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// Location in the file.
         place: Place,
-        /// What is wrong there.
+        /// The problem there.
         #[source]
         problem: ModelProblem,
     },
@@ -37,7 +37,7 @@ impl ModelError {
     }
 }
 
-/// A place in a file. Shown, it follows the name of the file.
+/// A location in a file. Displayed, it follows the name of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
@@ -58,16 +58,16 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong with a PLY or STL file.
+/// A problem of a PLY or STL file.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelProblem {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// What only PLY files can have.
+    /// Specific to PLY files.
     #[error(transparent)]
     Ply(#[from] PlyProblem),
-    /// What only STL files can have.
+    /// Specific to STL files.
     #[error(transparent)]
     Stl(#[from] StlProblem),
     /// Every triangle has zero area.
@@ -76,7 +76,7 @@ pub enum ModelProblem {
         /// Number of its triangles.
         triangles: usize,
     },
-    /// The triangles are no mesh.
+    /// The triangles do not form a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }

@@ -1,4 +1,4 @@
-//! The formats of models: the one table that everything goes by which opens, names or offers them.
+//! The model formats: the one table for opening, naming and listing them.
 
 use std::path::Path;
 
@@ -16,10 +16,10 @@ pub enum ModelFormat {
 }
 
 impl ModelFormat {
-    /// All of them, in the order in which they are named.
+    /// All formats, in the order of listing.
     pub const ALL: [Self; 4] = [Self::Obj, Self::Ply, Self::Stl, Self::Gltf];
 
-    /// How names of such files end, in lower case and without the dot.
+    /// File extensions, in lower case and without the dot.
     pub fn file_extensions(self) -> &'static [&'static str] {
         match self {
             Self::Obj => &["obj"],
@@ -29,19 +29,19 @@ impl ModelFormat {
         }
     }
 
-    /// The format that the name of a file tells, whatever the case of its letters.
+    /// The format for the extension of a path, case-insensitive.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
         let has = |format: &Self| format.file_extensions().iter().any(|known| extension.eq_ignore_ascii_case(known));
         Self::ALL.into_iter().find(has)
     }
 
-    /// Extensions as sentences name them: `.obj, .ply, .stl, .glb, .gltf`.
+    /// List of extensions for messages: `.obj, .ply, .stl, .glb, .gltf`.
     pub fn extensions() -> String {
         Self::each(".").join(", ")
     }
 
-    /// Patterns of names, as shells write them: `*.obj *.ply *.stl *.glb *.gltf`.
+    /// List of shell patterns: `*.obj *.ply *.stl *.glb *.gltf`.
     pub fn patterns() -> String {
         Self::each("*.").join(" ")
     }

@@ -1,4 +1,4 @@
-//! What a model file becomes, whatever its format, and how to read it.
+//! The result of reading a model file of any format, and the options for reading.
 
 use crate::mesh::{Mesh, NormalWeight};
 use crate::scene::limits::Limits;
@@ -6,55 +6,54 @@ use crate::scene::obj::ImportedMaterial;
 use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 
-/// A model as its file has it.
+/// A model as in its file.
 #[derive(Clone, Debug)]
 pub struct ImportedModel {
-    /// Its `slots` index `materials`.
+    /// Its `slots` are indices of `materials`.
     pub mesh: Mesh,
-    /// Only materials that faces use. One whose name the libraries lack has its name and nothing else.
+    /// Only materials that faces use. One that the libraries lack has only its name.
     pub materials: Vec<ImportedMaterial>,
-    /// The material libraries that were found.
+    /// The material libraries that were read.
     pub libraries: Vec<PathBuf>,
-    /// Whether every corner had a usable normal in the file; otherwise they were computed.
+    /// Whether the file has a valid normal for every corner; otherwise they were computed.
     pub normals_from_file: bool,
-    /// Faces of more than three corners; they were cut into triangles.
+    /// Number of faces with more than three corners, which were triangulated.
     pub polygons: usize,
-    /// What was left out or replaced, one sentence each.
+    /// Omissions and replacements, one sentence each.
     pub warnings: Vec<String>,
-    /// The same of the materials, which matter only to those who use them.
+    /// Warnings about the materials, which matter only if they are used.
     pub material_warnings: Vec<String>,
 }
 
-/// Where shading normals come from.
+/// Source of the shading normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModelNormals {
-    /// From the file; where it has none, computed with angle weights. Computed edges stay hard where triangles
+    /// From the file; if it has none, computed with angle weights. Computed normals keep edges hard where triangles
     /// meet at more than `crease_angle` radians.
     FileOrComputed {
-        /// Largest angle between triangles across which normals are averaged, radians.
+        /// Maximum angle between triangles across which normals are averaged, radians.
         crease_angle: f32,
     },
-    /// Area-weighted at each position of the file, whatever normals it has and however texture coordinates split
-    /// its vertices.
+    /// Area-weighted at each position of the file, regardless of its normals and of seams of texture coordinates.
     OfPositions,
-    /// None: the mesh has no normals, and vertices are split only where texture coordinates differ.
+    /// No normals; vertices are split only where texture coordinates differ.
     Ignore,
 }
 
-/// How to read, and how much at most.
+/// Options and limits for reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelOptions {
-    /// Where shading normals come from.
+    /// Source of the shading normals.
     pub normals: ModelNormals,
-    /// Larger files are refused. Loading takes up to about 25 bytes of memory for each byte of the file.
+    /// Larger files are rejected. Loading takes up to about 25 bytes of memory per byte of the file.
     pub max_bytes: u64,
-    /// Larger material libraries are left out.
+    /// Larger material libraries are ignored.
     pub max_library_bytes: u64,
 }
 
 impl Default for ModelOptions {
-    /// A crease angle of 60°: the right angles of boxes stay hard, and curves come out smooth even when they are
-    /// coarse (the faces of an icosahedron meet at 42°, those of an 8-sided column at 45°).
+    /// A crease angle of 60°: the right angles of boxes stay hard, and coarse curved surfaces become smooth (the faces
+    /// of an icosahedron meet at 42°, those of an 8-sided column at 45°).
     fn default() -> Self {
         let normals = ModelNormals::FileOrComputed { crease_angle: 60_f32.to_radians() };
         let limits = Limits::of_this_process();
@@ -62,13 +61,15 @@ impl Default for ModelOptions {
     }
 }
 
-/// Differences and products of `f32` numbers are exact enough in `f64` for corners on a line to give exactly nothing.
+/// Whether a triangle has an area. Differences and products of `f32` values in `f64` are exact enough for collinear
+/// vertices to give exactly zero.
 pub(in crate::scene) fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
     let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Uses the file's normals where they have a length, computed ones elsewhere; says whether all were the file's.
+/// Uses the normals of the file where they are valid and computed ones elsewhere; also returns whether all are from the
+/// file.
 pub(in crate::scene) fn with_normals(mesh: Mesh, from_file: &[Vec3], crease_angle: f32) -> (Mesh, bool) {
     let missing = from_file.iter().filter(|n| **n == Vec3::ZERO).count();
     if from_file.is_empty() || missing == from_file.len() {
@@ -77,7 +78,7 @@ pub(in crate::scene) fn with_normals(mesh: Mesh, from_file: &[Vec3], crease_angl
     if missing == 0 {
         return (Mesh { normals: from_file.to_vec(), ..mesh }, true);
     }
-    // A crease would split vertices whose normals the file has given.
+    // A crease would split vertices that have a normal from the file.
     let mut mesh = mesh.with_smooth_normals(NormalWeight::Angle, None);
     for (normal, &given) in mesh.normals.iter_mut().zip(from_file) {
         if given != Vec3::ZERO {

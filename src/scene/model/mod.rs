@@ -1,8 +1,8 @@
-//! Models of any format: which formats there are, and one way to read them all.
+//! Models of any format: the list of formats, and one function to read them all.
 //!
-//! A reader (`scene/obj`, `scene/ply`, `scene/stl`, `scene/gltf`) gives an [`ImportedModel`] or an error that names the place in the file.
-//! What the readers share is here: polygons into triangles, normals, and the way from numbered vertices to a checked
-//! mesh. Start reading at [`load_model`].
+//! A reader (`scene/obj`, `scene/ply`, `scene/stl`, `scene/gltf`) returns an [`ImportedModel`] or an error with its
+//! location in the file. This module holds the code that the readers share: triangulation, normals, and the conversion
+//! of indexed vertices to a checked mesh. Start reading at [`load_model`].
 
 pub(in crate::scene) mod assemble;
 pub(in crate::scene) mod error;
@@ -24,7 +24,7 @@ use std::path::Path;
 /// Loads a model of this format.
 ///
 /// # Errors
-/// When the file cannot be read, or is no model with area.
+/// If the file cannot be read, or is not a model with surface area.
 pub fn load_model(path: &Path, format: ModelFormat, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
     match format {
         ModelFormat::Obj => Ok(load_obj_with(path, options)?),

@@ -1,16 +1,17 @@
-//! Polygons into triangles.
+//! Triangulation of polygons.
 
 use glam::{DVec2, DVec3};
 
-/// Above this many corners a polygon is halved again and again: clipping ears takes quadratic time, and a fan would have
-/// needles without number at one vertex, which is hard on whatever comes after.
+/// Polygons with more corners are halved recursively: ear clipping takes quadratic time, and a fan would have very many
+/// thin triangles at one vertex, which is bad for all later algorithms.
 const MAX_EARS: usize = 1024;
 
-/// Cuts a polygon with at least 3 corners into `corners.len() - 2` triangles of indices into it, same orientation.
+/// Cuts a polygon with at least 3 corners into `corners.len() - 2` triangles of the same orientation; pushes indices
+/// into `corners`.
 ///
-/// Convex polygons become fans. Others lose one ear after another (Meisters 1975) in the plane of their Newell
-/// normal; what crosses itself or has no area falls back to the fan, so nothing fails. With more than [`MAX_EARS`]
-/// corners the polygon is taken for convex: a triangle on its two halves, and so on with each of them.
+/// Convex polygons become fans. Others are cut by ear clipping (Meisters 1975) in the plane of their Newell normal;
+/// self-intersecting and degenerate ones fall back to the fan, so that nothing fails. With more than [`MAX_EARS`]
+/// corners the polygon is assumed to be convex: one triangle between its two halves, then recursively in each half.
 pub(in crate::scene) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
     let count = corners.len();
     let fan = |from: &[usize], out: &mut Vec<[usize; 3]>| {
@@ -23,13 +24,13 @@ pub(in crate::scene) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usiz
     if count > MAX_EARS {
         return halve(0, count - 1, triangles);
     }
-    // Corners relative to the first one: far from the origin the products below would lose their digits.
+    // Relative to the first corner: far from the origin the products below would lose precision.
     let origin = corners[0];
     let normal: DVec3 = (0..count).map(|i| (corners[i] - origin).cross(corners[(i + 1) % count] - origin)).sum();
     let Some((x, y)) = normal.try_normalize().map(DVec3::any_orthonormal_pair) else {
         return fan(&all, triangles);
     };
-    // `any_orthonormal_pair` is right-handed with the normal: areas below are positive.
+    // `any_orthonormal_pair` is right-handed with the normal, so that areas are positive.
     let flat: Vec<DVec2> = corners.iter().map(|p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))).collect();
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);
     if (0..count).all(|i| turn(i, (i + 1) % count, (i + 2) % count) >= 0.0) {
@@ -54,7 +55,8 @@ pub(in crate::scene) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usiz
     fan(&ring, triangles);
 }
 
-/// Cuts the polygon of the corners `first..=last`: no corner gets more than two triangles a halving.
+/// Triangulates the polygon of the corners `first..=last`: each corner gets at most two triangles per level of
+/// recursion.
 fn halve(first: usize, last: usize, triangles: &mut Vec<[usize; 3]>) {
     if last - first >= 2 {
         let middle = first.midpoint(last);
@@ -75,7 +77,7 @@ mod tests {
             .iter()
             .map(|t| {
                 let [a, b, c] = t.map(|i| corners[i]);
-                // Each must face up: a fan over a concave corner has one that faces down.
+                // All triangles must face up: a fan at a concave corner has one that faces down.
                 assert!((b - a).cross(c - a).z >= -1e-12, "{t:?}");
                 0.5 * (b - a).cross(c - a).length()
             })
@@ -130,7 +132,7 @@ mod tests {
         let mut valence = vec![0; count];
         triangles.iter().flatten().for_each(|&i| valence[i] += 1);
         assert!(valence.iter().all(|n| (1..=40).contains(n)), "{:?}", valence.iter().max());
-        // Each side of the polygon lies at one triangle, and all other edges at two that run along them both ways.
+        // Each side of the polygon belongs to one triangle, and all other edges to two, in opposite directions.
         let mut sides = std::collections::HashMap::new();
         for [a, b, c] in triangles {
             for (from, to) in [(a, b), (b, c), (c, a)] {

@@ -1,6 +1,6 @@
-//! What is told about a model that could be read all the same.
+//! Warnings about a model that was read successfully.
 
-/// Sentences for the user, no more than anyone would read: a hostile file can cause a million.
+/// Sentences for the user, limited in number: a hostile file can cause a million.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Warnings {
     list: Vec<String>,

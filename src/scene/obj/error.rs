@@ -10,13 +10,13 @@ pub enum ObjError {
     Read {
         /// The OBJ file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: ReadError,
     },
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// No line describes a face.
+    /// The file has no faces.
     #[error("{}: has no faces (lines starting with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces {
         /// The OBJ file.
@@ -38,31 +38,31 @@ pub enum ObjError {
     Line {
         /// The OBJ file.
         path: PathBuf,
-        /// Number of the line, counted from 1.
+        /// The line, counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The problem in it.
         problem: LineProblem,
     },
-    /// The faces use more materials than 16-bit slots can number.
+    /// The faces use more materials than 16-bit slots allow.
     #[error("{}: uses more than 65,536 materials", path.display())]
     TooManyMaterials {
         /// The OBJ file.
         path: PathBuf,
     },
-    /// The triangles are no mesh.
+    /// The triangles do not form a valid mesh.
     #[error("{}: {source}", path.display())]
     Mesh {
         /// The OBJ file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: MeshError,
     },
 }
 
-/// What is wrong with one line.
+/// The problem in a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineProblem {
-    /// A corner of a face has none of the four forms.
+    /// A face corner has invalid syntax.
     #[error("`{text}` is not a face corner; expected v, v/vt, v//vn or v/vt/vn with whole numbers")]
     FaceCorner {
         /// The corner, as written.
@@ -74,34 +74,34 @@ pub enum LineProblem {
         /// Number of its corners.
         corners: usize,
     },
-    /// A face refers to what the file does not have.
+    /// An index of a face is out of range.
     #[error("the face uses {what} {index}, but the file has {count}")]
     OutOfRange {
-        /// What the index is of, such as a vertex.
+        /// What it is an index of, such as a vertex.
         what: &'static str,
         /// The index, as written.
         index: i64,
-        /// How many of them the file has.
+        /// How many the file has.
         count: usize,
     },
     /// A face has an index of 0.
     #[error("the face uses {what} 0, but indices start at 1 (or at -1, counting backwards)")]
     IndexZero {
-        /// What the index is of, such as a vertex.
+        /// What it is an index of, such as a vertex.
         what: &'static str,
     },
     /// A line has too few numbers.
     #[error("expected {expected} numbers after `{keyword}`")]
     Numbers {
-        /// The word that the line begins with.
+        /// The first word of the line.
         keyword: String,
-        /// How many numbers must follow.
+        /// The required number.
         expected: usize,
     },
-    /// A number is no number, or NaN or infinite.
+    /// A word is not a number, or is NaN or infinite.
     #[error("`{text}` is not a finite number")]
     NotFinite {
-        /// The number, as written.
+        /// The word, as written.
         text: String,
     },
 }

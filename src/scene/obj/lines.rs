@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-/// Logical lines with the number (from 1) of their first physical line: `\` at an end joins the next line on, and
-/// all three kinds of line ends are known.
+/// Logical lines with the number (from 1) of their first physical line: a `\` at the end continues a line, and all
+/// three kinds of line endings are supported.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
     let mut left = bytes;
     let mut number = 0;
@@ -43,7 +43,7 @@ pub(super) fn first_word(line: &[u8]) -> &[u8] {
     words(line).next().unwrap_or_default()
 }
 
-/// What follows the first word, without the white space around it.
+/// The text after the first word, trimmed.
 pub(super) fn rest(line: &[u8]) -> String {
     text_of(rest_bytes(line)).into_owned()
 }
@@ -58,13 +58,13 @@ pub(super) fn text_of(bytes: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(bytes)
 }
 
-/// Cuts a text into about `n` pieces, each of whole logical lines.
+/// Cuts a text into about `n` pieces of whole logical lines.
 pub(super) fn pieces(bytes: &[u8], n: usize) -> Vec<&[u8]> {
     let mut pieces = Vec::with_capacity(n);
     let mut left = bytes;
     for k in (1..=n).rev() {
         let mut end = left.len() / k;
-        // Behind a line end that nothing joins to what follows; files of the oldest kind have none, and stay in one piece.
+        // After a line ending without a continuation; old files with `\r` alone stay in one piece.
         end = loop {
             match left[end..].iter().position(|&byte| byte == b'\n') {
                 None => break left.len(),
@@ -86,11 +86,11 @@ pub(super) fn pieces(bytes: &[u8], n: usize) -> Vec<&[u8]> {
     pieces
 }
 
-/// How many line ends of any kind a text has.
+/// Number of line endings of any kind.
 pub(super) fn line_ends(bytes: &[u8]) -> usize {
     let (mut ends, mut after_return) = (0, false);
     for &byte in bytes {
-        // `\r\n` is one.
+        // `\r\n` counts once.
         ends += usize::from(byte == b'\r' || (byte == b'\n' && !after_return));
         after_return = byte == b'\r';
     }

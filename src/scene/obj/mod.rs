@@ -1,9 +1,8 @@
-//! Wavefront OBJ and MTL: any file in, one mesh with material slots out, or an error that names the line.
+//! Wavefront OBJ and MTL: reads a file as one mesh with material slots, or gives an error with the line.
 //!
-//! The file is parsed in `f64` (`parse`; materials by tobj), and assembled: polygons are cut into triangles,
-//! corners that share position, texture coordinate and normal share a vertex (across groups too), and normals that
-//! the file lacks are computed. Start reading at [`load_obj`]; [`save_obj`] is
-//! the way back.
+//! The file is parsed in `f64` (`parse`; materials by tobj). Then polygons are triangulated, corners with the same
+//! position, texture coordinate and normal share a vertex (across groups too), and missing normals are computed. Start
+//! reading at [`load_obj`]; [`save_obj`] is the inverse.
 
 mod error;
 mod lines;
@@ -26,24 +25,24 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// More `mtllib` lines than this are left out.
+/// Further `mtllib` lines are ignored.
 const MAX_LIBRARIES: usize = 256;
 
-/// [`load_obj_with`] and the default options.
+/// [`load_obj_with`] with the default options.
 ///
 /// # Errors
-/// As [`load_obj_with`].
+/// Like [`load_obj_with`].
 pub fn load_obj(path: &Path) -> Result<ImportedModel, ObjError> {
     load_obj_with(path, &ModelOptions::default())
 }
 
-/// Loads a model and the material libraries it names.
+/// Loads a model and its material libraries.
 ///
-/// The fourth number of a vertex and vertex colours are ignored, as are lines and points. Normals of length zero
-/// count as missing. A missing library or material is a warning.
+/// The fourth coordinate of vertices, vertex colours, lines and points are ignored. Normals of length zero count as
+/// missing. A missing library or material gives a warning.
 ///
 /// # Errors
-/// When the file cannot be read, a line of it has the wrong form, or it holds no mesh.
+/// If the file cannot be read, a line is invalid, or it has no mesh.
 pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ObjError> {
     let bytes = read(path, options.max_bytes)?;
     let mut parsed =
@@ -75,7 +74,7 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     if !mesh.triangles.iter().any(|triangle| has_area(&mesh, *triangle)) {
         return Err(ObjError::NoArea { path: path.into(), triangles: mesh.triangles.len() });
     }
-    // Slot 0 is what an empty list means.
+    // An empty list means slot 0 everywhere.
     mesh.slots = if parsed.materials.len() > 1 { slots } else { Vec::new() };
     mesh.uvs = corners.uvs;
     let (mesh, normals_from_file) = match options.normals {
@@ -98,20 +97,20 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
         .map_err(|source| ObjError::Read { path: path.into(), source })
 }
 
-/// One vertex for each different (position, texture coordinate, normal) that corners use.
+/// One vertex for each distinct (position, texture coordinate, normal) of the corners.
 struct MeshCorners {
     /// The vertex of each corner, in file order.
     vertices: Vec<u32>,
     positions: Vec<DVec3>,
-    /// Which position of the file each vertex has; empty where they are the same.
+    /// Index of the position in the file for each vertex; empty if they are the same.
     origins: Vec<u32>,
     uvs: Vec<Vec2>,
-    /// As the file has them: any length, zero where missing.
+    /// As in the file: any length, zero if missing.
     normals: Vec<Vec3>,
 }
 
 impl MeshCorners {
-    /// What no corner uses is left out; the rest is in order of first use.
+    /// Without unused values, in the order of first use.
     fn of(parsed: &ParsedObj) -> Self {
         let (has_uvs, has_normals) = (!parsed.uvs.is_empty(), !parsed.normals.is_empty());
         let mut corners = Self {
@@ -121,7 +120,7 @@ impl MeshCorners {
             uvs: Vec::new(),
             normals: Vec::new(),
         };
-        // By the number in the file: which of the positions that are used it is.
+        // By index in the file: its index among the used positions.
         let mut used = vec![u32::MAX; parsed.positions.len()];
         let mut n_used = 0;
         let mut found: HashMap<Corner, u32> = HashMap::new();
@@ -158,7 +157,8 @@ impl MeshCorners {
         corners
     }
 
-    /// Triangles, their slots, and how many were left out because two corners are one vertex of the file.
+    /// Triangles, their slots, and the number of triangles that were removed because two corners have the same position
+    /// index.
     fn triangles(&self, parsed: &ParsedObj) -> (Vec<[u32; 3]>, Vec<u16>, usize) {
         let mut triangles = Vec::with_capacity(self.vertices.len() / 3);
         let mut slots = Vec::with_capacity(self.vertices.len() / 3);
@@ -199,7 +199,7 @@ fn find_materials(
     let mut known: HashMap<String, ImportedMaterial> = HashMap::new();
     let mut seen = Vec::new();
     for line in parsed.libraries.iter().take(MAX_LIBRARIES) {
-        // A name may hold spaces, and a line may hold several names.
+        // A name may contain spaces, and a line may contain several names.
         let whole = line.replace('\\', "/");
         let names: Vec<&str> =
             if folder.join(text_to_path(&whole)).exists() { vec![&whole] } else { whole.split_whitespace().collect() };

@@ -1,4 +1,4 @@
-//! Materials of an OBJ file (MTL), as numbers and paths.
+//! Materials of an OBJ file (MTL) as numbers and paths.
 
 use crate::scene::model::warnings::Warnings;
 use crate::scene::{FileKind, InputFile};
@@ -6,14 +6,14 @@ use glam::Vec3;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// A material as its file states it; what is not stated is `None`. What it means is decided elsewhere.
+/// A material as in its file; missing values are `None`. It is interpreted elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportedMaterial {
     /// Empty for faces without `usemtl`.
     pub name: String,
     /// `Kd`, diffuse colour; treated as linear.
     pub diffuse: Option<Vec3>,
-    /// Whether the colours of the vertices take the place of the diffuse colour, which is their mean.
+    /// Whether vertex colours replace the diffuse colour, which is their mean.
     pub vertex_colors: bool,
     /// `Ks`, specular colour.
     pub specular: Option<Vec3>,
@@ -27,13 +27,13 @@ pub struct ImportedMaterial {
     pub opacity: Option<f32>,
     /// `illum`, the illumination model: 3 and 5 mirror, 4, 6, 7 and 9 glass.
     pub illumination_model: Option<u8>,
-    /// `map_Kd`, resolved against the folder of the MTL file.
+    /// `map_Kd`, relative to the folder of the MTL file.
     pub diffuse_texture: Option<PathBuf>,
-    /// `map_Ke`, resolved likewise.
+    /// `map_Ke`, likewise.
     pub emission_texture: Option<PathBuf>,
-    /// `map_d`, resolved likewise.
+    /// `map_d`, likewise.
     pub opacity_texture: Option<PathBuf>,
-    /// What only materials of the PBR extension state; `None` for all others.
+    /// Parameters of the PBR extension; `None` if none of them is present.
     pub pbr: Option<PbrMaterial>,
 }
 
@@ -46,7 +46,7 @@ pub struct PbrMaterial {
     pub metallic: Option<f32>,
     /// `Ps`, 0..1.
     pub sheen: Option<f32>,
-    /// `Pc`, strength of the coat, 0 or more: some programs write four times the share.
+    /// `Pc`, strength of the coat, at least 0: some programs write four times the reflectance.
     pub clearcoat: Option<f32>,
     /// `Pcr`, 0..1.
     pub clearcoat_roughness: Option<f32>,
@@ -54,17 +54,17 @@ pub struct PbrMaterial {
     pub anisotropy: Option<f32>,
     /// `anisor`, turns.
     pub anisotropy_rotation: Option<f32>,
-    /// `map_Pr`, resolved against the folder of the MTL file.
+    /// `map_Pr`, relative to the folder of the MTL file.
     pub roughness_texture: Option<PathBuf>,
-    /// `map_Pm`, resolved likewise.
+    /// `map_Pm`, likewise.
     pub metallic_texture: Option<PathBuf>,
-    /// `norm`, or `map_Bump` in its place, resolved likewise.
+    /// `norm`, else `map_Bump`, likewise.
     pub normal_texture: Option<PathBuf>,
-    /// `-bm` of that map.
+    /// The option `-bm` of that map.
     pub normal_scale: Option<f32>,
 }
 
-/// Reads one library; what cannot be used becomes a warning, and every other line still counts.
+/// Reads a library; invalid lines give warnings, and all other lines are used.
 pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings) -> Vec<ImportedMaterial> {
     let mut warn = |problem: String| warnings.push(format!("{}: {problem}", path.display()));
     let bytes = match InputFile::open_within(path, FileKind::Library, max_bytes).and_then(InputFile::bytes) {
@@ -87,12 +87,12 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
     }
 }
 
-/// Leaves only lines that tobj reads without an error, which would cost the whole file.
+/// Keeps only lines that tobj can read, since an error would lose the whole file.
 fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
     let mut out = String::with_capacity(text.len());
     let mut named = false;
     for (number, line) in text.lines().enumerate() {
-        // Marks and spaces in any order: the keyword must come first.
+        // Byte order marks and spaces in any order: the keyword must come first.
         let line = line.trim_end().trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
         let Some(keyword) = line.split_whitespace().next() else { continue };
         let value = line[keyword.len()..].trim();
@@ -101,13 +101,13 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
         };
         let rewritten = match keyword {
             "newmtl" => {
-                // A name that is not there still separates its lines from the material above.
+                // A missing name still begins a new material.
                 named = true;
                 Some(if value.is_empty() { "newmtl (unnamed)".into() } else { line.to_owned() })
             }
             "Ka" | "Kd" | "Ks" | "Ke" => match numbers()[..] {
                 [r, g, b, ..] => Some(format!("{keyword} {r} {g} {b}")),
-                // The format says that one number stands for all three.
+                // According to the format, a single number stands for all three.
                 [grey] if value.split_whitespace().count() == 1 => Some(format!("{keyword} {grey} {grey} {grey}")),
                 _ => None,
             },
@@ -137,7 +137,7 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
 
 fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(String)) -> ImportedMaterial {
     let name = &material.name;
-    // Whichever of the two number types some other crate asks tobj for.
+    // Either of the two number types of tobj, which a feature of another crate may select.
     let single = |number| f64::from(number) as f32;
     let mut color = |keyword: &str, value: Option<[_; 3]>| {
         let value = Vec3::from_array(value?.map(single));
@@ -159,7 +159,7 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
     };
     let stated = |keyword: &str| material.unknown_param.get(keyword).map(String::as_str);
     let path = |keyword: &str| {
-        // tobj knows some maps by itself.
+        // tobj parses some maps itself.
         let known = match keyword {
             "map_d" => material.dissolve_texture.as_deref(),
             "map_Bump" | "norm" => material.normal_texture.as_deref().filter(|_| keyword == "map_Bump"),
@@ -182,7 +182,7 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
         normal_texture: path("norm"),
         normal_scale: None,
     };
-    // Bump maps are heights, but programs that write this extension write normals there.
+    // Bump maps are height maps, but programs that write this extension store normal maps in them.
     let pbr = (pbr != PbrMaterial::default()).then(|| PbrMaterial {
         normal_scale: stated("map_Bump").or(material.normal_texture.as_deref()).and_then(bump_scale),
         normal_texture: pbr.normal_texture.clone().or_else(|| path("map_Bump")),
@@ -208,15 +208,16 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
     }
 }
 
-/// What stands after `-bm` in the options of a map.
+/// The value of the option `-bm` of a map.
 fn bump_scale(value: &str) -> Option<f32> {
     let mut words = value.split_whitespace().skip_while(|word| *word != "-bm").skip(1);
     words.next()?.parse().ok().filter(|scale: &f32| scale.is_finite())
 }
 
-/// The file name after the options of a `map_` line; `\` in it counts as `/`.
+/// The file name after the options of a `map_` line; `\` counts as `/`.
 ///
-/// A path of another machine (absolute, and not there) is looked for beside the MTL file.
+/// A path from another computer (with a drive, or absolute and missing) is replaced by the file of that name in the
+/// folder of the MTL file.
 fn texture_path(value: &str, folder: &Path) -> Option<PathBuf> {
     let mut left = value.trim();
     while left.starts_with('-') {
@@ -226,7 +227,7 @@ fn texture_path(value: &str, folder: &Path) -> Option<PathBuf> {
             "-o" | "-s" | "-t" => (1, 3),
             "-mm" => (2, 2),
             "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-imfchan" | "-texres" | "-type" => (1, 1),
-            // Not an option: a file whose name starts with a dash.
+            // Not an option: a file name that starts with a dash.
             _ => break,
         };
         left = left[option.len()..].trim_start();

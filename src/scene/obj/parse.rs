@@ -1,4 +1,4 @@
-//! The lines of an OBJ file as numbers, in `f64`, each checked where its line is still known.
+//! Parses the lines of an OBJ file, in `f64`; values are checked while the line number is known.
 
 use super::error::LineProblem;
 use super::lines::{first_word, line_ends, lines, pieces, rest, rest_bytes, text_of, words};
@@ -7,46 +7,46 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// What a file says.
+/// The contents of a file.
 #[derive(Debug, Default)]
 pub(super) struct ParsedObj {
     pub positions: Vec<DVec3>,
     pub uvs: Vec<DVec2>,
     pub normals: Vec<DVec3>,
-    /// Of all faces, one after the other.
+    /// Of all faces in order.
     pub corners: Vec<Corner>,
-    /// How many corners each face has.
+    /// Number of corners of each face.
     pub arities: Vec<u32>,
-    /// The number in `materials` of each face.
+    /// Index in `materials` of each face.
     pub face_materials: Vec<u32>,
-    /// Names after `usemtl`, in order of first use by a face; empty for faces before any of them.
+    /// Names after `usemtl`, in order of first use by a face; the empty name for faces before the first one.
     pub materials: Vec<String>,
-    /// What stood after each `mtllib`.
+    /// The text after each `mtllib`.
     pub libraries: Vec<String>,
-    /// Lines and points that were left out.
+    /// Number of lines and points, which are ignored.
     pub lines_and_points: usize,
 }
 
-/// Position, texture coordinate and normal, from 1; 0 for what the corner does not have.
+/// Indices of position, texture coordinate and normal, from 1; 0 if missing.
 pub(super) type Corner = [u32; 3];
 
-/// A problem and the line (from 1) that has it.
+/// A problem and its line, from 1.
 pub(super) type Located = (usize, LineProblem);
 
-/// Reads all lines. Those of an unknown kind are passed over, and so are numbers beyond those that count.
+/// Parses all lines. Unknown lines and excess numbers are ignored.
 ///
-/// Pieces of a long file are read side by side; what comes of them is the same as of one piece.
+/// Pieces of a long file are parsed in parallel; the result is the same as for one piece.
 pub(super) fn parse(bytes: &[u8]) -> Result<ParsedObj, Located> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     parse_in(bytes, (bytes.len() / LEAST_PIECE).clamp(1, 8 * rayon::current_num_threads()))
 }
 
-/// Bytes; less is not worth a thread.
+/// Minimum bytes per piece.
 const LEAST_PIECE: usize = 1 << 18;
 
 fn parse_in(bytes: &[u8], n_pieces: usize) -> Result<ParsedObj, Located> {
     let pieces = pieces(bytes, n_pieces);
-    // What stands before each piece: faces may count back from it.
+    // The counts before each piece, since faces may use indices relative to them.
     let mut starts = vec![Start::default()];
     if pieces.len() > 1 {
         let sizes: Vec<Start> = pieces.par_iter().map(|piece| Start::of(piece)).collect();
@@ -66,7 +66,7 @@ fn parse_in(bytes: &[u8], n_pieces: usize) -> Result<ParsedObj, Located> {
         }
     }
     let parsed = joined(read);
-    // A positive index may point forwards, so only now is it known whether it points at anything.
+    // A positive index may refer to a later line, so it can only be checked at the end.
     let counts = parsed.counts();
     for (kind, (index, number)) in furthest.into_iter().enumerate() {
         if index > counts[kind] as i64 {
@@ -76,17 +76,17 @@ fn parse_in(bytes: &[u8], n_pieces: usize) -> Result<ParsedObj, Located> {
     Ok(parsed)
 }
 
-/// What a file has before some place.
+/// Counts before a position in the file.
 #[derive(Clone, Copy, Default)]
 struct Start {
-    /// Line ends.
+    /// Number of line endings.
     lines: usize,
-    /// Positions, texture coordinates, normals.
+    /// Number of positions, texture coordinates and normals.
     counts: [usize; 3],
 }
 
 impl Start {
-    /// What a piece has, if all of it can be read.
+    /// The counts of a piece, assuming that it is valid.
     fn of(piece: &[u8]) -> Self {
         let mut start = Self { lines: line_ends(piece), ..Self::default() };
         for (_, line) in lines(piece) {
@@ -106,12 +106,12 @@ impl Start {
     }
 }
 
-/// What one piece of a file says.
+/// The contents of one piece of a file.
 #[derive(Default)]
 struct Piece {
     parsed: ParsedObj,
     before: [usize; 3],
-    /// Where `usemtl` stands: behind how many faces, and the name.
+    /// Each `usemtl`: the number of faces before it, and the name.
     materials: Vec<(usize, String)>,
     /// The largest index of each kind, and its line.
     furthest: [(i64, usize); 3],
@@ -151,7 +151,7 @@ impl Piece {
     }
 }
 
-/// One after the other.
+/// Concatenates the pieces.
 fn joined(pieces: Vec<Piece>) -> ParsedObj {
     let mut all = ParsedObj::default();
     let total = |len: fn(&ParsedObj) -> usize| pieces.iter().map(|piece| len(&piece.parsed)).sum::<usize>();
@@ -161,7 +161,7 @@ fn joined(pieces: Vec<Piece>) -> ParsedObj {
     all.corners.reserve_exact(total(|p| p.corners.len()));
     all.arities.reserve_exact(total(|p| p.arities.len()));
     all.face_materials.reserve_exact(total(|p| p.arities.len()));
-    // The name that faces now belong to, and its number once a face has used it.
+    // The current material name, and its index once a face has used it.
     let (mut name, mut material) = (String::new(), None);
     let mut known: HashMap<String, u32> = HashMap::new();
     for Piece { parsed, materials, .. } in pieces {
@@ -205,12 +205,12 @@ impl ParsedObj {
 
     /// Adds a face; returns the largest index of each kind.
     ///
-    /// - `counts`: what the file has so far.
+    /// - `counts`: counts up to this line.
     fn push_face(&mut self, line: &[u8], counts: [usize; 3]) -> Result<[i64; 3], LineProblem> {
         let (mut largest, mut n_corners) = ([0; 3], 0);
         for word in words(line).skip(1).take_while(|word| word[0] != b'#') {
             let indices = parse_corner(word, counts)?;
-            // What is too large for a corner is too large for the file, which its furthest index tells.
+            // An index that overflows `u32` is out of range, which the check of the largest index finds.
             self.corners.push(indices.map(|index| u32::try_from(index).unwrap_or(u32::MAX)));
             for (largest, index) in largest.iter_mut().zip(indices) {
                 *largest = index.max(*largest);
@@ -222,9 +222,9 @@ impl ParsedObj {
     }
 }
 
-/// Indices from 1; 0 for what the corner does not have.
+/// Indices from 1; 0 if missing.
 ///
-/// - `counts`: what the file has so far.
+/// - `counts`: counts up to this line.
 fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<[i64; 3], LineProblem> {
     let malformed = || LineProblem::FaceCorner { text: text_of(word).into_owned() };
     let mut indices = [0; 3];
@@ -253,7 +253,7 @@ fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<[i64; 3], LineProblem
     Ok(indices)
 }
 
-/// Up to 15 digits, so that sums never overflow; nothing longer can be an index.
+/// Up to 15 digits, so that sums cannot overflow; longer numbers are never valid.
 fn parse_index(part: &[u8]) -> Option<i64> {
     let (sign, digits) = match part {
         [b'-', digits @ ..] => (-1, digits),
@@ -269,7 +269,7 @@ fn parse_index(part: &[u8]) -> Option<i64> {
         .map(|value| sign * value)
 }
 
-/// The first `N` numbers of a line; what follows them does not count.
+/// The first `N` numbers of a line; the rest is ignored.
 fn numbers<const N: usize>(line: &[u8]) -> Result<[f64; N], LineProblem> {
     let mut found = [0.0; N];
     let mut words = words(line).skip(1).take_while(|word| word[0] != b'#');
@@ -280,7 +280,7 @@ fn numbers<const N: usize>(line: &[u8]) -> Result<[f64; N], LineProblem> {
     Ok(found)
 }
 
-/// A missing second number is 0.
+/// A missing second coordinate is 0.
 fn texture_coordinate(line: &[u8]) -> Result<DVec2, LineProblem> {
     let n_words = words(line).skip(1).take_while(|word| word[0] != b'#').count();
     if n_words == 1 { Ok(DVec2::new(numbers::<1>(line)?[0], 0.0)) } else { Ok(DVec2::from_array(numbers(line)?)) }
@@ -352,7 +352,7 @@ mod tests {
         assert_eq!(parsed.lines_and_points, 1);
     }
 
-    /// Whatever a file says, pieces of it say the same, and the first problem is that of the whole.
+    /// For any file, the result and the first error do not depend on the division into pieces.
     #[test]
     fn pieces_say_what_the_whole_says() {
         let mut text = String::from("mtllib a.mtl\n");

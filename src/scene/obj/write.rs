@@ -1,4 +1,4 @@
-//! Meshes back into OBJ files.
+//! Writing of meshes as OBJ files.
 
 use super::ObjError;
 use crate::mesh::Mesh;
@@ -9,24 +9,23 @@ use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// What stands around the mesh in its file.
+/// Additional contents of the file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObjExtras<'a> {
-    /// Name of each material slot; where one is missing or empty, nothing is written.
+    /// Name of each material slot; missing and empty names are not written.
     pub materials: &'a [String],
-    /// Material libraries, with paths that lead there from here.
+    /// Paths of material libraries, relative to the working directory.
     pub libraries: &'a [PathBuf],
-    /// A line of comment for the top.
+    /// A comment for the first line.
     pub comment: &'a str,
 }
 
-/// Writes a mesh in the coordinates of the file it came from: every number reads back as the one written.
+/// Writes a mesh in the coordinates of its original file; all numbers read back exactly.
 ///
-/// Appears whole or not at all: it is written beside `path` under another name first, and a file that was there
-/// stays until the new one is complete.
+/// Writes atomically: under a temporary name first, so that an existing file stays until the new one is complete.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -34,17 +33,17 @@ pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjE
     Ok(file.finish()?)
 }
 
-/// What has become of a mesh under a name.
+/// Result of [`save_new_obj`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene) enum NewObj {
     Written,
-    /// The file that is there is this mesh to the last byte.
+    /// The existing file is exactly this mesh.
     Same,
-    /// The name is another file's.
+    /// Another file has this name.
     Taken,
 }
 
-/// [`save_obj`] that replaces no file.
+/// Like [`save_obj`], but replaces no existing file.
 pub(in crate::scene) fn save_new_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<NewObj, ObjError> {
     if !path.exists() {
         return save_obj(path, mesh, extras).map(|()| NewObj::Written);
@@ -54,7 +53,7 @@ pub(in crate::scene) fn save_new_obj(path: &Path, mesh: &Mesh, extras: &ObjExtra
     write(&mut bytes, mesh, extras, folder).map_err(|error| unwritable(path, error))?;
     let old = InputFile::open_within(path, FileKind::Model, u64::MAX).map_err(std::io::Error::other).and_then(|file| {
         let mut old = Vec::new();
-        // A byte more tells a longer file.
+        // One more byte detects a longer file.
         file.take(bytes.len() as u64 + 1).read_to_end(&mut old).map(|_| old)
     });
     Ok(if old.is_ok_and(|old| old == bytes) { NewObj::Same } else { NewObj::Taken })
@@ -65,15 +64,15 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
         writeln!(out, "# {line}")?;
     }
     for library in extras.libraries {
-        // A path from here would be wrong from the file's own folder.
+        // A relative path would be wrong from the folder of the file.
         let beside = library.parent().is_some_and(|parent| same_folder(parent, folder));
         match library.file_name() {
             Some(name) if beside => mtllib(out, name)?,
             _ => mtllib(out, std::path::absolute(library)?.as_os_str())?,
         }
     }
-    // Vertices that differ in texture coordinate or normal alone share a place, so that a closed surface is closed for
-    // whoever goes by the numbers of places.
+    // Vertices that differ only in texture coordinate or normal share a position, so that a closed surface stays closed
+    // in terms of position indices.
     let places = Distinct::of(&mesh.positions);
     for place in &places.values {
         let [x, y, z] = (place.as_dvec3() + mesh.center).to_array();
@@ -112,14 +111,14 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
     Ok(())
 }
 
-/// The bytes of the name, whatever letters they are.
+/// Writes the bytes of the name, whatever their encoding.
 fn mtllib(out: &mut impl Write, name: &OsStr) -> std::io::Result<()> {
     out.write_all(b"mtllib ")?;
     out.write_all(name.as_encoded_bytes())?;
     writeln!(out)
 }
 
-/// Values in the order in which they come first, and for each element the number of its own, from 1.
+/// Distinct values in the order of first occurrence, and the index of each element's value, from 1.
 struct Distinct<V> {
     values: Vec<V>,
     numbers: Vec<u32>,

@@ -1,26 +1,26 @@
-//! What can be wrong with a PLY file.
+//! Problems of PLY files.
 
-/// What is wrong with a PLY file.
+/// A problem of a PLY file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlyProblem {
-    /// The first line is another.
+    /// The first line is not `ply`.
     #[error("is not a PLY file: its first line is not `ply`")]
     NotPly,
-    /// The header does not end, or not soon enough.
+    /// The header does not end within the limit.
     #[error("the header has no line `end_header` within {limit} bytes: the file is truncated or not a PLY file")]
     EndlessHeader {
-        /// Bytes that a header may have.
+        /// Maximum length of a header, bytes.
         limit: usize,
     },
-    /// No line, or a late one, says how numbers are stored.
+    /// The format line is missing, late or invalid.
     #[error("expected `format ascii 1.0`, `format binary_little_endian 1.0` or `format binary_big_endian 1.0`")]
     Format,
-    /// A line of the header is none that is known.
+    /// A line of the header is invalid.
     #[error("`{text}` is not a line of a PLY header; expected {expected}")]
     HeaderLine {
         /// The line.
         text: String,
-        /// What it should be.
+        /// What was expected.
         expected: &'static str,
     },
     /// A property has a type that does not exist.
@@ -35,25 +35,25 @@ pub enum PlyProblem {
         /// Its name.
         name: String,
     },
-    /// There is nothing that a mesh is made of.
+    /// The file has no faces.
     #[error("has no faces: expected an element `face` or `tristrips` (point clouds are not supported)")]
     NoFaces,
-    /// Vertices have no place.
+    /// The vertices have no positions.
     #[error("element `vertex` has no properties x, y and z")]
     NoPositions,
-    /// Faces have no corners.
+    /// The faces have no vertex indices.
     #[error("element `{element}` has no list of whole numbers `vertex_indices` or `vertex_index`")]
     NoIndices {
         /// Its name.
         element: &'static str,
     },
-    /// There are more vertices than 32 bits can number.
+    /// There are more vertices than 32-bit indices allow.
     #[error("the header declares {count} vertices, more than 32-bit indices can name")]
     TooManyVertices {
         /// How many the header declares.
         count: u64,
     },
-    /// The file cannot hold what the header declares.
+    /// The file is too short for the number of elements in its header.
     #[error(
         "the header declares {declared} of element `{element}`, but the file has room for {room} at most: it is truncated"
     )]
@@ -62,41 +62,41 @@ pub enum PlyProblem {
         element: String,
         /// How many the header declares.
         declared: u64,
-        /// How many fit into what is left of the file.
+        /// Maximum number that fits into the rest of the file.
         room: u64,
     },
-    /// The file ends too soon.
+    /// The file ends inside an element.
     #[error("the file ends in element `{element}` {row} of {declared}: it is truncated")]
     Truncated {
         /// Name of the element.
         element: String,
-        /// Its number, from 0.
+        /// Its index, from 0.
         row: u64,
         /// How many the header declares.
         declared: u64,
     },
-    /// A line of text has too few numbers or too many.
+    /// A line of text has the wrong number of values.
     #[error("element `{element}` {row} has a line of {found} numbers, which does not fit the properties in the header")]
     Numbers {
         /// Name of the element.
         element: String,
-        /// Its number, from 0.
+        /// Its index, from 0.
         row: u64,
-        /// How many the line has.
+        /// Number of values in the line.
         found: usize,
     },
-    /// A word is no number.
+    /// A word is not a number.
     #[error("`{text}` is not a number")]
     NotNumber {
         /// The word.
         text: String,
     },
-    /// The length of a list is negative or no whole number.
+    /// The length of a list is not a non-negative integer.
     #[error("a list of element `{element}` {row} has a length of {length}")]
     Length {
         /// Name of the element.
         element: String,
-        /// Its number, from 0.
+        /// Its index, from 0.
         row: u64,
         /// The length, as written.
         length: String,
@@ -106,15 +106,15 @@ pub enum PlyProblem {
     NotFinite {
         /// Position or texture coordinate.
         what: &'static str,
-        /// Its number, from 0.
+        /// Its index, from 0.
         vertex: u64,
     },
-    /// A face names a vertex that does not exist.
+    /// A vertex index of a face is out of range.
     #[error("element `{element}` {row} uses vertex {index}, but the file has {count} (counted from 0)")]
     OutOfRange {
-        /// Face or tristrips.
+        /// `face` or `tristrips`.
         element: &'static str,
-        /// Its number, from 0.
+        /// Its index, from 0.
         row: u64,
         /// The index, as written.
         index: String,

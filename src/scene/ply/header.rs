@@ -1,9 +1,9 @@
-//! The header of a PLY file: how numbers are stored, and which elements with which properties follow.
+//! The header of a PLY file: encoding, elements and their properties.
 
 use super::error::PlyProblem;
 use crate::printable;
 
-/// How the numbers after the header are stored.
+/// Encoding of the data after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -11,7 +11,7 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// The type of a number.
+/// Numeric type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     I8,
@@ -24,17 +24,17 @@ pub(super) enum Number {
     F64,
 }
 
-/// What an element has one of.
+/// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Property {
     pub name: String,
-    /// Type of the length, where it is a list.
+    /// Type of the length if it is a list.
     pub length: Option<Number>,
-    /// Type of the number, or of each number of the list.
+    /// Type of the value, or of the values of the list.
     pub number: Number,
 }
 
-/// Rows of the same form.
+/// An element: rows with the same properties.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Element {
     pub name: String,
@@ -46,13 +46,13 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// Where the first element begins, bytes.
+    /// Byte offset of the first element.
     pub body: usize,
-    /// Lines before it.
+    /// Number of lines of the header.
     pub lines: usize,
 }
 
-/// Longer headers are refused: they would be lists of elements without end.
+/// Longer headers are rejected: they could list elements endlessly.
 const MAX_BYTES: usize = 1 << 20;
 
 impl Number {
@@ -69,7 +69,7 @@ impl Number {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// The value that stands for all of a colour's channel.
+    /// The maximum of a colour channel of this type.
     pub fn white(self) -> f64 {
         match self {
             Self::I16 | Self::U16 => 65535.0,
@@ -94,30 +94,30 @@ impl Number {
 }
 
 impl Element {
-    /// The fewest bytes that a row takes.
+    /// Minimum number of bytes of a row.
     pub fn least_bytes(&self, encoding: Encoding) -> usize {
         let of = |property: &Property| match encoding {
-            // A digit, and what separates it from the next one.
+            // A digit and a separator.
             Encoding::Ascii => 2,
             _ => property.length.unwrap_or(property.number).bytes(),
         };
         self.properties.iter().map(of).sum()
     }
 
-    /// The number of the first property that has one of these names.
+    /// Index of the first property with one of these names.
     pub fn property(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|property| names.iter().any(|name| property.name.eq_ignore_ascii_case(name)))
     }
 }
 
 impl Header {
-    /// Reads the lines up to `end_header`; an error comes with the number of its line, from 1.
+    /// Parses the lines up to `end_header`; an error has the number of its line, from 1.
     pub fn parse(bytes: &[u8]) -> Result<Self, (usize, PlyProblem)> {
         let head = &bytes[..bytes.len().min(MAX_BYTES)];
         let rest = head.strip_prefix(b"ply").ok_or((1, PlyProblem::NotPly))?;
         let rest = rest.trim_ascii_start().len();
         let first_line = &head[..head.len() - rest];
-        // The first line tells how lines end: what follows the last one may be any byte.
+        // The first line determines the kind of line ending, since the data after the header may begin with any byte.
         let end = match (first_line.contains(&b'\n'), first_line.contains(&b'\r')) {
             (true, _) => b'\n',
             (false, true) => b'\r',

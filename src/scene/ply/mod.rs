@@ -1,9 +1,9 @@
 //! PLY (Stanford polygon files): ASCII and binary of both byte orders, any elements and properties in any order.
 //!
-//! The header says what the rows of each element hold (`header`); numbers come one after the other from text or bytes
-//! (`rows`), and those that a mesh is made of are kept: positions, normals, texture coordinates, colours, faces and triangle
-//! strips. Nothing is allocated for what a header declares before the file is known to have room for it. Colours that are all
-//! the same become a plain material. Start reading at [`load_ply`].
+//! The header declares the rows of each element (`header`); values are read in sequence from text or bytes (`rows`),
+//! and those of the mesh are kept: positions, normals, texture coordinates, colours, faces and triangle strips. Memory
+//! for declared elements is allocated only after checking that the file is long enough. If all colours are equal, they
+//! become a plain material. Start reading at [`load_ply`].
 
 mod error;
 mod header;
@@ -26,20 +26,21 @@ use glam::{DVec2, DVec3, Vec3};
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// [`load_ply_with`] and the default options.
+/// [`load_ply_with`] with the default options.
 ///
 /// # Errors
-/// When the file cannot be read, or is no model with area.
+/// Like [`load_ply_with`].
 pub fn load_ply(path: &Path) -> Result<ImportedModel, ModelError> {
     load_ply_with(path, &ModelOptions::default())
 }
 
 /// Loads the faces and triangle strips of a PLY file as one mesh.
 ///
-/// Normals of length zero count as missing. Colours are taken for sRGB. What is not modelled is named in a warning.
+/// Normals of length zero count as missing. Colours are read as sRGB. Unsupported elements and properties give a
+/// warning.
 ///
 /// # Errors
-/// When the file cannot be read, or is no model with area.
+/// If the file cannot be read, or is not a model with surface area.
 pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
     let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes)
         .and_then(InputFile::bytes)
@@ -76,22 +77,22 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
 
 type Located = (Place, PlyProblem);
 
-/// What a file says.
+/// The contents of a file.
 #[derive(Debug, Default)]
 struct Parsed {
-    /// Without triangles, which are still faces.
+    /// Without triangles: faces are not triangulated yet.
     vertices: Indexed,
     colours: Colours,
-    /// Numbers of vertices, of all faces, one after the other.
+    /// Vertex indices of all faces in order.
     corners: Vec<u32>,
-    /// How many corners each face has.
+    /// Number of corners of each face.
     arities: Vec<u32>,
     short_faces: usize,
-    /// Elements and properties that are not modelled.
+    /// Unsupported elements and properties.
     unused: Vec<String>,
 }
 
-/// What the colours of vertices are together, linear Rec. 709.
+/// Statistics of the vertex colours, linear Rec. 709.
 #[derive(Debug, Default)]
 struct Colours {
     first: Option<Vec3>,
@@ -101,11 +102,11 @@ struct Colours {
 }
 
 impl Colours {
-    /// Counts a colour, and decodes it.
+    /// Counts a colour and returns it in linear form.
     ///
-    /// - `encoded`: sRGB, of which `white` is all.
+    /// - `encoded`: sRGB, with `white` as maximum.
     fn add(&mut self, encoded: [f64; 3], white: f64) -> Vec3 {
-        // Most files have bytes, and the transfer function takes longer than all the rest of a vertex.
+        // A table for bytes, the usual case: the transfer function would take longer than the rest of a vertex.
         static OF_BYTES: LazyLock<[f64; 256]> =
             LazyLock::new(|| std::array::from_fn(|byte| decode_srgb(byte as f64 / 255.0)));
         let linear = encoded.map(|value| match value as u8 {
@@ -120,7 +121,7 @@ impl Colours {
         linear
     }
 
-    /// Without a name where there are no colours.
+    /// The material; unnamed if there are no colours.
     fn material(&self) -> ImportedMaterial {
         let Some(first) = self.first else { return ImportedMaterial::default() };
         let diffuse = Some(if self.differ { (self.sum / self.count as f64).as_vec3() } else { first });
@@ -129,7 +130,7 @@ impl Colours {
     }
 }
 
-/// What a property of a vertex is.
+/// Names of the vertex properties that are used.
 const ROLES: [&[&str]; N_ROLES] = [
     &["x"],
     &["y"],
@@ -144,7 +145,7 @@ const ROLES: [&[&str]; N_ROLES] = [
     &["blue", "b", "diffuse_blue"],
 ];
 const N_ROLES: usize = 11;
-/// Where the roles of normals, texture coordinates and colours begin.
+/// First roles of normals, texture coordinates and colours.
 const NORMAL: usize = 3;
 const UV: usize = 6;
 const COLOUR: usize = 8;
@@ -169,10 +170,10 @@ impl Parsed {
             return Err(whole(PlyProblem::TooManyVertices { count: n_vertices }));
         }
         let mut parsed = Self::default();
-        // An element without properties has rows without anything in them.
+        // The rows of an element without properties are empty.
         for element in header.elements.iter().filter(|element| element.count > 0 && !element.properties.is_empty()) {
             let least = element.least_bytes(header.encoding);
-            // The last line of a text need not end.
+            // The last line of a text may lack a line ending.
             let room = (rows.left() as u64 + 1) / least as u64;
             if element.count > room {
                 let (element, declared) = (printable::name(&element.name).to_string(), element.count);
@@ -194,7 +195,7 @@ impl Parsed {
     }
 
     fn read_vertices(&mut self, element: &Element, rows: &mut impl Rows) -> Result<(), Located> {
-        // By the number of the property: what it is.
+        // Role of each property.
         let mut role_of = vec![None; element.properties.len()];
         let mut white = 1.0;
         let mut has = [false; N_ROLES];
@@ -248,7 +249,7 @@ impl Parsed {
             }
             self.vertices.positions.push(position);
             if has_normals {
-                // What is not finite has no direction either.
+                // Normals that are not finite count as missing too.
                 self.vertices.normals.push(DVec3::new(nx, ny, nz).normalize_or_zero().as_vec3());
             }
             if has_uvs {
@@ -267,7 +268,7 @@ impl Parsed {
         Ok(())
     }
 
-    /// - `n_vertices`: how many the header declares, here or further on.
+    /// - `n_vertices`: number declared in the header, wherever the vertices are.
     fn read_faces(
         &mut self,
         element: &Element,
@@ -355,7 +356,7 @@ impl Parsed {
     }
 }
 
-/// Triangles of a strip: every vertex makes one with the two before it, every other one turned around.
+/// Triangles of a strip: each vertex forms one with the two before it; every other triangle is reversed.
 #[derive(Default)]
 struct Strip {
     last: [u32; 2],
@@ -371,7 +372,7 @@ impl Strip {
         let [a, b] = self.last;
         self.last = [b, vertex];
         self.length += 1;
-        // Strips turn corners by triangles that use a vertex twice.
+        // Strips contain degenerate triangles to change direction.
         let is_triangle = self.length >= 3 && a != b && b != vertex && vertex != a;
         is_triangle.then_some(if self.length % 2 == 1 { [a, b, vertex] } else { [b, a, vertex] })
     }
@@ -396,7 +397,7 @@ fn skip_list(element: &Element, row: u64, property: &header::Property, rows: &mu
     rows.skip(property.number, length).map_err(|problem| missing(problem, element, row, rows))
 }
 
-/// Up to 2³²; any more would be beyond the end of every file.
+/// Up to 2³² − 1; longer lists exceed any file.
 fn length_of(length: f64, element: &Element, row: u64, rows: &impl Rows) -> Result<u64, Located> {
     if length >= 0.0 && length <= f64::from(u32::MAX) && length.fract() == 0.0 {
         return Ok(length as u64);
@@ -415,7 +416,7 @@ fn missing(problem: Missing, element: &Element, row: u64, rows: &impl Rows) -> L
     (rows.place(), problem)
 }
 
-/// The first of them, and how many more there are.
+/// The first names, and the number of further ones.
 fn list(names: &[String]) -> String {
     const TOLD: usize = 8;
     let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };

@@ -1,38 +1,38 @@
-//! The numbers after a PLY header, one after the other: from lines of text, or from bytes.
+//! The values after a PLY header in sequence: from lines of text or from bytes.
 //!
-//! All numbers come as `f64`, which holds every type of the format exactly.
+//! All values are returned as `f64`, which represents all types of the format exactly.
 
 use super::error::PlyProblem;
 use super::header::Number;
 use crate::printable;
 use crate::scene::model::Place;
 
-/// Why a number is not there.
+/// Why a value cannot be read.
 #[derive(Debug)]
 pub(super) enum Missing {
     /// The file has ended.
     End,
-    /// The line has ended after so many numbers.
+    /// The line has ended after this many values.
     Line(usize),
-    /// What is there is no number.
+    /// The text is not a number.
     Problem(PlyProblem),
 }
 
-/// Where numbers come from.
+/// A source of values.
 pub(super) trait Rows {
     fn begin_row(&mut self) -> Result<(), Missing>;
     fn next(&mut self, number: Number) -> Result<f64, Missing>;
-    /// Passes over so many numbers.
+    /// Skips `count` values.
     fn skip(&mut self, number: Number, count: u64) -> Result<(), Missing>;
-    /// The error tells how many numbers the line has, if they are too many.
+    /// The error gives the number of values in the line if there are too many.
     fn end_row(&mut self) -> Result<(), Missing>;
-    /// Of what was read last.
+    /// Location of the last value.
     fn place(&self) -> Place;
-    /// Bytes that are left.
+    /// Number of remaining bytes.
     fn left(&self) -> usize;
 }
 
-/// Numbers as bytes, the highest one first if `BIG`.
+/// Binary values, big-endian if `BIG`.
 pub(super) struct Bytes<'a, const BIG: bool> {
     bytes: &'a [u8],
     at: usize,
@@ -101,17 +101,17 @@ impl<const BIG: bool> Rows for Bytes<'_, BIG> {
     }
 }
 
-/// Numbers as text, one row a line.
+/// Text values, one row per line.
 pub(super) struct Text<'a> {
     left: &'a [u8],
-    /// What is left of the line.
+    /// The rest of the line.
     line: &'a [u8],
     number: usize,
     words: usize,
 }
 
 impl<'a> Text<'a> {
-    /// - `lines`: how many stand before.
+    /// - `lines`: number of lines before `left`.
     pub fn new(left: &'a [u8], lines: usize) -> Self {
         Self { left, line: &[], number: lines, words: 0 }
     }
@@ -147,7 +147,7 @@ impl Rows for Text<'_> {
 
     fn next(&mut self, _: Number) -> Result<f64, Missing> {
         let word = self.word()?;
-        // Most are short whole numbers.
+        // Fast path: most values are short integers.
         if word.len() <= 15 && word.iter().all(u8::is_ascii_digit) {
             return Ok(word.iter().fold(0_u64, |sum, &digit| sum * 10 + u64::from(digit - b'0')) as f64);
         }

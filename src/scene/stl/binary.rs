@@ -1,4 +1,4 @@
-//! Binary STL: 80 bytes of header, the number of triangles, and 50 bytes for each, little-endian.
+//! Binary STL: a header of 80 bytes, the number of triangles, and 50 bytes per triangle, little-endian.
 
 use super::error::StlProblem;
 use super::{Located, Soup};
@@ -17,7 +17,7 @@ fn length_for(count: u32) -> u64 {
     START as u64 + TRIANGLE as u64 * u64::from(count)
 }
 
-/// Whether the length is that of so many triangles as the file declares.
+/// Whether the length matches the declared number of triangles.
 pub(super) fn has_right_length(bytes: &[u8]) -> bool {
     declared(bytes).is_some_and(|count| length_for(count) == bytes.len() as u64)
 }
@@ -37,7 +37,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
             f64::from(f32::from_le_bytes(bytes))
         };
         for corner in 0..3 {
-            // The normal stands before them.
+            // After the normal.
             let at = 12 + 12 * corner;
             let position = DVec3::new(number(at), number(at + 4), number(at + 8));
             if !position.is_finite() {

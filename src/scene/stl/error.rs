@@ -1,44 +1,44 @@
-//! What can be wrong with an STL file.
+//! Problems of STL files.
 
-/// What is wrong with an STL file.
+/// A problem of an STL file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StlProblem {
-    /// It does not begin like text and is too short to be binary.
+    /// It does not begin like a text file and is too short for a binary one.
     #[error(
         "is not an STL file: expected text that begins with `solid`, or at least 84 bytes, but the file has {bytes} bytes"
     )]
     NotStl {
-        /// Its length.
+        /// Its length, bytes.
         bytes: usize,
     },
-    /// It does not have the length that its count of triangles asks for.
+    /// Its length does not match its number of triangles.
     #[error(
         "declares {count} triangles, which take {expected} bytes, but the file has {bytes}: it is truncated or not an \
          STL file"
     )]
     Truncated {
-        /// Triangles that it declares.
+        /// The declared number of triangles.
         count: u32,
         /// Bytes that they take, with the header.
         expected: u64,
-        /// Its length.
+        /// Its length, bytes.
         bytes: usize,
     },
-    /// There is nothing in it.
+    /// The file has no triangles.
     #[error("has no triangles")]
     Empty,
-    /// A word is none of those that can stand there.
+    /// A word is not one of those expected.
     #[error("`{text}` found, expected {expected}")]
     Word {
         /// The word.
         text: String,
-        /// What could stand there.
+        /// What was expected.
         expected: &'static str,
     },
-    /// The text ends too soon.
+    /// The text ends too early.
     #[error("the file ends, expected {expected}: it is truncated")]
     End {
-        /// What could stand there.
+        /// What was expected.
         expected: &'static str,
     },
     /// A facet has fewer than three vertices.
@@ -50,12 +50,12 @@ pub enum StlProblem {
     /// A coordinate is NaN or infinite.
     #[error("vertex {corner} of triangle {triangle} has a coordinate that is NaN or infinite (both counted from 0)")]
     NotFinite {
-        /// Number of the triangle.
+        /// Index of the triangle, from 0.
         triangle: usize,
         /// 0, 1 or 2.
         corner: usize,
     },
-    /// There are more corners than 32 bits can number.
+    /// There are more triangle corners than 32-bit indices allow.
     #[error("has more triangles than 32-bit indices can name the corners of")]
     TooMany,
 }

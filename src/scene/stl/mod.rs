@@ -1,7 +1,7 @@
-//! STL (stereolithography): triangles without connections, as text or in binary.
+//! STL (stereolithography): unconnected triangles, in text or binary form.
 //!
-//! Corners at exactly the same position become one vertex, so the mesh is connected; normals of facets are ignored, for
-//! they say nothing that the corners do not. Start reading at [`load_stl`].
+//! Corners with exactly equal positions become one vertex, so that the mesh is connected; facet normals are ignored,
+//! since they are redundant. Start reading at [`load_stl`].
 
 mod binary;
 mod error;
@@ -19,18 +19,18 @@ use crate::scene::input_file::{FileKind, InputFile};
 use glam::DVec3;
 use std::path::Path;
 
-/// [`load_stl_with`] and the default options.
+/// [`load_stl_with`] with the default options.
 ///
 /// # Errors
-/// When the file cannot be read, or is no model with area.
+/// Like [`load_stl_with`].
 pub fn load_stl(path: &Path) -> Result<ImportedModel, ModelError> {
     load_stl_with(path, &ModelOptions::default())
 }
 
-/// Loads all solids of an STL file as one mesh, text or binary by what the file holds.
+/// Loads all solids of an STL file as one mesh; detects from the contents whether it is text or binary.
 ///
 /// # Errors
-/// When the file cannot be read, or is no model with area.
+/// If the file cannot be read, or is not a model with surface area.
 pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
     let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes)
         .and_then(InputFile::bytes)
@@ -66,21 +66,21 @@ pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     })
 }
 
-/// Corners of triangles, three by three.
+/// Corners of triangles, three per triangle.
 #[derive(Debug, Default)]
 struct Soup {
     /// Finite.
     corners: Vec<DVec3>,
-    /// Facets of more than three vertices.
+    /// Number of facets with more than three vertices.
     polygons: usize,
-    /// What a person should know.
+    /// Remarks for the user.
     notes: Vec<String>,
 }
 
 type Located = (Place, StlProblem);
 
-/// Text begins with `solid`, but so do the headers of many binary files: they are known by their length, or by bytes that
-/// no text has.
+/// Text begins with `solid`, but so do the headers of many binary files: those are detected by their length, or by
+/// bytes that text does not contain.
 fn is_text(bytes: &[u8]) -> bool {
     if binary::has_right_length(bytes) {
         return false;

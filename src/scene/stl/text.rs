@@ -1,4 +1,4 @@
-//! STL as text: `solid`, facets of one loop each, `endsolid`; in any case of letters and on any lines.
+//! Text STL: `solid`, facets of one loop each, `endsolid`; case-insensitive, with any line breaks.
 
 use super::error::StlProblem;
 use super::{Located, Soup};
@@ -7,7 +7,7 @@ use crate::scene::model::Place;
 use crate::scene::model::polygon::triangulate;
 use glam::DVec3;
 
-/// Words with the line that they stand in.
+/// The words with their line numbers.
 struct Words<'a> {
     left: &'a [u8],
     line: usize,
@@ -18,7 +18,7 @@ impl<'a> Words<'a> {
     fn next(&mut self) -> &'a [u8] {
         let start = self.left.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(self.left.len());
         let (space, rest) = self.left.split_at(start);
-        // A `\r` that no `\n` follows ends a line too.
+        // A `\r` without `\n` also ends a line.
         let ends = |at: usize| space[at] == b'\n' || space[at] == b'\r' && space.get(at + 1) != Some(&b'\n');
         self.line += (0..space.len()).filter(|&at| ends(at)).count();
         let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
@@ -27,7 +27,7 @@ impl<'a> Words<'a> {
         word
     }
 
-    /// Names may hold any words.
+    /// Names may contain any words.
     fn skip_line(&mut self) {
         let end = self.left.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(self.left.len());
         self.left = &self.left[end..];
@@ -97,13 +97,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
     Ok(soup)
 }
 
-/// What follows the word `facet`, to `endfacet`.
+/// Parses a facet after the word `facet`, up to `endfacet`.
 fn facet(words: &mut Words, corners: &mut Vec<DVec3>) -> Result<(), Located> {
     let word = words.next();
     if !word.eq_ignore_ascii_case(b"normal") {
         return Err(words.wrong(word, "`normal`"));
     }
-    // Whatever they are: they are not used.
+    // The normal is not used.
     for _ in 0..3 {
         words.next();
     }
