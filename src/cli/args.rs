@@ -1,4 +1,4 @@
-//! Arguments that several commands have.
+//! Arguments shared by several commands.
 
 use super::console::remark;
 use super::failure::Failure;
@@ -11,7 +11,7 @@ use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSourc
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// What to open, and how.
+/// The scene to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), or picture rendered by firstlight (.png,
@@ -22,7 +22,7 @@ pub struct SceneArgs {
     pub how: OpenArgs,
 }
 
-/// Several things to open, in the same way.
+/// Several scenes to open with the same options.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
     /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), or pictures rendered by firstlight
@@ -63,7 +63,7 @@ pub struct OpenArgs {
 }
 
 impl OpenArgs {
-    /// What of a model is asked for.
+    /// The chosen camera, time and variant of a model.
     pub fn choice(&self) -> ModelChoice {
         ModelChoice {
             camera: self.camera.clone(),
@@ -126,8 +126,8 @@ impl SceneArgs {
         })
     }
 
-    /// Loads the scene, or says why it cannot be had; `files` learns what is read for it, and refuses when one of
-    /// the outputs that it knows is among that.
+    /// Loads the scene; registers all files that are read in `files`, which rejects them if one of them is also an
+    /// output.
     pub fn load(
         &self,
         aspect: Option<f64>,
@@ -151,17 +151,18 @@ impl SceneArgs {
         Ok(scene)
     }
 
-    /// What the word on the command line means.
+    /// The source that the argument names.
     pub fn source(&self) -> Result<SceneSource, Failure> {
         SceneSource::parse(&self.scene).map_err(|error| {
-            // A word that is neither a scene nor a file is a slip of the pen; a file may be wanting or unfit.
+            // A word without extension that is no file is a typing error (usage); otherwise the file is missing or
+            // invalid.
             let is_name = Path::new(&self.scene).extension().is_none() && !Path::new(&self.scene).exists();
             if is_name { Failure::Usage(error.to_string()) } else { Failure::Failed(error.to_string()) }
         })
     }
 }
 
-/// What outputs may take the place of.
+/// What outputs may replace.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct OverwriteArgs {
     /// Allow an output to replace an existing film, whose samples are lost.
@@ -174,13 +175,13 @@ impl OverwriteArgs {
         if self.overwrite { Replace::Anything } else { Replace::AllButFilms }
     }
 
-    /// The files of a command that writes.
+    /// The file registry of a command that writes.
     pub fn files(self) -> Files {
         Files::new(self.replace())
     }
 }
 
-/// Names the files that were replaced, for the end of a message.
+/// The end of a message, which names the files that were replaced.
 pub fn replaced(paths: &[PathBuf], output: &Path) -> String {
     match paths {
         [] => String::new(),

@@ -1,4 +1,4 @@
-//! `firstlight completions SHELL`: a script that completes commands, options and built-in scenes.
+//! `firstlight completions SHELL`: prints a script that completes commands, options and built-in scenes.
 
 use super::CommandLine;
 use super::console::print_bytes;

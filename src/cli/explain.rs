@@ -1,4 +1,4 @@
-//! `firstlight explain SCENE --pixel X,Y`: why a pixel looks as it does, without a window.
+//! `firstlight explain SCENE --pixel X,Y`: explains the value of a pixel, without a window.
 
 use super::args::SceneArgs;
 use super::console::{print, remark};
@@ -59,7 +59,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         remark(format_args!("warning: {problem}"));
     }
     let of_scene = world.resource::<Rendering>().0;
-    // The classic model has no paths; what light there is does not depend on how it is drawn.
+    // The Phong integrator has no paths; the explanation shows the light transport of the scene in any case.
     let settings =
         RenderSettings { integrator: Integrator::Path, seed: args.seed.unwrap_or(of_scene.seed), ..of_scene };
     let prepared = &extraction.prepared;
@@ -69,7 +69,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
 }
 
-/// Whether a picture has the pixel; of the scene's own size that is known only once it is read.
+/// Checks that the image has the pixel; if the size comes from the scene, only after loading.
 fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
     if x < size.x && y < size.y {
         return Ok(());
@@ -83,7 +83,7 @@ fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
     )))
 }
 
-/// For people; luminance, since a table of three channels is hard to read.
+/// As text; in luminance, since a table of three channels is hard to read.
 fn text(title: &str, story: &PixelStory) -> Vec<String> {
     let mut out = Vec::new();
     let mut line = |text: String| out.push(text);
@@ -134,7 +134,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     out
 }
 
-/// For machines.
+/// As JSON.
 fn json(title: &str, story: &PixelStory) -> serde_json::Value {
     let rgb = |radiance: &DVec3| radiance.to_array();
     let all = |list: &[DVec3]| list.iter().map(rgb).collect::<Vec<_>>();
@@ -185,7 +185,7 @@ fn json(title: &str, story: &PixelStory) -> serde_json::Value {
     })
 }
 
-/// `640,360` as a pixel.
+/// Parses `640,360` as a pixel.
 fn parse_pixel(text: &str) -> Result<UVec2, String> {
     let wrong = || format!("`{text}` is not a pixel: expected X,Y, such as 640,360");
     let (x, y) = text.split_once(',').ok_or_else(wrong)?;

@@ -1,31 +1,31 @@
-//! Why a command did not do its work.
+//! Failures of commands.
 
 use firstlight::frame::FilmError;
 use firstlight::render::NoRoom;
 use firstlight::scene::{FilesError, SceneError, WriteError};
 
-/// Why a command did not do its work; a message of one line, but for [`Failure::Problems`].
+/// Why a command failed; a message of one line, except for lists.
 pub enum Failure {
-    /// The command itself cannot be right.
+    /// The command line is wrong.
     Usage(String),
     Failed(String),
-    /// What is in the way may pass: a disk is full, memory is taken, another process has the file.
+    /// The cause may be temporary: a full disk, lack of memory, a file used by another process.
     Passing(String),
-    /// It failed for several reasons; each is a message of its own.
+    /// Several problems, one message each.
     Problems(Vec<String>),
-    /// What a part was given is wrong, and will be when it is tried again; a message each.
+    /// The input of a part is wrong, so that trying again is useless; one message each.
     Input(Vec<String>),
-    /// A part was interrupted, or something was in its way that may pass.
+    /// A part was interrupted or had a temporary problem: the engine should try again.
     Retry(String),
-    /// Somebody pressed Ctrl+C; says what was saved.
+    /// Stopped by Ctrl+C; the message tells what was saved.
     Stopped(String),
 }
 
-/// The exit status of what may well succeed when it is tried again: `EX_TEMPFAIL` of sysexits.h.
+/// Exit status for failures that may succeed when tried again: `EX_TEMPFAIL` of sysexits.h.
 pub const TRY_AGAIN: u8 = 75;
 
 impl Failure {
-    /// Of a part: what failed is the fault of what it was given, unless it is known to pass.
+    /// The failure of a part: caused by its input, unless it is known to be temporary.
     pub fn of_part(self) -> Self {
         match self {
             Self::Failed(message) => Self::Input(vec![message]),

@@ -1,4 +1,4 @@
-//! `firstlight info SCENE`: what is in it, what it uses, what is not modelled, memory.
+//! `firstlight info SCENE`: contents of a scene, features in use, unsupported features, memory.
 
 use super::args::{SceneArgs, ScenesArgs};
 use super::console::{print, remark};
@@ -69,26 +69,26 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     if args.json { print(told.json()) } else { print(told.text()) }
 }
 
-/// What is told of a scene.
+/// The data for the report on a scene.
 struct Told<'a> {
     scene: &'a LoadedScene,
     inputs: &'a SceneInputs,
     extraction: &'a Extraction,
     film: FilmSize,
-    /// Of the image that the scene is read from; none for other sources.
+    /// Of the image that the scene is read from; empty for other sources.
     layers: Vec<&'static str>,
-    /// Of each mesh.
+    /// By mesh.
     faults: BTreeMap<*const Mesh, Faults>,
-    /// How they are looked for, where there may be some.
+    /// How caustics are sampled, if there can be any.
     caustics: Option<CausticChoice>,
-    /// What moves.
+    /// The animation of the scene file, if it has one.
     animation: Option<Animation>,
 }
 
 const NOT_MODELLED: [&str; 5] = ["spectra", "polarisation", "motion blur", "participating media", "lens aberrations"];
 
 impl Told<'_> {
-    /// For people.
+    /// As text.
     fn text(&self) -> Vec<String> {
         let Self { scene, inputs, extraction, film, .. } = self;
         let mut out = vec![scene.source.title()];
@@ -152,7 +152,7 @@ impl Told<'_> {
         out
     }
 
-    /// One line for machines.
+    /// As one line of JSON.
     fn json(&self) -> serde_json::Value {
         let Self { scene, inputs, extraction, film, .. } = self;
         let shading = &extraction.prepared.shading;
@@ -221,7 +221,7 @@ impl Told<'_> {
         self.inputs.objects.iter().filter(glows).count()
     }
 
-    /// Point lights, spot lights, directional lights.
+    /// Numbers of point, spot and directional lights.
     fn lights(&self) -> [usize; 3] {
         let mut counts = [0; 3];
         for light in &self.inputs.lights {
@@ -238,21 +238,21 @@ impl Told<'_> {
         self.inputs.camera.map_or_else(Lens::default, |camera| camera.lens)
     }
 
-    /// As photographers write it.
+    /// As an f-number.
     fn aperture(&self) -> String {
         let stop = self.inputs.camera.map_or(0.0, |camera| f_stop(camera.lens.radius, &camera.projection));
         format!("{}, lens radius {} m", f_number(stop), two_digits(self.lens().radius))
     }
 
     fn filter(&self) -> String {
-        // As the scene file spells it.
+        // As spelled in scene files.
         let words = format!("{:?}", self.scene.file.film.filter);
         let spaced =
             words.char_indices().flat_map(|(i, c)| (i > 0 && c.is_uppercase()).then_some(' ').into_iter().chain([c]));
         spaced.collect::<String>().to_lowercase()
     }
 
-    /// Of meshes, trees and the film.
+    /// Memory of meshes, trees and the film, bytes.
     fn bytes(&self) -> [usize; 3] {
         let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
         for object in &self.inputs.objects {
@@ -270,14 +270,14 @@ impl Told<'_> {
         [meshes.values().sum(), self.scene.trees.bytes(), film]
     }
 
-    /// What the scene has of [`FEATURES`], or what it lacks.
+    /// The names in [`FEATURES`] that the scene uses, or those that it does not use.
     fn features(&self, used: bool) -> Vec<&'static str> {
         let has = features(self.extraction, &self.lens());
         FEATURES.into_iter().zip(has).filter(|(_, has)| *has == used).map(|(name, _)| name).collect()
     }
 }
 
-/// For machines.
+/// The sampling of caustics as JSON.
 fn caustics_json(choice: CausticChoice) -> serde_json::Value {
     let CausticChoice { plan, cost, gain } = choice;
     serde_json::json!({
@@ -286,7 +286,7 @@ fn caustics_json(choice: CausticChoice) -> serde_json::Value {
     })
 }
 
-/// What moves, for people.
+/// The animation as text.
 fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl FnMut(&str, String)) {
     let (length, fps) = (number(animation.length()), number(animation.fps));
     let n_frames = animation.n_frames();
@@ -302,7 +302,7 @@ fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl Fn
     }
 }
 
-/// `translate of ball`.
+/// Such as `translate of ball`.
 fn moved(track: &TrackPart) -> String {
     let (property, name) = match track {
         TrackPart::Camera { property, .. } => (property.name(), "camera"),
@@ -313,7 +313,7 @@ fn moved(track: &TrackPart) -> String {
     format!("{property} of {}", printable::name(name))
 }
 
-/// The same for machines.
+/// The animation as JSON.
 fn animation_json(part: &AnimationPart, animation: &Animation) -> serde_json::Value {
     let tracks: Vec<_> = (part.tracks.iter())
         .map(|track| {
@@ -327,12 +327,12 @@ fn animation_json(part: &AnimationPart, animation: &Animation) -> serde_json::Va
     })
 }
 
-/// A number of a scene file, with three digits behind the point at most.
+/// A number of a scene file, with at most three decimal places.
 fn number(value: f64) -> String {
     ((value * 1e3).round() / 1e3).to_string()
 }
 
-/// What a glTF file has, for people.
+/// The contents of a glTF file as text.
 fn facts_rows(facts: &GltfFacts, row: &mut impl FnMut(&str, String)) {
     let names = |names: &[String]| {
         let shown: Vec<_> = names.iter().map(|name| printable::name(name)).collect();
@@ -353,7 +353,7 @@ fn facts_rows(facts: &GltfFacts, row: &mut impl FnMut(&str, String)) {
     }
 }
 
-/// The same for machines.
+/// The contents of a glTF file as JSON.
 fn facts_json(facts: &GltfFacts) -> serde_json::Value {
     let notes: Vec<_> = facts.notes.iter().map(|(material, note)| serde_json::json!([material, note])).collect();
     serde_json::json!({

@@ -1,4 +1,4 @@
-//! A scene that is rendered without a window, and the pictures of it.
+//! A scene that is rendered without a window, and its images.
 
 use super::console::{inform, print_bytes, remark};
 use super::failure::Failure;
@@ -23,7 +23,7 @@ use glam::UVec2;
 use std::path::Path;
 use std::time::Instant;
 
-/// A scene and how it is to be rendered.
+/// A scene with its render settings.
 pub(super) struct RenderJob {
     pub scene: LoadedScene,
     pub world: World,
@@ -63,7 +63,7 @@ impl RenderJob {
         for problem in &extraction.problems {
             remark(format_args!("warning: {problem}"));
         }
-        // What is not asked for is as the film has it that is gone on with, then as the scene has it.
+        // Options that are not given come from the film that is resumed, else from the scene.
         let Rendering(of_scene) = *world.resource();
         let mut display = world.resource::<DisplaySettings>().0;
         display.exposure_stops += args.exposure;
@@ -96,13 +96,13 @@ impl RenderJob {
         Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
     }
 
-    /// The camera, as it is.
+    /// The current camera.
     pub fn rig(&mut self) -> Option<Rig> {
         let camera = SceneInputs::of(&mut self.world).camera?;
         Some(Rig { view: camera.view, projection: camera.projection, lens: camera.lens })
     }
 
-    /// Looks from there from now on.
+    /// Changes the camera.
     pub fn set_rig(&mut self, rig: &Rig) {
         if let Some(camera) = SceneInputs::of(&mut self.world).camera {
             self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
@@ -112,14 +112,14 @@ impl RenderJob {
         self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
     }
 
-    /// Renders a whole picture.
+    /// Renders a complete image.
     pub fn picture(&self, args: &RenderArgs, target: Target) -> Result<Film, Failure> {
         let mut film = self.new_film(&purposes(args))?;
         render_offline_until(&self.extraction.prepared, &self.settings, &mut film, target, &|| false, |_| true);
         Ok(film)
     }
 
-    /// A film, and the certainty that there is memory for all that it is made for: before any ray is traced.
+    /// An empty film, after checking that there is memory for all outputs: before any ray is traced.
     fn new_film(&self, purposes: &[Purpose]) -> Result<Film, Failure> {
         let (width, height) = self.size;
         let light_traced = self.extraction.prepared.features().caustics;
@@ -131,7 +131,8 @@ impl RenderJob {
         Ok(film)
     }
 
-    /// What each pixel shows, where layers are asked for that tell it, or what the film has kept.
+    /// The feature buffers, if a requested layer needs them: those of the film if they have enough samples, else new
+    /// ones.
     pub fn features(
         &mut self,
         args: &RenderArgs,
@@ -146,7 +147,7 @@ impl RenderJob {
         Ok(FeatureLayers::gather(&extraction.prepared, names, settings, *size, samples, &|| false))
     }
 
-    /// What the film shows without most of its noise, if that is asked for and `stop` does not say so.
+    /// The denoised film; `None` if it is not requested or `stop` returned true.
     pub fn denoised(&self, args: &RenderArgs, film: &Film, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
         if !args.denoise {
             return None;
@@ -156,7 +157,7 @@ impl RenderJob {
         denoise_film(prepared, film, &features, stop)
     }
 
-    /// Writes a picture with its metadata to a file, or to standard output.
+    /// Writes an image with its metadata to a file or to standard output.
     pub fn write(
         &self,
         args: &RenderArgs,
@@ -186,7 +187,7 @@ impl RenderJob {
         print_bytes(&picture.bytes(args.picture_format()?)?)
     }
 
-    /// The note of a picture of this film at `path`.
+    /// The metadata of an image of this film at `path`.
     pub fn note(&self, film: &Film, path: &Path) -> String {
         let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
         self.draft.note(path, self.size, samples, self.display.into())
@@ -209,7 +210,7 @@ impl RenderJob {
         }
     }
 
-    /// When it is good enough.
+    /// When to stop rendering.
     pub fn target(&self, args: &RenderArgs) -> Target {
         let open_ended = args.time.is_none() && args.error.is_none();
         let of_picture = self.scene.shot.as_ref().filter(|_| !args.resume).map(|shot| shot.spp.max(1));
@@ -219,7 +220,7 @@ impl RenderJob {
     }
 }
 
-/// What is written at the end.
+/// The outputs that are written at the end.
 pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
     let film = args.film.is_some() || args.resume;
     let picture = match args.picture_format() {
@@ -234,15 +235,15 @@ pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
     std::iter::once(picture).chain(others.into_iter().flatten()).collect()
 }
 
-/// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.
+/// Reserves memory for writing the outputs, so that a long rendering is not lost at the end.
 pub fn room_to_write(args: &RenderArgs, (width, height): (u32, u32)) -> Result<Room, Failure> {
     Ok(Room::for_files(width, height, &purposes(args))?)
 }
 
-/// `size` times `scale`, if that is a film that can be had.
+/// `size` times `scale`, if that is a valid size of a film.
 pub fn scaled((width, height): (u32, u32), scale: Option<f64>) -> Result<(u32, u32), Failure> {
     let Some(scale) = scale else { return Ok((width, height)) };
-    // Numbers out of range become the largest one, which is too large.
+    // The conversion saturates, and the maximum is rejected as too large.
     let side = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
     let (width, height) = (side(width), side(height));
     firstlight::scene::file::check_film_size(width, height)

@@ -1,4 +1,4 @@
-//! `--layers`: what an EXR picture has besides its light.
+//! `--layers`: additional layers of an EXR image.
 
 use super::console::remark;
 use super::failure::Failure;
@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use firstlight::frame::{FeatureLayers, PictureLayer};
 use firstlight::render::Film;
 
-/// Layers of a picture.
+/// Layers of an image.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LayerArgs {
     /// Layers of an .exr picture besides its light, such as albedo,normal,depth
@@ -58,12 +58,12 @@ impl From<LayerArg> for PictureLayer {
 }
 
 impl LayerArgs {
-    /// Whether there are any.
+    /// Whether no layer is requested.
     pub fn is_empty(&self) -> bool {
         self.layers.is_empty()
     }
 
-    /// Whether some of them are made of feature buffers.
+    /// Whether a layer needs feature buffers.
     pub fn have_features(&self) -> bool {
         self.layers.iter().any(|&layer| PictureLayer::from(layer).is_feature())
     }
@@ -72,7 +72,7 @@ impl LayerArgs {
         self.layers.contains(&LayerArg::Error)
     }
 
-    /// Before anything is rendered.
+    /// Checks the combination of layers; called before rendering.
     pub fn check(&self) -> Result<(), Failure> {
         const WITH_VARIANCE: [LayerArg; 4] = [LayerArg::Albedo, LayerArg::Normal, LayerArg::Depth, LayerArg::Position];
         if self.layers.contains(&LayerArg::Variance) && !WITH_VARIANCE.iter().any(|one| self.layers.contains(one)) {
@@ -82,7 +82,7 @@ impl LayerArgs {
         Ok(())
     }
 
-    /// The layers that this film can have: its error may not be known yet, which is said.
+    /// The layers that this film can have; warns if its error cannot be estimated yet.
     pub fn of(&self, film: &Film) -> Vec<PictureLayer> {
         let error_known = film.error_estimate().is_some();
         if self.has_error() && !error_known {
@@ -92,7 +92,7 @@ impl LayerArgs {
         self.layers.iter().filter(|layer| is_known(layer)).map(|&layer| layer.into()).collect()
     }
 
-    /// Those of a film that was rendered without looking at what it shows.
+    /// Fails if feature layers are requested but the film was rendered without them.
     pub fn check_kept(&self, features: Option<&FeatureLayers>) -> Result<(), Failure> {
         if self.have_features() && features.is_none() {
             let message = "the films have no such layers: render one of them with --film and the same --layers";

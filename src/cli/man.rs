@@ -1,4 +1,4 @@
-//! `firstlight man [FOLDER]`: the manual page, or a page for each command.
+//! `firstlight man [FOLDER]`: prints the manual page, or writes a page per command.
 
 use super::CommandLine;
 use super::console::{inform, print_bytes};
@@ -32,7 +32,7 @@ pub fn run(args: &ManArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `firstlight-render` of `render`.
+/// Such as `firstlight-render` for `render`.
 fn name(command: &Command) -> String {
     command.get_display_name().unwrap_or(command.get_name()).to_owned()
 }

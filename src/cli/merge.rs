@@ -1,7 +1,7 @@
-//! `firstlight merge A.exr B.exr -o C.exr`: films of the same picture with different samples, added up.
+//! `firstlight merge A.exr B.exr -o C.exr`: adds up films of the same image with different samples.
 //!
-//! What films say of themselves is looked through first: which belong together, which samples are there twice or missing.
-//! Then they are added up one after the other, with memory for two, however many there are.
+//! First the metadata of all films is read: whether they belong together, and which samples are duplicate or missing.
+//! Then the films are added one by one, with memory for two, however many there are.
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
@@ -76,7 +76,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     }
     let mut files = args.overwrite.files();
     files.read_all(args.films.iter().cloned())?;
-    // It may take the place of a film of which it has all samples, which is known only when it is there.
+    // The output may replace a film if it contains all samples of that film, which is only known at the end.
     let claim = files.claim(output, Replace::Anything)?;
     if let Some(picture) = &args.picture {
         let format = PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
@@ -153,26 +153,26 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a film or an image of `film` at `path` says of itself.
+/// The metadata of `film`, or of an image of it, at `path`.
 ///
-/// - `first`: the film whose metadata `shot` is.
+/// - `first`: path of the film that has the metadata `shot`.
 pub fn note_of(film: &Film, shot: ImageMetadata, first: &Path, path: &Path) -> String {
     let (first_sample, spp, uneven) = (film.first_sample(), film.spp(), film.is_uneven());
     ImageMetadata { first_sample, spp, uneven, ..shot }.moved(first, path).to_note()
 }
 
-/// Films that belong together and have no sample in common, in the order of their samples.
+/// Films of the same image without common samples, in the order of their samples.
 pub struct FilmSet {
     pub films: Vec<PathBuf>,
-    /// Samples of each film that all of its pixels have.
+    /// The samples that all pixels of each film have.
     samples: Vec<Range<u32>>,
     coverage: Coverage,
-    /// Some of them have samples where the error was: gaps say nothing then.
+    /// Whether some films are adaptive: then gaps do not mean missing samples.
     is_adaptive: bool,
 }
 
 impl FilmSet {
-    /// Looks through what films say of themselves.
+    /// Reads the metadata of the films.
     ///
     /// - `paths`: in any order.
     pub fn read(paths: Vec<PathBuf>) -> Result<Self, Failure> {
@@ -195,7 +195,7 @@ impl FilmSet {
             let shared = firstlight::render::MergeError::SharedSamples { first: start, last: end - 1 };
             return Err(refused(&paths[a], &paths[b], shared.to_string()));
         }
-        // So that the result does not depend on how they are named.
+        // The result must not depend on the names of the films.
         known.sort();
         let films = known.iter().map(|(.., i)| paths[*i].clone()).collect();
         let ends = known.iter().skip(1).map(|(first, ..)| *first).chain([coverage.hull().end]);
@@ -203,9 +203,9 @@ impl FilmSet {
         Ok(Self { films, samples, coverage, is_adaptive })
     }
 
-    /// Samples that some pixel does not have.
+    /// Samples that are missing in some pixel.
     ///
-    /// - `wanted`: all that are to be there; else from the first to the last that is, if all films are uniform.
+    /// - `wanted`: the complete range; `None`: from the first to the last existing sample, if all films are uniform.
     pub fn missing(&self, wanted: Option<Range<u32>>) -> Vec<Range<u32>> {
         match wanted {
             None if self.is_adaptive => Vec::new(),
@@ -213,16 +213,16 @@ impl FilmSet {
         }
     }
 
-    /// The films of a group of them; `None` where there are fewer groups.
+    /// The films of one of several groups; `None` if there are fewer groups.
     fn group(&self, part: Part) -> Option<Self> {
         let group = groups(&self.samples, part.count as usize).into_iter().nth(part.index as usize)?;
         let (films, samples) = (self.films[group.clone()].to_vec(), self.samples[group].to_vec());
         Some(Self { films, samples, coverage: self.coverage.clone(), is_adaptive: self.is_adaptive })
     }
 
-    /// Adds them up, one after the other.
+    /// Adds up the films one by one.
     ///
-    /// - `progress`: told how many films are there of how many.
+    /// - `progress`: called with the number of films that are added and the total number.
     pub fn add_up(&self, progress: &dyn Fn(usize, usize)) -> Result<FilmFile, Failure> {
         let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
         let (first, others) = self.films.split_first().expect("one film at least");
@@ -243,7 +243,7 @@ impl FilmSet {
     }
 }
 
-/// Samples add up however they were allocated; what is resumed is as adaptive as any part.
+/// Samples can be added however they were allocated; if one film is adaptive, so is the sum.
 fn agree_on_allocation(a: &mut ImageMetadata, b: &mut ImageMetadata) {
     let is_adaptive = |shot: &ImageMetadata| shot.allocation != SampleAllocation::Uniform;
     if !is_adaptive(a) || !is_adaptive(b) {

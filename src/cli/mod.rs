@@ -1,8 +1,7 @@
-//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
-//! understood, or the input of a part is wrong; 75: a part is to be tried again; 130: stopped by Ctrl+C, what there was is
-//! saved.
+//! The command line: one file per command. Exit status 0: done; 1: failed; 2: invalid command line, or invalid input of
+//! a part; 75: a part should be tried again; 130: stopped by Ctrl+C, with the results so far saved.
 //!
-//! A command is obedient by construction: it runs where it can be left behind (see `stop`).
+//! Every command can be interrupted, since it runs on a thread that can be abandoned (see `stop`).
 
 mod animate;
 mod args;
@@ -72,7 +71,7 @@ enum SimdArg {
 }
 
 impl SimdArg {
-    /// Makes it the one of this process.
+    /// Sets the instruction set of this process.
     fn choose(self) -> Result<(), Failure> {
         let set = match self {
             Self::Avx512 => InstructionSet::Avx512,
@@ -141,7 +140,7 @@ impl CliCommand {
     }
 }
 
-/// Runs what the command line asks for.
+/// Runs the command.
 pub fn main() -> ExitCode {
     firstlight::console::tell_panics();
     if let Some(warning) = Limits::misunderstood() {
@@ -183,11 +182,10 @@ pub fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-/// What clap has to say: help on standard output, or what it did not understand, with status 2 and the nearest known
-/// option.
+/// Reports what clap returned: help on standard output, or an error with status 2 and the most similar option.
 fn not_understood(error: clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        // The program's own words. Whoever closed the pipe has read enough; a full disk has not.
+        // A help text. A closed pipe is fine; a full disk is not.
         return match error.print().and_then(|()| firstlight::console::print_bytes(&[])) {
             Err(error) if error.kind() != ErrorKind::BrokenPipe => {
                 remark(format_args!("error: cannot write the help text: {error}"));
@@ -200,8 +198,8 @@ fn not_understood(error: clap::Error) -> ExitCode {
         remark(format_args!("error: {message}"));
         return ExitCode::from(2);
     }
-    // It quotes what was typed, and a line end in that would begin a line of its own: asked again with words that are fit
-    // to be printed, it says the same of those.
+    // The message quotes the arguments, and a line break in them would begin a new line: they are parsed again with
+    // such characters escaped, which gives the same message without line breaks.
     let words = words::typed();
     let shown: Vec<String> = words.iter().map(|word| printable::name(&word.to_string_lossy()).into_owned()).collect();
     let error = match words.iter().zip(&shown).all(|(word, shown)| word == shown.as_str()) {
@@ -212,15 +210,15 @@ fn not_understood(error: clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Warnings go to the terminal, those of the window libraries only when something fails; `--verbose` and `RUST_LOG` ask
-/// for more.
+/// Starts the log: warnings go to the terminal, except those of the window libraries, which report only errors;
+/// `--verbose` and `RUST_LOG` give more.
 fn start_log(verbose: bool) {
     use tracing_subscriber::EnvFilter;
     let own = if verbose { "warn,firstlight=debug" } else { "warn" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
         EnvFilter::new(format!("{own},winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error"))
     });
-    // Only a second logger can fail, and then the first one does the work.
+    // Fails only if a logger exists, which is then used.
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| LogWriter);
     let _ = log.try_init();
 }

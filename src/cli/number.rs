@@ -1,9 +1,9 @@
-//! Numbers of the command line: each with the message that says what it must be, before anything is loaded.
+//! Parsers of numbers in the command line: each reports the valid range before anything is loaded.
 
 use firstlight::mesh::simplify::{Target, check_target};
 use firstlight::scene::check_stops;
 
-/// `640x480` as a width and a height.
+/// Parses `640x480` as a width and a height; pixels.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a number of pixels"));
@@ -12,7 +12,7 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
-/// A positive, finite number.
+/// Parses a positive, finite number.
 pub fn parse_positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
@@ -20,7 +20,7 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A finite number of seconds.
+/// Parses a finite number of seconds.
 pub fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -28,7 +28,7 @@ pub fn parse_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A relative error to stop at: `0.05`, or the same as `5%`. From 1 on only with the sign: 5 is meant as 5 %.
+/// Parses a relative error: `0.05` or `5%`. Values from 1 on need the percent sign, since 5 usually means 5 %.
 pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = number_and_unit(text);
     match number.parse::<f64>().map(|value| value * unit) {
@@ -41,18 +41,18 @@ pub fn parse_share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A share as a percentage with two significant digits: estimates are no more precise than that.
+/// A fraction as a percentage with two significant digits, the precision of the estimates.
 pub fn percent(share: f64) -> String {
     format!("{} %", two_digits(100.0 * share))
 }
 
-/// A number with two significant digits, or all before the point.
+/// A number with two significant digits, or all digits of its integer part.
 pub fn two_digits(value: f64) -> String {
     let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize } else { 0 };
     format!("{value:.digits$}")
 }
 
-/// Stops of exposure: any number that is one.
+/// Parses a number of stops of exposure.
 pub fn parse_stops(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(stops) => check_stops(stops).map(|()| stops).map_err(|error| error.to_string()),
@@ -60,7 +60,7 @@ pub fn parse_stops(text: &str) -> Result<f32, String> {
     }
 }
 
-/// The share of triangles to keep: `0.1` or `10%`.
+/// Parses the fraction of triangles to keep: `0.1` or `10%`.
 pub fn parse_ratio(text: &str) -> Result<f64, String> {
     let (number, unit) = number_and_unit(text);
     let ratio = number.parse::<f64>().map_err(|_| "must be a number above 0 and at most 1, or a percentage")? * unit;
@@ -68,24 +68,24 @@ pub fn parse_ratio(text: &str) -> Result<f64, String> {
     Ok(ratio)
 }
 
-/// A number of triangles to keep.
+/// Parses a number of triangles to keep.
 pub fn parse_faces(text: &str) -> Result<usize, String> {
     let faces = text.parse().map_err(|_| "must be a number of triangles, at least 1")?;
     check_target(Target::Faces(faces)).map_err(|error| error.to_string())?;
     Ok(faces)
 }
 
-/// The largest distance between two surfaces.
+/// The maximum distance between two surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Deviation {
     /// In the units of the file.
     Length(f64),
-    /// Of the diagonal of the model's bounding box.
+    /// As a fraction of the diagonal of the model's bounding box.
     Share(f64),
 }
 
 impl Deviation {
-    /// In the units of a model with this diagonal.
+    /// The distance for a model with this diagonal, in the same units.
     pub fn length(self, diagonal: f64) -> f64 {
         match self {
             Self::Length(length) => length,
@@ -94,7 +94,7 @@ impl Deviation {
     }
 }
 
-/// `0.01` as a length, `0.5%` as a share of the diagonal.
+/// Parses `0.01` as a length and `0.5%` as a fraction of the diagonal.
 pub fn parse_error(text: &str) -> Result<Deviation, String> {
     let (number, unit) = number_and_unit(text);
     let number: f64 = number.parse().map_err(|_| "must be a length above 0, or a percentage of the diagonal")?;
@@ -102,7 +102,7 @@ pub fn parse_error(text: &str) -> Result<Deviation, String> {
     Ok(if unit == 1.0 { Deviation::Length(number) } else { Deviation::Share(unit * number) })
 }
 
-/// A number and what it counts: `%` is a hundredth.
+/// A number and its unit: 0.01 with `%`, else 1.
 fn number_and_unit(text: &str) -> (&str, f64) {
     match text.trim_end().strip_suffix('%') {
         Some(number) => (number.trim_end(), 0.01),

@@ -1,4 +1,4 @@
-//! `firstlight pack SCENE -o scene.zip`: a scene with all of its files, for other machines.
+//! `firstlight pack SCENE -o scene.zip`: packs a scene with all of its files, for other machines.
 
 use super::args::{OverwriteArgs, SceneArgs, replaced};
 use super::console::inform;

@@ -1,7 +1,7 @@
-//! `firstlight render SCENE --part I/N --film part.exr`: one part of an image, as often as an engine asks for it.
+//! `firstlight render SCENE --part I/N --film part.exr`: renders one part of an image; may be run any number of times.
 //!
-//! A part that is complete is recognised and skipped; one that was interrupted is resumed from its last film, which is saved
-//! every minute. Exit status: 0 done, 75 try again, 2 wrong input.
+//! A complete part is recognised and skipped; an interrupted one is resumed from its last film, which is saved every
+//! minute by default. Exit status: 0 done, 75 try again, 2 wrong input.
 
 use super::animate::{Sequence, animate};
 use super::console::{inform, remark};
@@ -24,13 +24,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Stands for the number of the part in the name of a film.
+/// Placeholder for the number of the part in the name of a film.
 const NUMBER: &str = "{part}";
 
-/// Renders the part that `args` asks for.
+/// Renders the part given by `args`.
 pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     stop.is_of_part();
-    // The same samples in every pixel: only those can be divided before any is taken.
+    // Uniform allocation: only a fixed number of samples can be divided in advance.
     let args = &RenderArgs { uniform: args.part_by != PartBy::Frames || args.uniform, ..args.clone() };
     let part = args.part.as_deref().expect("only parts come here");
     let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
@@ -44,7 +44,7 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     })
 }
 
-/// A part of a sequence.
+/// Renders a part of a sequence.
 fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     let Some(n) = args.turntable.or(args.bookmarks.as_ref().and(args.frames)) else {
         return Err(Failure::Usage("--part-by frames needs a sequence: --turntable N or --bookmarks".to_owned()));
@@ -60,7 +60,7 @@ fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     animate(args, job, progress, &Sequence { frames, is_part: true, n_replaced: 0 }, stop).map_err(Failure::of_part)
 }
 
-/// A part of the samples or of the tiles of one image.
+/// Renders a part of the samples or of the tiles of an image.
 fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     if args.turntable.is_some() || args.bookmarks.is_some() {
         return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
@@ -70,7 +70,7 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     let claim = files.go_on(&path).map_err(|error| Failure::from(error).of_part())?;
     let progress = Progress::new();
     let job = load(args, &mut files, &progress)?;
-    // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
+    // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     let all = samples(args, &job);
     let samples = match args.part_by {
@@ -84,13 +84,13 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
         _ => None,
     };
     check_samples(&film, &samples, region.as_ref(), &path)?;
-    // All parts see the same: the first one keeps it for the film of all.
+    // The features of all parts are equal: the first part stores them for the merged film.
     let features = if part.index == 0 { job.features(args, kept).map_err(Failure::of_part)? } else { None };
     let work = Work { args, job: &job, part, samples, region, features, path };
     work.render(film, claim, progress, stop)
 }
 
-/// What there is to do.
+/// The work on a part.
 struct Work<'a> {
     args: &'a RenderArgs,
     job: &'a RenderJob,
@@ -118,13 +118,13 @@ impl Work<'_> {
                 .suspend(|| inform(format_args!("resuming {path}, which has {before} of {goal} samples per pixel")));
         }
         job.draft.prepare();
-        // From here on a stop saves what there is.
+        // From here on, a stop saves the film.
         stop.attend();
         let (mut claim, mut wait) = (Some(claim), Duration::from_secs_f64(args.save_every));
         let bad_before = film.n_bad();
         while film.spp_in(region) < goal && !stop.is_asked() {
             let due = Instant::now() + wait;
-            // A pass that takes long is ended in the middle.
+            // A long pass is interrupted.
             let late = || stop.is_asked() || Instant::now() > due + wait / 2;
             let prepared = &job.extraction.prepared;
             let report = render_region_until(prepared, &job.settings, &mut film, region, target, &late, |now| {
@@ -146,7 +146,7 @@ impl Work<'_> {
             }
             let start = Instant::now();
             claim = self.save(&film, claim.take())?;
-            // Large films are saved less often: no more than a twentieth of the time is spent on it.
+            // Large films are saved less often: saving takes at most a twentieth of the time.
             wait = wait.max(20 * start.elapsed());
         }
         progress.finish();
@@ -166,9 +166,9 @@ impl Work<'_> {
         Err(stop.failure(message))
     }
 
-    /// Saves the film, and claims its file for the next time.
+    /// Saves the film and claims its file again.
     fn save(&self, film: &Film, claim: Option<WholeFile>) -> Result<Option<WholeFile>, Failure> {
-        // On a disk without locks another process may have come further: its film stays.
+        // On a file system without locks, another process may have rendered more: its film is kept.
         if let Ok(there) = read_film_summary(&self.path)
             && there.layout != film.layout()
             && there.layout.has_all_of(&film.layout())
@@ -187,7 +187,7 @@ impl Work<'_> {
         claim_again().map(Some)
     }
 
-    /// `part 3/64, samples 128 to 191`.
+    /// Such as `part 3/64, samples 128 to 191`.
     fn name(&self) -> String {
         let Part { count, .. } = self.part;
         let samples = in_words(std::slice::from_ref(&self.samples));
@@ -200,7 +200,7 @@ impl Work<'_> {
     }
 }
 
-/// Where the film of the part is kept.
+/// Path of the film of the part.
 fn film_path(args: &RenderArgs, part: Part) -> Result<PathBuf, Failure> {
     let path = args.film.as_deref().ok_or_else(|| Failure::Usage("--part needs --film FILE.exr".to_owned()))?;
     let path = numbered(path, part);
@@ -210,7 +210,7 @@ fn film_path(args: &RenderArgs, part: Part) -> Result<PathBuf, Failure> {
     }
 }
 
-/// A path with the number of the part in the place of `{part}`.
+/// A path with `{part}` replaced by the number of the part.
 pub fn numbered(path: &Path, part: Part) -> PathBuf {
     match path.to_str() {
         Some(text) => PathBuf::from(text.replace(NUMBER, &part.padded())),
@@ -218,7 +218,7 @@ pub fn numbered(path: &Path, part: Part) -> PathBuf {
     }
 }
 
-/// The scene; what is wrong with it stays wrong, unless its disk cannot be reached.
+/// Loads the scene; its errors are permanent unless its file is temporarily unreachable.
 fn load(args: &RenderArgs, files: &mut Files, progress: &Progress) -> Result<RenderJob, Failure> {
     RenderJob::new(args, None, files, progress).map_err(|failure| match args.scene.source() {
         Ok(SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path)) => {
@@ -231,7 +231,7 @@ fn load(args: &RenderArgs, files: &mut Files, progress: &Progress) -> Result<Ren
     })
 }
 
-/// All samples that are divided.
+/// The range of all samples, which is divided into parts.
 fn samples(args: &RenderArgs, job: &RenderJob) -> Range<u32> {
     args.samples.clone().unwrap_or_else(|| {
         let first = job.scene.shot.as_ref().map_or(0, |shot| shot.first_sample);
@@ -239,7 +239,7 @@ fn samples(args: &RenderArgs, job: &RenderJob) -> Range<u32> {
     })
 }
 
-/// The film that is there with what it has kept, or an empty one.
+/// The existing film with its features, or an empty film.
 fn film_so_far(args: &RenderArgs, job: &RenderJob, path: &Path) -> Result<(Film, Option<FeatureLayers>), Failure> {
     let empty = || Ok((job.film(args, None)?, None));
     if !path.exists() {
@@ -251,7 +251,7 @@ fn film_so_far(args: &RenderArgs, job: &RenderJob, path: &Path) -> Result<(Film,
             let features = kept.features.take();
             Ok((job.film(args, Some((kept, path)))?, features))
         }
-        // Its samples are lost either way.
+        // The samples of a damaged film are lost in any case.
         Err(error) if error.is_damaged() => {
             remark(format_args!("warning: {error}: this part is rendered again"));
             empty()
@@ -273,7 +273,7 @@ fn region(film: &Film, part: Part, job: &RenderJob) -> Result<Region, Failure> {
     Ok(film.region(start, end).expect("a part has a tile at least"))
 }
 
-/// Refuses a film with samples of another part.
+/// Rejects a film that has samples of another part.
 fn check_samples(film: &Film, samples: &Range<u32>, region: Option<&Region>, path: &Path) -> Result<(), Failure> {
     let layout = film.layout();
     let tiles_x = film.width().div_ceil(film.tile_size());

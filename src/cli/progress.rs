@@ -1,9 +1,9 @@
-//! How far a rendering is: a bar on a terminal, a line every few seconds in a pipe or a log.
+//! Progress of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
 
 use super::console::Bar;
 use super::waiting::Waiting;
 
-/// Ends by itself when it is dropped.
+/// Ends when it is dropped.
 pub struct Progress {
     bar: Bar,
     lines: Option<Waiting>,
@@ -14,7 +14,7 @@ impl Progress {
         Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("loading")) }
     }
 
-    /// What is being done, before it is known how long it takes.
+    /// Shows the current stage, whose duration is unknown.
     pub fn stage(&self, text: String) {
         if let Some(lines) = &self.lines {
             lines.next(text.clone());
@@ -22,7 +22,7 @@ impl Progress {
         self.bar.set_message(text);
     }
 
-    /// `share` of all is done, 0..1.
+    /// Shows the progress: `share` is the fraction that is done, 0..1.
     pub fn at(&self, share: f64, text: String) {
         let share = share.clamp(0.0, 1.0);
         self.bar.set_position((share * 1000.0) as u64);
@@ -32,12 +32,12 @@ impl Progress {
         self.bar.set_message(text);
     }
 
-    /// Prints past the bar.
+    /// Prints while the bar is hidden.
     pub fn suspend(&self, print: impl FnOnce()) {
         self.bar.suspend(print);
     }
 
-    /// From here on nothing is told.
+    /// Ends the display.
     pub fn finish(&mut self) {
         self.bar.finish_and_clear();
         self.lines = None;

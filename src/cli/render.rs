@@ -1,4 +1,4 @@
-//! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
+//! `firstlight render SCENE -o out.png`: renders an image without a window, and a film from which it can be resumed.
 
 use super::animate::{Sequence, animate, frames};
 use super::args::replaced;
@@ -24,7 +24,7 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The command, from words that a job has.
+/// The command, for parsing the arguments of a job.
 #[derive(clap::Parser)]
 #[command(name = "firstlight render", no_binary_name = true)]
 pub struct Command {
@@ -42,7 +42,7 @@ impl Command {
         })
     }
 
-    /// The part that the words ask for.
+    /// The arguments of the part, if one is given.
     pub fn part(&self) -> Result<Option<RenderArgs>, Failure> {
         self.render.part()
     }
@@ -54,7 +54,7 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
         return part::run(&job, stop);
     }
     let jobs = command.jobs()?;
-    // A mistake in the last name should not cost the wait for the others.
+    // An error in the last argument should be reported before the others are rendered.
     for job in &jobs {
         job.scene.source()?;
         job.picture_format()?;
@@ -74,7 +74,7 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     args.picture_format()?;
     check_stdout(args)?;
     let film_path = film_path(args)?;
-    // A picture that cannot be written is not worth the wait.
+    // Outputs that cannot be written are reported before rendering.
     let mut files = args.overwrite.files();
     if let Some(path) = args.scene.source()?.path() {
         files.read(path)?;
@@ -114,7 +114,7 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     pool.install(|| render(args, film, &mut files, stop))
 }
 
-/// Standard output takes one picture and nothing else.
+/// Checks that standard output is used for one image and nothing else.
 fn check_stdout(args: &RenderArgs) -> Result<(), Failure> {
     let message = if !args.to_stdout() {
         return Ok(());
@@ -134,7 +134,7 @@ fn is_exr(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
 }
 
-/// Where the film is kept, if it is.
+/// Path of the film, if it is saved.
 fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
     match &args.film {
         Some(path) if !is_exr(path) => {
@@ -149,7 +149,7 @@ fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
     }
 }
 
-/// - `film_file`: where the film is kept, if it is; nobody else writes to it in the meantime.
+/// - `film_file`: file of the film if it is saved; no other process can write it in the meantime.
 fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, stop: &Stop) -> Result<(), Failure> {
     let mut progress = Progress::new();
     let film_path = film_file.as_ref().map(|file| file.path().to_path_buf());
@@ -162,7 +162,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         progress.suspend(|| remark(format_args!("warning: {warning}")));
     }
     let job = RenderJob::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
-    // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
+    // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the picture was saved in the middle of a pass; the new one has {} samples", shot.spp);
@@ -187,12 +187,12 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let features_start = Instant::now();
     let features = job.features(args, kept_features)?;
     let features_seconds = features_start.elapsed().as_secs_f64();
-    // From here on a stop saves what there is, which must not take long.
+    // From here on, a stop saves the results, which must be quick.
     job.draft.prepare();
     stop.attend();
     let asked = || stop.is_asked();
     if region.is_some() && film.spp() == 0 {
-        // A pixel without a sample shows nothing.
+        // Pixels without samples would be black.
         let once = Target { spp: Some(1), ..Target::default() };
         render_offline_until(&job.extraction.prepared, &job.settings, &mut film, once, &asked, |_| true);
     }
@@ -212,7 +212,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     progress.finish();
-    // Samples that agree on nothing but black do not know what they have missed.
+    // If all samples are black, the error estimate is meaningless.
     let is_dark = extraction.prepared.has_light() && is_black(&film);
     let error = film.error_estimate_in(region).map(|error| error.relative);
     let reached = target.reached(film.spp_in(region), report.seconds, error);
@@ -223,7 +223,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
 
     drop(room);
-    // The film first: a picture can be made of it.
+    // The film first: an image can be made from it.
     if let Some(file) = film_file {
         let note = job.note(&film, file.path());
         write_film_with_features(&film, features.as_ref(), &note, file)?;
@@ -304,7 +304,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
 }
 
-/// The tiles around a rectangle, if the film has any.
+/// The tiles that cover a rectangle, if it overlaps the film.
 fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Failure> {
     let start = UVec2::new(x, y);
     film.region(start, start.saturating_add(UVec2::new(width, height))).ok_or_else(|| {
@@ -313,7 +313,7 @@ fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Fai
     })
 }
 
-/// Where the first sample of a list is, for people who want to look into it.
+/// Location of the first sample of a list, for the user to inspect.
 fn first_of(samples: &[BadSample]) -> String {
     let place = |&BadSample { x, y, sample }: &BadSample| format!(" (pixel {x},{y}, sample {sample})");
     samples.first().map(place).unwrap_or_default()
@@ -323,7 +323,7 @@ fn is_black(film: &Film) -> bool {
     (0..film.height()).all(|y| (0..film.width()).all(|x| film.mean(x, y) == Vec3::ZERO))
 }
 
-/// One line for machines.
+/// The result as one line of JSON.
 fn json(
     job: &RenderJob,
     report: &OfflineReport,

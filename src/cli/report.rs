@@ -1,4 +1,4 @@
-//! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
+//! `firstlight report [SCENES]`: error versus time, as an HTML page, a table and a few lines of text.
 
 use super::args::{OverwriteArgs, SceneArgs};
 use super::console::{Bar, inform, lines, print, remark};
@@ -20,16 +20,16 @@ use firstlight::scene::{
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// Samples per pixel of the last step, unless given.
+/// Default number of samples per pixel of the last step.
 const DEFAULT_SPP: u32 = 256;
 
-/// How many times the samples of the last step an own reference has.
+/// Samples of a rendered reference, as a multiple of those of the last step.
 const REFERENCE_FACTOR: u32 = 16;
 
-/// The same for one that was stopped: a fifth of what is measured against it is then its own error.
+/// The minimum for an interrupted reference: a fifth of the measured error is then its own.
 const LEAST_REFERENCE_FACTOR: u32 = 4;
 
-/// Pixels of a picture, about, unless a size is given: enough to tell, few enough to wait for.
+/// Approximate default number of pixels: enough for a measurement, and quick to render.
 const DEFAULT_PIXELS: f64 = 50_000.0;
 
 #[derive(Args, Clone, Debug)]
@@ -110,15 +110,15 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     }
 }
 
-/// The folder of the report, taken away again where nothing came of it and it was not there before.
+/// The folder of the report; on drop it is removed if it is new and empty.
 #[derive(Clone)]
 struct OutFolder {
-    /// Those that were made, the innermost first.
+    /// The folders that were created, innermost first.
     made: Vec<PathBuf>,
 }
 
 impl OutFolder {
-    /// A page that cannot be written is not worth the wait.
+    /// Creates the folder and tests writing to it, before rendering.
     fn new(path: &Path) -> Result<Self, Failure> {
         let made = path.ancestors().take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let folder = Self { made: made.map(Path::to_path_buf).collect() };
@@ -136,13 +136,13 @@ impl OutFolder {
 impl Drop for OutFolder {
     fn drop(&mut self) {
         for folder in &self.made {
-            // Not if somebody else has put something there.
+            // Fails if it is not empty.
             let _ = std::fs::remove_dir(folder);
         }
     }
 }
 
-/// What was measured, and what is missing if somebody has stopped it.
+/// The measurements, and what is missing if they were stopped.
 fn measure_all(
     args: &ReportArgs,
     names: &[OsString],
@@ -150,7 +150,7 @@ fn measure_all(
     files: &mut Files,
     stop: &Stop,
 ) -> Result<(Vec<SceneOutcome>, Option<String>), Failure> {
-    // Every scene is read first: a mistake in the last name should not cost the wait for the others.
+    // All scenes are loaded first, so that an error in the last argument is reported at once.
     let mut scenes = Vec::new();
     for name in names {
         let scene = SceneArgs { scene: name.clone(), ..SceneArgs::default() };
@@ -184,7 +184,7 @@ fn measure_all(
     Ok((outcomes, missing))
 }
 
-/// Some seconds as people say it.
+/// A duration in a suitable unit.
 fn duration(seconds: f64) -> String {
     match seconds {
         ..90.0 => format!("{seconds:.0} s"),
@@ -193,7 +193,7 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A scene, ready to be rendered.
+/// A scene that is ready to be rendered.
 struct ReportScene {
     title: String,
     inputs: SceneInputs,
@@ -241,7 +241,7 @@ impl ReportScene {
         })
     }
 
-    /// What was found out, if it was enough to tell anything, and what is missing because somebody has stopped it.
+    /// Measures a scene; the result may be missing, or incomplete with a description of what is missing, after a stop.
     fn measure(
         &self,
         args: &ReportArgs,
@@ -272,14 +272,14 @@ impl ReportScene {
                 .into_iter()
                 .map_while(|(technique, settings)| {
                     let others = self.measure_curve(limits, settings, &format!("without {technique}"), progress, stop);
-                    // Half a curve would be compared with a whole one.
+                    // Comparing a partial curve with a complete one would be misleading.
                     if stop.is_asked() {
                         missing.get_or_insert_with(|| {
                             format!("the comparison of {technique} and later techniques is missing")
                         });
                         return None;
                     }
-                    // Only a step that both have can tell.
+                    // Only steps that both curves have can be compared.
                     let is_unused = steps.iter().zip(&others).all(|(a, b)| a.picture == b.picture);
                     Some(Ablation { technique, curve: measure(&others), is_unused })
                 })
@@ -302,7 +302,7 @@ impl ReportScene {
         (Some(outcome), missing)
     }
 
-    /// What is compared: each technique switched off alone.
+    /// The settings to compare: each technique disabled on its own.
     fn ablations(&self) -> Vec<(&'static str, RenderSettings)> {
         let with = |techniques| RenderSettings { techniques, ..self.settings };
         let even = RenderSettings { allocation: SampleAllocation::Uniform, ..self.settings };
@@ -310,8 +310,8 @@ impl ReportScene {
         techniques.into_iter().chain([("adaptive allocation of samples", even)]).collect()
     }
 
-    /// A new one each time: what a render finds out about a scene and keeps (where caustics come from) must be found out,
-    /// and paid for, by each.
+    /// A new snapshot each time: data that a rendering gathers about a scene and caches (such as the sources of
+    /// caustics) must be gathered, and its time counted, for each curve.
     fn prepared(&self) -> Prepared {
         Extraction::new(&self.inputs, &self.trees).prepared
     }
@@ -328,7 +328,7 @@ impl ReportScene {
         measure_curve(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
-    /// One that was kept, or a new one; `None` when somebody stops it before it is good for anything.
+    /// A cached reference, or a new one; `None` if it was stopped too early to be useful.
     fn reference(&self, last: &CurveStep, progress: &mut ReportProgress, stop: &Stop) -> Option<Reference> {
         let store = ReferenceStore::of_platform();
         let spp = last.spp.saturating_mul(REFERENCE_FACTOR);
@@ -354,14 +354,14 @@ impl ReportScene {
     }
 }
 
-/// About [`DEFAULT_PIXELS`] in the shape of `width` × `height`, or that itself if it is smaller.
+/// A size of about [`DEFAULT_PIXELS`] with the aspect ratio of `width` × `height`; that size itself if it is smaller.
 fn modest(width: u32, height: u32) -> (u32, u32) {
     let scale = (DEFAULT_PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
     let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
     (scaled(width), scaled(height))
 }
 
-/// Progress of the whole report; a curve counts by its pixels, and a reference as many curves.
+/// Progress of the whole report; a curve is weighted by its pixels, a reference by several curves.
 struct ReportProgress {
     bar: Bar,
     done: f64,
@@ -378,7 +378,7 @@ impl ReportProgress {
         Self { bar: Bar::new((weight * pixels) as u64), done: 0.0 }
     }
 
-    /// Begins a part of the work, and counts it as done when the next one begins.
+    /// Begins a task, which counts as done when the next one begins; returns a function that sets its progress, 0..1.
     fn task(&mut self, message: String, weight: f64, (width, height): (u32, u32)) -> impl FnMut(f64) {
         let (bar, before) = (self.bar.clone(), self.done);
         let share = weight * f64::from(width) * f64::from(height);
@@ -388,7 +388,7 @@ impl ReportProgress {
     }
 }
 
-/// What was typed, for the page; the program by its plain name.
+/// The command line for the page, with the program's plain name.
 fn command_line() -> String {
     let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
     let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));

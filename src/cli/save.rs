@@ -1,4 +1,4 @@
-//! `firstlight save SCENE -o out.ron`: a model, a built-in scene or what a picture shows, as a scene file.
+//! `firstlight save SCENE -o out.ron`: saves a model, a built-in scene or the scene of an image as a scene file.
 
 use super::args::{OverwriteArgs, SceneArgs, replaced};
 use super::console::inform;

@@ -1,4 +1,4 @@
-//! `firstlight [SCENE|MODEL]`: a window, or a picture where there is no display.
+//! `firstlight [SCENE|MODEL]`: opens a window, or renders an image if there is no display.
 
 use super::args::{OverwriteArgs, SceneArgs};
 use super::console::{inform, remark};
@@ -81,7 +81,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     }
     settings.remember(&source);
     let (width, height) = args.size.or(settings.window).unwrap_or((1280, 720));
-    // Whatever is wrong with that folder, the picture is what the person is here for.
+    // Problems with the settings folder must not prevent rendering.
     if let Err(error) = store.keep_settings(&settings) {
         remark(format_args!("warning: {error}"));
     }
@@ -109,7 +109,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     })
 }
 
-/// Plays a recording, and keeps the picture at its end.
+/// Replays a recording and saves its final image.
 fn play(args: &ShowArgs) -> Result<(), Failure> {
     let Some(path) = &args.replay else { return Ok(()) };
     PictureFormat::of(&args.output).map_err(|error| Failure::Usage(error.into()))?;

@@ -1,4 +1,4 @@
-//! `firstlight simplify IN -o OUT.obj`: fewer triangles, with the error measured.
+//! `firstlight simplify IN -o OUT.obj`: reduces the number of triangles and measures the error.
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
@@ -53,7 +53,7 @@ enum MethodArg {
     Melax,
 }
 
-/// Points for each direction of the measured error.
+/// Points per direction of the error measurement.
 const SAMPLES: usize = 200_000;
 
 pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
@@ -62,7 +62,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         MethodArg::Melax => Method::Melax,
     };
     let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
-    // A result that cannot be written is not worth the wait.
+    // Outputs that cannot be written are reported before the work.
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
         let message = format!(
             "{}: the output name must end in .obj: simplified models are written as Wavefront OBJ",
@@ -78,7 +78,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     files.read(&args.input)?;
     files.write(&args.output)?;
     let waiting = Waiting::new(format!("reading {}", args.input.display()));
-    // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
+    // Computed normals are not written: without normals in the file, the next program computes its own.
     let mut model = load_model(&args.input, format, &ModelOptions::default()).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
         let options = ModelOptions { normals: ModelNormals::Ignore, ..ModelOptions::default() };
@@ -114,7 +114,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     if missed {
         remark(format_args!("warning: borders, seams and non-manifold edges allow no fewer than {after} triangles"));
     }
-    // A material that no library describes would only be missed.
+    // Materials that no library defines are not written.
     let kept = model.materials.iter().filter(|_| format == ModelFormat::Obj);
     let names: Vec<String> = kept.map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
@@ -162,7 +162,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is not as a simplifier would have it, and what becomes of it; a sentence each.
+/// Defects of the input mesh and how they were treated, one sentence each.
 fn faults(model: &ImportedModel) -> Vec<String> {
     let (triangles, edges) = (Faults::of(&model.mesh), Topology::of(&model.mesh));
     let counted = |count: usize, fate: &str| (count > 0).then(|| format!("{count} {fate}"));

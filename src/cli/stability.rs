@@ -1,4 +1,5 @@
-//! `firstlight stability`: the hard cases, counted, as a table or for machines. Fails if there is a finding.
+//! `firstlight stability`: runs the hard cases and prints the counts, as a table or as JSON. Fails if there are
+//! findings.
 
 use super::console::{Bar, lines, print};
 use super::failure::Failure;
@@ -8,7 +9,7 @@ use firstlight::report::cpu_seconds;
 use firstlight::stability::{CASES, Case, Tally, Worst};
 use std::time::Instant;
 
-/// Rays of the largest case, unless given.
+/// Default number of rays of the largest case.
 const USUAL_RAYS: u64 = 10_000_000;
 
 #[derive(Args, Clone, Debug)]
@@ -74,7 +75,7 @@ fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Resu
     print(serde_json::Value::from(object))
 }
 
-/// The ray of a finding, as arguments that replay it.
+/// The arguments that replay the ray of a finding.
 fn replay_args(args: &StabilityArgs, case: &Case, worst: &Worst) -> String {
     let rays = if args.rays == USUAL_RAYS { String::new() } else { format!(" --rays {}", args.rays) };
     format!("--case {} --replay {}:{}{rays}", case.name, worst.stage, worst.ray)
@@ -172,7 +173,7 @@ fn json(args: &StabilityArgs, case: &Case, tally: &Tally, seconds: f64) -> serde
     })
 }
 
-/// A whole number, also written as 1e9.
+/// Parses an integer that may be written as 1e9.
 fn parse_rays(text: &str) -> Result<u64, String> {
     match text.parse::<f64>() {
         Ok(rays) if (1.0..=1e15).contains(&rays) => Ok(rays as u64),

@@ -1,4 +1,4 @@
-//! `firstlight status FOLDER`: how far a job is, from what lies in its folder.
+//! `firstlight status FOLDER`: shows the progress of a job from the files in its folder.
 
 use super::console::{inform, print, remark};
 use super::failure::Failure;
@@ -27,13 +27,13 @@ pub struct StatusArgs {
     json: bool,
 }
 
-/// How far the parts of a round are.
+/// Progress of the parts of a round.
 #[derive(Default)]
 struct Parts {
     count: u32,
     done: u32,
     begun: u32,
-    /// Samples per pixel that are there, of all parts together.
+    /// Samples per pixel of all parts together.
     samples: u64,
     films: Vec<PathBuf>,
 }
@@ -103,7 +103,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     ))
 }
 
-/// `40 s`, `12 min` or `3.5 h`.
+/// Such as `40 s`, `12 min` or `3.5 h`.
 fn duration(seconds: f64) -> String {
     match seconds {
         ..100.0 => format!("{seconds:.0} s"),
@@ -112,7 +112,7 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Saves what all films show together, whatever is missing.
+/// Saves an image of all films together, even if some are missing.
 fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> Result<(), Failure> {
     PictureFormat::of(path).map_err(|error| Failure::Usage(error.into()))?;
     let all = has_merged.then(|| folder.join(ALL[0]));

@@ -1,9 +1,10 @@
-//! Ctrl+C (and, on Unix, being told to end). A command works on a thread of its own: while there is nothing to save it is
-//! left behind, wherever it is, and the program ends at once; from [`Stop::attend`] on it finishes off and saves what it
-//! has. The second Ctrl+C always ends the program at once.
+//! Handling of Ctrl+C (and, on Unix, of termination signals). A command works on its own thread: while there is nothing
+//! to save, that thread is abandoned, whatever it is doing, and the program ends at once; after [`Stop::attend`], the
+//! command finishes and saves its results. A second Ctrl+C ends the program at once, except for parts that an engine
+//! runs.
 //!
-//! So nothing that a command calls has to ask whether to go on before there is something to save: not the parsers of other
-//! people, which cannot.
+//! Code that runs before there is anything to save, such as third-party parsers, therefore need not support
+//! cancellation.
 
 use super::failure::Failure;
 use firstlight::console::{Bar, clear_line};
@@ -13,13 +14,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The exit status of a program that was stopped by Ctrl+C, as shells count it.
+/// Exit status of a program stopped by Ctrl+C, as in shells.
 pub const STOPPED: u8 = 130;
 
-/// Bytes: scene files nest as deep as the first thread of a program allows.
+/// Stack size in bytes: deeply nested scene files need as much as the main thread has.
 const STACK: usize = 16 << 20;
 
-/// Whether somebody wants to stop.
+/// Whether a stop was requested.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<StopState>);
 
@@ -27,21 +28,21 @@ pub struct Stop(Arc<StopState>);
 struct StopState {
     asked: AtomicBool,
     attended: AtomicBool,
-    /// It is told to end by an engine that tries it again.
+    /// Whether an engine runs the command, which tries again after a stop.
     is_part: AtomicBool,
     left: Mutex<Left>,
 }
 
-/// What is there when a command is left behind.
+/// State to clean up when a command is abandoned.
 #[derive(Default)]
 struct Left {
-    /// What is saved, as a sentence has it.
+    /// What has been saved, as part of a sentence.
     saved: Option<String>,
     undo: Vec<Box<dyn FnOnce() + Send>>,
 }
 
 impl Stop {
-    /// Does `work`, and answers for it where Ctrl+C comes while nothing is to be saved; call it once.
+    /// Runs `work`, and returns early if Ctrl+C is pressed while there is nothing to save; may be called only once.
     pub fn obeyed_by(work: impl FnOnce(&Self) -> Result<(), Failure> + Send + 'static) -> Result<(), Failure> {
         enum News {
             Stop,
@@ -54,22 +55,22 @@ impl Stop {
         let taken_over = ctrlc::set_handler(move || {
             if shared.0.asked.swap(true, Ordering::SeqCst) {
                 if shared.is_tried_again() {
-                    // Engines signal more than once before they kill, and a film may be half written.
+                    // Engines send several signals before they kill, and a film may be half written.
                     return;
                 }
                 std::process::exit(i32::from(STOPPED));
             }
-            // Nobody waits any more for what is done.
+            // Fails if the main thread no longer waits.
             let _ = sender.send(News::Stop);
         });
         if let Err(error) = taken_over {
-            // Ctrl+C then ends the program at once, as it would any other.
+            // Ctrl+C then ends the program at once, as by default.
             tracing::warn!("Ctrl+C will not save anything: {error}");
         }
         let of_work = stop.clone();
         let body = move || {
             let result = work(&of_work);
-            // Whoever has left does not listen.
+            // Fails if the main thread no longer waits.
             let _ = done.send(News::Done(result));
         };
         let worker = std::thread::Builder::new().name("command".to_owned()).stack_size(STACK).spawn(body);
@@ -78,7 +79,7 @@ impl Stop {
             match news.recv_timeout(std::time::Duration::from_millis(200)) {
                 Ok(News::Done(result)) => return result,
                 Ok(News::Stop) if !stop.0.attended.load(Ordering::SeqCst) => return Err(stop.leave()),
-                // What attends looks at the flag itself; what panics says nothing here.
+                // A command that attends checks the flag itself; a panic sends no message.
                 Ok(News::Stop) | Err(_) => {}
             }
         }
@@ -93,37 +94,37 @@ impl Stop {
         self.0.asked.load(Ordering::Relaxed)
     }
 
-    /// The command is a part of something larger: when an engine stops it, it is to be tried again.
+    /// Declares the command to be a part of a larger job: an engine that stops it tries it again.
     pub fn is_of_part(&self) {
         self.0.is_part.store(true, Ordering::SeqCst);
     }
 
-    /// Whether a stop means that the command is to be tried again; on a terminal somebody has pressed Ctrl+C.
+    /// Whether the command will be tried again after a stop; not on a terminal, where the user has pressed Ctrl+C.
     pub fn is_tried_again(&self) -> bool {
         self.0.is_part.load(Ordering::SeqCst) && !Bar::is_watched()
     }
 
-    /// What a command that was stopped ends with.
+    /// The failure of a stopped command.
     pub fn failure(&self, message: String) -> Failure {
         if self.is_tried_again() { Failure::Retry(message) } else { Failure::Stopped(message) }
     }
 
-    /// From here on the command looks at [`is_asked`](Self::is_asked), and saves what it has when it is asked.
+    /// From here on, the command checks [`is_asked`](Self::is_asked) and saves its results when it returns true.
     pub fn attend(&self) {
         self.0.attended.store(true, Ordering::SeqCst);
     }
 
-    /// From here on there is nothing to save until the command [attends](Self::attend) again: it may be left behind.
+    /// From here on, there is nothing to save until the next [`attend`](Self::attend): the command may be abandoned.
     pub fn rest(&self) {
         self.0.attended.store(false, Ordering::SeqCst);
     }
 
-    /// What is there from here on, whatever becomes of the rest: `a.obj is saved`.
+    /// Declares what has been saved for good, such as `a.obj is saved`.
     pub fn has_saved(&self, what: impl Into<String>) {
         self.left().saved = Some(what.into());
     }
 
-    /// Done when the command is left behind: what it would have cleaned up itself.
+    /// Registers clean-up work for when the command is abandoned.
     pub fn undo(&self, work: impl FnOnce() + Send + 'static) {
         self.left().undo.push(Box::new(work));
     }
@@ -136,7 +137,7 @@ impl Stop {
         whole_file::give_up();
         let Left { saved, undo } = std::mem::take(&mut *self.left());
         undo.into_iter().for_each(|work| work());
-        // A bar may stand there.
+        // Removes a progress bar.
         clear_line();
         self.failure(saved.map_or("stopped: nothing was saved".to_owned(), |saved| format!("stopped: {saved}")))
     }

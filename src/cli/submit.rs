@@ -1,5 +1,5 @@
-//! `firstlight submit ENGINE SCENE --parts N`: the folder of a job with all that it needs, and its first round handed to an
-//! engine.
+//! `firstlight submit ENGINE SCENE --parts N`: creates the folder of a job with all of its files and submits its first
+//! round to an engine.
 
 use super::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
 use super::console::inform;
@@ -66,7 +66,7 @@ pub struct SubmitArgs {
     claim: String,
 }
 
-/// What the picture is, as `render` has it.
+/// Options of the image, as for `render`.
 #[derive(Args, Clone, Debug)]
 struct LookArgs {
     /// Width and height in pixels [default: from the scene].
@@ -110,7 +110,7 @@ impl LookArgs {
     }
 }
 
-/// How the scene is opened, as options of `render`, but for the image that lights it.
+/// The options for opening the scene as options of `render`, except the environment image.
 fn open_words(how: &OpenArgs) -> Vec<String> {
     let up = how.up.and_then(|up| up.to_possible_value()).map(|value| value.get_name().to_owned());
     let options = [
@@ -180,7 +180,7 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         error: args.error,
         max_spp: args.max_spp.max(spp),
     };
-    // As every part will read them.
+    // Checks that the parts will be able to parse the arguments.
     Command::parse(&render_words(&job))?;
     let options = EngineOptions {
         folder: absolute(&folder).to_str().map(str::to_owned).ok_or_else(|| not_utf8(&folder))?,
@@ -194,11 +194,11 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         #[cfg(unix)]
         if file.is_script {
             use std::os::unix::fs::PermissionsExt;
-            // Without it, the script is run by naming the shell.
+            // Without this, the script can still be run by naming the shell.
             let _ = std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755));
         }
     }
-    // Last: a folder with this file is a job.
+    // Last: this file marks the folder as a job.
     job.write(&folder)?;
     let (name, parts) = (folder.display(), job.parts);
     inform(format_args!(
@@ -220,7 +220,7 @@ fn make_folders(folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Puts the scene into the folder; answers with what parts open, and the image that lights it.
+/// Copies the scene into the folder; returns the scene argument of the parts, and the environment image.
 fn pack(scene: &SceneArgs, folder: &Path) -> Result<(String, Option<String>), Failure> {
     let source = scene.source()?;
     if let SceneSource::Builtin(name) = &source
@@ -235,7 +235,7 @@ fn pack(scene: &SceneArgs, folder: &Path) -> Result<(String, Option<String>), Fa
     Ok((inside(&package.scene), package.environment.as_deref().map(inside)))
 }
 
-/// Submits the first round where the engine is there.
+/// Submits the first round if the engine is available.
 fn hand_over(engine: Engine, folder: &Path, dry_run: bool) -> Result<(), Failure> {
     let name = folder.display();
     let (tool, line) = match engine {
@@ -248,7 +248,7 @@ fn hand_over(engine: Engine, folder: &Path, dry_run: bool) -> Result<(), Failure
     };
     let paths = std::env::var_os("PATH").unwrap_or_default();
     let is_there = std::env::split_paths(&paths).any(|path| path.join(tool).is_file());
-    // Kubernetes waits for its rounds, which is for the person to decide where.
+    // For Kubernetes, the script waits for its rounds, so the user decides where it runs.
     if dry_run || !is_there || engine == Engine::Kubernetes {
         inform(format_args!("submit it with: {line}"));
         return Ok(());

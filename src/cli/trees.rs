@@ -1,4 +1,4 @@
-//! `firstlight info --tree SCENE|MODEL`: what each way to split each mesh costs to build and to trace.
+//! `firstlight info --tree SCENE|MODEL`: build and traversal costs of each split method for each mesh.
 
 use super::console::{inform, lines, print};
 use super::failure::Failure;
@@ -39,7 +39,7 @@ pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<
     Ok(())
 }
 
-/// Each mesh once, with its name and how its first object stands.
+/// Each mesh once, with the name and transform of its first object.
 fn meshes(inputs: &SceneInputs, extraction: &Extraction) -> Vec<(String, Arc<Mesh>, Affine3A)> {
     let objects: HashMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
     let mut known = HashSet::new();

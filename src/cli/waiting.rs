@@ -1,18 +1,18 @@
-//! What lasts, told to whoever waits: a line every few seconds, on a terminal and off it.
+//! Reports of long work: a line every few seconds, on a terminal or not.
 
 use super::console::inform;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Tells what is being done while this lives.
+/// Reports the current stage until it is dropped.
 pub struct Waiting {
     stages: Option<Sender<String>>,
     teller: Option<JoinHandle<()>>,
 }
 
 impl Waiting {
-    /// Time between two lines; what is done sooner is not told at all.
+    /// Time between two lines; shorter stages are not reported.
     const EVERY: Duration = Duration::from_secs(5);
 
     pub fn new(stage: impl Into<String>) -> Self {
@@ -35,15 +35,15 @@ impl Waiting {
                 }
             }
         };
-        // Without a thread for it there is no telling, and the work is done all the same.
+        // If no thread can be started, nothing is reported, but the work is done.
         let teller = std::thread::Builder::new().name("waiting".to_owned()).spawn(work).ok();
         Self { stages: Some(stages), teller }
     }
 
-    /// What is done from now on.
+    /// Sets the current stage.
     pub fn next(&self, stage: impl Into<String>) {
         if let Some(stages) = &self.stages {
-            // Nobody listens where there is no thread.
+            // Fails if there is no thread.
             let _ = stages.send(stage.into());
         }
     }
@@ -53,7 +53,7 @@ impl Drop for Waiting {
     fn drop(&mut self) {
         self.stages = None;
         if let Some(teller) = self.teller.take() {
-            // It has nothing to fail at but a panic, which has been told.
+            // It can only fail by a panic, which has been reported.
             let _ = teller.join();
         }
     }
@@ -67,7 +67,7 @@ mod tests {
     fn what_lasts_is_told_again_and_again_and_then_no_more() {
         let (sender, lines) = mpsc::channel();
         let waiting = Waiting::telling("reading", Duration::from_millis(5), move |line| {
-            // Whoever has heard enough is gone.
+            // Fails after the end of the test.
             let _ = sender.send(line);
         });
         let heard = |what: &str| (0..1000).any(|_| lines.recv().expect("it tells on").ends_with(what));

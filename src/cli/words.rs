@@ -1,5 +1,4 @@
-//! The words of the command line as they were typed: options of every command that stand before it, and commands that
-//! are nearly one.
+//! Preprocessing of the command line: global options before a command, and mistyped commands.
 
 use super::CommandLine;
 use clap::CommandFactory;
@@ -8,12 +7,12 @@ use firstlight::scene::{BUILTIN_SCENES, SceneSource, suggestion};
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-/// What was typed, with the options that stand before a command behind it: `--quiet render` is `render --quiet`.
+/// The arguments, with global options before a command moved behind it: `--quiet render` becomes `render --quiet`.
 pub fn typed() -> Vec<OsString> {
     ordered(std::env::args_os().collect(), &commands())
 }
 
-/// What to say of the first word that is no option, if it cannot be opened and looks like a command.
+/// An error message if the first argument that is not an option cannot be opened and resembles a command.
 pub fn mistyped_command() -> Option<String> {
     let words = typed();
     mistyped(words.get(1 + n_leading_options(&words))?, &commands())
@@ -24,7 +23,7 @@ fn commands() -> Vec<String> {
     names.get_subcommands().map(|command| command.get_name().to_owned()).chain(["help".to_owned()]).collect()
 }
 
-/// How many words after the first belong to options that every command has.
+/// Number of arguments after the program name that belong to global options.
 fn n_leading_options(words: &[OsString]) -> usize {
     let mut n = 0;
     while let Some(word) = words.get(1 + n).and_then(|word| word.to_str()) {

@@ -1,5 +1,5 @@
-//! `firstlight work FOLDER`: what engines run in the folder of a job that `firstlight submit` has written: one part of a round,
-//! its merge, or the question which round is next.
+//! `firstlight work FOLDER`: run by engines in the folder of a job created by `firstlight submit`: renders a part of a
+//! round, merges a round, or prints the number of the next round.
 
 use super::console::{inform, print};
 use super::failure::Failure;
@@ -41,7 +41,7 @@ pub struct WorkArgs {
     threads: Option<u16>,
 }
 
-/// The film of all rounds that are merged, and its image.
+/// The film of all merged rounds, and its image.
 pub const ALL: [&str; 2] = ["all.exr", "all.png"];
 
 impl From<JobError> for Failure {
@@ -79,7 +79,7 @@ pub fn run(args: &WorkArgs, stop: &Stop) -> Result<(), Failure> {
     }
 }
 
-/// A job, from inside of its folder.
+/// A job, read from its folder.
 struct Work {
     folder: PathBuf,
     job: Job,
@@ -108,7 +108,7 @@ impl Work {
         words.extend(["--part".to_owned(), format!("{}/{count}", part.number())]);
         words.extend(["--film".to_owned(), self.job.film_of(number, "{part}")]);
         words.extend(threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
-        // Paths of the job count from its folder.
+        // The paths of a job are relative to its folder.
         let moved = std::env::set_current_dir(&self.folder);
         moved.map_err(|error| Failure::Retry(format!("error: {}: {error}", self.folder.display())))?;
         let command = Command::parse(&words).map_err(|failure| failure.of_part())?;
@@ -118,7 +118,7 @@ impl Work {
         }
     }
 
-    /// Films of the parts of a round that are there, and how many there are to be.
+    /// The existing films of the parts of a round, and the number of its parts.
     fn films(&self, number: usize, round: &Round) -> (Vec<PathBuf>, u32) {
         let count = self.job.parts_of(&round.range());
         let path = |index| self.folder.join(self.job.film_of(number, &Part { index, count }.padded()));
@@ -134,7 +134,7 @@ impl Work {
         let all = self.folder.join(ALL[0]);
         let claim = WholeFile::claim(&all, Replace::Anything)?;
         let (films, count) = self.films(number, round);
-        // A merge that was killed after it had written the film does not add the parts to it again.
+        // After a merge that was killed when it had written the film, the parts must not be added again.
         let is_in_all = |path: &Path| {
             let summary = read_film_summary(path).ok()?;
             let mut blocks = summary.layout.tiles.iter().flat_map(|tile| &tile.blocks);
@@ -199,7 +199,7 @@ fn inform_of(done: usize, n: usize) {
     }
 }
 
-/// The words of `render` that all parts of a job have.
+/// The arguments of `render` that are common to all parts of a job.
 pub fn render_words(job: &Job) -> Vec<String> {
     [job.scene.clone()].into_iter().chain(job.options.iter().cloned()).collect()
 }
