@@ -25,10 +25,10 @@ const MOST_LENS_RADIUS: f64 = 1e6;
 /// Stops of exposure, up or down. Beyond this, every image is black or white.
 pub const MOST_STOPS: f32 = 64.0;
 
-/// Seconds, for every time of an animation: twelve days.
+/// Limit of all times of an animation, seconds: twelve days.
 pub(crate) const MOST_SECONDS: f64 = 1e6;
 
-/// Keys of an animation in all.
+/// Maximum number of keys of an animation.
 pub(crate) const MOST_KEYS: usize = 1_000_000;
 
 /// A number for a message: very large and very small ones in scientific notation.
@@ -98,7 +98,7 @@ pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue>
     Ok(())
 }
 
-/// A moment of an animation.
+/// Checks a time of an animation; seconds.
 pub(crate) fn check_moment(field: &'static str, seconds: f64) -> Result<(), BadValue> {
     if (0.0..=MOST_SECONDS).contains(&seconds) {
         return Ok(());
@@ -107,7 +107,7 @@ pub(crate) fn check_moment(field: &'static str, seconds: f64) -> Result<(), BadV
     Err(BadValue::out_of_range(field, number(seconds), rule))
 }
 
-/// A length of time of an animation.
+/// Checks a duration of an animation; seconds.
 pub(crate) fn check_span(field: &'static str, seconds: f64) -> Result<(), BadValue> {
     if seconds > 0.0 && seconds <= MOST_SECONDS {
         return Ok(());
@@ -116,13 +116,13 @@ pub(crate) fn check_span(field: &'static str, seconds: f64) -> Result<(), BadVal
     Err(BadValue::out_of_range(field, number(seconds), rule))
 }
 
-/// Frames per second.
+/// Checks a number of frames per second.
 pub(crate) fn check_fps(fps: f64) -> Result<(), BadValue> {
     let good = (1e-3..=1e4).contains(&fps);
     if good { Ok(()) } else { Err(BadValue::out_of_range("fps", number(fps), "lie between 0.001 and 10000")) }
 }
 
-/// Share of the time of a frame during which the shutter is open.
+/// Checks an exposure time as a fraction of the frame duration.
 pub(crate) fn check_shutter_share(share: f64) -> Result<(), BadValue> {
     if (0.0..=1.0).contains(&share) {
         return Ok(());
@@ -131,7 +131,7 @@ pub(crate) fn check_shutter_share(share: f64) -> Result<(), BadValue> {
     Err(BadValue::out_of_range("shutter", number(share), rule))
 }
 
-/// Seconds during which the shutter is open.
+/// Checks an exposure time; seconds.
 pub(crate) fn check_shutter_seconds(seconds: f64) -> Result<(), BadValue> {
     if (0.0..=3600.0).contains(&seconds) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! The camera that a scene file describes, and the way back.
+//! Conversion between the camera of a scene file and its components.
 
 use super::file::CameraPart;
 use super::units::lens_radius_of;

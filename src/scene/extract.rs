@@ -176,11 +176,11 @@ impl Extraction {
 }
 
 impl Extraction {
-    /// The snapshot at another moment, about the same origin, with the same numbers of objects and materials as far as
-    /// all can be seen then. What is the same at both moments is shared: see [`SnapshotPart`].
+    /// The snapshot at another time, relative to the same origin; objects and materials have the same indices unless
+    /// one of them is invalid at that time. Parts that do not change are shared: see [`SnapshotPart`].
     ///
-    /// - `inputs`: those that this was made of.
-    /// - `seconds`: the moment.
+    /// - `inputs`: the inputs that this was made of.
+    /// - `seconds`: the time.
     pub fn at(&self, animation: &Animation, inputs: &SceneInputs, trees: &Trees, seconds: f64) -> Prepared {
         let then = animation.inputs_at(inputs, seconds);
         if then.objects != inputs.objects || !same_shapes(&then.lights, &inputs.lights) {
@@ -198,7 +198,7 @@ impl Extraction {
     }
 }
 
-/// Whether the same lights are spheres of the same place and size.
+/// Whether the same lights are spheres, with equal positions and radii.
 fn same_shapes(a: &[LightInput], b: &[LightInput]) -> bool {
     let shape = |light: &LightInput| {
         let radius = light.light.radius();

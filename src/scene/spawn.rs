@@ -101,7 +101,7 @@ impl LoadedScene {
         self.animate(world, &entities);
     }
 
-    /// Shows the moment that the file asks for, where it has tracks.
+    /// Adds the animation of the file and sets the time that the file specifies.
     fn animate(&self, world: &mut World, entities: &Entities) {
         let part = &self.file.animation;
         if *part == AnimationPart::default() {

@@ -1,4 +1,4 @@
-//! The animation of a world in words: names for what moves, and what of it can be said.
+//! The animation of a world as part of a scene file: names of the animated entities, and what cannot be expressed.
 
 use super::written::to_part;
 use super::{Animation, Channel};
@@ -9,10 +9,10 @@ use bevy_ecs::prelude::Entity;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
-/// What of a world moves.
+/// The animated entities of a world.
 #[derive(Default)]
 pub(in crate::scene) struct Moved {
-    /// Of objects and lights that move: names that nothing else of their kind has.
+    /// Unique names of the animated objects and lights.
     names: HashMap<Entity, String>,
     materials: HashSet<Entity>,
 }
@@ -40,7 +40,7 @@ impl Moved {
         moved
     }
 
-    /// Names of things of a kind, of which some move.
+    /// Assigns names to the animated ones of `things`, all of one kind.
     fn give_names(&mut self, what: &str, things: Vec<(Entity, Option<&str>)>, moves: impl Fn(Entity) -> bool) {
         let mut uses: HashMap<String, usize> = HashMap::new();
         for name in things.iter().filter_map(|(_, name)| *name) {
@@ -61,19 +61,19 @@ impl Moved {
         }
     }
 
-    /// The name that an object or light needs because it moves.
+    /// The unique name of an animated object or light.
     pub(in crate::scene) fn name(&self, entity: Entity) -> Option<&String> {
         self.names.get(&entity)
     }
 
-    /// Whether a material changes in time.
+    /// Whether a material is animated.
     pub(in crate::scene) fn has_material(&self, entity: Entity) -> bool {
         self.materials.contains(&entity)
     }
 
-    /// How a scene file says it. What has lost its property in the meantime is added to `losses`.
+    /// The animation as in a scene file. Tracks whose entity has lost the property are added to `losses`.
     ///
-    /// - `at`: the moment that is shown, seconds.
+    /// - `at`: the current time of the world, seconds.
     /// - `materials`: their names in the file.
     pub(in crate::scene) fn part(
         &self,
@@ -101,7 +101,7 @@ impl Moved {
     }
 }
 
-/// Whether the property can be set; `None` for what is not seen.
+/// Whether the property of the channel can be set; `None` if its entity is not in `inputs`.
 fn has_property(channel: Channel, inputs: &SceneInputs) -> Option<bool> {
     use super::ObjectProperty::{Rotate, Scale};
     Some(match channel {

@@ -1,7 +1,7 @@
-//! Keys: values at times, and what is between them.
+//! Keys and the interpolation between them.
 //!
-//! Source of the smooth curves: Catmull and Rom 1974, for keys at uneven times with the slopes of the parabola through
-//! three keys; limited after Hyman 1983 where a curve must not leave the range of its keys. Source of smooth turns:
+//! Source of the smooth curves: Catmull and Rom 1974, for non-uniform times, with the slopes of the parabola through
+//! three keys; limited as by Hyman 1983 if a curve must stay within the range of its keys. Source of smooth rotations:
 //! Shoemake 1985, Bézier curves of quaternions, with slopes found in the same way.
 
 use super::property::Quantity;
@@ -9,21 +9,21 @@ use glam::{DMat3, DQuat, DVec3, EulerRot};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// What is between two keys.
+/// Interpolation between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
-    /// A straight line; turns take the shorter way at an even pace.
+    /// Linear; rotations about more than one axis take the shorter arc at constant angular velocity.
     #[default]
     Linear,
-    /// A curve without a kink at any key.
+    /// A curve with continuous derivative.
     Smooth,
     /// The value of the earlier key.
     Held,
 }
 
 impl Interpolation {
-    /// As in a scene file.
+    /// Name in scene files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -33,17 +33,17 @@ impl Interpolation {
     }
 }
 
-/// What a key says.
+/// The value of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KeyValue {
-    /// A number, or the same number three times.
+    /// A number; stands for three equal numbers.
     Number(f64),
-    /// Three numbers: coordinates, degrees, factors or the channels of a colour.
+    /// Three numbers: coordinates, degrees, factors or colour channels.
     Three(DVec3),
 }
 
 impl KeyValue {
-    /// As three numbers.
+    /// The three numbers.
     pub fn three(self) -> DVec3 {
         match self {
             Self::Number(number) => DVec3::splat(number),
@@ -52,23 +52,23 @@ impl KeyValue {
     }
 }
 
-/// Seconds, and the value then.
+/// Time in seconds, and value.
 pub type Key = (f64, KeyValue);
 
-/// The values of a property in time. Before the first key and after the last one, those count.
+/// A property over time. It is constant before the first key and after the last one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What is between two keys.
+    /// Interpolation between the keys.
     pub interpolation: Interpolation,
-    /// In the order of time, no two at the same; at least one.
+    /// In ascending order of time, without duplicate times; not empty.
     pub keys: Vec<Key>,
 }
 
-/// Where a time is among keys.
+/// Position of a time relative to the keys.
 enum Place {
-    /// At a key, or beside all keys.
+    /// At a key, or outside of all keys.
     At(usize),
-    /// From key `i` to the next, at a share of the way above 0 and below 1.
+    /// Between key `i` and the next one, at a fraction in (0, 1).
     Between(usize, f64),
 }
 
@@ -81,7 +81,7 @@ impl Curve {
         self.keys[key].1.three()
     }
 
-    /// Seconds from a key to the next.
+    /// Seconds from a key to the next one.
     fn span(&self, key: usize) -> f64 {
         self.time(key + 1) - self.time(key)
     }
@@ -95,9 +95,9 @@ impl Curve {
         Place::Between(before, (seconds - self.time(before)) / self.span(before))
     }
 
-    /// The value at a time; a number is repeated three times. The values of keys come back to the last bit.
+    /// The value at a time; a single number is returned three times. The values at keys are exact.
     ///
-    /// - `quantity`: what the numbers are, which decides how they are mixed.
+    /// - `quantity`: determines how values are interpolated.
     pub fn at(&self, quantity: Quantity, seconds: f64) -> DVec3 {
         let (key, share) = match self.place(seconds) {
             Place::At(key) => return self.value(key),
@@ -118,24 +118,25 @@ impl Curve {
                 let (out, into) = (self.slope(quantity, key, key), self.slope(quantity, key + 1, key));
                 let (t, t2, t3) = (share, share * share, share * share * share);
                 let mixed = a + (3.0 * t2 - 2.0 * t3) * (b - a) + span * ((t3 - 2.0 * t2 + t) * out + (t3 - t2) * into);
-                // Rounding may lead beyond keys that are limits.
+                // Rounding may exceed the range of the keys.
                 if quantity.is_limited() { mixed.clamp(a.min(b), a.max(b)) } else { mixed }
             }
         }
     }
 
-    /// Change from a key to the next, per second.
+    /// Rate of change from a key to the next one, per second.
     fn chord(&self, key: usize) -> DVec3 {
         (self.value(key + 1) - self.value(key)) / self.span(key)
     }
 
-    /// The slope of a smooth curve at a key, per second, as the part from key `from` to the next has it.
+    /// The slope of a smooth curve at a key, per second, for the segment that begins at key `from`.
     fn slope(&self, quantity: Quantity, key: usize, from: usize) -> DVec3 {
         let slope = slope(self.keys.len(), key, &|i| self.span(i), &|i| self.chord(i));
         if !quantity.is_limited() {
             return slope;
         }
-        // Three times the chord on either side keeps a curve monotone (Hyman 1983; Fritsch and Carlson 1980).
+        // A slope of at most three times the chord on either side keeps a curve monotone (Hyman 1983; Fritsch and
+        // Carlson 1980).
         let chords = [key.checked_sub(1), (key + 1 < self.keys.len()).then_some(key)];
         let mut limited = slope;
         for chord in chords.into_iter().flatten().map(|i| self.chord(i)) {
@@ -148,14 +149,14 @@ impl Curve {
         limited
     }
 
-    /// Whether a turn changes in more than one of its three angles, so that only a mixture of turns has sense.
+    /// Whether a rotation changes in more than one of its three angles, so that it needs quaternions.
     fn turns_freely(&self) -> bool {
         let first = self.value(0);
         let changes = |axis: usize| self.keys.iter().any(|(_, value)| value.three()[axis] != first[axis]);
         (0..3).filter(|&axis| changes(axis)).count() > 1
     }
 
-    /// Degrees about X, then Y, then Z, between a key and the next.
+    /// The interpolated rotation between a key and the next one: degrees about X, then Y, then Z.
     fn turned(&self, key: usize, share: f64) -> DVec3 {
         let turn = |i: usize| quaternion(self.value(i));
         let (a, b) = (turn(key), turn(key + 1));
@@ -174,14 +175,14 @@ impl Curve {
         }
     }
 
-    /// Whether nothing changes from a key to the next; slopes come from the neighbours.
+    /// Whether the curve is constant from a key to the next one; slopes depend on the neighbours.
     fn rests(&self, key: usize) -> bool {
         let reach = usize::from(self.interpolation == Interpolation::Smooth);
         let last = self.keys.len() - 2;
         (key.saturating_sub(reach)..=(key + reach).min(last)).all(|i| self.value(i) == self.value(i + 1))
     }
 
-    /// Whether the value changes within these seconds; in doubt yes.
+    /// Whether the value may change within this range of seconds; never false if it does.
     pub fn is_moving_during(&self, seconds: &RangeInclusive<f64>) -> bool {
         let (start, end) = (*seconds.start(), *seconds.end());
         (0..self.keys.len().saturating_sub(1)).any(|i| {
@@ -194,9 +195,10 @@ impl Curve {
     }
 }
 
-/// The slope at a key of the parabola through it and its neighbours; through three keys at an end; of the line between two.
+/// The slope at a key: of the parabola through it and its neighbours; at an end, through the three nearest keys; for
+/// two keys, of the line.
 ///
-/// - `span`, `chord`: seconds from a key to the next, and the change per second.
+/// - `span`, `chord`: seconds from a key to the next one, and the change per second.
 fn slope(n: usize, key: usize, span: &dyn Fn(usize) -> f64, chord: &dyn Fn(usize) -> DVec3) -> DVec3 {
     let inner = |i: usize| {
         let (before, after) = (span(i - 1), span(i));
@@ -205,7 +207,7 @@ fn slope(n: usize, key: usize, span: &dyn Fn(usize) -> f64, chord: &dyn Fn(usize
     match (key, n) {
         (_, 0..=1) => DVec3::ZERO,
         (_, 2) => chord(0),
-        // The mean of the slopes at both ends of a parabola is that of its chord.
+        // The mean of the slopes at both ends of a parabola is the slope of its chord.
         (0, _) => 2.0 * chord(0) - inner(1),
         _ if key + 1 == n => 2.0 * chord(n - 2) - inner(n - 2),
         _ => inner(key),
@@ -217,7 +219,7 @@ fn quaternion(degrees: DVec3) -> DQuat {
     DQuat::from_euler(EulerRot::ZYX, z, y, x)
 }
 
-/// From one turn to another on the shorter way: axis times radians, in the frame of either.
+/// The shorter rotation from one orientation to another: axis times radians, in the frame of either.
 fn way(from: DQuat, to: DQuat) -> DVec3 {
     let turn = from.conjugate() * to;
     let turn = if turn.w < 0.0 { -turn } else { turn };
@@ -228,13 +230,13 @@ fn slerp(from: DQuat, to: DQuat, share: f64) -> DQuat {
     from * DQuat::from_scaled_axis(share * way(from, to))
 }
 
-/// Degrees about X, then Y, then Z, of a turn; accurate for any, also where Y is at a right angle.
+/// Euler angles of a rotation, degrees about X, then Y, then Z; accurate even if the angle about Y is near 90 degrees.
 fn degrees(turn: DQuat) -> DVec3 {
     let m = DMat3::from_quat(turn.normalize());
     let y = (-m.x_axis.z).atan2(m.x_axis.x.hypot(m.x_axis.y));
     let x = if m.y_axis.z == 0.0 && m.z_axis.z == 0.0 { 0.0 } else { m.y_axis.z.atan2(m.z_axis.z) };
     let (sin, cos) = x.sin_cos();
-    // What is left after the turns about X and Y.
+    // The rotation that remains after those about X and Y.
     let (z_sin, z_cos) = (sin * m.z_axis.x - cos * m.y_axis.x, cos * m.y_axis.y - sin * m.z_axis.y);
     DVec3::new(x, y, z_sin.atan2(z_cos)).map(f64::to_degrees)
 }
@@ -342,7 +344,7 @@ mod tests {
 
     #[test]
     fn smooth_turns_follow_an_even_turn_about_any_axis_and_have_no_kink() {
-        // A turn about one slanted axis at an even pace, with keys at uneven times.
+        // A rotation about an oblique axis at constant speed, with non-uniform keys.
         let axis = DVec3::new(1.0, 2.0, -0.5).normalize();
         let turn = |t: f64| degrees(DQuat::from_axis_angle(axis, 0.4 * t));
         let track = curve(Interpolation::Smooth, &UNEVEN.map(|t| (t, turn(t))));
@@ -384,7 +386,7 @@ mod tests {
         assert!(moves(&linear, 0.9, 1.1) && moves(&linear, 1.4, 1.5));
         let held = numbers(Interpolation::Held, &keys);
         assert!(!moves(&held, 1.2, 1.9) && moves(&held, 1.9, 2.0) && !moves(&held, 2.0, 5.0));
-        // Whatever is called still is so, for every quantity.
+        // A curve reported as not moving must be constant, for every quantity.
         for how in [Interpolation::Linear, Interpolation::Smooth, Interpolation::Held] {
             let track = numbers(how, &keys);
             for i in -4..45 {

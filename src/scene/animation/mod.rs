@@ -1,10 +1,10 @@
-//! Scenes that move: keys in time for camera, objects, lights and materials, and what they say at a moment.
+//! Animation of scenes: keys over time for camera, objects, lights and materials.
 //!
-//! The tracks of a world are its resource [`Animation`]; the moment that it shows is the resource [`Moment`]. What is
-//! seen at a moment is a pure function of both: [`Animation::inputs_at`] leaves the world alone, and [`show_moment`]
-//! changes those components of the world that are different then, and no others.
+//! The tracks of a world are its resource [`Animation`]; its current time is the resource [`Moment`]. The state at a
+//! time is a pure function of both: [`Animation::inputs_at`] computes it without changing the world, and
+//! [`show_moment`] changes only those components of the world that differ.
 //!
-//! [`Curve`] has the formulas, [`Channel`] lists what may have one.
+//! [`Curve`] implements the interpolation, [`Channel`] lists the properties that can be animated.
 
 mod described;
 mod key;
@@ -24,61 +24,61 @@ use super::file::CameraPart;
 use bevy_ecs::prelude::{Entity, Resource};
 use std::ops::RangeInclusive;
 
-/// What moves in a scene, and how its frames follow each other.
+/// The animation of a scene and its frame rate.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct Animation {
     /// Frames per second: frame i is at i / fps.
     pub fps: f64,
-    /// Seconds from the first frame to the end; up to the last key when not given.
+    /// Seconds from the first frame to the end; `None`: up to the last key.
     pub duration: Option<f64>,
-    /// How long the shutter is open.
+    /// Exposure time.
     pub shutter: Shutter,
-    /// What of the camera has no keys, as a scene file says it.
+    /// The camera as in the scene file, for the properties without tracks.
     pub camera: CameraPart,
-    /// No two of the same property.
+    /// At most one per property.
     pub tracks: Vec<Track>,
 }
 
-/// How long the shutter is open: half of it before the moment of the image, and half after it.
+/// Exposure time, centred at the time of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shutter {
-    /// Share of the time of a frame, 0..1.
+    /// Fraction of the frame duration, 0..1.
     Share(f64),
     /// Seconds.
     Seconds(f64),
 }
 
 impl Default for Shutter {
-    /// Not at all: everything stands still in an image.
+    /// 0: no motion blur.
     fn default() -> Self {
         Self::Share(0.0)
     }
 }
 
-/// A property and its values in time.
+/// A property and its values over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// What changes.
+    /// The property.
     pub channel: Channel,
     /// Its values.
     pub curve: Curve,
 }
 
-/// A property of something in the world.
+/// A property of an entity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Channel {
     /// Of the first camera.
     Camera(CameraProperty),
     /// Of an object.
     Object(Entity, ObjectProperty),
-    /// Of a light that is no object.
+    /// Of a light that is not an object.
     Light(Entity, LightProperty),
     /// Of a material.
     Material(Entity, MaterialProperty),
 }
 
 impl Channel {
-    /// What its keys hold.
+    /// The type of its values.
     pub fn quantity(self) -> Quantity {
         match self {
             Self::Camera(property) => property.quantity(),
@@ -90,7 +90,7 @@ impl Channel {
 }
 
 impl Channel {
-    /// Its property as in a scene file.
+    /// Name of the property in scene files.
     pub fn property(self) -> &'static str {
         match self {
             Self::Camera(property) => property.name(),
@@ -102,7 +102,7 @@ impl Channel {
 }
 
 impl Track {
-    /// The value at a time; a number is repeated three times.
+    /// The value at a time; a single number is returned three times.
     pub fn at(&self, seconds: f64) -> glam::DVec3 {
         self.curve.at(self.channel.quantity(), seconds)
     }
@@ -115,19 +115,18 @@ impl Animation {
         self.duration.unwrap_or_else(|| ends.fold(0.0, f64::max))
     }
 
-    /// Seconds at which a frame is.
+    /// Time of a frame, seconds.
     pub fn moment_of(&self, frame: u32) -> f64 {
         f64::from(frame) / self.fps
     }
 
-    /// Frames from the first one up to the end; one at least.
+    /// Number of frames; at least 1.
     pub fn n_frames(&self) -> u32 {
-        // What rounding adds to a whole number is no frame.
+        // Tolerance for rounding of a whole number of frames.
         (self.length() * self.fps - 1e-6).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
     }
 
-    /// When the shutter is open for the image of a moment, seconds; `None` when it has no length, or when nothing moves
-    /// in the meantime.
+    /// The exposure interval of an image at this time, seconds; `None` if its length is 0 or nothing moves in it.
     pub fn open_shutter(&self, seconds: f64) -> Option<RangeInclusive<f64>> {
         let length = match self.shutter {
             Shutter::Share(share) => share / self.fps,
@@ -137,7 +136,7 @@ impl Animation {
         (length > 0.0 && self.is_moving_during(open.clone())).then_some(open)
     }
 
-    /// Whether anything may look different at two moments of these seconds. In doubt yes, never no.
+    /// Whether anything may change within this range of seconds; never false if something does.
     pub fn is_moving_during(&self, seconds: RangeInclusive<f64>) -> bool {
         self.tracks.iter().any(|track| track.curve.is_moving_during(&seconds))
     }

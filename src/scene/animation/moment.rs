@@ -1,4 +1,4 @@
-//! What is seen at a moment.
+//! The state of a scene at a given time.
 
 use super::{Animation, CameraProperty, Channel};
 use crate::scene::camera::{camera, camera_part};
@@ -12,12 +12,12 @@ use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, Entity, Resource, World};
 use std::collections::HashMap;
 
-/// The moment that a world shows, seconds.
+/// Current time of a world, seconds.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment(pub f64);
 
 impl Animation {
-    /// What the snapshot is made of at a moment. It does not depend on the moment that `inputs` are of.
+    /// The inputs of a snapshot at a time; the result does not depend on the time that `inputs` are of.
     pub fn inputs_at(&self, inputs: &SceneInputs, seconds: f64) -> SceneInputs {
         let mut inputs = inputs.clone();
         let objects: HashMap<Entity, usize> = of_entities(inputs.objects.iter().map(|object| object.entity));
@@ -54,7 +54,7 @@ impl Animation {
         self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
     }
 
-    /// The camera at a moment, as a scene file says it.
+    /// The camera at a time, as in a scene file.
     pub fn camera_at(&self, seconds: f64) -> CameraPart {
         let mut part = self.camera.clone();
         for track in &self.tracks {
@@ -70,13 +70,13 @@ fn of_entities(entities: impl Iterator<Item = Entity>) -> HashMap<Entity, usize>
     entities.enumerate().map(|(i, entity)| (entity, i)).collect()
 }
 
-/// Shows another moment: changes the components that are different then, and no others.
+/// Sets the current time: changes only the components that differ.
 pub fn show_moment(world: &mut World, seconds: f64) {
     keep_changes(world);
     place(world, seconds);
 }
 
-/// Shows the first moment of a world whose camera is not that of any moment yet.
+/// Sets the time without first storing changes of the camera, as needed for a new scene.
 pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
     let Some(animation) = world.remove_resource::<Animation>() else { return };
     for track in &animation.tracks {
@@ -84,7 +84,7 @@ pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
         match track.channel {
             Channel::Camera(_) => {}
             Channel::Object(entity, property) => {
-                // What has been deleted may be undone later.
+                // A deleted entity may be restored by undo.
                 if let (Some(_), Some(&placement)) = (world.get::<Shape>(entity), world.get::<Placement>(entity)) {
                     put(world, entity, property.set(placement, value));
                 }
@@ -116,7 +116,7 @@ pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
     world.insert_resource(animation);
 }
 
-/// What somebody has changed of the camera since a moment was shown becomes what it is between its keys.
+/// Stores changes of the camera since the time was set, for its properties without tracks.
 fn keep_changes(world: &mut World) {
     let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves_camera()) else {
         return;
@@ -129,7 +129,7 @@ fn keep_changes(world: &mut World) {
     }
 }
 
-/// The camera of a scene file under its tracks: as it was written, with what is different now.
+/// The camera for the properties without tracks: the one from the file, updated by what has changed.
 pub(in crate::scene) fn rest_camera(
     animation: &Animation,
     seconds: f64,
@@ -146,7 +146,7 @@ pub(in crate::scene) fn rest_camera(
     if !animation.moves_camera() || aims(&part) == aims(&written) {
         return part;
     }
-    // Keys need the words that they were written for.
+    // The tracks need the same form (`look_at` or `forward`) as in the file.
     match written.look_at {
         Some(_) => CameraPart { look_at: Some(view.pivot()), forward: None, pivot_distance: None, ..part },
         None => {

@@ -1,32 +1,32 @@
-//! What can change in time: the properties of camera, objects, lights and materials, by their names in a scene file.
+//! The properties that can be animated: of camera, objects, lights and materials, by their names in scene files.
 
 use serde::{Deserialize, Serialize};
 
-/// What the numbers of a key are, which decides how many there are and how they are mixed.
+/// Type of a key's value: determines the number of components and the interpolation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Three coordinates, metres; smooth curves may swing beyond their keys.
+    /// Three coordinates, metres; smooth curves may overshoot their keys.
     Position,
-    /// Three coordinates of any length but 0, as [`Self::Position`].
+    /// Three coordinates, not all 0; like [`Self::Position`].
     Direction,
     /// Degrees about X, then Y, then Z.
     Rotation,
-    /// One factor or three; stays between its keys.
+    /// One factor or three; stays within the range of the keys.
     Factors,
-    /// One number or three, linear Rec. 709; stays between its keys.
+    /// One number or three, linear Rec. 709; stays within the range of the keys.
     Color,
-    /// Stays between its keys.
+    /// One number; stays within the range of the keys.
     Number,
 }
 
 impl Quantity {
-    /// Whether smooth curves stay between their keys, which are within the limits of the value.
+    /// Whether smooth curves stay within the range of their keys, and so within the limits of the value.
     pub(super) fn is_limited(self) -> bool {
         matches!(self, Self::Factors | Self::Color | Self::Number)
     }
 }
 
-/// An enum of properties with their names in scene files.
+/// Defines an enum of properties with their names in scene files.
 macro_rules! properties {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal: $quantity:ident,)* }) => {
         $(#[$about])*
@@ -36,15 +36,15 @@ macro_rules! properties {
         }
 
         impl $name {
-            /// All of them.
+            /// All properties.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// As in a scene file.
+            /// Name in scene files.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $word,)* }
             }
 
-            /// What its keys hold.
+            /// The type of its values.
             pub fn quantity(self) -> Quantity {
                 match self { $(Self::$variant => Quantity::$quantity,)* }
             }
@@ -53,49 +53,49 @@ macro_rules! properties {
 }
 
 properties! {
-    /// Of the camera, as in a scene file.
+    /// Property of the camera, as in scene files.
     CameraProperty {
         /// Centre of the lens, metres.
         Eye = "eye": Position,
-        /// What is in the middle of the image, metres.
+        /// Point in the centre of the image, metres.
         LookAt = "look_at": Position,
-        /// Direction of the view, in place of `look_at`.
+        /// View direction, instead of `look_at`.
         Forward = "forward": Direction,
-        /// What is up in the image.
+        /// Up direction of the image.
         Up = "up": Direction,
         /// Vertical field of view, degrees.
         Vfov = "vfov": Number,
-        /// Height of what an orthographic camera sees, metres.
+        /// Height of the image of an orthographic camera, metres.
         OrthographicHeight = "orthographic_height": Number,
-        /// Metres.
+        /// Radius of the aperture, metres.
         LensRadius = "lens_radius": Number,
         /// Focal length over diameter of the aperture.
         FStop = "f_stop": Number,
         /// Metres along the view axis.
         FocusDistance = "focus_distance": Number,
-        /// Degrees.
+        /// Rotation of the aperture, degrees.
         BladeRotation = "blade_rotation": Number,
     }
 }
 
 properties! {
-    /// Of an object, as in a transform.
+    /// Property of an object, as in transforms.
     ObjectProperty {
-        /// Where its own point is in the world (the centre of a sphere, the origin of a mesh), metres.
+        /// World-space position of its origin (the centre of a sphere, the origin of a mesh), metres.
         Translate = "translate": Position,
         /// Degrees about X, then Y, then Z.
         Rotate = "rotate": Rotation,
-        /// Factors along its own axes.
+        /// Factors along the axes of object space.
         Scale = "scale": Factors,
     }
 }
 
 properties! {
-    /// Of a light that is no object, as in the light.
+    /// Property of a light that is not an object.
     LightProperty {
         /// Metres.
         Position = "position": Position,
-        /// Where it shines before it is rotated.
+        /// Direction of emission before rotation.
         Direction = "direction": Direction,
         /// Degrees about X, then Y, then Z.
         Rotate = "rotate": Rotation,
@@ -113,7 +113,7 @@ properties! {
 }
 
 properties! {
-    /// A number or colour of a material, as in the material.
+    /// A number or colour of a material.
     MaterialProperty {
         /// Of a diffuse material.
         Albedo = "albedo": Color,

@@ -1,4 +1,4 @@
-//! Values of a moment, set where their property is.
+//! Setting of animated values in cameras, placements, lights and materials.
 
 use super::property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty};
 use crate::render::{self, Param, Params};
@@ -8,7 +8,7 @@ use crate::scene::placement::{Linear, Placement};
 use glam::DVec3;
 
 impl CameraProperty {
-    /// Sets the field of this name.
+    /// Sets this field.
     pub fn set(self, camera: &mut CameraPart, value: DVec3) {
         match self {
             Self::Eye => camera.eye = value,
@@ -26,7 +26,7 @@ impl CameraProperty {
 }
 
 impl ObjectProperty {
-    /// The same placement but for this. One that is given as a matrix keeps its linear part.
+    /// The placement with this value changed. If its linear part is a matrix, that part is kept.
     #[must_use]
     pub fn set(self, placement: Placement, value: DVec3) -> Placement {
         let Placement { translation, linear } = placement;
@@ -44,7 +44,7 @@ impl ObjectProperty {
 }
 
 impl LightProperty {
-    /// Sets it, if a light of this kind has it.
+    /// Sets the value; `None` if lights of this kind do not have the property.
     pub fn set(self, light: &mut LightKind, placement: &mut Placement, value: DVec3) -> Option<()> {
         match (self, light) {
             (Self::Position, LightKind::Point(_) | LightKind::Spot(_)) => placement.translation = value,
@@ -64,7 +64,7 @@ impl LightProperty {
         Some(())
     }
 
-    /// The properties that a light of this kind has.
+    /// The properties of lights of this kind.
     pub fn of(light: &LightKind) -> impl Iterator<Item = Self> {
         let mut light = *light;
         let has = move |property: &Self| property.set(&mut light, &mut Placement::default(), DVec3::ONE).is_some();
@@ -73,7 +73,7 @@ impl LightProperty {
 }
 
 impl MaterialProperty {
-    /// Sets it, if a material of this kind has it.
+    /// Sets the value; `None` if materials of this kind do not have the property.
     pub fn set<P: Params>(self, material: &mut render::Material<P>, value: DVec3) -> Option<()> {
         let (number, color) = (value.x as f32, value.as_vec3());
         let (_, param) = material.params_mut().into_iter().find(|(name, _)| *name == self.name())?;
@@ -92,7 +92,7 @@ impl MaterialProperty {
         Some(())
     }
 
-    /// The properties that a material of this kind has.
+    /// The properties of materials of this kind.
     pub fn of<P: Params>(material: &render::Material<P>) -> impl Iterator<Item = Self> {
         let names: Vec<&str> = material.params().into_iter().map(|(name, _)| name).collect();
         Self::ALL.iter().copied().filter(move |property| names.contains(&property.name()))

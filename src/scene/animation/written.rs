@@ -1,11 +1,12 @@
-//! Between the section `animation` of a scene file, which names things, and the tracks of a world, which know entities.
+//! Conversion between the section `animation` of a scene file, which uses names, and the tracks of a world, which use
+//! entities.
 
 use super::{Animation, Channel, Curve, Shutter, Track};
 use crate::scene::file::{AnimationPart, CameraPart, TrackPart};
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
 
-/// The entities of a scene by their names in its file. A name that several have is that of the last one.
+/// The entities of a scene by name. If several have the same name, it refers to the last one.
 #[derive(Default)]
 pub(in crate::scene) struct Entities<'a> {
     pub objects: HashMap<&'a str, Entity>,
@@ -13,7 +14,7 @@ pub(in crate::scene) struct Entities<'a> {
     pub materials: HashMap<&'a str, Entity>,
 }
 
-/// The tracks that a checked file says; what names nothing is left out.
+/// The tracks of a checked file; those whose name does not exist are omitted.
 pub(in crate::scene) fn of_part(part: &AnimationPart, camera: &CameraPart, entities: &Entities) -> Animation {
     let track = |track: &TrackPart| {
         let find = |known: &HashMap<&str, Entity>, name: &str| known.get(name).copied();
@@ -37,10 +38,10 @@ pub(in crate::scene) fn of_part(part: &AnimationPart, camera: &CameraPart, entit
     }
 }
 
-/// How a scene file says it.
+/// The animation as in a scene file.
 ///
-/// - `at`: the moment that is shown, seconds.
-/// - `name`: of the object, light or material of a channel; `None` for one that is gone.
+/// - `at`: the current time, seconds.
+/// - `name`: of the object, light or material of a channel; `None` if it no longer exists.
 pub(in crate::scene) fn to_part(
     animation: &Animation,
     at: f64,

@@ -1,4 +1,4 @@
-//! The section `animation` of a scene file: keys in time for whatever moves.
+//! The section `animation` of a scene file.
 
 use crate::scene::animation::{
     CameraProperty, Interpolation, Key, KeyValue, LightProperty, MaterialProperty, ObjectProperty,
@@ -8,26 +8,26 @@ use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// What moves, and when.
+/// Keys over time for properties of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AnimationPart {
-    /// The moment that is shown when the scene is opened, seconds.
+    /// Time that is shown when the scene is opened, seconds.
     #[serde(default, skip_serializing_if = "is_default")]
     pub at: f64,
     /// Frames per second: frame i is at i / fps.
     #[serde(default = "default_fps")]
     pub fps: f64,
-    /// Seconds from the first frame to the end; up to the last key when not given.
+    /// Seconds from the first frame to the end; `None`: up to the last key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<f64>,
-    /// Share of the time of a frame during which the shutter is open, half before the moment and half after it.
+    /// Exposure time as a fraction of the frame duration, centred at the time of the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter: Option<f64>,
-    /// In place of `shutter`: seconds during which it is open.
+    /// Exposure time in seconds, instead of `shutter`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter_seconds: Option<f64>,
-    /// One for each number, colour or transform that changes.
+    /// One per animated property.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackPart>,
 }
@@ -38,54 +38,54 @@ impl Default for AnimationPart {
     }
 }
 
-/// The values of one property at given times.
+/// A property over time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TrackPart {
     /// Of the camera.
     Camera {
-        /// As in `camera`.
+        /// A property of `camera`.
         property: CameraProperty,
-        /// What is between two keys.
+        /// Interpolation between the keys.
         #[serde(default, skip_serializing_if = "is_default")]
         interpolation: Interpolation,
-        /// Pairs of seconds and a value, in the order of time.
+        /// Pairs of a time in seconds and a value, in ascending order.
         keys: Vec<Key>,
     },
     /// Of an object.
     Object {
-        /// Name of the object, which no other object has.
+        /// Unique name of the object.
         name: String,
-        /// As in a transform.
+        /// A property of a transform.
         property: ObjectProperty,
-        /// What is between two keys.
+        /// Interpolation between the keys.
         #[serde(default, skip_serializing_if = "is_default")]
         interpolation: Interpolation,
-        /// Pairs of seconds and a value, in the order of time.
+        /// Pairs of a time in seconds and a value, in ascending order.
         keys: Vec<Key>,
     },
-    /// Of a light that is no object.
+    /// Of a light that is not an object.
     Light {
-        /// Name of the light, which no other light has.
+        /// Unique name of the light.
         name: String,
-        /// As in the light.
+        /// A property of the light.
         property: LightProperty,
-        /// What is between two keys.
+        /// Interpolation between the keys.
         #[serde(default, skip_serializing_if = "is_default")]
         interpolation: Interpolation,
-        /// Pairs of seconds and a value, in the order of time.
+        /// Pairs of a time in seconds and a value, in ascending order.
         keys: Vec<Key>,
     },
     /// Of a material.
     Material {
         /// Name of the material.
         name: String,
-        /// As in the material.
+        /// A property of the material.
         property: MaterialProperty,
-        /// What is between two keys.
+        /// Interpolation between the keys.
         #[serde(default, skip_serializing_if = "is_default")]
         interpolation: Interpolation,
-        /// Pairs of seconds and a value, in the order of time.
+        /// Pairs of a time in seconds and a value, in ascending order.
         keys: Vec<Key>,
     },
 }
@@ -101,7 +101,7 @@ impl TrackPart {
         }
     }
 
-    /// What is between two keys.
+    /// Interpolation between the keys.
     pub fn interpolation(&self) -> Interpolation {
         match self {
             Self::Camera { interpolation, .. }

@@ -170,7 +170,7 @@ impl Check<'_> {
         }
     }
 
-    /// One number or colour of a material.
+    /// Checks a number or colour of a material.
     pub(super) fn param(&mut self, path: &str, field: &str, param: ParamRef<'_, InFile>) {
         match param {
             Param::Reflectance(color) | Param::Map(color) => self.share(path, field, color),

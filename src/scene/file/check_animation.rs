@@ -1,4 +1,4 @@
-//! What the section `animation` must satisfy.
+//! Checks of the section `animation`.
 
 use super::animation::TrackPart;
 use super::check::Check;
@@ -15,7 +15,7 @@ use crate::scene::light::LightKind;
 use crate::scene::view::unit_direction;
 use std::collections::{BTreeMap, HashMap};
 
-/// Paths of a track and its curve, by what it moves.
+/// Paths, properties and curves of the tracks of one entity.
 type Moved<'a, P> = Vec<(String, P, Curve)>;
 
 impl Check<'_> {
@@ -93,7 +93,7 @@ impl Check<'_> {
                 TrackPart::Material { name, property, .. } => self.material_track(&path, name, *property, track),
             }
         }
-        // A camera that is wrong already is told by itself.
+        // A camera that is invalid without animation is reported elsewhere.
         if file.camera.components().is_ok() {
             self.at_all_keys(&camera, |seconds| {
                 let mut part = file.camera.clone();
@@ -108,7 +108,7 @@ impl Check<'_> {
         }
     }
 
-    /// Whether times and values are such as the property has.
+    /// Checks times and values; returns whether they are valid for the property.
     fn keys(&mut self, path: &str, property: &str, quantity: Quantity, track: &TrackPart) -> bool {
         let keys = track.keys();
         let path = format!("{path}/keys");
@@ -161,7 +161,7 @@ impl Check<'_> {
         good
     }
 
-    /// The index of the only one that has the name.
+    /// The index of the only entity with this name.
     fn named(&mut self, path: &str, what: &str, name: &str, known: &HashMap<&str, Vec<usize>>) -> Option<usize> {
         let path = format!("{path}/name");
         match known.get(name).map(Vec::as_slice) {
@@ -245,7 +245,7 @@ impl Check<'_> {
         });
     }
 
-    /// Looks at the moments of all keys of what moves together, and tells the first that is wrong.
+    /// Checks an entity at the times of all keys of its tracks, and reports the first problem.
     fn at_all_keys<P: Property>(&mut self, moved: &Moved<P>, problem: impl Fn(f64) -> Option<BadValue>) {
         let mut times: Vec<(f64, usize, usize)> = (moved.iter().enumerate())
             .flat_map(|(track, (.., curve))| {
@@ -255,7 +255,7 @@ impl Check<'_> {
         times.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (time, track, key) in times {
             let Some(bad) = problem(time) else { continue };
-            // The value that is wrong may be that of another track, which has a key before.
+            // The invalid value may belong to another track, with an earlier key.
             let own = moved.iter().find(|(_, property, _)| property.word() == bad.field());
             let place = own.map(|(path, _, curve): &(String, P, Curve)| {
                 let key = curve.keys.partition_point(|&(start, _): &Key| start <= time).saturating_sub(1);
@@ -267,7 +267,7 @@ impl Check<'_> {
     }
 }
 
-/// What has a name in scene files.
+/// Anything with a name in scene files.
 trait Property {
     fn word(&self) -> &'static str;
 }

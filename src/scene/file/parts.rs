@@ -46,7 +46,7 @@ pub struct SceneFile {
     /// Lights that are no objects; all other emitters are objects with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightPart>,
-    /// What moves, and when.
+    /// The animation: keys over time for properties of the scene.
     #[serde(default, skip_serializing_if = "is_default")]
     pub animation: AnimationPart,
 }

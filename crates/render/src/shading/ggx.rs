@@ -159,8 +159,8 @@ pub fn lost_over_returned(cos_theta: f32, alpha: f32) -> f32 {
 /// Entries per side of the albedo table.
 const N: usize = 48;
 
-/// The albedo has its largest curvature where the cosine is about alpha: columns are uniform in the root of `cos (1 +
-/// BEND α) / (cos + BEND α)`.
+/// The albedo has its largest curvature where the cosine is about alpha: columns are uniform in the root of
+/// `cos (1 + BEND α) / (cos + BEND α)`.
 const BEND: f32 = 2.0;
 
 fn table_cos(column: usize, row: usize) -> f32 {

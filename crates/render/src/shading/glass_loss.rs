@@ -18,8 +18,8 @@ const N_ETA: usize = 25;
 /// Range of (η − 1) / (η + 1) in the table, on both sides of 0: indices from 1/4 to 4.
 const MOST_CONTRAST: f32 = 0.6;
 
-/// The loss has its largest curvature where the cosine is about alpha: columns are uniform in the root of `cos (1 +
-/// BEND α) / (cos + BEND α)`.
+/// The loss has its largest curvature where the cosine is about alpha: columns are uniform in the root of
+/// `cos (1 + BEND α) / (cos + BEND α)`.
 const BEND: f32 = 2.0;
 
 struct LossTable {

@@ -7,8 +7,8 @@ use crate::shading::sheen;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
 
-/// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵: `f0 ·
-/// facing + f90 · grazing`.
+/// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵:
+/// `f0 · facing + f90 · grazing`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SchlickAlbedo {
     pub facing: f32,
