@@ -2,12 +2,7 @@
 //!
 //! The session finds out what changed by itself: a light that moved restarts the image and keeps every tree.
 
-use firstlight::bevy_ecs::prelude::{Query, Res, Resource};
-use firstlight::bevy_ecs::schedule::IntoScheduleConfigs;
-use firstlight::frame::{Stage, write_film};
 use firstlight::prelude::*;
-use firstlight::render::Display;
-use firstlight::scene::SceneSource;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

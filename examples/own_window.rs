@@ -3,7 +3,6 @@
 //! Arrow keys orbit, Escape closes. The session renders on threads of its own; `update` never waits for them.
 
 use firstlight::prelude::*;
-use firstlight::scene::SceneSource;
 use pixels::{Pixels, SurfaceTexture};
 use std::error::Error;
 use std::sync::Arc;

@@ -6,6 +6,7 @@ use super::number::parse_seconds;
 use clap::{Args, ValueEnum};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
+use firstlight::scene::model::ModelFormat;
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSource, UpAxis, load};
 use std::ffi::OsString;
@@ -31,6 +32,19 @@ pub struct ScenesArgs {
     pub scenes: Vec<OsString>,
     #[command(flatten)]
     pub how: OpenArgs,
+}
+
+/// Fails with all names that cannot be opened, before work begins.
+pub fn check_scenes<'a>(scenes: impl Iterator<Item = &'a SceneArgs>) -> Result<(), Failure> {
+    let mut problems = Vec::new();
+    for scene in scenes {
+        let source = scene.source()?;
+        // Other reasons than this one are known when the file is read.
+        if let Some(path) = source.path().filter(|path| !path.exists()) {
+            problems.push(format!("{}: no such file", path.display()));
+        }
+    }
+    if problems.is_empty() { Ok(()) } else { Err(Failure::Problems(problems)) }
 }
 
 impl ScenesArgs {
@@ -139,6 +153,7 @@ impl SceneArgs {
             files.read(path)?;
             check_film_source(&source)?;
         }
+        self.tell_ignored(&source);
         let environment = self.how.env.as_deref();
         let choice = self.how.choice();
         let (progress, choice) = (Some(progress), Some(&choice));
@@ -149,6 +164,20 @@ impl SceneArgs {
             remark(format_args!("warning: {warning}"));
         }
         Ok(scene)
+    }
+
+    /// Warns of options that have no effect on what is opened.
+    pub fn tell_ignored(&self, source: &SceneSource) {
+        let what = match source {
+            _ if self.how.up.is_none() => return,
+            SceneSource::Model(path) if ModelFormat::of(path) == Some(ModelFormat::Gltf) => {
+                "a glTF model, which is Y up"
+            }
+            SceneSource::Model(_) | SceneSource::Picture(_) => return,
+            SceneSource::Builtin(_) => "a built-in scene",
+            SceneSource::Scene(_) => "a scene file",
+        };
+        remark(format_args!("warning: {}: --up has no effect on {what}", source.title()));
     }
 
     /// The source that the argument names.
@@ -182,13 +211,10 @@ impl OverwriteArgs {
 }
 
 /// The end of a message, which names the files that were replaced.
-pub fn replaced(paths: &[PathBuf], output: &Path) -> String {
-    match paths {
-        [] => String::new(),
-        [path] if path == output => ", replaced the existing file".to_owned(),
-        paths => {
-            let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-            format!(", replaced {}", names.join(", "))
-        }
+pub fn replaced(paths: &[PathBuf]) -> String {
+    if paths.is_empty() {
+        return String::new();
     }
+    let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    format!(", replaced the existing {}", names.join(", "))
 }

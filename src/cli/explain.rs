@@ -3,7 +3,7 @@
 use super::args::SceneArgs;
 use super::console::{print, remark};
 use super::failure::Failure;
-use super::number::parse_size;
+use super::number::{between, parse_size};
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
 use firstlight::printable;
@@ -32,10 +32,10 @@ pub struct ExplainArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Number of samples to trace.
-    #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = between::<u32>(1, 1 << 20))]
     spp: u32,
     /// Random seed [default: from the scene].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
     seed: Option<u32>,
     /// Print all paths with their vertices as one line of JSON.
     #[arg(long)]

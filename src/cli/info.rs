@@ -1,12 +1,12 @@
 //! `firstlight info SCENE`: contents of a scene, features in use, unsupported features, memory.
 
-use super::args::{SceneArgs, ScenesArgs};
+use super::args::{SceneArgs, ScenesArgs, check_scenes};
 use super::console::{print, remark};
 use super::failure::Failure;
-use super::number::two_digits;
+use super::info_objects::ObjectList;
+use super::number::{counted, two_digits};
 use clap::Args;
 use firstlight::frame::{PictureLayer, f_number, f_stop};
-use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
 use firstlight::scene::file::{AnimationPart, TrackPart};
@@ -32,7 +32,9 @@ pub struct InfoArgs {
 }
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
-    args.scenes.each().try_for_each(|scene| tell(args, &scene))
+    let scenes: Vec<SceneArgs> = args.scenes.each().collect();
+    check_scenes(scenes.iter())?;
+    scenes.iter().try_for_each(|scene| tell(args, scene))
 }
 
 fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
@@ -52,20 +54,15 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
         return super::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
-    let mut faults = BTreeMap::new();
-    for object in &inputs.objects {
-        if let Shape::Mesh(mesh) = &object.shape {
-            faults.entry(Arc::as_ptr(mesh)).or_insert_with(|| Faults::of(mesh));
-        }
-    }
     let prepared = &extraction.prepared;
     let settings = world.resource::<Rendering>().0;
     let can_be_seen = prepared.camera.check().is_ok() && settings.check().is_ok();
     let caustics = (prepared.features().caustics && can_be_seen)
         .then(|| caustic_choice(prepared, &settings, (film.width, film.height)));
     let animation = world.get_resource::<Animation>().cloned();
+    let list = ObjectList::of(&inputs);
     let told =
-        Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults, caustics, animation };
+        Told { scene: &scene, inputs: &inputs, list, extraction: &extraction, film, layers, caustics, animation };
     if args.json { print(told.json()) } else { print(told.text()) }
 }
 
@@ -73,24 +70,21 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
 struct Told<'a> {
     scene: &'a LoadedScene,
     inputs: &'a SceneInputs,
+    list: ObjectList<'a>,
     extraction: &'a Extraction,
     film: FilmSize,
     /// Of the image that the scene is read from; empty for other sources.
     layers: Vec<&'static str>,
-    /// By mesh.
-    faults: BTreeMap<*const Mesh, Faults>,
     /// How caustics are sampled, if there can be any.
     caustics: Option<CausticChoice>,
     /// The animation of the scene file, if it has one.
     animation: Option<Animation>,
 }
 
-const NOT_MODELLED: [&str; 5] = ["spectra", "polarisation", "motion blur", "participating media", "lens aberrations"];
-
 impl Told<'_> {
     /// As text.
     fn text(&self) -> Vec<String> {
-        let Self { scene, inputs, extraction, film, .. } = self;
+        let Self { scene, extraction, film, .. } = self;
         let mut out = vec![scene.source.title()];
         let mut row = |name: &str, text: String| out.push(format!("  {name:14}{text}"));
         let counts = |counts: BTreeMap<&str, usize>| {
@@ -98,31 +92,18 @@ impl Told<'_> {
             if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
         };
         row("objects", counts(self.objects()));
-        for object in &inputs.objects {
-            let name = printable::name(object.name.as_deref().unwrap_or("(no name)"));
-            match &object.shape {
-                Shape::Mesh(mesh) => {
-                    let triangles = counted(mesh.triangles.len(), "triangle", "triangles");
-                    row("", format!("{name}: {triangles}, {}", counted(mesh.positions.len(), "vertex", "vertices")));
-                    self.faults[&Arc::as_ptr(mesh)].sentences().for_each(|fault| row("", format!("{name}: {fault}")));
-                }
-                Shape::Spheres(balls) => row("", format!("{name}: {} spheres", balls.centers.len())),
-                _ => {}
-            }
-        }
+        self.list.lines().into_iter().for_each(|line| row("", line));
+        row("size", self.list.size());
         let shading = &extraction.prepared.shading;
         row("materials", counts(self.materials()));
         let pictures = scene.picture_bytes() as f64 / f64::from(1 << 20);
         let pictures = if pictures > 0.0 { format!(", images {pictures:.1} MiB") } else { String::new() };
         row("textures", format!("{}{pictures}", shading.textures.len()));
-        let emitters = counted(self.emitters(), "emissive object", "emissive objects");
         let [points, spots, directional] = self.lights();
-        let mut lights = format!("{emitters}, {}", counted(points, "point light", "point lights"));
-        for (n, one, many) in
-            [(spots, "spot light", "spot lights"), (directional, "directional light", "directional lights")]
-        {
+        let mut lights = format!("{}, {}", counted(self.emitters(), "emissive object"), counted(points, "point light"));
+        for (n, kind) in [(spots, "spot light"), (directional, "directional light")] {
             if n > 0 {
-                lights += &format!(", {}", counted(n, one, many));
+                lights += &format!(", {}", counted(n, kind));
             }
         }
         row("lights", lights);
@@ -148,34 +129,28 @@ impl Told<'_> {
         row("time", format!("{:.3} s to load, {:.3} s to build kd-trees", scene.load_seconds, scene.build_seconds));
         row("uses", list(&self.features(true)));
         row("not used", list(&self.features(false)));
-        row("not modelled", NOT_MODELLED.join(", "));
+        let not_modelled = self.not_modelled();
+        if not_modelled.is_empty() {
+            row("not modelled", "nothing that this scene contains".to_owned());
+        }
+        for (i, what) in not_modelled.into_iter().enumerate() {
+            row(if i == 0 { "not modelled" } else { "" }, what);
+        }
         out
     }
 
     /// As one line of JSON.
     fn json(&self) -> serde_json::Value {
-        let Self { scene, inputs, extraction, film, .. } = self;
+        let Self { scene, extraction, film, .. } = self;
         let shading = &extraction.prepared.shading;
-        let parts: Vec<_> = (inputs.objects.iter())
-            .filter_map(|object| match &object.shape {
-                Shape::Mesh(mesh) => {
-                    let Faults { collapsed, duplicates, flat } = self.faults[&Arc::as_ptr(mesh)];
-                    Some(serde_json::json!({
-                        "name": object.name, "triangles": mesh.triangles.len(), "vertices": mesh.positions.len(),
-                        "collapsed_triangles": collapsed, "duplicate_triangles": duplicates, "flat_triangles": flat,
-                    }))
-                }
-                Shape::Spheres(balls) => Some(serde_json::json!({ "name": object.name, "balls": balls.centers.len() })),
-                _ => None,
-            })
-            .collect();
         let lens = self.lens();
         let [meshes, trees, film_bytes] = self.bytes();
         serde_json::json!({
             "scene": scene.source.title(),
             "fingerprint": scene.fingerprint().to_string(),
             "objects": self.objects(),
-            "parts": parts,
+            "parts": self.list.json(),
+            "bounds": self.list.bounds_json(),
             "materials": self.materials(),
             "textures": shading.textures.len(),
             "emissive_objects": self.emitters(),
@@ -193,13 +168,25 @@ impl Told<'_> {
             "build_s": scene.build_seconds,
             "uses": self.features(true),
             "not_used": self.features(false),
-            "not_modelled": NOT_MODELLED,
+            "not_modelled": self.not_modelled(),
             "caustics": self.caustics.map(caustics_json),
             "animation": self.animation.as_ref().map(|animation| animation_json(&scene.file.animation, animation)),
             "model": scene.facts.as_ref().map(facts_json),
             "warnings": scene.warnings,
             "problems": extraction.problems,
         })
+    }
+
+    /// What the files of the scene have that is not modelled, one thing each.
+    fn not_modelled(&self) -> Vec<String> {
+        let Some(facts) = &self.scene.facts else {
+            // Other formats have it in their warnings.
+            let warnings = self.scene.warnings.iter().filter(|warning| warning.contains("not modelled"));
+            return warnings.cloned().collect();
+        };
+        let extensions = facts.unknown_extensions.iter().map(|name| format!("extension {}", printable::name(name)));
+        let notes = facts.notes.iter().map(|(material, note)| format!("{}: {note}", printable::name(material)));
+        extensions.chain(notes).collect()
     }
 
     fn objects(&self) -> BTreeMap<&'static str, usize> {
@@ -290,10 +277,10 @@ fn caustics_json(choice: CausticChoice) -> serde_json::Value {
 fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl FnMut(&str, String)) {
     let (length, fps) = (number(animation.length()), number(animation.fps));
     let n_frames = animation.n_frames();
-    let frames = counted(n_frames as usize, "frame", "frames");
+    let frames = counted(n_frames as usize, "frame");
     row("animation", format!("{length} s, {frames} at {fps} per second, shown at {} s", number(part.at)));
     for (what, track) in part.tracks.iter().map(|track| (moved(track), track)) {
-        let keys = counted(track.keys().len(), "key", "keys");
+        let keys = counted(track.keys().len(), "key");
         let span = match track.keys() {
             [(start, _), .., (end, _)] => format!(", {} to {} s", number(*start), number(*end)),
             _ => String::new(),
@@ -348,9 +335,6 @@ fn facts_rows(facts: &GltfFacts, row: &mut impl FnMut(&str, String)) {
     };
     row("animations", animations);
     row("extensions", names(&facts.extensions));
-    for (material, note) in &facts.notes {
-        row("", format!("{}: {note}", printable::name(material)));
-    }
 }
 
 /// The contents of a glTF file as JSON.
@@ -421,8 +405,4 @@ fn counts<'a>(kinds: impl Iterator<Item = &'a str>) -> BTreeMap<&'a str, usize> 
         *counts.entry(kind).or_default() += 1;
     }
     counts
-}
-
-fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }

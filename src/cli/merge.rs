@@ -148,7 +148,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         }));
     }
     let error = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
-    let replaced = replaced(files.replaced(), output);
+    let replaced = replaced(files.replaced());
     inform(format_args!("{}: {} samples per pixel{error}{replaced}", output.display(), film.spp()));
     Ok(())
 }

@@ -10,6 +10,7 @@ mod console;
 mod explain;
 mod failure;
 mod info;
+mod info_objects;
 mod job;
 mod layers;
 mod man;

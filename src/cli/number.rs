@@ -2,6 +2,8 @@
 
 use firstlight::mesh::simplify::{Target, check_target};
 use firstlight::scene::check_stops;
+use std::fmt::Display;
+use std::str::FromStr;
 
 /// Parses `640x480` as a width and a height; pixels.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -18,6 +20,26 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("must be a positive number".to_owned()),
     }
+}
+
+/// A parser of whole numbers in a range, both ends included.
+pub fn between<T>(low: T, high: T) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Copy + Display,
+{
+    move |text| match text.parse::<T>() {
+        Ok(value) if value >= low && value <= high => Ok(value),
+        // Too long for its type, it is still a number.
+        _ if text.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit()) && !text.is_empty() => {
+            Err(format!("must be between {low} and {high}"))
+        }
+        _ => Err(format!("must be a whole number between {low} and {high}")),
+    }
+}
+
+/// A whole number from 1 on.
+pub fn at_least_one(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|number| *number > 0).ok_or_else(|| "must be a whole number, at least 1".to_owned())
 }
 
 /// Parses a finite number of seconds.
@@ -50,6 +72,16 @@ pub fn percent(share: f64) -> String {
 pub fn two_digits(value: f64) -> String {
     let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize } else { 0 };
     format!("{value:.digits$}")
+}
+
+/// A number with what it counts, whose plural ends in s.
+pub fn counted(n: usize, one: &str) -> String {
+    format!("{n} {one}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A number of samples per pixel in words.
+pub fn samples_per_pixel(spp: u32) -> String {
+    format!("{spp} {} per pixel", if spp == 1 { "sample" } else { "samples" })
 }
 
 /// Parses a number of stops of exposure.
@@ -125,6 +157,18 @@ mod tests {
             (0.0, "0 %"),
         ] {
             assert_eq!(percent(share), text);
+        }
+    }
+
+    #[test]
+    fn whole_numbers_lie_between_their_limits() {
+        let parse = between::<u16>(1, 1024);
+        assert_eq!((parse("1"), parse("1024")), (Ok(1), Ok(1024)));
+        for text in ["0", "1025", "-3", "99999999999999999999"] {
+            assert_eq!(parse(text).unwrap_err(), "must be between 1 and 1024", "{text}");
+        }
+        for text in ["", "two", "1.5", "1 2"] {
+            assert_eq!(parse(text).unwrap_err(), "must be a whole number between 1 and 1024", "{text}");
         }
     }
 

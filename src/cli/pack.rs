@@ -37,7 +37,7 @@ pub fn run(args: &PackArgs) -> Result<(), Failure> {
     let package = Package::of(&scene, &args.scene.source()?)?;
     package.write_zip(out)?;
     let (output, n) = (args.output.display(), package.names().count());
-    let replaced = replaced(files.replaced(), &args.output);
+    let replaced = replaced(files.replaced());
     let environment = package.environment.as_ref().map(|name| format!(" --env {name}")).unwrap_or_default();
     inform(format_args!("{output}: {n} files{replaced}; unpack it and open {}{environment}", package.scene));
     Ok(())

@@ -5,7 +5,7 @@ use super::args::replaced;
 use super::console::{inform, print, prints_to_terminal, remark};
 use super::failure::Failure;
 use super::job::{RenderJob, room_to_write};
-use super::number::percent;
+use super::number::{percent, samples_per_pixel};
 use super::part;
 use super::progress::Progress;
 use super::render_args::{RenderArgs, RenderCommand};
@@ -55,8 +55,8 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     }
     let jobs = command.jobs()?;
     // An error in the last argument should be reported before the others are rendered.
+    super::args::check_scenes(jobs.iter().map(|job| &job.scene))?;
     for job in &jobs {
-        job.scene.source()?;
         job.picture_format()?;
     }
     for (i, job) in jobs.iter().enumerate() {
@@ -176,14 +176,24 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());
     let mut film = job.film(args, kept)?;
     if let Some(path) = film_path.filter(|_| args.resume) {
-        let (path, spp) = (path.display(), film.spp());
-        progress.suspend(|| inform(format_args!("resuming {path}, which has {spp} samples per pixel")));
+        let (path, spp) = (path.display(), samples_per_pixel(film.spp()));
+        progress.suspend(|| inform(format_args!("resuming {path}, which has {spp}")));
     }
     let room = room_to_write(args, job.size)?;
     let target = job.target(args);
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let region = args.region.map(|region| region_in(&film, region)).transpose()?;
+    if args.resume
+        && target.reached(
+            film.spp_in(region.as_ref()),
+            0.0,
+            film.error_estimate_in(region.as_ref()).map(|error| error.relative),
+        )
+    {
+        let message = format!("nothing to render: the film has reached {}", target_in_words(&target));
+        progress.suspend(|| inform(message));
+    }
     let features_start = Instant::now();
     let features = job.features(args, kept_features)?;
     let features_seconds = features_start.elapsed().as_secs_f64();
@@ -207,7 +217,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
             .map_or(0.0, |(goal, error)| f64::from(now.spp) / f64::from(error.spp_for(goal)));
         let mrays = now.rays.total() as f64 / now.seconds.max(1e-9) * 1e-6;
         let share = by_spp.max(by_time).max(by_error);
-        progress.at(share, format!("{} samples per pixel, {mrays:.1} Mrays/s", now.spp));
+        progress.at(share, format!("{}, {mrays:.1} Mrays/s", samples_per_pixel(now.spp)));
         true
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
@@ -274,15 +284,17 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         print(json(&job, &report, seconds, (&film, is_dark), denoised_error, files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output_name(), job.size);
-        let (spp, seconds) = (film.spp(), report.seconds);
+        let seconds = report.seconds;
         let error = error.filter(|_| !is_dark);
         let error = error.map_or(String::new(), |error| format!(", estimated error {}", percent(error)));
         let denoised = denoised_error.map_or(String::new(), |error| format!(" (denoised: {})", percent(error)));
         let kept = film_path.map_or(String::new(), |path| format!(", film saved to {}", path.display()));
-        let replaced = replaced(files.replaced(), &args.output);
-        inform(format_args!(
-            "{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{denoised}{kept}{replaced}"
-        ));
+        let replaced = replaced(files.replaced());
+        let spp = match region {
+            None => samples_per_pixel(film.spp()),
+            Some(region) => in_region(&film, region),
+        };
+        inform(format_args!("{output}: {width} x {height}, {spp} in {seconds:.1} s{error}{denoised}{kept}{replaced}"));
     }
     if args.has_next {
         drop(ManuallyDrop::into_inner(job));
@@ -290,27 +302,50 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     match (stopped, film_path) {
         (false, _) => Ok(()),
         (true, Some(path)) => Err(Failure::Stopped(format!(
-            "stopped after {} samples per pixel; saved {} and the film {}: continue with --resume --film {}",
-            film.spp(),
+            "stopped after {}; saved {} and the film {}: continue with --resume --film {}",
+            samples_per_pixel(film.spp()),
             args.output_name(),
             path.display(),
             path.display()
         ))),
         (true, None) => Err(Failure::Stopped(format!(
-            "stopped after {} samples per pixel; saved {} (to be able to resume, save a film with --film)",
-            film.spp(),
+            "stopped after {}; saved {} (to be able to resume, save a film with --film)",
+            samples_per_pixel(film.spp()),
             args.output_name()
         ))),
     }
 }
 
-/// The tiles that cover a rectangle, if it overlaps the film.
+/// The tiles that cover a rectangle, if it overlaps the film; warns if it reaches beyond the image.
 fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Failure> {
-    let start = UVec2::new(x, y);
-    film.region(start, start.saturating_add(UVec2::new(width, height))).ok_or_else(|| {
-        let (width, height) = (film.width(), film.height());
-        Failure::Usage(format!("--region: {x},{y} is outside of the picture of {width} x {height} pixels"))
-    })
+    let (start, size) = (UVec2::new(x, y), UVec2::new(film.width(), film.height()));
+    let end = start.saturating_add(UVec2::new(width, height));
+    let region = film.region(start, end).ok_or_else(|| {
+        Failure::Usage(format!("--region: {x},{y} is outside of the image of {} x {} pixels", size.x, size.y))
+    })?;
+    if end.cmpgt(size).any() {
+        let UVec2 { x: width, y: height } = end.min(size) - start;
+        remark(format_args!(
+            "warning: --region reaches beyond the image of {} x {} pixels: it is cut to {x},{y},{width},{height}",
+            size.x, size.y
+        ));
+    }
+    Ok(region)
+}
+
+/// Samples per pixel of an image of which a region was rendered.
+fn in_region(film: &Film, region: &Region) -> String {
+    let size = region.end - region.start;
+    let (spp, elsewhere) = (samples_per_pixel(film.spp_in(Some(region))), film.spp());
+    let (Region { start, .. }, UVec2 { x: width, y: height }) = (region, size);
+    format!("{spp} in the region of {width} x {height} at {},{}, at least {elsewhere} elsewhere", start.x, start.y)
+}
+
+/// What ends a rendering, in words.
+fn target_in_words(target: &Target) -> String {
+    let spp = target.spp.map(samples_per_pixel);
+    let error = target.error.map(|error| format!("an error of {}", percent(error)));
+    spp.into_iter().chain(error).collect::<Vec<_>>().join(" or ")
 }
 
 /// Location of the first sample of a list, for the user to inspect.

@@ -3,7 +3,7 @@
 use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
 use super::failure::Failure;
 use super::layers::LayerArgs;
-use super::number::{parse_positive, parse_share, parse_size, parse_stops};
+use super::number::{at_least_one, between, parse_positive, parse_share, parse_size, parse_stops};
 use clap::{Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
@@ -58,7 +58,7 @@ pub struct RenderArgs {
     #[arg(help_heading = "Output", long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
     /// Samples per pixel, the mean over the picture [default: 256, unless --time or --error is given].
-    #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     pub spp: Option<u32>,
     /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
     #[arg(help_heading = "Films and parts", long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
@@ -74,7 +74,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub layers: LayerArgs,
     /// Samples per pixel that albedo, normal, depth, position, object and material are made of [default: 16].
-    #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = between::<u32>(1, 65_536))]
     pub layer_samples: Option<u32>,
     /// Save the picture denoised: raw and filtered combined, so that it converges to the raw picture
     ///
@@ -82,7 +82,7 @@ pub struct RenderArgs {
     #[arg(help_heading = "Output", long, conflicts_with_all = ["region", "layers"])]
     pub denoise: bool,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
-    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
+    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = between::<u32>(1, 100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
     /// Render only a rectangle: left, top, width and height in pixels, enlarged to whole tiles of 32 pixels
     ///
@@ -93,7 +93,7 @@ pub struct RenderArgs {
     #[arg(help_heading = "Animation", long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
     pub bookmarks: Option<Vec<u8>>,
     /// Number of frames for --bookmarks.
-    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
+    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = between::<u32>(1, 100_000), requires = "bookmarks")]
     pub frames: Option<u32>,
     /// Render one of N equal parts into --film: I/N, such as 3/64, or auto for the task of an array job
     ///
@@ -127,10 +127,10 @@ pub struct RenderArgs {
     #[arg(help_heading = "Allocation of samples", long, value_enum, value_name = "METRIC", conflicts_with = "samples")]
     pub error_metric: Option<MetricArg>,
     /// Number of worker threads [default: all cores]; the picture does not depend on it.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     pub threads: Option<u16>,
     /// Random seed [default: from the scene, else 0].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
     pub seed: Option<u32>,
     /// Light transport [default: from the scene].
     #[arg(long, value_enum)]
@@ -139,7 +139,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum)]
     pub filter: Option<FilterArg>,
     /// Maximum path length in segments; 1 shows only emitters.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
     pub max_depth: Option<u32>,
     /// Exposure in stops, added to that of the scene; does not affect .exr.
     #[arg(help_heading = "Output", long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]

@@ -3,7 +3,7 @@
 use super::args::{OverwriteArgs, SceneArgs};
 use super::console::{Bar, inform, lines, print, remark};
 use super::failure::Failure;
-use super::number::{parse_positive, parse_size};
+use super::number::{between, parse_positive, parse_size};
 use super::stop::Stop;
 use clap::Args;
 use firstlight::render::{
@@ -46,7 +46,7 @@ pub struct ReportArgs {
     #[arg(long, value_name = "DIR", default_value = "report")]
     out: PathBuf,
     /// Maximum samples per pixel [default: 256, unless --time is given].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, 1 << 20))]
     spp: Option<u32>,
     /// Maximum seconds of rendering per scene.
     ///
@@ -57,10 +57,10 @@ pub struct ReportArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Number of worker threads [default: all cores].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     threads: Option<u16>,
     /// Random seed.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1, value_parser = between::<u32>(0, u32::MAX))]
     seed: u32,
     /// Skip the comparison with each technique disabled.
     #[arg(long)]

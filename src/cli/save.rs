@@ -14,6 +14,9 @@ pub struct SaveArgs {
     /// Scene file; mesh and image paths in it are relative to its folder.
     #[arg(short, long, value_name = "OUT.ron")]
     output: PathBuf,
+    /// Replace an existing scene file, whose comments and layout are lost.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 pub fn run(args: &SaveArgs) -> Result<(), Failure> {
@@ -22,11 +25,16 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     }
     let mut files = OverwriteArgs::default().files();
     files.write(&args.output)?;
+    // Somebody may have written it by hand.
+    if !args.overwrite && !files.replaced().is_empty() {
+        let message = "already exists: replace it with --overwrite, or choose another name";
+        return Err(Failure::Failed(format!("{}: {message}", args.output.display())));
+    }
     let scene = args.scene.load(None, &mut files, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let saved = save_scene(&mut world, Some(&scene), &args.output)?;
-    inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced(), &args.output)));
+    inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced())));
     for note in &saved.notes {
         inform(format_args!("note: {note}"));
     }

@@ -1,8 +1,9 @@
 //! `firstlight [SCENE|MODEL]`: opens a window, or renders an image if there is no display.
 
-use super::args::{OverwriteArgs, SceneArgs};
+use super::args::{OverwriteArgs, SceneArgs, replaced};
 use super::console::{inform, remark};
 use super::failure::Failure;
+use super::number::{between, counted, samples_per_pixel};
 use super::render;
 use super::render_args::{PartBy, RenderArgs, free_name};
 use super::stop::Stop;
@@ -20,10 +21,10 @@ pub struct ShowArgs {
     #[arg(long, value_name = "WxH", value_parser = super::number::parse_size)]
     size: Option<(u32, u32)>,
     /// Number of worker threads [default: all cores].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     threads: Option<u16>,
     /// Random seed [default: 0].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
     seed: Option<u32>,
     /// Record the session to a file, for --replay.
     #[arg(long, value_name = "FILE", conflicts_with = "env")]
@@ -37,7 +38,7 @@ pub struct ShowArgs {
     #[command(flatten)]
     overwrite: OverwriteArgs,
     /// Samples per pixel for --replay [default: as recorded].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)), requires = "replay")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, Film::MAX_SAMPLES), requires = "replay")]
     spp: Option<u32>,
     /// Print input latency and number of camera paths as JSON on exit; rendering does not stop at an error target.
     #[cfg(feature = "viewer")]
@@ -68,6 +69,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     use firstlight::frame::{SettingsStore, check_recordable};
     use firstlight::viewer::{ViewerError, ViewerOptions, run};
     let source = args.scene.source()?;
+    args.scene.tell_ignored(&source);
     if let Some(record) = &args.record {
         let mut files = OverwriteArgs::default().files();
         files.read_all(source.path().map(std::path::Path::to_path_buf))?;
@@ -128,9 +130,13 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
     let print = Print { film: &played.film, display: &display, size, note: Some(&note), denoised: None };
     print.write(&args.output, files.replace())?;
-    if files.replaced().contains(&args.output) {
-        inform(format_args!("{}: replaced the existing file", args.output.display()));
-    }
+    let (output, (width, height), replaced) = (args.output.display(), size, replaced(files.replaced()));
+    let (commands, spp) = (counted(played.commands, "command"), samples_per_pixel(film.spp()));
+    inform(format_args!(
+        "{output}: {width} x {height}, {spp}; replayed {commands} in {} from {}{replaced}",
+        counted(played.frames as usize, "frame"),
+        path.display()
+    ));
     Ok(())
 }
 

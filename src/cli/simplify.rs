@@ -145,7 +145,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         });
         return print(report);
     }
-    inform(format_args!("{}: model saved{}", args.output.display(), replaced(files.replaced(), &args.output)));
+    inform(format_args!("{}: model saved{}", args.output.display(), replaced(files.replaced())));
     print(format_args!("{before} -> {after} triangles in {seconds:.3} s"))?;
     for (name, d) in [("original to result", deviation.forward), ("result to original", deviation.backward)] {
         let percent = |length: f64| percent(length / diagonal);

@@ -3,6 +3,7 @@
 
 use super::console::{Bar, lines, print};
 use super::failure::Failure;
+use super::number::between;
 use clap::Args;
 use firstlight::render::worker_threads;
 use firstlight::report::cpu_seconds;
@@ -27,7 +28,7 @@ pub struct StabilityArgs {
     #[arg(long, requires = "cases", value_name = "STAGE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
     /// Number of worker threads [default: all cores]; the counts do not depend on it.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     threads: Option<u16>,
     /// Print the result as one line of JSON.
     #[arg(long)]

@@ -4,7 +4,7 @@
 use super::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
 use super::console::inform;
 use super::failure::Failure;
-use super::number::{parse_positive, parse_share, parse_size, parse_stops};
+use super::number::{at_least_one, between, parse_positive, parse_share, parse_size, parse_stops};
 use super::render::Command;
 use super::render_args::file_stem;
 use super::work::render_words;
@@ -34,20 +34,20 @@ pub struct SubmitArgs {
     #[command(flatten)]
     look: LookArgs,
     /// Number of parts of each round.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(1, 1_000_000))]
     parts: u32,
     /// Folder of the job, which all machines see [default: firstlight-job-SCENE].
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Samples per pixel; of the first round where --error is given [default: 256; with --error one for each part, 16 at
     /// least].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     spp: Option<u32>,
     /// Render in rounds until the estimated relative error is at most this: 1% or 0.01.
     #[arg(long, value_name = "ERROR", value_parser = parse_share)]
     error: Option<f64>,
     /// Samples per pixel after which no other round follows.
-    #[arg(long, value_name = "N", requires = "error", default_value_t = 16_384, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    #[arg(long, value_name = "N", requires = "error", default_value_t = 16_384, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     max_spp: u32,
     /// Write the folder, and submit nothing.
     #[arg(long)]
@@ -76,7 +76,7 @@ struct LookArgs {
     #[arg(long, value_name = "FACTOR", value_parser = parse_positive)]
     scale: Option<f64>,
     /// Random seed [default: from the scene, else 0].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(0, u32::MAX))]
     seed: Option<u32>,
     /// Light transport [default: from the scene].
     #[arg(long, value_enum)]
@@ -85,7 +85,7 @@ struct LookArgs {
     #[arg(long, value_enum)]
     filter: Option<FilterArg>,
     /// Maximum path length in segments.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_depth: Option<u32>,
     /// Exposure in stops, added to that of the scene.
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse_stops)]

@@ -4,7 +4,7 @@
 use super::console::{inform, print};
 use super::failure::Failure;
 use super::merge::{FilmSet, note_of};
-use super::number::percent;
+use super::number::{at_least_one, between, percent};
 use super::part;
 use super::render::Command;
 use super::stop::Stop;
@@ -22,7 +22,7 @@ pub struct WorkArgs {
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
     /// Number of the round, from 1 [default: the one that is to be rendered now].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
     round: Option<u32>,
     /// Render this part of the round: I/N, or auto for the task of an array job.
     #[arg(long, value_name = "I/N")]
@@ -37,7 +37,7 @@ pub struct WorkArgs {
     #[arg(long, conflicts_with_all = ["part", "merge", "round"])]
     next: bool,
     /// Number of worker threads [default: all cores]; the picture does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = between::<u16>(1, 1024))]
     threads: Option<u16>,
 }
 

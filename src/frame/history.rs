@@ -2,16 +2,16 @@
 //!
 //! Changes need not be announced. When a frame has touched anything, the scene is read and compared with its previous
 //! state; a difference becomes a step. So commands, panels and user systems can all be undone. A continuous drag
-//! ([`super::Edit::Begin`] to [`super::Edit::End`]) is one step, and so is camera motion between two edits.
+//! ([`super::Edit::Begin`] to [`super::Edit::End`]) is one step, and so is camera motion between two edits. Render
+//! settings and display settings, such as the integrator and the exposure, are not part of the scene, so undo keeps them.
 //!
 //! States share equal entities, and meshes and images are shared anyway.
 
 use super::rig::Rig;
 use super::selection::Selection;
-use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    DirectionalLight, DisplaySettings, Lens, LightKind, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight,
-    Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View, WithLight,
+    DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection,
+    SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{
@@ -39,8 +39,6 @@ struct EntityState {
 struct State {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
-    settings: Option<RenderSettings>,
-    display: Option<Display>,
     camera: Option<(Entity, Rig)>,
 }
 
@@ -247,8 +245,6 @@ pub fn notice(
     mut directional_lights: RemovedComponents<DirectionalLight>,
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
-    rendering: Option<Res<Rendering>>,
-    developing: Option<Res<DisplaySettings>>,
     mut had_environment: Local<bool>,
     mut history: ResMut<History>,
 ) {
@@ -256,12 +252,10 @@ pub fn notice(
     let removed = shapes.read().count() + materials.read().count() + lights + names.read().count();
     let environment_changed = environment.as_ref().is_some_and(|environment| environment.is_changed())
         || std::mem::replace(&mut *had_environment, environment.is_some()) != environment.is_some();
-    let settings_changed = rendering.is_some_and(|rendering| rendering.is_changed())
-        || developing.is_some_and(|developing| developing.is_changed());
     if removed > 0 || environment_changed || !parts.is_empty() {
         history.touched = true;
     }
-    if settings_changed || !camera.is_empty() {
+    if !camera.is_empty() {
         history.camera_touched = true;
     }
 }
@@ -282,13 +276,7 @@ pub fn remember(world: &mut World) {
         .iter(world)
         .min_by_key(|(entity, ordinal, ..)| (ordinal.map_or(u32::MAX, |ordinal| ordinal.0), *entity))
         .map(|(entity, _, view, projection, lens)| (entity, Rig { view: *view, projection: *projection, lens: *lens }));
-    let state = State {
-        entities,
-        environment: world.get_resource::<SceneEnvironment>().cloned(),
-        settings: world.get_resource::<Rendering>().map(|rendering| rendering.0),
-        display: world.get_resource::<DisplaySettings>().map(|developing| developing.0),
-        camera,
-    };
+    let state = State { entities, environment: world.get_resource::<SceneEnvironment>().cloned(), camera };
     world.resource_mut::<History>().record(state);
     remember_selection(world);
 }
@@ -355,12 +343,6 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     {
         world.insert_resource(environment.clone());
     }
-    if let Some(settings) = wanted.settings.filter(|_| wanted.settings != now.settings) {
-        world.insert_resource(Rendering(settings));
-    }
-    if let Some(display) = wanted.display.filter(|_| wanted.display != now.display) {
-        world.insert_resource(DisplaySettings(display));
-    }
     if let Some((entity, rig)) = wanted.camera.filter(|_| wanted.camera != now.camera) {
         put(world, entity, &Some(rig.view));
         put(world, entity, &Some(rig.projection));
@@ -403,15 +385,7 @@ fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     if !Arc::ptr_eq(&old.entities, &new.entities) && old.entities != new.entities {
         return what_changed_in_entities(&old.entities, &new.entities);
     }
-    let (label, goes_on) = if old.environment != new.environment {
-        ("sky", false)
-    } else if old.settings != new.settings {
-        ("render settings", false)
-    } else if old.camera != new.camera {
-        ("camera", true)
-    } else {
-        ("display", true)
-    };
+    let (label, goes_on) = if old.environment != new.environment { ("environment", false) } else { ("camera", true) };
     (label.to_owned(), goes_on.then(|| label.to_owned()))
 }
 

@@ -35,8 +35,8 @@ pub struct HotReload {
     reading: Vec<PathBuf>,
     /// Whether a reload is running.
     busy: Arc<Mutex<bool>>,
-    /// Whether the last reload failed.
-    failed: bool,
+    /// The error messages of the last reload; empty if it succeeded.
+    failed: Vec<String>,
 }
 
 impl HotReload {
@@ -187,21 +187,29 @@ fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
 }
 
 fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
-    let had_failed = std::mem::replace(&mut world.resource_mut::<HotReload>().failed, result.is_err());
+    let had_failed = std::mem::take(&mut world.resource_mut::<HotReload>().failed);
+    let was_mended = !had_failed.is_empty();
+    // What was wrong with the file before is not what is wrong with it now, if anything is.
+    world.resource_mut::<Status>().withdraw(had_failed);
     let scene = match result {
         Ok(Some(scene)) => scene,
         Ok(None) => {
-            if had_failed {
+            if was_mended {
                 let text = format!("{} can be read again; the picture is up to date", old.source.title());
                 world.resource_mut::<Status>().say(now, MessageKind::Note, text);
             }
             return;
         }
         Err(error) => {
+            let texts: Vec<String> =
+                error.problems.iter().map(|problem| format!("{problem} (the scene is unchanged)")).collect();
             let mut status = world.resource_mut::<Status>();
-            for problem in &error.problems {
-                status.say(now, MessageKind::Error, format!("{problem} (the scene is unchanged)"));
+            // The same error again is shown again.
+            status.withdrawn.retain(|text| !texts.contains(text));
+            for text in &texts {
+                status.say(now, MessageKind::Error, text.as_str());
             }
+            world.resource_mut::<HotReload>().failed = texts;
             return;
         }
     };

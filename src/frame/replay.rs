@@ -65,6 +65,10 @@ pub struct Replayed {
     pub film: Film,
     /// Differences from the recorded session.
     pub warnings: Vec<String>,
+    /// Number of the frame at which the recording ends.
+    pub frames: u64,
+    /// Number of commands that were replayed.
+    pub commands: usize,
 }
 
 /// Options of a replay.
@@ -83,6 +87,10 @@ pub struct ReplayOptions {
 pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sync)) -> Result<Replayed, String> {
     let (header, lines) = read(path, stop)?;
     let failed = |reason: String| format!("{}: {reason}", path.display());
+    if !lines.iter().any(|line| matches!(line, RecordedLine::Opened(..))) {
+        let reason = "the recording ends before its scene was open: there is nothing to replay";
+        return Err(failed(reason.to_owned()));
+    }
     let source = match &header.scene {
         SceneWord::Builtin(name) => SceneSource::Builtin(name.clone()),
         SceneWord::File(file) => {
@@ -112,17 +120,21 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     })?;
     session.open(source);
     let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
-    let mut end = None;
+    let (mut end, mut last, mut commands) = (None, 0, 0);
     for line in lines {
         if stop() {
             return Err(failed("the replay was stopped".to_owned()));
         }
         match line {
-            RecordedLine::Do(frame, at, command) => player.command(frame, at, command),
-            RecordedLine::Opened(frame, number, print) => {
-                player.wait_for_scene(frame, number, &print, stop).map_err(failed)?
+            RecordedLine::Do(frame, at, command) => {
+                player.command(frame, at, command);
+                (last, commands) = (frame, commands + 1);
             }
-            RecordedLine::End(_, spp) => end = Some(spp),
+            RecordedLine::Opened(frame, number, print) => {
+                player.wait_for_scene(frame, number, &print, stop).map_err(failed)?;
+                last = frame;
+            }
+            RecordedLine::End(frame, spp) => (end, last) = (Some(spp), frame),
         }
     }
     player.update();
@@ -147,7 +159,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     let target = Target { spp: Some(spp.max(1)), ..Target::default() };
     let pool = session.pool();
     pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, stop, |_| true));
-    Ok(Replayed { session, film, warnings })
+    Ok(Replayed { session, film, warnings, frames: last, commands })
 }
 
 impl Replayed {

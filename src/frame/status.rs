@@ -77,6 +77,8 @@ pub struct Status {
     pub loading: Option<String>,
     /// Messages, the newest last.
     pub messages: VecDeque<Message>,
+    /// Texts of earlier messages that no longer apply, such as errors of a scene file that has been corrected.
+    pub withdrawn: Vec<String>,
     /// Number of samples that were rejected because they were not finite.
     pub n_bad: u64,
     /// The first few of them.
@@ -120,6 +122,11 @@ impl Status {
     /// Millions of rays per second, all classes.
     pub fn mrays(&self) -> f64 {
         self.camera_mrays + self.bounce_mrays + self.shadow_mrays
+    }
+
+    /// Withdraws the last errors of a scene file, by their texts.
+    pub(super) fn withdraw(&mut self, texts: Vec<String>) {
+        self.withdrawn = texts;
     }
 
     /// Adds a message, made safe to print, at a time on the session's clock; drops the oldest one beyond a hundred.

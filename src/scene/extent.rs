@@ -61,8 +61,8 @@ impl ExtentCache {
         near
     }
 
-    /// The world-space bounding box of an object; `None` for infinite and invalid ones.
-    fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
+    /// The world-space bounding box of an object, metres; `None` for infinite and invalid ones.
+    pub fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
         let (min, max) = self.own_box(&object.shape)?;
         let world = object.placement.affine();
         let corners = corners_of(min, max).map(|corner| world.transform_point3(corner));

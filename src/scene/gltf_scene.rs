@@ -63,6 +63,9 @@ impl Maker<'_> {
         let facts = document.facts(&assembly, &surfaces);
         let variant = self.variant(&facts)?;
         let mut warnings = assembly.warnings.clone();
+        if let Some(ignored) = choice.at.and_then(|at| beyond_animation(at, facts.animation_length)) {
+            warnings.push(self.told(&ignored));
+        }
 
         let mut distinct = HashSet::new();
         let wanted: Vec<_> = (assembly.meshes.iter())
@@ -274,6 +277,16 @@ impl Maker<'_> {
             });
         }
         parts
+    }
+}
+
+/// What to say of a moment, seconds, at which nothing moves any more, or not yet.
+fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
+    match length {
+        None => Some(format!("has no animations: at {at} s it is as it is stored")),
+        Some(end) if at > end => Some(format!("the animations end at {end} s: at {at} s the model is as at their end")),
+        Some(_) if at < 0.0 => Some(format!("the animations begin at 0 s: at {at} s the model is as at their start")),
+        Some(_) => None,
     }
 }
 

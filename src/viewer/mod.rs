@@ -16,6 +16,7 @@
 //! | `region_tool` | the rectangle that gets all samples |
 //! | `change` | the effect of mesh simplification on the image |
 //! | `reaction` | input latency |
+//! | `help` | the list of keys |
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
 //! | `dialog` | file dialogs of the desktop |
@@ -28,6 +29,7 @@ mod change;
 mod dialog;
 pub mod display;
 mod handles;
+mod help;
 mod input;
 pub mod keys;
 mod overlay;

@@ -1,8 +1,6 @@
-//! Overlays on the image: the status line, messages, and the list of keys.
+//! Overlays on the image: the status line, messages, and the legend of an inspection.
 
-use super::keys::{Binding, finds, shown};
 use super::toasts::{Toast, Tone};
-use crate::frame::Navigation;
 use crate::printable;
 use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
@@ -12,9 +10,11 @@ pub const PANE: Color32 = Color32::from_rgba_premultiplied(19, 20, 23, 246);
 /// Background of other overlays, dark so that text is readable on any image.
 pub const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
 const TEXT: Color32 = Color32::from_gray(228);
-const KEY: Color32 = Color32::from_rgb(250, 205, 125);
+/// Colour of the names of keys.
+pub const KEY: Color32 = Color32::from_rgb(250, 205, 125);
 const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
-const TEXT_SIZE: f32 = 13.0;
+/// Points.
+pub const TEXT_SIZE: f32 = 13.0;
 
 /// Sets the style of overlays, once.
 pub fn style(context: &Context) {
@@ -83,119 +83,6 @@ pub fn toasts(context: &Context, toasts: &[Toast]) {
                 ui.add_space(4.0);
             }
         });
-}
-
-/// State of the list of keys while it is open.
-#[derive(Default)]
-pub struct Help {
-    pub open: bool,
-    /// Only lines that match all of these words are shown.
-    search: String,
-    /// Just opened: the search field takes the focus.
-    fresh: bool,
-    /// The user has typed into the search field or clicked it: letters belong to it.
-    touched: bool,
-    /// The search field has the focus, perhaps only because the list was opened.
-    focused: bool,
-}
-
-impl Help {
-    pub fn toggle(&mut self) {
-        *self = Self { open: !self.open, search: String::new(), fresh: true, touched: false, focused: false };
-    }
-
-    /// Records a typed letter, which the search field gets when it is drawn next.
-    pub fn note_letter(&mut self) {
-        self.touched |= self.open && (self.fresh || self.focused);
-    }
-
-    /// Whether the letter that opened it closes it: until letters belong to the search field.
-    pub fn closes_by_its_letter(&self) -> bool {
-        self.open && !self.touched && (self.fresh || self.focused)
-    }
-
-    /// Whether it has not been drawn since it was opened.
-    pub fn is_fresh(&self) -> bool {
-        self.open && self.fresh
-    }
-}
-
-/// Draws the list of keys in the middle, with search field and scroll bar.
-pub fn help(context: &Context, help: &mut Help, navigation: Navigation) {
-    let screen = context.content_rect();
-    let column_width = 430.0_f32.min(screen.width() - 60.0).max(120.0);
-    let columns = if screen.width() >= 2.0 * column_width + 80.0 { 2 } else { 1 };
-    let height = (screen.height() - 130.0).max(60.0);
-    let Help { open, search, fresh, touched, focused } = help;
-    egui::Window::new("Keys and mouse")
-        .open(open)
-        .anchor(Align2::CENTER_CENTER, Vec2::new(0.0, -8.0))
-        .collapsible(false)
-        .resizable(false)
-        .fixed_size(Vec2::new(columns as f32 * column_width + 20.0, height))
-        .show(context, |ui| {
-            let field = egui::TextEdit::singleline(search)
-                .hint_text("search: blur, undo, video … (H closes)")
-                .desired_width(220.0);
-            let field = ui.add(field);
-            if std::mem::take(fresh) {
-                field.request_focus();
-            }
-            *touched |= field.changed() || field.clicked();
-            *focused = field.has_focus() || field.gained_focus();
-            ui.add_space(4.0);
-            let mut groups = shown(navigation);
-            for (title, bindings) in &mut groups {
-                bindings.retain(|binding| finds(&binding.line(title), search));
-            }
-            groups.retain(|(_, found)| !found.is_empty());
-            egui::ScrollArea::vertical().auto_shrink([false, false]).max_height(height - 36.0).show(ui, |ui| {
-                if groups.is_empty() {
-                    ui.weak("no matches");
-                }
-                ui.horizontal_top(|ui| {
-                    for (i, groups) in in_columns(&groups, columns).into_iter().enumerate() {
-                        ui.vertical(|ui| {
-                            ui.set_width(column_width);
-                            groups_grid(ui, i, groups, column_width);
-                        });
-                    }
-                });
-            });
-        });
-}
-
-/// Splits the groups into columns of about equal length.
-fn in_columns<'a>(groups: &'a [(&'a str, Vec<&'a Binding>)], columns: usize) -> Vec<&'a [(&'a str, Vec<&'a Binding>)]> {
-    if columns < 2 {
-        return vec![groups];
-    }
-    let lines = |groups: &[(&str, Vec<&Binding>)]| groups.iter().map(|(_, found)| found.len() + 2).sum::<usize>();
-    let longer = |split: usize| lines(&groups[..split]).max(lines(&groups[split..]));
-    let split = (0..=groups.len()).min_by_key(|&split| longer(split)).unwrap_or(0);
-    vec![&groups[..split], &groups[split..]]
-}
-
-fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[(&str, Vec<&Binding>)], width: f32) {
-    let keys_width = 0.38 * width;
-    for (title, bindings) in groups {
-        ui.label(RichText::new(*title).size(TEXT_SIZE + 2.0).strong());
-        egui::Grid::new(("keys", id, title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-            for binding in bindings {
-                // Both columns wrap rather than displace each other.
-                ui.scope(|ui| {
-                    ui.set_width(keys_width);
-                    ui.add(egui::Label::new(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY)).wrap());
-                });
-                ui.scope(|ui| {
-                    ui.set_width(width - keys_width - 24.0);
-                    ui.add(egui::Label::new(RichText::new(binding.effect).size(TEXT_SIZE)).wrap());
-                });
-                ui.end_row();
-            }
-        });
-        ui.add_space(10.0);
-    }
 }
 
 /// Draws the legend of an inspection in the lower left corner; it ignores the mouse.

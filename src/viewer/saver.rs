@@ -209,11 +209,26 @@ pub fn new_scene_file(folder: &Path, scene: &str) -> PathBuf {
     free.next().unwrap_or_else(|| folder.join(format!("{stem}.ron")))
 }
 
-/// File stem for images of this scene: its own name without folder and extension.
+/// File stem for images of this scene: its own name without folder, extension, and the number of a file that was saved
+/// here before.
 fn file_stem(scene: &str) -> String {
     let stem = Path::new(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let stem = without_number(&stem);
     let plain: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_ .".contains(c) { c } else { '-' }).collect();
     if plain.trim_matches(['.', ' ']).is_empty() { "picture".to_owned() } else { plain }
+}
+
+/// `room` of `room-0001` and of `room-0001-0002`. Numbers that do not begin with 0, such as years, are part of a name.
+fn without_number(mut stem: &str) -> &str {
+    while let Some((base, number)) = stem.rsplit_once('-')
+        && !base.is_empty()
+        && number.len() == 4
+        && number.starts_with('0')
+        && number.bytes().all(|byte| byte.is_ascii_digit())
+    {
+        stem = base;
+    }
+    stem
 }
 
 #[cfg(test)]
@@ -295,5 +310,19 @@ mod tests {
         assert_eq!(file_stem(""), "picture");
         assert_eq!(file_stem(".."), "picture");
         assert_eq!(file_stem("a:b"), "a-b");
+    }
+
+    #[test]
+    fn numbers_count_from_the_base_name() {
+        assert_eq!(file_stem("out/model-0001.png"), "model");
+        assert_eq!(file_stem("model-0001-0001.ron"), "model");
+        for name in ["shot-2024", "model-12", "-0001", "model-01a2", "model-00001"] {
+            assert_eq!(file_stem(&format!("{name}.ron")), name);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let first = new_scene_file(folder.path(), "model.obj");
+        assert_eq!(first, folder.path().join("model-0001.ron"));
+        std::fs::write(&first, "").unwrap();
+        assert_eq!(new_scene_file(folder.path(), &first.to_string_lossy()), folder.path().join("model-0002.ron"));
     }
 }

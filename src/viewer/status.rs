@@ -16,10 +16,12 @@ pub fn figures(status: &Status) -> String {
     } else if status.done {
         line += "finished   ";
     }
+    // With a region, its samples and its error: those of the whole image would not belong together.
+    let of_region = status.region.map(|(_, spp)| spp);
+    let (spp, place) = of_region.map_or((status.spp, ""), |spp| (spp, " in the region"));
     write!(
         line,
-        "{} spp   {}   {:.2} Mrays/s   {}×{}",
-        status.spp,
+        "{spp} spp{place}   {}   {:.2} Mrays/s   {}×{}",
         seconds(status.seconds),
         status.mrays(),
         status.film_width,
@@ -29,13 +31,11 @@ pub fn figures(status: &Status) -> String {
     if status.divider > 1 {
         write!(line, " (1/{})", status.divider).expect("a string takes all");
     }
-    match (status.estimated_error, status.denoised_error) {
-        (Some(error), Some(denoised)) => write!(line, "   error {} (denoised {})", percent(error), percent(denoised)),
-        (Some(error), None) => write!(line, "   error {}", percent(error)),
-        (None, Some(denoised)) => write!(line, "   error – (denoised {})", percent(denoised)),
-        (None, None) => write!(line, "   error –"),
+    let error = status.estimated_error.map_or("–".to_owned(), percent);
+    write!(line, "   error {error}{place}").expect("a string takes all");
+    if let Some(denoised) = status.denoised_error {
+        write!(line, " (denoised {})", percent(denoised)).expect("a string takes all");
     }
-    .expect("a string takes all");
     if !status.restart_cause.is_empty() {
         write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
     }
@@ -130,7 +130,9 @@ pub fn thousands(n: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Region;
     use crate::scene::Lens;
+    use glam::UVec2;
 
     #[test]
     fn figures_say_what_matters() {
@@ -143,6 +145,13 @@ mod tests {
         );
         (status.estimated_error, status.divider) = (None, 1);
         assert!(figures(&status).contains("320×180   error –"));
+        // What gets all samples is what the figures are about.
+        let region = Region { start: UVec2::ZERO, end: UVec2::splat(32) };
+        status.region = Some((region, 512));
+        status.estimated_error = Some(0.012);
+        assert!(figures(&status).starts_with("512 spp in the region   12.3 s"));
+        assert!(figures(&status).contains("error 1.2 % in the region"));
+        status.region = None;
         status.done = true;
         assert!(figures(&status).starts_with("finished   37 spp"));
         status.paused = true;

@@ -44,6 +44,12 @@ impl Toasts {
         }
     }
 
+    /// Removes a problem that exists no longer.
+    pub fn withdraw(&mut self, text: &str) {
+        let text = printable::lines(text);
+        self.shown.retain(|toast| toast.tone != Tone::Problem || toast.text != text);
+    }
+
     /// Returns the messages that are still visible.
     pub fn at(&mut self, now: Instant) -> &[Toast] {
         self.shown.retain(|toast| toast.until > now);
@@ -76,6 +82,15 @@ mod tests {
         assert!(second > first + Duration::from_secs(2));
         assert!(toasts.at(second).is_empty());
         assert_eq!(toasts.next_change(), None);
+    }
+
+    #[test]
+    fn a_problem_that_is_mended_is_withdrawn() {
+        let (mut toasts, start) = (Toasts::default(), Instant::now());
+        toasts.add(Tone::Problem, "a.ron:3:1: unknown field", start);
+        toasts.add(Tone::Problem, "no such file", start);
+        toasts.withdraw("a.ron:3:1: unknown field");
+        assert_eq!(toasts.at(start).iter().map(|toast| toast.text.as_str()).collect::<Vec<_>>(), ["no such file"]);
     }
 
     #[test]

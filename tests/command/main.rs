@@ -10,5 +10,6 @@ mod faults;
 mod pack;
 mod parts;
 mod report;
+mod said;
 mod terminal;
 mod usage;

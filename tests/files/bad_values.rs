@@ -278,7 +278,7 @@ fn the_command_line() {
         ("--size 4000000000x16", "GiB"),
         ("--scale 1e9", "GiB"),
         ("--scale nan", "must be a positive number"),
-        ("--max-depth 0", "0 is not in 1.."),
+        ("--max-depth 0", "must be a whole number, at least 1"),
         ("--exposure nan", "must be a finite number of stops"),
         ("--exposure 1e30", "must be a finite number of stops"),
         ("--time nan", "must be a positive number"),

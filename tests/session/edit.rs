@@ -6,7 +6,7 @@ use firstlight::frame::{
     Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
     SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Inspection, MaterialKind};
+use firstlight::render::{Inspection, Integrator, MaterialKind};
 use firstlight::scene::{
     ColorParam, DirectionalLight, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight,
     Rgb, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
@@ -88,6 +88,49 @@ fn clicking_selects_what_is_seen_there() {
     assert_eq!(driver.selected().0, [], "the sky is nothing");
     driver.edit([Edit::SelectAll]);
     assert_eq!(driver.selected().0.len(), 12);
+}
+
+/// How the scene is rendered and shown is no edit: an undo after it undoes the edit before it.
+#[test]
+fn an_undo_leaves_the_integrator_and_the_exposure_alone() {
+    let mut driver = Driver::open("gallery");
+    let before = driver.session.inputs().clone();
+    driver.select("gold ball");
+    driver.edit([Edit::Move { by: DVec3::new(0.5, 0.25, -1.0) }]);
+    for command in [Command::SetIntegrator(Integrator::Phong), Command::AdjustExposure { stops: 1.0 }] {
+        driver.session.send(command);
+        driver.frame();
+    }
+    driver.edit([Edit::Undo]);
+    driver.frame();
+    assert_eq!(driver.session.inputs(), &before);
+    assert_eq!(driver.session.status().integrator, Integrator::Phong);
+    assert_eq!(driver.session.status().display.exposure_stops, 1.0);
+    // A change of settings between two steps does not end what can be redone.
+    driver.session.send(Command::SetIntegrator(Integrator::Path));
+    driver.frame();
+    driver.edit([Edit::Redo]);
+    assert_ne!(driver.session.inputs(), &before);
+}
+
+#[test]
+fn a_material_stays_when_the_object_that_uses_it_is_deleted() {
+    let mut driver = Driver::open("gallery");
+    driver.edit([Edit::Add(NewThing::Sphere)]);
+    let material = driver.get::<MaterialSlots>("ball").0[0];
+    driver.edit([
+        Edit::Set { id: material.to_bits(), property: Property::Color, value: DVec3::new(0.1, 0.8, 0.2) },
+        Edit::Rename { id: material.to_bits(), name: "leaf green".to_owned() },
+        Edit::Delete,
+    ]);
+    let inventory = driver.session.inventory();
+    let entry = inventory.material(material).expect("it is in the list");
+    assert_eq!((entry.label.as_str(), entry.users.len()), ("leaf green", 0));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.ron");
+    driver.session.send(Command::SaveScene { path: path.clone() });
+    driver.until(|session| !session.is_saving());
+    assert!(std::fs::read_to_string(path).unwrap().contains("leaf green"));
 }
 
 #[test]

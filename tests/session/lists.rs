@@ -157,7 +157,7 @@ fn the_sky_is_made_stronger_in_proportion() {
     for (new, old) in [(zenith, Vec3::new(0.2, 0.4, 0.8)), (horizon, Vec3::splat(0.5)), (ground, Vec3::splat(0.1))] {
         assert!(new.abs_diff_eq(2.0 * old, 1e-6), "{new} {old}");
     }
-    assert_eq!(driver.session.world().resource::<History>().undo_label(), Some("sky"));
+    assert_eq!(driver.session.world().resource::<History>().undo_label(), Some("environment"));
     driver.edit(Edit::Set { id: 0, property: Property::SkyRotation, value: DVec3::splat(30.0) });
     let refused = &driver.session.status().messages.back().expect("it is told").text;
     assert!(refused.contains("SkyRotation"), "{refused}");

@@ -142,12 +142,14 @@ fn what_changes_on_disk_is_read_again_and_nothing_else_is() {
     let errors = driver.said(MessageKind::Error);
     assert!(errors.iter().all(|error| error.contains("tent.obj:1")), "{errors:?}");
     assert_eq!(driver.session.status().restarts, restarts);
+    assert_eq!(driver.session.status().withdrawn, [""; 0]);
 
     // Mended; the text of the scene and a picture change as well, and the camera follows the file if that moved it.
     std::fs::write(path.join("tent.obj"), TENT).unwrap();
     image::RgbImage::from_pixel(2, 2, image::Rgb([20, 180, 160])).save(path.join("tiles.png")).unwrap();
     std::fs::write(path.join("room.ron"), ROOM.replace("(0.3, 1, 4)", "(0.5, 1, 4)")).unwrap();
     driver.run_until(|session| session.status().restarts > restarts);
+    assert_eq!(driver.session.status().withdrawn, errors, "a window shows them no longer");
     driver.settle();
     driver.run_until(|session| session.is_idle());
     assert_eq!(driver.eye(), DVec3::new(0.5, 1.0, 4.0));

@@ -52,12 +52,22 @@ fn the_letter_that_opens_the_list_of_keys_closes_it_and_can_be_searched_for() {
     program.key("h h");
     std::thread::sleep(Duration::from_millis(700));
     is_closed("nothing to be left");
-    // Once something was typed, it is a letter like any other.
+    // While it is open, no key is a command: the camera, the objects and the integrator stay.
     program.key("h");
     is_open("the list again");
-    program.type_text("wh");
+    program.key("d r i Delete x ctrl+z Right");
     std::thread::sleep(Duration::from_millis(700));
     is_open("the list to stay");
+    program.key("h");
+    is_closed("the same picture behind it");
+    // In a search it is a letter like any other, also as the first one, and typed before the list has been drawn.
+    program.key("h slash h d r");
+    is_open("the list with a search");
+    std::thread::sleep(Duration::from_millis(700));
+    is_open("the list to stay");
+    let found = part(&program, MIDDLE);
+    program.key("BackSpace BackSpace BackSpace");
+    until("more lines", || (difference(&found, &part(&program, MIDDLE)) > 1.0).then_some(()));
     program.key("Escape");
     is_closed("the list to go at last");
     // That a picture is being saved is said before it is saved, and what was saved after it.

@@ -7,6 +7,7 @@
 mod animation;
 mod check;
 mod check_animation;
+mod expected;
 mod locate;
 mod parts;
 mod syntax;

@@ -1,11 +1,16 @@
 //! Converts parser errors to messages: what was found, what was expected, and the nearest known name.
 
+use super::expected::field_at;
+use super::locate::line_and_column;
 use crate::scene::error::{SceneError, suggestion};
 use ron::error::{Error, SpannedError};
 use std::path::Path;
 
 /// Converts a parser error to a message with line and column.
 pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
+    if let Some((offset, message)) = wrong_form(error, text) {
+        return SceneError::at(file, line_and_column(text, offset), message);
+    }
     let at = (error.span.start.line.max(1), error.span.start.col.max(1));
     let of = |outer: &Option<String>| outer.as_ref().map(|name| format!(" of `{}`", plain(name))).unwrap_or_default();
     let message = match &error.code {
@@ -32,6 +37,77 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
         _ => at,
     };
     SceneError::at(file, at, message)
+}
+
+/// Where a value of the wrong form begins, and what was expected in its place; `None` for errors of other kinds.
+fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
+    let offset = byte_offset(text, error.span.start.line, error.span.start.col);
+    let end = byte_offset(text, error.span.end.line, error.span.end.col).max(offset);
+    match &error.code {
+        Error::SuggestRawIdentifier(found) => {
+            let before = text[..end].rfind(found.as_str());
+            let behind = text[offset..].find(found.as_str()).map(|at| offset + at);
+            let is_field = |start: &usize| text[start + found.len()..].trim_start().starts_with(':');
+            if let Some(start) = before.into_iter().chain(behind).find(is_field) {
+                let hint = found.replace('-', "_");
+                return Some((start, format!("unknown field `{found}` (did you mean `{hint}`?)")));
+            }
+        }
+        Error::ExpectedComma
+        | Error::ExpectedStructLikeEnd
+        | Error::ExpectedOptionEnd
+        | Error::ExpectedArrayEnd
+        | Error::ExpectedMapEnd => {
+            let rest = text[offset..].trim_start();
+            let word: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            let is_field = !word.is_empty() && rest[word.len()..].trim_start().starts_with(':');
+            if is_field || rest.starts_with('"') {
+                let before = if is_field { format!("`{word}`") } else { "the text in quotes".to_owned() };
+                return Some((text.len() - rest.len(), format!("a comma is missing before {before}")));
+            }
+        }
+        Error::ExpectedArray
+        | Error::ExpectedBoolean
+        | Error::ExpectedChar
+        | Error::ExpectedFloat
+        | Error::ExpectedInteger
+        | Error::ExpectedOption
+        | Error::ExpectedMap
+        | Error::ExpectedMapColon
+        | Error::ExpectedDifferentStructName { .. }
+        | Error::ExpectedStructLike
+        | Error::ExpectedNamedStructLike(_)
+        | Error::ExpectedUnit
+        | Error::ExpectedString
+        | Error::ExpectedStringEnd
+        | Error::ExpectedIdentifier
+        | Error::ExpectedStructName(_)
+        | Error::ExpectedDifferentLength { .. }
+        | Error::InvalidValueForType { .. }
+        | Error::InvalidIdentifier(_)
+        | Error::IntegerOutOfBounds
+        | Error::InvalidIntegerDigit { .. }
+        | Error::UnexpectedChar(_) => {}
+        _ => return None,
+    }
+    let field = field_at(text, offset)?;
+    // The types of the file describe values within `constant(…)` and those of fields that are not known here.
+    let expectation = field.expectation().filter(|_| !field.is_within_kind(offset));
+    let Some((what, example)) = expectation else {
+        let Error::InvalidValueForType { expected, .. } = &error.code else { return None };
+        return Some((field.start, format!("`{}`: expected {expected}, found `{}`", field.name, field.quoted())));
+    };
+    Some((
+        field.start,
+        format!("`{0}`: expected {what}, such as `{0}: {example}`, found `{1}`", field.name, field.quoted()),
+    ))
+}
+
+/// Byte offset of a line and a column of the parser, which count characters from 1.
+fn byte_offset(text: &str, line: usize, column: usize) -> usize {
+    let line_start: usize = text.split_inclusive('\n').take(line.max(1) - 1).map(str::len).sum();
+    let rest = &text[line_start..];
+    line_start + rest.char_indices().nth(column.max(1) - 1).map_or(rest.len(), |(at, _)| at)
 }
 
 /// Returns the position at which `word` starts, if the parser's position is within it or directly behind it.

@@ -5,7 +5,7 @@ use crate::frame::{Explaining, Projector, SceneBounds, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::presenter::{PresentError, Presenter};
-use crate::viewer::{overlay, panel, status, story};
+use crate::viewer::{help as key_list, overlay, panel, status, story};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -88,7 +88,7 @@ impl App {
                 overlay::toasts(context, toasts);
             }
             if help.open {
-                overlay::help(context, help, navigation);
+                key_list::draw(context, help, navigation);
             }
             if let Some(question) = question {
                 answer = question.show(context);

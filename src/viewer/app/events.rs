@@ -2,6 +2,7 @@
 
 use super::{App, FRAME, Wake};
 use crate::frame::{Command, Edit};
+use crate::viewer::help::{Help, ListKey};
 use crate::viewer::question::Question;
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
@@ -38,7 +39,7 @@ impl ApplicationHandler<Wake> for App {
             self.draw_or_leave(event_loop);
             return;
         }
-        if self.closes_help(&event) {
+        if self.help_takes(&event, now) {
             self.repaint_at = Some(now);
             self.needs_tick = true;
             return;
@@ -75,14 +76,9 @@ impl ApplicationHandler<Wake> for App {
                     }
                     return;
                 }
-                // Escape and F1 leave the list of keys even during text input; letters typed while it opens, before its
-                // field has the focus, belong to the field.
+                // Escape and F1 leave the list of keys even during text input.
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
-                let is_for_help = self.help.is_fresh() && matches!(event.logical_key, Key::Character(_));
-                if pressed && (typing || is_for_help) && !(leaves && self.help.open) {
-                    if matches!(event.logical_key, Key::Character(_)) {
-                        self.help.note_letter();
-                    }
+                if pressed && typing && !(leaves && self.help.open) {
                     return;
                 }
                 if pressed {
@@ -191,19 +187,24 @@ impl ApplicationHandler<Wake> for App {
 }
 
 impl App {
-    /// Whether H closes the list that H opened, which it does until letters are typed into its search field; called
-    /// before overlays see the event.
-    fn closes_help(&mut self, event: &WindowEvent) -> bool {
+    /// Whether the open list of keys takes a key press, see [`Help::answer`]; called before overlays see the event.
+    fn help_takes(&mut self, event: &WindowEvent, now: Instant) -> bool {
         let WindowEvent::KeyboardInput { event, is_synthetic: false, .. } = event else { return false };
-        let modifiers = self.input.modifiers();
-        let is_plain = !modifiers.control_key() && !modifiers.alt_key() && !modifiers.super_key();
-        let is_letter = matches!(&event.logical_key, Key::Character(text) if text.eq_ignore_ascii_case("h"));
-        let closes = event.state.is_pressed() && is_letter && is_plain && self.help.closes_by_its_letter();
-        let closes = closes && self.leaving.question.is_none();
-        // A key that is held down neither toggles the list repeatedly nor types.
-        if closes && !event.repeat {
-            self.help.toggle();
+        let Some(presenter) = &self.presenter else { return false };
+        let context = presenter.egui_context();
+        let is_asked = self.help.open && event.state.is_pressed() && self.leaving.question.is_none();
+        if !is_asked || context.wants_keyboard_input() {
+            return false;
         }
-        closes
+        let navigation = self.input.navigation();
+        match Help::answer(navigation, event.physical_key, &event.logical_key, self.input.modifiers()) {
+            ListKey::Pass => return false,
+            ListKey::Search => Help::begin_search(context),
+            ListKey::Letter if !event.repeat => {
+                self.toasts.add(Tone::News, "list of keys: / searches it, H closes it", now);
+            }
+            ListKey::Letter | ListKey::Nothing => {}
+        }
+        true
     }
 }

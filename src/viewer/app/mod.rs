@@ -24,8 +24,9 @@ mod memory;
 use super::dialog::Dialog;
 use super::display::{self, DisplayServer};
 use super::handles::Handles;
+use super::help::Help;
 use super::input::Input;
-use super::overlay::{self, Help};
+use super::overlay;
 use super::panel::PanelState;
 use super::presenter::{PresentError, Presenter};
 use super::reaction::Reaction;
@@ -392,6 +393,9 @@ impl App {
             self.toasts.add(Tone::Problem, trouble, now);
         }
         let status = self.session.status();
+        for text in &status.withdrawn {
+            self.toasts.withdraw(text);
+        }
         for message in status.messages.iter().filter(|message| message.at == clock) {
             let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
             self.toasts.add(tone, message.text.clone(), now);

@@ -322,7 +322,7 @@ pub static BINDINGS: &[KeyGroup] = &[
         bindings: &[
             Binding {
                 triggers: &[text("h", Action::ToggleHelp), named(NamedKey::F1, Action::ToggleHelp)],
-                effect: "show or hide this list of keys",
+                effect: "show or hide this list of keys; / searches it",
             },
             Binding {
                 triggers: &[text("n", Action::TogglePanel)],
