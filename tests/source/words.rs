@@ -138,6 +138,7 @@ fn is_grammar(text: &str) -> bool {
         || text.ends_with(".ron")
         || text.starts_with("lamps.")
         || text.contains("camera: (")
+        || text.contains("(eye: (")
 }
 
 /// `{lamp}` is a name in the source.
