@@ -180,7 +180,7 @@ fn go_on(mut film: Film) {
     });
     let settings = RenderSettings { max_depth: 3, ..RenderSettings::default() };
     if film.width() * film.height() <= 64 {
-        let report = advance(&SCENE, &settings, &mut film, spp.saturating_add(2), &|| false);
+        let report = advance(&*SCENE, &settings, &mut film, spp.saturating_add(2), &|| false);
         assert!(report.completed && film.spp() >= spp.saturating_add(2));
     }
     let twin = film.clone();

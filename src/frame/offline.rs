@@ -1,7 +1,7 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
 use crate::render::{
-    BadSample, ErrorEstimate, Film, Prepared, RayCounts, Region, RenderSettings, SampleAllocation, advance_region,
+    BadSample, ErrorEstimate, Exposed, Film, RayCounts, Region, RenderSettings, SampleAllocation, advance_region,
 };
 use crate::scene::BadValue;
 use serde::{Deserialize, Serialize};
@@ -78,33 +78,33 @@ pub struct OfflineReport {
 /// Adds samples to `film` until `target` is reached; `progress` returns false to stop early.
 ///
 /// With a time limit, at least one sample per pixel is taken, and the film may end with a partial pass.
-pub fn render_offline(
-    prepared: &Prepared,
+pub fn render_offline<'a>(
+    scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
     progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    render_offline_until(prepared, settings, film, target, &|| false, progress)
+    render_offline_until(scene, settings, film, target, &|| false, progress)
 }
 
 /// Like [`render_offline`], ended within milliseconds by `stop`, which is called often by all workers; the film then
 /// may have a partial pass, or pixels without a sample.
-pub fn render_offline_until(
-    prepared: &Prepared,
+pub fn render_offline_until<'a>(
+    scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
     stop: &(dyn Fn() -> bool + Sync),
     progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    render_region_until(prepared, settings, film, None, target, stop, progress)
+    render_region_until(scene, settings, film, None, target, stop, progress)
 }
 
 /// Like [`render_offline_until`], for a region of the film, or all of it; samples, error and target are those of the
 /// region.
-pub fn render_region_until(
-    prepared: &Prepared,
+pub fn render_region_until<'a>(
+    scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
     film: &mut Film,
     region: Option<&Region>,
@@ -114,6 +114,7 @@ pub fn render_region_until(
 ) -> OfflineReport {
     /// Approximate seconds between reports.
     const SLICE: f64 = 0.25;
+    let scene = scene.into();
     let start = Instant::now();
     let deadline =
         target.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).map(|limit| start + limit);
@@ -130,7 +131,7 @@ pub fn render_region_until(
             _ => first_worth_a_look(film, region, error, at_most),
         });
         let next = look.map_or(at_most, |look| look.min(at_most));
-        let pass = advance_region(prepared, settings, film, region, next, &late);
+        let pass = advance_region(scene, settings, film, region, next, &late);
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));

@@ -137,7 +137,7 @@ fn every_filter_sees_the_same_light() {
 }
 
 /// Root of relMSE of a film against the truth.
-fn error(film: &Film, truth: &Film) -> f64 {
+pub fn error(film: &Film, truth: &Film) -> f64 {
     let pairs = film.means().into_iter().zip(truth.means());
     let terms = pairs.map(|(found, truth)| {
         let (found, truth) = (found.as_dvec3(), truth.as_dvec3());

@@ -13,6 +13,7 @@ mod features;
 mod filters;
 mod lanes;
 mod light_transport;
+mod motion_blur;
 mod orthographic;
 mod phong;
 mod principled;

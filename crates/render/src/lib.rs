@@ -42,7 +42,9 @@ pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
-pub use driver::renderer::{BadSample, PassReport, advance, advance_region, replay_sample};
+pub use driver::renderer::{advance, advance_region};
+pub use driver::report::{BadSample, PassReport};
+pub use driver::single::replay_sample;
 pub use driver::threads::worker_threads;
 pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_colors, develop_pixel, encode_srgb};
 pub use film::error::{MergeError, RecordError};
@@ -58,4 +60,4 @@ pub use film::room::{NoRoom, Purpose, Room};
 pub use film::tiles::Film;
 pub use integrators::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
 pub use prepare::light::LightTable;
-pub use prepare::{Features, Prepared};
+pub use prepare::{Exposed, Features, Moments, Prepared, moment_of_sample};

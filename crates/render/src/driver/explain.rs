@@ -5,14 +5,14 @@
 //! sum to the whole. Start reading at [`explain`].
 
 use crate::core::settings::{Integrator, RenderSettings};
-use crate::driver::renderer::trace_recorded;
+use crate::driver::single::trace_recorded;
+use crate::driver::wave::Pass;
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
-use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::caustics::plan::choose;
 use crate::integrators::record::{FoundBy, LightSource, Place, TracedPath};
-use crate::prepare::prepared::Prepared;
+use crate::prepare::exposed::Exposed;
 use glam::{DVec3, UVec2};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -46,8 +46,8 @@ pub struct Explanation {
 /// Traces samples of a pixel as in the image. `None` for the classic model, which has no paths, and for an empty range.
 ///
 /// Contributions of light paths ([`light_traced`]) are not included: those paths belong to no pixel.
-pub fn explain(
-    snapshot: &Prepared,
+pub fn explain<'a>(
+    scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
     film_size: UVec2,
     pixel: UVec2,
@@ -57,7 +57,7 @@ pub fn explain(
     if settings.integrator != Integrator::Path || samples.is_empty() {
         return None;
     }
-    let paths = trace_recorded(snapshot, settings, film_size, pixel, samples.clone());
+    let paths = trace_recorded(scene.into(), settings, film_size, pixel, samples.clone());
     Some(Explanation { pixel, film_size, samples, paths })
 }
 
@@ -113,22 +113,35 @@ impl Explanation {
 /// Returns the contribution of light paths to a pixel, mean over these samples of the whole image; W·m⁻²·sr⁻¹.
 ///
 /// A light path may contribute to any pixel, so all of them are traced. `None` if `stop` returned true.
-pub fn light_traced(
-    snapshot: &Prepared,
+pub fn light_traced<'a>(
+    scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
     film_size: UVec2,
     pixel: UVec2,
     samples: Range<u32>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<DVec3> {
-    let plan = choose(snapshot, settings, film_size, stop)?.plan;
+    let scene = scene.into();
+    let plan = choose(scene.middle(), settings, film_size, stop)?.plan;
     if !plan.has_light_paths() {
         return Some(DVec3::ZERO);
     }
-    let Some(pass) = CausticPass::of(snapshot, settings, film_size, &snapshot.camera_media(), plan) else {
+    let pass = Pass::new(scene.middle(), settings, film_size, plan);
+    let Some(caustics) = &pass.caustics else {
         return Some(DVec3::ZERO);
     };
     let mut layer = LightLayer::new(film_size, samples.start, plan.light_path_stride);
-    let completed = prepare_guide(&pass, stop) && layer.advance(&pass, samples.len() as u32, stop).completed;
+    if !prepare_guide(caustics, stop) {
+        return None;
+    }
+    let completed = if scene.is_moving() {
+        (0..samples.len() as u32).all(|i| {
+            let moment = scene.of_sample(settings, samples.start + i);
+            let pass = pass.of_moment(&moment);
+            layer.advance_with(i + 1, stop, &|_| pass.caustics.as_ref()).completed
+        })
+    } else {
+        layer.advance(caustics, samples.len() as u32, stop).completed
+    };
     completed.then(|| layer.mean((pixel.y * film_size.x + pixel.x) as usize))
 }

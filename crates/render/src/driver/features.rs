@@ -8,7 +8,7 @@
 
 use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
-use crate::driver::renderer::pixels_in_blocks;
+use crate::driver::wave::pixels_in_blocks;
 use crate::film::features::{FeatureBuffers, IdCounts, IdShares};
 use crate::integrators::features::FeatureWave;
 use crate::integrators::path::CameraPath;

@@ -5,7 +5,7 @@
 
 use crate::core::material::MaterialId;
 use crate::core::settings::RenderSettings;
-use crate::driver::renderer::mean_bounces;
+use crate::driver::single::mean_bounces;
 use crate::film::develop::encode_srgb;
 use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;

@@ -106,11 +106,31 @@ impl LightLayer {
         self.spp = self.complete();
     }
 
+    /// Returns the numbers of the image samples whose light paths are missing up to `target_spp` samples per pixel.
+    pub fn missing(&self, target_spp: u32) -> Range<u32> {
+        let next = self.done.last().map_or(0, |range| range.end);
+        let end = next + self.batches.of_sample(target_spp).saturating_sub(self.n_done());
+        let per_sample = u64::from(self.batches.per_sample);
+        (next / per_sample) as u32..end.div_ceil(per_sample) as u32
+    }
+
     /// Traces light paths up to `target_spp` samples per pixel of the image, or until `stop` returns true; unfinished
     /// batches are discarded.
     pub fn advance(&mut self, pass: &CausticPass, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> LayerReport {
+        self.advance_with(target_spp, stop, &|_| Some(pass))
+    }
+
+    /// Like [`Self::advance`], for a scene that differs from sample to sample.
+    ///
+    /// - `pass_of`: the pass for an image sample; `None` if light paths contribute nothing to it.
+    pub fn advance_with<'a>(
+        &mut self,
+        target_spp: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+        pass_of: &(dyn Fn(u32) -> Option<&'a CausticPass<'a>> + Sync),
+    ) -> LayerReport {
         let mut report = LayerReport { completed: true, ..LayerReport::default() };
-        let size = self.batches.size;
+        let (size, per_sample) = (self.batches.size, u64::from(self.batches.per_sample));
         let mut left = self.batches.of_sample(target_spp).saturating_sub(self.n_done());
         let mut next = self.done.last().map_or(0, |range| range.end);
         // Enough at once to keep all workers busy, few enough that a stop discards little.
@@ -118,7 +138,10 @@ impl LightLayer {
         'all: while left > 0 {
             let traced: Vec<Option<(Vec<Splat>, RayCounts)>> = (next..next + left.min(at_once))
                 .into_par_iter()
-                .map_init(LightWave::default, |wave, batch| wave.trace(pass, batch * u64::from(size), size, stop))
+                .map_init(LightWave::default, |wave, batch| match pass_of((batch / per_sample) as u32) {
+                    Some(pass) => wave.trace(pass, batch * u64::from(size), size, stop),
+                    None => Some(Default::default()),
+                })
                 .collect();
             for batch in traced {
                 let Some((splats, rays)) = batch else {

@@ -72,7 +72,8 @@ mod tests {
     use super::*;
     use crate::core::settings::RenderSettings;
     use crate::core::snapshot::Object;
-    use crate::driver::renderer::{BadSample, advance};
+    use crate::driver::renderer::advance;
+    use crate::driver::report::BadSample;
     use crate::film::tiles::Film;
     use crate::prepare::prepared::Prepared;
     use crate::test_scene::prepared;

@@ -11,6 +11,7 @@ pub(crate) mod casters;
 pub(crate) mod classic_table;
 pub(crate) mod contacts;
 pub(crate) mod delta_lines;
+pub(crate) mod exposed;
 pub(crate) mod guide;
 pub(crate) mod instance_table;
 pub(crate) mod light;
@@ -19,4 +20,5 @@ pub(crate) mod plan_cache;
 pub(crate) mod prepared;
 pub(crate) mod surface_table;
 
+pub use exposed::{Exposed, Moments, moment_of_sample};
 pub use prepared::{Features, Prepared};

@@ -16,6 +16,8 @@ use glam::{UVec2, Vec2, Vec3};
 pub(crate) struct CausticPass<'a> {
     pub scene: &'a Prepared,
     pub casters: &'a CasterTable,
+    /// The table whose guiding cache is used: `casters`, or for a scene that moves that of the middle moment.
+    pub guide_of: &'a CasterTable,
     pub techniques: Techniques,
     pub max_depth: u32,
     pub seed: u32,
@@ -57,6 +59,7 @@ impl<'a> CausticPass<'a> {
         Some(Self {
             scene,
             casters,
+            guide_of: casters,
             techniques: settings.techniques,
             max_depth: settings.max_depth,
             seed: settings.seed,
@@ -87,7 +90,7 @@ impl CausticPass<'_> {
         if !self.plan.guided {
             return None;
         }
-        self.casters.guide.get().filter(|guide| !guide.is_empty())
+        self.guide_of.guide.get().filter(|guide| !guide.is_empty())
     }
 
     /// Returns the guiding distributions for a vertex, if no light path can find the path so far.
