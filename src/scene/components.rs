@@ -305,7 +305,7 @@ impl PartialEq for SceneEnvironment {
     }
 }
 
-/// Size of the film that the scene asks for, pixels. A window has its own size.
+/// Size of the film as specified by the scene, pixels. A window has its own size.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilmSize {
     /// Width in pixels.

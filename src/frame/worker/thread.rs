@@ -358,7 +358,7 @@ impl<'a> Loop<'a> {
         {
             let film = film.clone();
             for sender in self.to_keep.drain(..) {
-                // Whoever asked may have gone.
+                // Fails if the receiver has been dropped.
                 let _ = sender.send(film.clone());
             }
         }

@@ -1,9 +1,9 @@
 //! Sample allocation: which blocks of pixels get the next samples.
 //!
 //! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per
-//! pixel on average, and doubles the budget. At its beginning it is decided, from the film alone, which blocks double
-//! their samples, once or twice, and in which order; the decision is stored in the film. So a film is a function of
-//! scene, seed and settings, independent of threads and portions, and a film that was stopped resumes as it was begun.
+//! pixel on average, and doubles the budget. At its beginning, the film alone determines which blocks double their
+//! samples, once or twice, and in which order; the decision is stored in the film. So a film is a function of scene,
+//! seed and settings, independent of threads and portions, and resuming a stopped film gives the same result.
 //!
 //! Between passes the sample count of every block is a power of two, so that each pixel's sequence stays stratified,
 //! and doublings measure the error. The optimal allocation has n ∝ √variance; powers of two lose 2 %. Doublings are

@@ -12,7 +12,7 @@ use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
 /// Planes of a record, one number per pixel each: three channels each of the sum, of its rest and of the mean at the
-/// last power of two; then the same of light tracing.
+/// last power of two; then the same nine for light tracing.
 pub const N_PLANES: usize = 18;
 
 /// All data of a film.

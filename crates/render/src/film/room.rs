@@ -23,8 +23,8 @@ pub struct Room {
     _memory: Vec<u8>,
 }
 
-/// What an image is used for besides its film: determines the bytes per pixel of the buffers for writing it, and of the
-/// compressed file at its worst in a list that doubles as it grows.
+/// What an image is used for besides its film: determines the bytes per pixel of the buffers for writing it, including
+/// the largest possible compressed file in a list that doubles as it grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// Four developed bytes, and three compressed ones, twice.
@@ -95,7 +95,7 @@ fn most(purposes: &[Purpose]) -> u64 {
     purposes.iter().map(|purpose| purpose.bytes_a_pixel()).max().unwrap_or(0)
 }
 
-/// Formats a number of bytes for people.
+/// Formats a number of bytes for messages.
 fn size(bytes: u64) -> String {
     let mib = bytes as f64 / f64::from(1 << 20);
     if mib < 1024.0 { format!("{mib:.0} MiB") } else { format!("{:.1} GiB", mib / 1024.0) }

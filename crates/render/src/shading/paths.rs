@@ -228,7 +228,7 @@ impl ShadowBatch {
     }
 }
 
-/// Clears a list, and creates or drops it as wanted.
+/// Clears the list and creates it if necessary; drops it if it is not `wanted`.
 fn restart<T>(list: &mut Option<Vec<T>>, wanted: bool) {
     if wanted {
         list.get_or_insert_default().clear();
