@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 /// The scene to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), or picture rendered by firstlight (.png,
+    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), or image rendered by firstlight (.png,
     /// .exr).
-    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
+    #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
     pub how: OpenArgs,
@@ -26,9 +26,9 @@ pub struct SceneArgs {
 /// Several scenes to open with the same options.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), or pictures rendered by firstlight
+    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), or images rendered by firstlight
     /// (.png, .exr).
-    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
+    #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]
     pub how: OpenArgs,

@@ -28,7 +28,7 @@ pub struct ExplainArgs {
     /// Pixel coordinates; 0,0 is the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
     pixel: UVec2,
-    /// Width and height of the picture in pixels [default: from the scene].
+    /// Width and height of the image in pixels [default: from the scene].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Number of samples to trace.
@@ -75,7 +75,7 @@ fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "--pixel: {x},{y} is outside of the picture of {} x {} pixels: the last pixel is {},{}",
+        "--pixel: {x},{y} is outside of the image of {} x {} pixels: the last pixel is {},{}",
         size.x,
         size.y,
         size.x - 1,

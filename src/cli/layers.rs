@@ -9,7 +9,7 @@ use firstlight::render::Film;
 /// Layers of an image.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LayerArgs {
-    /// Layers of an .exr picture besides its light, such as albedo,normal,depth
+    /// Layers of an .exr image besides its light, such as albedo,normal,depth
     ///
     /// A film that is saved as well keeps them, for --resume and `firstlight merge`.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_enum, help_heading = "Output")]
@@ -86,7 +86,7 @@ impl LayerArgs {
     pub fn of(&self, film: &Film) -> Vec<PictureLayer> {
         let error_known = film.error_estimate().is_some();
         if self.has_error() && !error_known {
-            remark(format_args!("warning: the picture has no layer `error`: every pixel needs two samples for it"));
+            remark(format_args!("warning: the image has no layer `error`: every pixel needs two samples for it"));
         }
         let is_known = |layer: &LayerArg| *layer != LayerArg::Error || error_known;
         self.layers.iter().filter(|layer| is_known(layer)).map(|&layer| layer.into()).collect()

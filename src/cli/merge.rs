@@ -27,15 +27,15 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Films of one picture with disjoint samples (`render --film FILE --samples A..B`, or `--part I/N`).
+    /// Films of one image with disjoint samples (`render --film FILE --samples A..B`, or `--part I/N`).
     #[arg(value_name = "FILM.exr", required = true, num_args = 2..)]
     films: Vec<PathBuf>,
     /// Merged film; `render --resume` continues it.
     #[arg(short, long, value_name = "FILM.exr")]
     output: PathBuf,
-    /// Also save the picture: .png is tone-mapped, .exr holds linear light (HDR).
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
+    /// Also save the image: .png is tone-mapped, .exr holds linear light (HDR).
+    #[arg(long, value_name = "FILE", alias = "picture")]
+    image: Option<PathBuf>,
     /// Samples that the films must have together [default: from the first to the last that any film has].
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
     samples: Option<Range<u32>>,
@@ -71,14 +71,14 @@ pub fn run(args: &MergeArgs, stop: &Stop) -> Result<(), Failure> {
 fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let output = &part.map_or_else(|| args.output.clone(), |part| numbered(&args.output, part));
     if !matches!(PictureFormat::of(output), Ok(PictureFormat::Exr)) {
-        let message = "the name of a film must end in .exr (use --picture for a .png)";
+        let message = "the name of a film must end in .exr (use --image for a .png)";
         return Err(Failure::Usage(format!("{}: {message}", output.display())));
     }
     let mut files = args.overwrite.files();
     files.read_all(args.films.iter().cloned())?;
     // The output may replace a film if it contains all samples of that film, which is only known at the end.
     let claim = files.claim(output, Replace::Anything)?;
-    if let Some(picture) = &args.picture {
+    if let Some(picture) = &args.image {
         let format = PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
         if !args.layers.is_empty() && format != PictureFormat::Exr {
             return Err(Failure::Usage(format!(
@@ -88,7 +88,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         }
         files.write(picture)?;
     } else if !args.layers.is_empty() {
-        return Err(Failure::Usage("--layers belong to a picture: name it with --picture FILE.exr".to_owned()));
+        return Err(Failure::Usage("--layers belong to an image: name it with --image FILE.exr".to_owned()));
     }
     args.layers.check()?;
     let mut set = FilmSet::read(args.films.clone())?;
@@ -120,7 +120,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         check_replaced_film(&film, &note_of_film, output)?;
     }
     write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
-    if let Some(path) = &args.picture {
+    if let Some(path) = &args.image {
         let (size, note) = ((film.width(), film.height()), note(path));
         let display = shot.display.into();
         if args.layers.is_empty() {

@@ -53,7 +53,7 @@ struct CommandLine {
     command: Option<CliCommand>,
     #[command(flatten)]
     show: show::ShowArgs,
-    /// Instruction set of the renderer [default: the widest available]; the pictures are identical.
+    /// Instruction set of the renderer [default: the widest available]; the images are identical.
     #[arg(long, value_name = "SET", value_enum, global = true)]
     simd: Option<SimdArg>,
     /// Print only results, warnings and errors.
@@ -86,14 +86,14 @@ impl SimdArg {
 
 #[derive(Subcommand)]
 enum CliCommand {
-    /// Render a scene to a picture file, without a window.
+    /// Render a scene to an image file, without a window.
     #[command(after_help = render_args::EXAMPLES)]
     Render(Box<render_args::RenderCommand>),
     /// Measure error against time, and the benefit of each sampling technique.
     Report(report::ReportArgs),
-    /// Merge films that hold different samples of the same picture.
+    /// Merge films that hold different samples of the same image.
     Merge(merge::MergeArgs),
-    /// Save a model, a built-in scene or the scene of a picture as a scene file.
+    /// Save a model, a built-in scene or the scene of an image as a scene file.
     Save(save::SaveArgs),
     /// Pack a scene with all of its files into an archive, for other machines.
     Pack(pack::PackArgs),

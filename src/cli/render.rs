@@ -62,7 +62,7 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     for (i, job) in jobs.iter().enumerate() {
         run_one(job, stop)?;
         if job.has_next {
-            stop.has_saved(format!("{} of {} pictures are saved", i + 1, jobs.len()));
+            stop.has_saved(format!("{} of {} images are saved", i + 1, jobs.len()));
             stop.rest();
         }
     }
@@ -94,14 +94,14 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         None if args.to_stdout() => {}
         None => files.write(&args.output)?,
     }
-    if let Some(path) = &args.error_picture {
+    if let Some(path) = &args.error_image {
         if !is_exr(path) {
-            return Err(Failure::Usage(format!("{}: the name of an error picture must end in .exr", path.display())));
+            return Err(Failure::Usage(format!("{}: the name of an error image must end in .exr", path.display())));
         }
         files.write(path)?;
     }
     if args.spp == Some(1) && !args.resume {
-        let asked = [("--error-picture", args.error_picture.is_some()), ("--layers error", args.layers.has_error())];
+        let asked = [("--error-image", args.error_image.is_some()), ("--layers error", args.layers.has_error())];
         if let Some((option, _)) = asked.iter().find(|(_, is_asked)| *is_asked) {
             let message = format!("{option} needs at least two samples per pixel: use --spp 2 or more");
             return Err(Failure::Usage(message));
@@ -119,11 +119,11 @@ fn check_stdout(args: &RenderArgs) -> Result<(), Failure> {
     let message = if !args.to_stdout() {
         return Ok(());
     } else if args.json {
-        "-o - and --json both write to standard output: write the picture to a file"
+        "-o - and --json both write to standard output: write the image to a file"
     } else if args.turntable.is_some() || args.bookmarks.is_some() {
-        "-o - takes one picture: write the frames to files"
+        "-o - takes one image: write the frames to files"
     } else if prints_to_terminal() {
-        "standard output is a terminal: redirect it, or write the picture to a file"
+        "standard output is a terminal: redirect it, or write the image to a file"
     } else {
         return Ok(());
     };
@@ -165,7 +165,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
-        let message = format!("the picture was saved in the middle of a pass; the new one has {} samples", shot.spp);
+        let message = format!("the image was saved in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
@@ -240,11 +240,11 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
     let denoised = job.denoised(args, &film, &asked);
     if args.denoise && denoised.is_none() {
-        remark(format_args!("warning: stopped before the picture was denoised: {} is raw", args.output_name()));
+        remark(format_args!("warning: stopped before the image was denoised: {} is raw", args.output_name()));
     }
     job.write(args, (&film, features.as_ref()), denoised.as_ref(), &args.output, files.replace())?;
     let denoised_error = denoised.map(|denoised| denoised.error).filter(|_| !is_dark);
-    if let Some(path) = &args.error_picture {
+    if let Some(path) = &args.error_image {
         write_errors(&film, path, files.replace())?;
     }
     if film.n_bad() > bad_before {

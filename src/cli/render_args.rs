@@ -21,7 +21,7 @@ Examples:
   firstlight render scene.ron -o scene.png --film scene.exr --time 60
   firstlight render scene.ron -o scene.png --film scene.exr --resume --time 60
   firstlight render scene.ron -o scene.exr --layers albedo,normal,depth,object
-  firstlight render picture.png -o larger.png --scale 2
+  firstlight render image.png -o larger.png --scale 2
 
 `firstlight --help` lists the built-in scenes.";
 
@@ -30,7 +30,7 @@ Examples:
 pub struct RenderCommand {
     #[command(flatten)]
     scenes: ScenesArgs,
-    /// Picture file, replaced if it exists; a folder for several scenes; - for standard output.
+    /// Image file, replaced if it exists; a folder for several scenes; - for standard output.
     ///
     /// .png is tone-mapped, .exr holds linear light (HDR). By default a new file firstlight-NAME.png in the current
     /// folder.
@@ -45,10 +45,10 @@ pub struct RenderCommand {
 pub struct RenderArgs {
     #[arg(skip)]
     pub scene: SceneArgs,
-    /// The picture; [`STDOUT`] for standard output.
+    /// The image; [`STDOUT`] for standard output.
     #[arg(skip)]
     pub output: PathBuf,
-    /// Picture format [default: from the name of the output, else png].
+    /// Image format [default: from the name of the output, else png].
     #[arg(long, value_enum, help_heading = "Output")]
     pub format: Option<FormatArg>,
     /// Width and height in pixels [default: from the scene].
@@ -57,7 +57,7 @@ pub struct RenderArgs {
     /// Scale width and height.
     #[arg(help_heading = "Output", long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
-    /// Samples per pixel, the mean over the picture [default: 256, unless --time or --error is given].
+    /// Samples per pixel, the mean over the image [default: 256, unless --time or --error is given].
     #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     pub spp: Option<u32>,
     /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
@@ -68,17 +68,17 @@ pub struct RenderArgs {
     pub film: Option<PathBuf>,
     /// Save the estimated relative error of each pixel as an .exr in which 0.05 is 5 %
     ///
-    /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole picture.
-    #[arg(help_heading = "Output", long, value_name = "FILE.exr", visible_alias = "error-image", conflicts_with_all = ["turntable", "bookmarks", "region"])]
-    pub error_picture: Option<PathBuf>,
+    /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole image.
+    #[arg(help_heading = "Output", long, value_name = "FILE.exr", alias = "error-picture", conflicts_with_all = ["turntable", "bookmarks", "region"])]
+    pub error_image: Option<PathBuf>,
     #[command(flatten)]
     pub layers: LayerArgs,
     /// Samples per pixel that albedo, normal, depth, position, object and material are made of [default: 16].
     #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = between::<u32>(1, 65_536))]
     pub layer_samples: Option<u32>,
-    /// Save the picture denoised: raw and filtered combined, so that it converges to the raw picture
+    /// Save the image denoised: raw and filtered combined, so that it converges to the raw image
     ///
-    /// The film stays raw, and --error counts for the raw picture.
+    /// The film stays raw, and --error counts for the raw image.
     #[arg(help_heading = "Output", long, conflicts_with_all = ["region", "layers"])]
     pub denoise: bool,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
@@ -99,7 +99,7 @@ pub struct RenderArgs {
     ///
     /// A complete part is skipped, an interrupted one is resumed. {part} in --film is replaced by the number of the part.
     /// Exit status: 0 done, 75 try again, 2 wrong input.
-    #[arg(help_heading = "Films and parts", long, value_name = "I/N", conflicts_with_all = ["resume", "region", "time", "error", "json", "error_picture", "error_metric"])]
+    #[arg(help_heading = "Films and parts", long, value_name = "I/N", conflicts_with_all = ["resume", "region", "time", "error", "json", "error_image", "error_metric"])]
     pub part: Option<String>,
     /// What is divided into parts.
     #[arg(help_heading = "Films and parts", long, value_name = "WHAT", value_enum, default_value_t = PartBy::Samples, requires = "part")]
@@ -115,18 +115,18 @@ pub struct RenderArgs {
     /// Stop after this many seconds of rendering.
     #[arg(help_heading = "When to stop", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
-    /// Stop when the estimated relative error of the picture is at most this: 1% or 0.01.
+    /// Stop when the estimated relative error of the image is at most this: 1% or 0.01.
     #[arg(help_heading = "When to stop", long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
     pub error: Option<f64>,
     /// Take as many samples of every pixel [default: more where the error is larger, except with --samples]
     ///
-    /// --spp is the mean over the picture then.
+    /// --spp is the mean over the image then.
     #[arg(help_heading = "Allocation of samples", long, conflicts_with = "error_metric")]
     pub uniform: bool,
     /// The error that the allocation of samples minimises [default: relmse].
     #[arg(help_heading = "Allocation of samples", long, value_enum, value_name = "METRIC", conflicts_with = "samples")]
     pub error_metric: Option<MetricArg>,
-    /// Number of worker threads [default: all cores]; the picture does not depend on it.
+    /// Number of worker threads [default: all cores]; the image does not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     pub threads: Option<u16>,
     /// Random seed [default: from the scene, else 0].
@@ -170,7 +170,7 @@ pub enum FormatArg {
 pub enum MetricArg {
     /// Of linear light, relative to its level.
     Relmse,
-    /// Of the picture as it is displayed.
+    /// Of the image as it is displayed.
     Display,
 }
 
@@ -200,7 +200,7 @@ impl RenderCommand {
         let output = match (&self.output, render.part_by) {
             (Some(_), PartBy::Samples | PartBy::Tiles) => {
                 let message =
-                    "a part has no image of its own: omit -o, and use `firstlight merge --picture` for all parts";
+                    "a part has no image of its own: omit -o, and use `firstlight merge --image` for all parts";
                 return Err(Failure::Usage(message.to_owned()));
             }
             (None, PartBy::Frames) => {
@@ -223,7 +223,7 @@ impl RenderCommand {
             ("-o -", several && self.output.as_deref() == Some(Path::new(STDOUT))),
             ("--film", self.render.film.is_some()),
             ("--resume", self.render.resume),
-            ("--error-picture", self.render.error_picture.is_some()),
+            ("--error-image", self.render.error_image.is_some()),
         ];
         if let Some((option, _)) = one_only.iter().find(|(_, is_given)| several && *is_given) {
             return Err(Failure::Usage(format!("{option} works with one scene only, but {} are given", scenes.len())));

@@ -37,7 +37,7 @@ pub struct ReportArgs {
     /// Built-in scenes, scene files (.ron) or models (.obj, .ply, .stl, .glb, .gltf) [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,
-    /// Converged linear picture (.exr) of the scene [default: rendered with 16 times the samples and cached].
+    /// Converged linear image (.exr) of the scene [default: rendered with 16 times the samples and cached].
     ///
     /// Rendering the default reference takes about 16 times as long as the last step; it is cached for the next report.
     #[arg(long, value_name = "FILE")]
@@ -75,7 +75,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     };
     if args.reference.is_some() && names.len() != 1 {
         return Err(Failure::Usage(format!(
-            "--reference is a picture of one scene, but {} scenes are given: name the scene it shows",
+            "--reference is an image of one scene, but {} scenes are given: name the scene it shows",
             names.len()
         )));
     }

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 pub struct ShowArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Size of the window in pixels; of the picture if there is no display.
+    /// Size of the window in pixels; of the image if there is no display.
     #[arg(long, value_name = "WxH", value_parser = super::number::parse_size)]
     size: Option<(u32, u32)>,
     /// Number of worker threads [default: all cores].
@@ -29,10 +29,10 @@ pub struct ShowArgs {
     /// Record the session to a file, for --replay.
     #[arg(long, value_name = "FILE", conflicts_with = "env")]
     record: Option<PathBuf>,
-    /// Replay a recording without a window and render its final picture.
+    /// Replay a recording without a window and render its final image.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["record", "scene", "size", "seed", "env"])]
     replay: Option<PathBuf>,
-    /// Picture file for --replay.
+    /// Image file for --replay.
     #[arg(short, long, value_name = "FILE", default_value = "replay.png", requires = "replay")]
     output: PathBuf,
     #[command(flatten)]
@@ -166,7 +166,7 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         spp: None,
         time: None,
         error: None,
-        error_picture: None,
+        error_image: None,
         layers: Default::default(),
         layer_samples: None,
         denoise: false,

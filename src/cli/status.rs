@@ -19,9 +19,9 @@ pub struct StatusArgs {
     /// The folder of the job.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Save a picture of all samples that are there, .png or .exr.
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
+    /// Save an image of all samples that are there, .png or .exr.
+    #[arg(long, value_name = "FILE", alias = "picture")]
+    image: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -68,7 +68,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let so_far = now.saturating_sub(round.since) as f64;
     let left = (!is_done && share > 0.0).then(|| so_far * (1.0 - share) / share);
-    if let Some(path) = &args.picture {
+    if let Some(path) = &args.image {
         picture(folder, path, &parts.films, merged.is_some())?;
     }
     if args.json {
@@ -118,7 +118,7 @@ fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> R
     let all = has_merged.then(|| folder.join(ALL[0]));
     let films: Vec<PathBuf> = all.into_iter().chain(films.iter().cloned()).collect();
     if films.is_empty() {
-        remark("warning: no part has a film yet: there is no picture");
+        remark("warning: no part has a film yet: there is no image");
         return Ok(());
     }
     let set = FilmSet::read(films)?;

@@ -22,7 +22,7 @@ Examples:
   firstlight submit slurm scene.ron --size 3840x2160 --parts 64 --spp 1024
   firstlight submit slurm scene.ron --parts 64 --error 0.5% --max-spp 8192
   firstlight submit kubernetes scene.ron --parts 20 --image registry/firstlight:1 --dry-run
-  firstlight status firstlight-job-scene --picture so-far.png";
+  firstlight status firstlight-job-scene --image so-far.png";
 
 #[derive(Args, Clone, Debug)]
 pub struct SubmitArgs {

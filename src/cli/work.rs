@@ -36,7 +36,7 @@ pub struct WorkArgs {
     /// Print the number of the round that is to be rendered now, or nothing when all is done.
     #[arg(long, conflicts_with_all = ["part", "merge", "round"])]
     next: bool,
-    /// Number of worker threads [default: all cores]; the picture does not depend on it.
+    /// Number of worker threads [default: all cores]; the image does not depend on it.
     #[arg(long, value_name = "N", value_parser = between::<u16>(1, 1024))]
     threads: Option<u16>,
 }

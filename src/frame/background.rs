@@ -227,7 +227,7 @@ impl BackgroundTasks {
             });
             this.wake();
         };
-        self.spawn("firstlight picture", work, |board, _| board.reading -= 1);
+        self.spawn("firstlight image", work, |board, _| board.reading -= 1);
     }
 
     /// Returns whether a mesh, an image or a kd-tree that an edit needs is still under way, or waits to be taken.

@@ -195,7 +195,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         Ok(Some(scene)) => scene,
         Ok(None) => {
             if was_mended {
-                let text = format!("{} can be read again; the picture is up to date", old.source.title());
+                let text = format!("{} can be read again; the image is up to date", old.source.title());
                 world.resource_mut::<Status>().say(now, MessageKind::Note, text);
             }
             return;

@@ -255,10 +255,10 @@ impl Player {
         let title = current.0.source.title();
         if now != print && was_edited {
             self.warnings.push(format!(
-                "{title} was edited during the recording and is replayed as it is now: the picture may differ"
+                "{title} was edited during the recording and is replayed as it is now: the image may differ"
             ));
         } else if now != print {
-            self.warnings.push(format!("{title} has changed since the recording: the picture may differ"));
+            self.warnings.push(format!("{title} has changed since the recording: the image may differ"));
         }
         Ok(())
     }

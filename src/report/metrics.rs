@@ -25,7 +25,7 @@ impl Distance {
         assert_eq!(
             (picture.width, picture.height),
             (reference.width, reference.height),
-            "only pictures of one size can be compared"
+            "only images of one size can be compared"
         );
         let (mut relative, mut absolute) = (DVec3::ZERO, DVec3::ZERO);
         for (x, truth) in picture.pixels.iter().zip(&reference.pixels) {

@@ -49,7 +49,7 @@ impl SceneOutcome {
         let share = self.foreign_share.filter(|share| is_another_scene(*share))?;
         let path = self.reference_path.as_ref().map_or(String::new(), |path| path.display().to_string());
         Some(format!(
-            "{path} does not look like a picture of {}: {:.0} % of the picture differs by more than noise, and more \
+            "{path} does not look like an image of {}: {:.0} % of the image differs by more than noise, and more \
              samples do not help; is it a different scene, view, exposure or lighting?",
             self.title,
             100.0 * share

@@ -116,7 +116,7 @@ fn section(outcome: &SceneOutcome) -> String {
     html.push_str(&about_reference(outcome));
     let spp = |wanted: u32| outcome.curve.steps.iter().map(|step| step.spp).filter(|&spp| spp <= wanted).max();
     let last = outcome.curve.last();
-    html.push_str("<div class=\"pictures\">\n");
+    html.push_str("<div class=\"images\">\n");
     for (picture, caption) in [
         (&outcome.early, format!("{} samples per pixel", spp(4).unwrap_or(1))),
         (&outcome.last, format!("{} samples per pixel, error {}", last.spp, percent(last.error()))),
@@ -304,6 +304,6 @@ fn png_url(picture: &LinearPicture, display: &Display) -> String {
     let mut png = Vec::new();
     PngEncoder::new(&mut png)
         .write_image(&rgb, picture.width, picture.height, ExtendedColorType::Rgb8)
-        .expect("a picture in memory can be written to memory");
+        .expect("an image in memory can be written to memory");
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }

@@ -288,7 +288,7 @@ impl<'a> Writer<'a> {
                 EnvironmentSource::Image { file: file.clone(), scale: Rgb(*scale), rotate }
             }
             (Environment::Image { .. }, _) => {
-                self.losses.push("the picture around the scene came from no file and is left out".to_owned());
+                self.losses.push("the image around the scene came from no file and is left out".to_owned());
                 EnvironmentSource::Black
             }
         }

@@ -42,7 +42,7 @@ pub enum MetadataError {
     #[error("is neither a PNG nor an OpenEXR image")]
     Format,
     /// The image was not made by this program, or has lost its metadata.
-    #[error("it has no embedded firstlight scene: only pictures rendered by firstlight can be opened")]
+    #[error("it has no embedded firstlight scene: only images rendered by firstlight can be opened")]
     Missing,
     /// The metadata has invalid syntax.
     #[error("its firstlight metadata cannot be parsed: {0}")]
@@ -57,7 +57,7 @@ pub enum MetadataError {
     #[error("its firstlight metadata is invalid: {0}")]
     Invalid(String),
     /// The scene file is neither at its path nor in the folder of the image.
-    #[error("its scene {} was not found: put it next to the picture", .0.display())]
+    #[error("its scene {} was not found: put it next to the image", .0.display())]
     NoScene(PathBuf),
 }
 

@@ -130,7 +130,7 @@ impl FileKind {
             Self::Scene => "scenes",
             Self::Model => "models",
             Self::Library => "material libraries",
-            Self::Image => "pictures",
+            Self::Image => "images",
             Self::Film => "films",
             Self::Recording => "recordings",
             Self::Settings => "settings",

@@ -123,7 +123,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             }
             scene
         }
-        SceneSource::Picture(_) => unreachable!("pictures were resolved above"),
+        SceneSource::Picture(_) => unreachable!("images were resolved above"),
     };
     if scene.facts.is_none() {
         scene.choose(options.choice())?;
@@ -167,7 +167,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     };
     if scene.content_fingerprint().to_string() != shot.fingerprint {
         let (picture, title) = (path.display(), scene.source.title());
-        scene.warnings.push(format!("{picture}: {title} has changed since the picture was rendered"));
+        scene.warnings.push(format!("{picture}: {title} has changed since the image was rendered"));
     }
     shot.apply(&mut scene.file);
     if scene.facts.is_none() {

@@ -47,7 +47,7 @@ impl SceneSource {
             Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
             _ if path.is_dir() => Err(SceneError::in_file(
                 path,
-                format!("is a folder: expected a scene (.ron), a model ({models}) or a picture (.png, .exr)"),
+                format!("is a folder: expected a scene (.ron), a model ({models}) or an image (.png, .exr)"),
             )),
             Some("hdr") if path.exists() => {
                 let message = "is an environment image: add it to a scene or a model with --env FILE.hdr";
@@ -55,7 +55,7 @@ impl SceneSource {
             }
             _ if path.exists() => {
                 let message = format!(
-                    "unsupported file format: expected a scene (.ron), a model ({models}) or a picture rendered by \
+                    "unsupported file format: expected a scene (.ron), a model ({models}) or an image rendered by \
                      firstlight (.png, .exr); convert other models to .glb or .obj"
                 );
                 Err(SceneError::in_file(path, message))

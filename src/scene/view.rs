@@ -48,7 +48,7 @@ pub enum ViewError {
         eye: DVec3,
     },
     /// The up vector is zero.
-    #[error("camera: `up` is zero; give the direction that is up in the picture, for example (0, 1, 0)")]
+    #[error("camera: `up` is zero; give the direction that is up in the image, for example (0, 1, 0)")]
     NoUp,
     /// The up vector is parallel to the view direction.
     #[error(

@@ -56,7 +56,7 @@ pub enum WriteError {
     #[error("{}: missing file extension: use .png or .exr", .0.display())]
     NoExtension(PathBuf),
     /// All numbers for new files of this name are used.
-    #[error("{}: all numbers are in use: move some of the pictures", .0.display())]
+    #[error("{}: all numbers are in use: move some of the images", .0.display())]
     NoFreeName(PathBuf),
     /// The error image cannot be written before the error can be estimated.
     #[error("{}: the error is unknown until every pixel has two samples", .0.display())]

@@ -333,7 +333,7 @@ impl LightCase {
         let size = UVec2::new(self.width, self.height);
         let radiance = replay_sample(&self.scene, &self.settings, size, at);
         let mut replay = Replay::default();
-        replay.push("picture", ReplayValue::Text(self.name.clone()));
+        replay.push("image", ReplayValue::Text(self.name.clone()));
         replay.push("pixel_x", ReplayValue::Count(x));
         replay.push("pixel_y", ReplayValue::Count(y));
         replay.push("sample", ReplayValue::Count(sample));

@@ -135,7 +135,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "anywhere",
-        about: "the same scene moved by 10^6 and scaled by 10^-3 ... 10^3: the same picture within its noise",
+        about: "the same scene moved by 10^6 and scaled by 10^-3 ... 10^3: the same image within its noise",
         share: 0.05,
         kind: Kind::Anywhere,
     },

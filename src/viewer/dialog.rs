@@ -28,7 +28,7 @@ pub enum DialogPurpose {
 impl DialogPurpose {
     fn title(self) -> &'static str {
         match self {
-            Self::Open => "Open a scene, a model or a picture",
+            Self::Open => "Open a scene, a model or an image",
             Self::AddMesh => "Add a model",
             Self::Texture { .. } => "Choose a texture image",
         }

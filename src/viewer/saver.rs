@@ -75,7 +75,7 @@ impl Saver {
     ) {
         let (folder, stem) = (self.folder.clone(), file_stem(scene));
         self.spawn(move || {
-            let film = film.recv().map_err(|_| "there was no picture to save".to_owned())?;
+            let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             print(&folder, &stem, &film, draft, &display, size, format)
         });
     }
@@ -93,7 +93,7 @@ impl Saver {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
             let Larger { prepared, settings, size, spp, threads } = larger;
-            let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
+            let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // A separate pool: the window's threads belong to the visible image, and must not wait for this.
             let pool = worker_threads().num_threads(threads).build();
@@ -119,9 +119,9 @@ impl Saver {
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
-            let film = film.recv().map_err(|_| "there was no picture to save".to_owned())?;
+            let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             let Shown { prepared, names, settings, threads, size } = shown;
-            let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
+            let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
             let pool = worker_threads().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
             let of_film = (film.width(), film.height());
@@ -148,7 +148,7 @@ impl Saver {
         match std::thread::Builder::new().name("save".to_owned()).spawn(work) {
             Ok(thread) => self.threads.push(thread),
             Err(error) => {
-                let _ = self.sender.send(Err(format!("the picture was not saved: cannot start a thread: {error}")));
+                let _ = self.sender.send(Err(format!("the image was not saved: cannot start a thread: {error}")));
             }
         }
         self.threads.retain(|thread| !thread.is_finished());
@@ -215,7 +215,7 @@ fn file_stem(scene: &str) -> String {
     let stem = Path::new(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let stem = without_number(&stem);
     let plain: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_ .".contains(c) { c } else { '-' }).collect();
-    if plain.trim_matches(['.', ' ']).is_empty() { "picture".to_owned() } else { plain }
+    if plain.trim_matches(['.', ' ']).is_empty() { "image".to_owned() } else { plain }
 }
 
 /// `room` of `room-0001` and of `room-0001-0002`. Numbers that do not begin with 0, such as years, are part of a name.
@@ -300,15 +300,15 @@ mod tests {
 
         let (_, never) = channel();
         saver.save(never, None, Display::default(), (1, 1), "gallery", PictureFormat::Png);
-        assert_eq!(saver.finish(), [Err("there was no picture to save".to_owned())]);
+        assert_eq!(saver.finish(), [Err("there was no image to save".to_owned())]);
     }
 
     #[test]
     fn every_scene_has_a_file_name() {
         assert_eq!(file_stem("gallery"), "gallery");
         assert_eq!(file_stem("/a/b.c/bunny.obj"), "bunny");
-        assert_eq!(file_stem(""), "picture");
-        assert_eq!(file_stem(".."), "picture");
+        assert_eq!(file_stem(""), "image");
+        assert_eq!(file_stem(".."), "image");
         assert_eq!(file_stem("a:b"), "a-b");
     }
 

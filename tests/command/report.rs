@@ -190,8 +190,8 @@ fn a_reference_of_another_scene_is_told_from_a_noisy_one() {
         let table = std::fs::read_to_string(folder.path().join(reference).join("steps.csv")).unwrap();
         let share: f64 = table.lines().last().unwrap().rsplit(',').next().unwrap().parse().unwrap();
         let is_foreign = !matches!(reference, "good" | "noisy");
-        assert_eq!(said.contains("does not look like a picture of cornell"), is_foreign, "{reference}: {said}");
-        assert_eq!(page.contains("does not look like a picture of cornell"), is_foreign, "{reference}");
+        assert_eq!(said.contains("does not look like an image of cornell"), is_foreign, "{reference}: {said}");
+        assert_eq!(page.contains("does not look like an image of cornell"), is_foreign, "{reference}");
         assert_eq!(share >= 0.05, is_foreign, "{reference}: {share}");
     }
 }

@@ -168,7 +168,7 @@ fn notes_and_recordings() {
         assert!(says(path, "info a.png", 1).err.starts_with("error: "), "{text}");
     }
     write_png(&path.join("a.png"), &note(1, &name, "builtin(\"cornell\")"));
-    assert!(says(path, "info a.png", 0).err.contains("has changed since the picture was rendered"));
+    assert!(says(path, "info a.png", 0).err.contains("has changed since the image was rendered"));
     let header = |format: u32, scene: &str| {
         format!("(format:{format},program:\"{name}\",scene:{scene},up:None,width:8,height:8,seed:0)")
     };

@@ -69,7 +69,7 @@ fn a_picture_goes_to_standard_output() {
         assert!(bytes == std::fs::read(path.join(file)).unwrap(), "the same bytes as those of a file");
     }
     assert!(refused(path, &format!("{line} - --json")).contains("both write to standard output"));
-    assert!(refused(path, &format!("{line} - --turntable 3")).contains("takes one picture"));
+    assert!(refused(path, &format!("{line} - --turntable 3")).contains("takes one image"));
     assert!(refused(path, &format!("{line} b.png --format exr")).contains("a name that ends in .exr"));
     assert!(!path.join("-").exists() && !path.join("b.png").exists());
 }

@@ -385,7 +385,7 @@ fn numbers_out_of_range_are_refused_before_anything_is_loaded() {
         (render, &["--samples", "5..5"], "the range 5..5 is empty"),
         (render, &["--region", "1,1,0,5"], "not a rectangle"),
         (render, &["--turntable", "0"], "must be between 1 and 100000"),
-        (explain, &["--pixel", "9,3", "--size", "9x9"], "9,3 is outside of the picture"),
+        (explain, &["--pixel", "9,3", "--size", "9x9"], "9,3 is outside of the image"),
         (explain, &["--pixel", "9"], "not a pixel"),
         (explain, &["--spp", "0", "--pixel", "1,1"], "must be between 1 and 1048576"),
         (report, &["--threads", "-1"], "must be between 1 and 1024"),

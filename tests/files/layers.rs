@@ -157,7 +157,7 @@ fn films_keep_layers_through_resuming_and_merging() {
         assert!(layers_of(&path.join("merged-picture.exr")).0 == layers_of(&path.join("whole.exr")).0, "{order}");
     }
     let said = refused(path, "merge b.exr c.exr -o d.exr --layers albedo");
-    assert!(said.contains("--picture"), "{said}");
+    assert!(said.contains("--image"), "{said}");
     does(path, &format!("{scene} --samples 2..3 -o p.exr --film d.exr"));
     let said = refused(path, "merge b.exr d.exr -o e.exr --picture e-picture.exr --layers albedo");
     assert!(said.contains("have no such layers"), "{said}");

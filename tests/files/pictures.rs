@@ -106,7 +106,7 @@ fn a_scene_that_has_changed_since_the_picture_is_noticed() {
     assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
     assert_equal(path, "a.png", "b.png");
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
-    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the picture was rendered"));
+    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the image was rendered"));
     // A vertex of the mesh moves.
     std::fs::write(path.join("room.ron"), ROOM).unwrap();
     assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");

@@ -59,8 +59,8 @@ const RETIRED: [(&str, &str); 52] = [
     ("visits a ray", "visits per ray"),
 ];
 
-/// In the window an image may be a picture, and the environment a sky.
-const FINE_IN_THE_PROGRAM: [&str; 5] = ["picture", "pictures", "sky", "skies", "house"];
+/// In the window the environment may be a sky.
+const FINE_IN_THE_PROGRAM: [&str; 3] = ["sky", "skies", "house"];
 
 /// Names of scenes, which may have words that are retired elsewhere.
 pub fn scene_names() -> BTreeSet<String> {
@@ -134,7 +134,10 @@ fn help(source: &str) -> Vec<(usize, String)> {
 
 /// A field, a scene or a part of a film by its name alone, or a whole scene.
 fn is_grammar(text: &str) -> bool {
+    // Names that options had.
+    let old = ["picture", "error-picture"];
     ["eye", "ball", "balls", "lamps"].contains(&text)
+        || old.contains(&text)
         || text.ends_with(".ron")
         || text.starts_with("lamps.")
         || text.contains("camera: (")

@@ -81,7 +81,7 @@ fn a_picture_of_a_scene_that_has_changed_says_so() {
     assert_ne!(smaller, text);
     std::fs::write(folder.join("room.ron"), smaller).expect("a file");
     let program = desktop.open(&["room-0001.png", "--size", "320x240"], &[("RUST_LOG", "info")]);
-    until("it to say so", || program.errors().contains("has changed since the picture was rendered").then_some(()));
+    until("it to say so", || program.errors().contains("has changed since the image was rendered").then_some(()));
     program.key("ctrl+q");
     // What it says on the way is no failure.
     assert!(program.left().0.success());

@@ -79,7 +79,7 @@ fn make(
         (_, TextureSource::VertexColors { .. }) => free_name(world, "vertex colors"),
         (_, TextureSource::Image { file, .. }) => {
             let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-            free_name(world, &stem.unwrap_or_else(|| "picture".to_owned()))
+            free_name(world, &stem.unwrap_or_else(|| "image".to_owned()))
         }
     };
     put(world, entity, Arc::new(SurfaceTexture { name, part, texture }))

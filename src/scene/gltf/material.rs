@@ -223,7 +223,7 @@ impl Document {
         let webp = texture.extensions.get("EXT_texture_webp").and_then(|extension| extension.get("source"));
         let webp = webp.and_then(Value::as_u64).and_then(|image| u32::try_from(image).ok());
         let Some(image) = texture.source.or(webp) else {
-            notes.push(format!("textures[{index}] has no picture in a format that is read, and is left out"));
+            notes.push(format!("textures[{index}] has no image in a format that is read, and is left out"));
             return Ok(None);
         };
         if self.root.images.get(image as usize).is_none() {

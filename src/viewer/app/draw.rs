@@ -25,7 +25,7 @@ impl App {
         let picture = self.session.picture();
         if self.shown_picture != Some(picture.number) {
             presenter.set_picture(picture)?;
-            tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
+            tracing::debug!("image {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
         let wanted = self.session.world().resource::<ViewMode>().0.inspection;

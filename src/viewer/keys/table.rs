@@ -249,10 +249,10 @@ pub static BINDINGS: &[KeyGroup] = &[
                 triggers: &[inspect("9", Inspection::Luminance)],
                 effect: "show luminance in false colour, in stops",
             },
-            Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "show the picture" },
+            Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "show the image" },
             Binding {
                 triggers: &[named(NamedKey::F2, Action::Inspect(Inspection::Denoised))],
-                effect: "show the denoised picture, the raw one",
+                effect: "show the denoised image, the raw one",
             },
             Binding {
                 triggers: &[text("j", Action::Explain)],
@@ -261,7 +261,7 @@ pub static BINDINGS: &[KeyGroup] = &[
         ],
     },
     KeyGroup {
-        title: "Picture",
+        title: "Image",
         bindings: &[
             Binding {
                 triggers: &[
@@ -282,7 +282,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[shifted(Typed::Text("b"), true, Action::ClearRegion)],
-                effect: "no region: render the whole picture again",
+                effect: "no region: render the whole image again",
             },
             Binding { triggers: &[send("r", Command::Restart)], effect: "restart: discard all samples" },
             Binding {
@@ -313,7 +313,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf) or a saved picture (.png, .exr)",
+                effect: "open a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
             },
         ],
     },
@@ -330,7 +330,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[named(NamedKey::Tab, Action::ToggleOverlays)],
-                effect: "hide or show everything but the picture",
+                effect: "hide or show everything but the image",
             },
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen on, off" },
             Binding {
@@ -345,7 +345,7 @@ pub static BINDINGS: &[KeyGroup] = &[
         bindings: &[
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Render")],
-                effect: "integrator, when to stop (error, time, samples), threads, size of saved pictures",
+                effect: "integrator, when to stop (error, time, samples), threads, size of saved images",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],

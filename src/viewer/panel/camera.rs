@@ -44,7 +44,7 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
                     asked.send(Command::SetProjection(Projection { vfov_deg, ..rig.projection }));
                 }
             }),
-            Some(height) => row_with_hint(ui, "height", "of what the picture shows, at any distance", |ui| {
+            Some(height) => row_with_hint(ui, "height", "of what the image shows, at any distance", |ui| {
                 if let Some(height) = number(ui, height, proportional(height), 1e-6..=1e9, " m") {
                     let orthographic_height = Some(height);
                     asked.send(Command::SetProjection(Projection { orthographic_height, ..rig.projection }));

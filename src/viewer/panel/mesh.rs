@@ -54,7 +54,7 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
                 row(ui, "difference", |ui| match state.change.of(entity) {
                     Some(Difference { mean, plain, spp: [before, now] }) => {
                         let hint = format!(
-                            "difference to the picture with the original mesh ({before} samples, now {now}), noise \
+                            "difference to the image with the original mesh ({before} samples, now {now}), noise \
                              included: mean, and share of pixels that differ by more than 5 %"
                         );
                         let text = format!("{} mean, {} of pixels", percent(mean), percent(plain));

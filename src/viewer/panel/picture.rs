@@ -37,7 +37,7 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
                     is_display,
                     "adaptive, display",
                     Adaptive(ErrorMetric::Display { exposure_stops: session.status().display.exposure_stops }),
-                    "more samples where the error of the displayed picture is large",
+                    "more samples where the error of the displayed image is large",
                 ),
             ];
             let shown = choices.iter().find(|choice| choice.0).map_or("", |choice| choice.1);
@@ -90,13 +90,13 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
             asked.toggle_brush = true;
         }
         if status.region.is_some()
-            && ui.button("Whole picture").on_hover_text("render the whole picture (Shift+B)").clicked()
+            && ui.button("Whole image").on_hover_text("render the whole image (Shift+B)").clicked()
         {
             asked.send(Command::SetRegion { region: None });
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("Save PNG").on_hover_text("save the picture as displayed, in a new file (K)").clicked() {
+        if ui.button("Save PNG").on_hover_text("save the image as displayed, in a new file (K)").clicked() {
             asked.screenshot = Some(false);
         }
         if ui.button("Save EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
@@ -109,7 +109,7 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         }
         let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
         ui.add(drag)
-            .on_hover_text("size of saved pictures relative to the window; larger ones are rendered in the background");
+            .on_hover_text("size of saved images relative to the window; larger ones are rendered in the background");
     });
 }
 

@@ -42,7 +42,7 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
 
 /// Opening of a file by dialog, and recent files.
 pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
-    if ui.button("File …").on_hover_text("open a scene, a model or a saved picture (Ctrl+O)").clicked() {
+    if ui.button("File …").on_hover_text("open a scene, a model or a saved image (Ctrl+O)").clicked() {
         asked.dialog = Some(DialogPurpose::Open);
     }
     let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();

@@ -44,7 +44,7 @@ pub fn denoise_film(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Denoised> {
     let size = (film.width(), film.height());
-    assert_eq!((features.width, features.height), size, "features of another picture");
+    assert_eq!((features.width, features.height), size, "features of another image");
     let emits = |shares: &IdShares| {
         shares.iter().any(|(material, _)| snapshot.tables.emission.get(material as usize).is_some_and(Option::is_some))
     };

@@ -64,7 +64,7 @@ impl Inspection {
     /// Name for the user, lower case.
     pub fn label(self) -> &'static str {
         match self {
-            Self::Picture => "picture",
+            Self::Picture => "image",
             Self::Denoised => "denoised",
             Self::Normals => "normals",
             Self::Depth => "depth",

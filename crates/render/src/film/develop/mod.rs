@@ -56,7 +56,7 @@ pub fn develop_colors(
     (width, height): (u32, u32),
     rgba: &mut Vec<u8>,
 ) {
-    assert_eq!(colors.len(), from.0 as usize * from.1 as usize, "pixels of a picture of {} x {}", from.0, from.1);
+    assert_eq!(colors.len(), from.0 as usize * from.1 as usize, "pixels of an image of {} x {}", from.0, from.1);
     let row_of = |row: &mut Row, y: u32| row.take(&colors[y as usize * from.0 as usize..][..from.0 as usize]);
     develop_rows([from.0, from.1], display, [width, height], rgba, &row_of);
 }
