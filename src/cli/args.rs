@@ -34,12 +34,12 @@ pub struct ScenesArgs {
     pub how: OpenArgs,
 }
 
-/// Fails with all names that cannot be opened, before work begins.
+/// Reports all files that do not exist, before work begins.
 pub fn check_scenes<'a>(scenes: impl Iterator<Item = &'a SceneArgs>) -> Result<(), Failure> {
     let mut problems = Vec::new();
     for scene in scenes {
         let source = scene.source()?;
-        // Other reasons than this one are known when the file is read.
+        // Other problems are found when the file is read.
         if let Some(path) = source.path().filter(|path| !path.exists()) {
             problems.push(format!("{}: no such file", path.display()));
         }
@@ -166,7 +166,7 @@ impl SceneArgs {
         Ok(scene)
     }
 
-    /// Warns of options that have no effect on what is opened.
+    /// Warns of options that have no effect on this source.
     pub fn tell_ignored(&self, source: &SceneSource) {
         let what = match source {
             _ if self.how.up.is_none() => return,

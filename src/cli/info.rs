@@ -177,10 +177,10 @@ impl Told<'_> {
         })
     }
 
-    /// What the files of the scene have that is not modelled, one thing each.
+    /// Unsupported features of the scene's files, one text each.
     fn not_modelled(&self) -> Vec<String> {
         let Some(facts) = &self.scene.facts else {
-            // Other formats have it in their warnings.
+            // For other formats they are in the warnings.
             let warnings = self.scene.warnings.iter().filter(|warning| warning.contains("not modelled"));
             return warnings.cloned().collect();
         };

@@ -1,4 +1,4 @@
-//! The objects of a scene as a list that can be read: instances of one mesh in one line, with counts and sizes.
+//! The objects of a scene as a readable list: instances of one mesh in one line, with counts and sizes.
 
 use super::number::counted;
 use firstlight::mesh::{Faults, Mesh};
@@ -8,13 +8,13 @@ use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-/// Objects of one shape.
+/// Objects with the same shape.
 pub struct ObjectGroup<'a> {
     first: &'a ObjectInput,
-    /// Whether another object of the group has another name.
+    /// Whether the objects of the group have different names.
     has_other_names: bool,
     count: usize,
-    /// Sides of the axis-aligned box of the largest object, metres; `None` for infinite ones.
+    /// Size of the axis-aligned box of the largest object, metres; `None` for infinite ones.
     size: Option<DVec3>,
 }
 
@@ -23,18 +23,18 @@ pub struct ObjectList<'a> {
     groups: Vec<ObjectGroup<'a>>,
     /// Corners of the axis-aligned box of all finite objects, metres.
     bounds: Option<(DVec3, DVec3)>,
-    /// Of each mesh.
+    /// By mesh.
     faults: BTreeMap<*const Mesh, Faults>,
 }
 
-/// What makes objects one line of the list.
+/// Objects with equal keys form one line of the list.
 #[derive(PartialEq, Eq, Hash)]
 enum Key {
-    /// The same mesh or cloud, by address.
+    /// Address of the mesh or group of spheres.
     Shared(usize),
-    /// Nameless objects of one kind.
+    /// Unnamed objects of one kind.
     Kind(&'static str),
-    /// An object that has a name, by index.
+    /// Index of a named object.
     Own(usize),
 }
 
@@ -67,15 +67,15 @@ impl<'a> ObjectList<'a> {
         list
     }
 
-    /// The size of the scene in words.
+    /// The size of the scene as text.
     pub fn size(&self) -> String {
         let Some((min, max)) = self.bounds else { return "nothing finite".to_owned() };
         format!("{}, from {} to {}", sides(max - min), point(min), point(max))
     }
 
-    /// One line for each group, and one for each fault of a mesh.
+    /// One line per group, and one per defect of a mesh.
     pub fn lines(&self) -> Vec<String> {
-        /// Nobody reads more; `--json` has all.
+        /// Further lines are omitted; `--json` has all.
         const MOST: usize = 60;
         let mut lines = Vec::new();
         for group in self.groups.iter().take(MOST) {
@@ -92,7 +92,7 @@ impl<'a> ObjectList<'a> {
         lines
     }
 
-    /// The same for machines: meshes and sphere clouds.
+    /// Meshes and groups of spheres as JSON.
     pub fn json(&self) -> Vec<serde_json::Value> {
         let part = |group: &ObjectGroup| {
             let ObjectGroup { first, count, size, .. } = group;
@@ -115,7 +115,7 @@ impl<'a> ObjectList<'a> {
         self.groups.iter().filter_map(part).collect()
     }
 
-    /// Corners of the box of the scene for machines; null where nothing is finite.
+    /// Corners of the bounding box of the scene as JSON; null if nothing is finite.
     pub fn bounds_json(&self) -> serde_json::Value {
         self.bounds.map_or(
             serde_json::Value::Null,

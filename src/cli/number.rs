@@ -22,14 +22,14 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A parser of whole numbers in a range, both ends included.
+/// A parser of integers in a range, both ends included.
 pub fn between<T>(low: T, high: T) -> impl Fn(&str) -> Result<T, String> + Clone
 where
     T: FromStr + PartialOrd + Copy + Display,
 {
     move |text| match text.parse::<T>() {
         Ok(value) if value >= low && value <= high => Ok(value),
-        // Too long for its type, it is still a number.
+        // Integers that overflow the type get the message about the range.
         _ if text.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit()) && !text.is_empty() => {
             Err(format!("must be between {low} and {high}"))
         }
@@ -37,7 +37,7 @@ where
     }
 }
 
-/// A whole number from 1 on.
+/// Parses an integer, at least 1.
 pub fn at_least_one(text: &str) -> Result<u32, String> {
     text.parse().ok().filter(|number| *number > 0).ok_or_else(|| "must be a whole number, at least 1".to_owned())
 }
@@ -74,12 +74,12 @@ pub fn two_digits(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A number with what it counts, whose plural ends in s.
+/// A number and a noun, whose plural ends in s.
 pub fn counted(n: usize, one: &str) -> String {
     format!("{n} {one}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A number of samples per pixel in words.
+/// A number of samples per pixel as text.
 pub fn samples_per_pixel(spp: u32) -> String {
     format!("{spp} {} per pixel", if spp == 1 { "sample" } else { "samples" })
 }

@@ -333,7 +333,7 @@ fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Fai
     Ok(region)
 }
 
-/// Samples per pixel of an image of which a region was rendered.
+/// Description of the samples per pixel of an image of which a region was rendered.
 fn in_region(film: &Film, region: &Region) -> String {
     let size = region.end - region.start;
     let (spp, elsewhere) = (samples_per_pixel(film.spp_in(Some(region))), film.spp());
@@ -341,7 +341,7 @@ fn in_region(film: &Film, region: &Region) -> String {
     format!("{spp} in the region of {width} x {height} at {},{}, at least {elsewhere} elsewhere", start.x, start.y)
 }
 
-/// What ends a rendering, in words.
+/// The target of a rendering as text.
 fn target_in_words(target: &Target) -> String {
     let spp = target.spp.map(samples_per_pixel);
     let error = target.error.map(|error| format!("an error of {}", percent(error)));

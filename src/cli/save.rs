@@ -25,7 +25,7 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     }
     let mut files = OverwriteArgs::default().files();
     files.write(&args.output)?;
-    // Somebody may have written it by hand.
+    // It may have been written by hand.
     if !args.overwrite && !files.replaced().is_empty() {
         let message = "already exists: replace it with --overwrite, or choose another name";
         return Err(Failure::Failed(format!("{}: {message}", args.output.display())));

@@ -189,7 +189,7 @@ fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
 fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
     let had_failed = std::mem::take(&mut world.resource_mut::<HotReload>().failed);
     let was_mended = !had_failed.is_empty();
-    // What was wrong with the file before is not what is wrong with it now, if anything is.
+    // Old errors of the file no longer apply.
     world.resource_mut::<Status>().withdraw(had_failed);
     let scene = match result {
         Ok(Some(scene)) => scene,
@@ -204,7 +204,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
             let texts: Vec<String> =
                 error.problems.iter().map(|problem| format!("{problem} (the scene is unchanged)")).collect();
             let mut status = world.resource_mut::<Status>();
-            // The same error again is shown again.
+            // Errors that occur again are displayed again.
             status.withdrawn.retain(|text| !texts.contains(text));
             for text in &texts {
                 status.say(now, MessageKind::Error, text.as_str());

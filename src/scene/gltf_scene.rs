@@ -280,7 +280,7 @@ impl Maker<'_> {
     }
 }
 
-/// What to say of a moment, seconds, at which nothing moves any more, or not yet.
+/// A warning for a time, in seconds, outside of the animations of a model.
 fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
     match length {
         None => Some(format!("has no animations: at {at} s it is as it is stored")),

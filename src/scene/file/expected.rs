@@ -1,21 +1,21 @@
-//! What the fields of a scene file expect, in words and by an example, for values that have the wrong form.
+//! The expected form of the fields of a scene file, with examples, for error messages.
 
 use std::borrow::Cow;
 
-/// The innermost field around a place in a text.
+/// The innermost field at a position in a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldAt<'a> {
     pub name: &'a str,
-    /// The field around it; empty at the top level.
+    /// The enclosing field; empty at the top level.
     pub parent: &'a str,
     /// Byte offset of its value.
     pub start: usize,
-    /// Its value up to the comma or the bracket that ends it, or as much of it as can be told apart.
+    /// The text of its value, up to the comma or bracket that ends it.
     pub value: &'a str,
 }
 
 impl FieldAt<'_> {
-    /// What the field expects and an example; `None` for fields that are not known.
+    /// The expected form and an example; `None` for unknown fields.
     pub fn expectation(&self) -> Option<(&'static str, Cow<'static, str>)> {
         let in_transform = self.parent == "transform";
         let (what, example) = match self.name {
@@ -82,13 +82,13 @@ impl FieldAt<'_> {
         Some((what, Cow::Borrowed(example)))
     }
 
-    /// Whether a place lies in the brackets of a value with a kind, such as `constant(…)`.
+    /// Whether a position is inside the brackets of a tagged value such as `constant(…)`.
     pub fn is_within_kind(&self, offset: usize) -> bool {
         let word = self.value.bytes().take_while(|byte| is_word(*byte)).count();
         word > 0 && self.value[word..].starts_with('(') && offset > self.start + word
     }
 
-    /// The value as messages quote it.
+    /// The value, shortened for messages.
     pub fn quoted(&self) -> String {
         const MOST: usize = 40;
         let line = self.value.lines().next().unwrap_or_default().trim_end();
@@ -96,7 +96,7 @@ impl FieldAt<'_> {
         if short.len() < line.len() { format!("{short}…") } else { short }
     }
 
-    /// Whether the value is a name without quotes.
+    /// Whether the value is an unquoted name.
     fn is_word(&self) -> bool {
         let value = self.value.trim_end();
         value.starts_with(|c: char| c.is_alphabetic() || c == '_')
@@ -104,9 +104,9 @@ impl FieldAt<'_> {
     }
 }
 
-/// The innermost field whose value begins before `offset`, or at it.
+/// The innermost field whose value begins at or before `offset`.
 pub fn field_at(text: &str, offset: usize) -> Option<FieldAt<'_>> {
-    /// An open bracket, and the field of it that is being read.
+    /// An open bracket, with its current field.
     #[derive(Clone, Copy, Default)]
     struct Open<'a>(Option<(&'a str, usize)>);
 
@@ -156,9 +156,9 @@ fn is_word(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-' | b'.' | b'+') || !byte.is_ascii()
 }
 
-/// If a colon follows the word, it is a field. Returns where the scan continues.
+/// Reports the word as a field if a colon follows it. Returns the position at which the scan continues.
 ///
-/// - `from`, `to`: bytes of the word without its quotes; `end`: behind its quotes.
+/// - `from`, `to`: byte range of the word without quotes; `end`: position after its quotes.
 fn named<'a>(text: &'a str, from: usize, to: usize, end: usize, found: &mut dyn FnMut((&'a str, usize))) -> usize {
     let rest = &text[end.min(text.len())..];
     let Some(value) = rest.trim_start().strip_prefix(':') else { return end.min(text.len()) };
@@ -167,7 +167,7 @@ fn named<'a>(text: &'a str, from: usize, to: usize, end: usize, found: &mut dyn 
     text.len() - value.len()
 }
 
-/// Behind the closing quote of the string that begins at `at`.
+/// Position after the closing quote of the string that begins at `at`.
 fn end_of_string(text: &str, at: usize) -> usize {
     let mut escaped = false;
     let end = text.bytes().enumerate().skip(at + 1).find(|&(_, byte)| {
@@ -178,7 +178,7 @@ fn end_of_string(text: &str, at: usize) -> usize {
     end.map_or(text.len(), |(end, _)| end + 1)
 }
 
-/// Up to the comma or closing bracket that ends the value which begins at `start`.
+/// The value that begins at `start`, up to its comma or closing bracket.
 fn value_at(text: &str, start: usize) -> &str {
     let (mut depth, mut at) = (0, start);
     while let Some(byte) = text.as_bytes().get(at) {

@@ -31,7 +31,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
         Error::TrailingCharacters => "unexpected text after the end of the scene".to_owned(),
         other => own_names(&lower_first(&other.to_string())),
     };
-    // The parser's position is behind the word.
+    // The parser's position is after the word.
     let at = match &error.code {
         Error::NoSuchStructField { found, .. } | Error::NoSuchEnumVariant { found, .. } => word_before(text, at, found),
         _ => at,
@@ -39,7 +39,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
     SceneError::at(file, at, message)
 }
 
-/// Where a value of the wrong form begins, and what was expected in its place; `None` for errors of other kinds.
+/// Position of a value of the wrong form, and a message with the expected form; `None` for other errors.
 fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
     let offset = byte_offset(text, error.span.start.line, error.span.start.col);
     let end = byte_offset(text, error.span.end.line, error.span.end.col).max(offset);
@@ -91,7 +91,7 @@ fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
         _ => return None,
     }
     let field = field_at(text, offset)?;
-    // The types of the file describe values within `constant(…)` and those of fields that are not known here.
+    // Inside `constant(…)` and for unknown fields, the message names the expected type.
     let expectation = field.expectation().filter(|_| !field.is_within_kind(offset));
     let Some((what, example)) = expectation else {
         let Error::InvalidValueForType { expected, .. } = &error.code else { return None };
@@ -103,7 +103,7 @@ fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
     ))
 }
 
-/// Byte offset of a line and a column of the parser, which count characters from 1.
+/// Byte offset of a line and column of the parser, which are counted in characters from 1.
 fn byte_offset(text: &str, line: usize, column: usize) -> usize {
     let line_start: usize = text.split_inclusive('\n').take(line.max(1) - 1).map(str::len).sum();
     let rest = &text[line_start..];
