@@ -1,29 +1,22 @@
-//! `firstlight render --turntable N` and `--bookmarks 1,2,3 --frames N`: numbered images of a moving camera.
+//! Numbered images: `firstlight render --frames A..B` of an animation, `--turntable N`, and `--bookmarks 1,2,3 --frames N`.
 
 use super::console::{inform, remark};
 use super::failure::Failure;
+use super::frames::FramesArg;
 use super::job::RenderJob;
 use super::progress::Progress;
 use super::render_args::RenderArgs;
+use super::sequence::{Motion, Sequence};
 use super::stop::Stop;
+use super::video;
 use firstlight::frame::navigation::Rig;
-use firstlight::frame::{SettingsStore, Target, along, turntable};
+use firstlight::frame::{SettingsStore, Target, along, read_film_summary, turntable, write_film_with_features};
+use firstlight::scene::whole_file::WholeFile;
 use firstlight::scene::{ImageMetadata, ImageSamples};
-use std::ffi::OsStr;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The frames to render.
-pub(super) struct Sequence {
-    /// Frame indices, from 0.
-    pub frames: Range<usize>,
-    /// Whether existing frames are kept.
-    pub is_part: bool,
-    /// Number of existing images that are replaced.
-    pub n_replaced: usize,
-}
-
-/// Renders every frame to `FILE-0001.png` and so on; each has its own metadata and opens like any other image.
+/// Renders every frame to `FILE-0001.png` and so on; each is an image as any other, and opens as one. What is there
+/// already, as it would be rendered, stays.
 pub(super) fn animate(
     args: &RenderArgs,
     mut job: RenderJob,
@@ -31,54 +24,85 @@ pub(super) fn animate(
     sequence: &Sequence,
     stop: &Stop,
 ) -> Result<(), Failure> {
-    let rigs = way(args, &mut job)?;
+    let rigs = match sequence.motion {
+        Motion::Animation => {
+            job.set_fps(args)?;
+            None
+        }
+        _ => Some(way(args, &mut job)?),
+    };
     let target = job.target(args);
-    let digits = digits(rigs.len());
     let replace = args.overwrite.replace();
-    let frames = &sequence.frames;
-    for (done, i) in frames.clone().enumerate() {
-        progress.at(done as f64 / frames.len() as f64, format!("frame {} of {}", i + 1, rigs.len()));
-        job.set_rig(&rigs[i]);
-        let path = numbered(&args.output, i + 1, digits);
-        if !(sequence.is_part && is_complete(&job, &path, target)?) {
+    let (n, last) = (sequence.len(), sequence.numbers.end.saturating_sub(1));
+    let (mut n_kept, mut n_replaced) = (0, 0);
+    for (done, number) in sequence.numbers.clone().enumerate() {
+        progress.at(done as f64 / n as f64, format!("frame {number} ({} of {n})", done + 1));
+        match &rigs {
+            Some(rigs) => job.set_rig(&rigs[number as usize - 1]),
+            None => job.set_frame(args, number)?,
+        }
+        let path = sequence.path(&args.output, number);
+        let film_path = args.film.as_deref().map(|film| sequence.path(film, number));
+        if is_complete(args, &job, &path, film_path.as_deref(), target)? {
+            n_kept += 1;
+        } else {
+            n_replaced += usize::from(path.exists());
             let film = job.picture(args, target)?;
             let features = job.features(args, None)?;
+            if let Some(path) = &film_path {
+                let claim = WholeFile::claim(path, replace)?;
+                write_film_with_features(&film, features.as_ref(), &job.note(&film, path), claim)?;
+            }
             let denoised = job.denoised(args, &film, &|| false);
             job.write(args, (&film, features.as_ref()), denoised.as_ref(), &path, replace)?;
         }
-        stop.has_saved(format!("{} of {} frames are saved", done + 1, frames.len()));
+        stop.has_saved(format!("{} of {n} frames are saved", done + 1));
     }
     progress.finish();
-    let (first, last) = (numbered(&args.output, frames.start + 1, digits), numbered(&args.output, frames.end, digits));
-    let replaced = match sequence.n_replaced {
+    let (first, last) = (sequence.path(&args.output, sequence.numbers.start), sequence.path(&args.output, last));
+    let replaced = match n_replaced {
         0 => String::new(),
         1 => ", replacing 1 existing file".to_owned(),
         n => format!(", replacing {n} existing files"),
     };
-    inform(format_args!("{} to {}: {} frames{replaced}", first.display(), last.display(), frames.len()));
+    let kept = if n_kept > 0 { format!(", {n_kept} complete already") } else { String::new() };
+    inform(format_args!("{} to {}: {n} frames{kept}{replaced}", first.display(), last.display()));
+    if let Some(path) = &args.video {
+        let images = sequence.numbers.clone().map(|number| sequence.path(&args.output, number));
+        video::write(path, images, job.fps(args), replace)?;
+        inform(format_args!("{}: {n} frames at {} per second", path.display(), job.fps(args)));
+    }
     Ok(())
 }
 
-/// Whether a frame exists already with the metadata that it would be rendered with.
-fn is_complete(job: &RenderJob, path: &Path, target: Target) -> Result<bool, Failure> {
+/// Whether a frame is there already, as it would be rendered.
+fn is_complete(
+    args: &RenderArgs,
+    job: &RenderJob,
+    path: &Path,
+    film: Option<&Path>,
+    target: Target,
+) -> Result<bool, Failure> {
+    // Its metadata says how many samples an image has, not how long it took, nor which layers it has.
+    let is_told = target.seconds.is_none() && target.error.is_none() && args.layers.is_empty();
+    if args.part.is_none() && !is_told {
+        return Ok(false);
+    }
     let Ok(there) = ImageMetadata::read(path) else { return Ok(false) };
     let samples = ImageSamples { first: 0, spp: there.spp, uneven: there.uneven };
     let note = job.draft.note(path, job.size, samples, job.display.into());
     let ours = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
-    Ok(ours == there && target.spp.is_none_or(|spp| spp == there.spp))
+    let ours = ImageMetadata { denoised: args.denoise.then(|| "own".to_owned()), ..ours };
+    if ours != there || target.spp.is_some_and(|spp| spp != there.spp) {
+        return Ok(false);
+    }
+    let Some(film) = film else { return Ok(true) };
+    // An image is written after its film: what is missing is a film that was not asked for then, or deleted.
+    Ok(ImageMetadata::read(film).is_ok_and(|there| ours.differs_from(&there).is_none() && there.spp == ours.spp)
+        && read_film_summary(film).is_ok())
 }
 
-/// The names of all images of an animation; `None` for a single image.
-pub(super) fn frames(args: &RenderArgs) -> Option<impl Iterator<Item = PathBuf>> {
-    let n = args.turntable.or(args.bookmarks.as_ref().and(args.frames))? as usize;
-    Some((1..=n).map(move |number| numbered(&args.output, number, digits(n))))
-}
-
-fn digits(n: usize) -> usize {
-    n.to_string().len().max(4)
-}
-
-/// The camera of each frame.
+/// Where the camera is in each frame.
 fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
     let rig = job.rig().ok_or_else(|| Failure::Failed("the scene has no camera".to_owned()))?;
     if let Some(n) = args.turntable {
@@ -98,13 +122,9 @@ fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
         })
     };
     let stops: Vec<Rig> = numbers.iter().map(stop).collect::<Result<_, _>>()?;
-    Ok(along(&stops, args.frames.unwrap_or(1)))
-}
-
-/// Returns `FILE-0007.png` for `FILE.png`.
-fn numbered(path: &Path, number: usize, digits: usize) -> PathBuf {
-    let mut name = path.file_stem().map_or_else(|| "frame".into(), OsStr::to_os_string);
-    name.push(format!("-{number:0digits$}."));
-    name.push(path.extension().unwrap_or(OsStr::new("png")));
-    path.with_file_name(name)
+    let n = match args.frames {
+        Some(FramesArg::Count(n)) => n,
+        _ => 1,
+    };
+    Ok(along(&stops, n))
 }

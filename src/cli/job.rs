@@ -4,6 +4,7 @@ use super::console::{inform, print_bytes, remark};
 use super::failure::Failure;
 use super::progress::Progress;
 use super::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
+use super::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
@@ -16,8 +17,8 @@ use firstlight::render::{
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
-    DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Rendering,
-    SceneInputs, SnapshotPart,
+    Animation, DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft,
+    Rendering, SceneInputs, SnapshotPart, show_moment,
 };
 use glam::UVec2;
 use std::path::Path;
@@ -110,6 +111,41 @@ impl RenderJob {
         let inputs = SceneInputs::of(&mut self.world);
         self.extraction.update(SnapshotPart::Camera, &inputs, &self.scene.trees);
         self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
+    }
+
+    /// Takes over the frames per second that are asked for.
+    pub fn set_fps(&mut self, args: &RenderArgs) -> Result<(), Failure> {
+        let title = self.scene.source.title();
+        let Some(mut animation) = self.world.get_resource_mut::<Animation>().filter(|it| it.moves()) else {
+            let message = "has no animation: add the section `animation` to the scene file, or use --turntable N";
+            return Err(Failure::Failed(format!("{title} {message}")));
+        };
+        if let Some(fps) = args.fps {
+            animation.fps = fps;
+        }
+        Ok(())
+    }
+
+    /// Frames per second of a sequence.
+    pub fn fps(&self, args: &RenderArgs) -> f64 {
+        let of_scene = || self.world.get_resource::<Animation>().map(|animation| animation.fps);
+        args.fps.or_else(of_scene).unwrap_or(DEFAULT_FPS)
+    }
+
+    /// Shows a frame of the animation from now on.
+    pub fn set_frame(&mut self, args: &RenderArgs, number: u32) -> Result<(), Failure> {
+        self.set_moment(f64::from(number) / self.fps(args))
+    }
+
+    /// Shows a moment from now on, seconds. The image does not depend on the moments before.
+    pub fn set_moment(&mut self, seconds: f64) -> Result<(), Failure> {
+        show_moment(&mut self.world, seconds);
+        self.extraction = Extraction::new(&SceneInputs::of(&mut self.world), &self.scene.trees);
+        for problem in &self.extraction.problems {
+            remark(format_args!("warning: at {seconds} s {problem}"));
+        }
+        self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene));
+        Ok(())
     }
 
     /// Renders a complete image.

@@ -1,7 +1,7 @@
 //! Parsers of numbers in the command line: each reports the valid range before anything is loaded.
 
 use firstlight::mesh::simplify::{Target, check_target};
-use firstlight::scene::check_stops;
+use firstlight::scene::{check_fps, check_stops};
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -40,6 +40,12 @@ where
 /// Parses an integer, at least 1.
 pub fn at_least_one(text: &str) -> Result<u32, String> {
     text.parse().ok().filter(|number| *number > 0).ok_or_else(|| "must be a whole number, at least 1".to_owned())
+}
+
+/// Frames per second.
+pub fn parse_fps(text: &str) -> Result<f64, String> {
+    let fps = text.parse::<f64>().map_err(|_| "must be a number of frames per second".to_owned())?;
+    check_fps(fps).map(|()| fps).map_err(|error| error.to_string())
 }
 
 /// Parses a finite number of seconds.

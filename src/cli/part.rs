@@ -3,12 +3,13 @@
 //! A complete part is recognised and skipped; an interrupted one is resumed from its last film, which is saved every
 //! minute by default. Exit status: 0 done, 75 try again, 2 wrong input.
 
-use super::animate::{Sequence, animate};
+use super::animate::animate;
 use super::console::{inform, remark};
 use super::failure::Failure;
 use super::job::RenderJob;
 use super::progress::Progress;
 use super::render_args::{PartBy, RenderArgs};
+use super::sequence::Sequence;
 use super::stop::Stop;
 use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::part::Part;
@@ -31,14 +32,14 @@ const NUMBER: &str = "{part}";
 pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     stop.is_of_part();
     // Uniform allocation: only a fixed number of samples can be divided in advance.
-    let args = &RenderArgs { uniform: args.part_by != PartBy::Frames || args.uniform, ..args.clone() };
+    let args = &RenderArgs { uniform: args.part_by() != PartBy::Frames || args.uniform, ..args.clone() };
     let part = args.part.as_deref().expect("only parts come here");
     let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
     let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Retry(format!("error: cannot start worker threads: {error}")))?;
-    pool.install(|| match args.part_by {
+    pool.install(|| match args.part_by() {
         PartBy::Frames => frames(args, part, stop),
         PartBy::Samples | PartBy::Tiles => film(args, part, stop),
     })
@@ -46,23 +47,23 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
 
 /// Renders a part of a sequence.
 fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
-    let Some(n) = args.turntable.or(args.bookmarks.as_ref().and(args.frames)) else {
-        return Err(Failure::Usage("--part-by frames needs a sequence: --turntable N or --bookmarks".to_owned()));
+    let Some(sequence) = Sequence::of(args)? else {
+        let message = "--part-by frames needs a sequence: --frames A..B, --turntable N or --bookmarks";
+        return Err(Failure::Usage(message.to_owned()));
     };
-    if args.film.is_some() {
-        return Err(Failure::Usage("--part-by frames writes images: use -o FILE instead of --film".to_owned()));
-    }
+    let n = sequence.len() as u32;
     let frames = part.frames(n).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
+    let sequence = sequence.part(frames);
+    let args = &sequence.opened(args)?;
     let mut files = args.overwrite.files();
     let progress = Progress::new();
     let job = load(args, &mut files, &progress)?;
-    let frames = frames.start as usize..frames.end as usize;
-    animate(args, job, progress, &Sequence { frames, is_part: true, n_replaced: 0 }, stop).map_err(Failure::of_part)
+    animate(args, job, progress, &sequence, stop).map_err(Failure::of_part)
 }
 
 /// Renders a part of the samples or of the tiles of an image.
 fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
-    if args.turntable.is_some() || args.bookmarks.is_some() {
+    if args.is_sequence() {
         return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
     }
     let path = film_path(args, part)?;
@@ -73,13 +74,13 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     let all = samples(args, &job);
-    let samples = match args.part_by {
+    let samples = match args.part_by() {
         PartBy::Tiles => all.clone(),
         _ => part.samples(all.clone()).map_err(|error| Failure::Usage(format!("--part: {error}")))?,
     };
     let args = &RenderArgs { samples: Some(samples.clone()), ..args.clone() };
     let (film, kept) = film_so_far(args, &job, &path).map_err(Failure::of_part)?;
-    let region = match args.part_by {
+    let region = match args.part_by() {
         PartBy::Tiles => Some(region(&film, part, &job)?),
         _ => None,
     };

@@ -1,6 +1,6 @@
 //! `firstlight render SCENE -o out.png`: renders an image without a window, and a film from which it can be resumed.
 
-use super::animate::{Sequence, animate, frames};
+use super::animate::animate;
 use super::args::replaced;
 use super::console::{inform, print, prints_to_terminal, remark};
 use super::failure::Failure;
@@ -9,7 +9,9 @@ use super::number::{percent, samples_per_pixel};
 use super::part;
 use super::progress::Progress;
 use super::render_args::{RenderArgs, RenderCommand};
+use super::sequence::Sequence;
 use super::stop::Stop;
+use super::video;
 use firstlight::frame::{
     OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors,
     write_film_with_features,
@@ -73,7 +75,13 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
 pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     args.picture_format()?;
     check_stdout(args)?;
-    let film_path = film_path(args)?;
+    let sequence = Sequence::of(args)?;
+    if args.video.is_some() && sequence.is_none() {
+        return Err(Failure::Usage("--video needs a sequence: --frames A..B, --turntable N or --bookmarks".to_owned()));
+    }
+    video::check(args)?;
+    // Of a sequence, each frame has a film of its own.
+    let film_path = film_path(args)?.filter(|_| sequence.is_none());
     // Outputs that cannot be written are reported before rendering.
     let mut files = args.overwrite.files();
     if let Some(path) = args.scene.source()?.path() {
@@ -89,8 +97,11 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         }
         Some(path) => Some(files.claim(&path, files.replace())?),
     };
-    match frames(args) {
-        Some(frames) => files.write_all(frames)?,
+    match &sequence {
+        Some(sequence) => {
+            files.write_all(sequence.paths(args))?;
+            args.video.iter().try_for_each(|path| files.write(path))?;
+        }
         None if args.to_stdout() => {}
         None => files.write(&args.output)?,
     }
@@ -111,7 +122,17 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;
-    pool.install(|| render(args, film, &mut files, stop))
+    pool.install(|| match &sequence {
+        Some(sequence) => render_sequence(args, sequence, &mut files, stop),
+        None => render(args, film, &mut files, stop),
+    })
+}
+
+fn render_sequence(args: &RenderArgs, sequence: &Sequence, files: &mut Files, stop: &Stop) -> Result<(), Failure> {
+    let args = &sequence.opened(args)?;
+    let progress = Progress::new();
+    let job = RenderJob::new(args, None, files, &progress)?;
+    animate(args, job, progress, sequence, stop)
 }
 
 /// Checks that standard output is used for one image and nothing else.
@@ -120,7 +141,7 @@ fn check_stdout(args: &RenderArgs) -> Result<(), Failure> {
         return Ok(());
     } else if args.json {
         "-o - and --json both write to standard output: write the image to a file"
-    } else if args.turntable.is_some() || args.bookmarks.is_some() {
+    } else if args.is_sequence() {
         "-o - takes one image: write the frames to files"
     } else if prints_to_terminal() {
         "standard output is a terminal: redirect it, or write the image to a file"
@@ -167,11 +188,6 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the image was saved in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
-    }
-    if args.turntable.is_some() || args.bookmarks.is_some() {
-        let n = args.turntable.or(args.frames).unwrap_or(1) as usize;
-        let sequence = Sequence { frames: 0..n, is_part: false, n_replaced: files.replaced().len() };
-        return animate(args, ManuallyDrop::into_inner(job), progress, &sequence, stop);
     }
     let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());
     let mut film = job.film(args, kept)?;

@@ -2,8 +2,9 @@
 
 use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
 use super::failure::Failure;
+use super::frames::{FramesArg, parse_frames};
 use super::layers::LayerArgs;
-use super::number::{at_least_one, between, parse_positive, parse_share, parse_size, parse_stops};
+use super::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
 use clap::{Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
@@ -92,18 +93,26 @@ pub struct RenderArgs {
     /// Move the camera through bookmarks of the scene, such as 1,2,3.
     #[arg(help_heading = "Animation", long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
     pub bookmarks: Option<Vec<u8>>,
-    /// Number of frames for --bookmarks.
-    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = between::<u32>(1, 100_000), requires = "bookmarks")]
-    pub frames: Option<u32>,
+    /// Render frames A to B-1 of the animation as FILE-0000.png, FILE-0001.png, …: frame i is at i / fps seconds
+    ///
+    /// N is 0..N; with --bookmarks it is the number of frames. --film saves the film of each frame.
+    #[arg(help_heading = "Animation", long, value_name = "A..B|N", allow_negative_numbers = true, value_parser = parse_frames, conflicts_with_all = ["turntable", "resume", "samples", "json", "error_image", "region", "at"])]
+    pub frames: Option<FramesArg>,
+    /// Frames per second [default: from the scene file, else 24].
+    #[arg(help_heading = "Animation", long, value_name = "N", allow_negative_numbers = true, value_parser = parse_fps)]
+    pub fps: Option<f64>,
+    /// Make a video of the frames with ffmpeg, where it is installed; the extension selects the format.
+    #[arg(help_heading = "Animation", long, value_name = "FILE.mp4", conflicts_with = "part")]
+    pub video: Option<PathBuf>,
     /// Render one of N equal parts into --film: I/N, such as 3/64, or auto for the task of an array job
     ///
     /// A complete part is skipped, an interrupted one is resumed. {part} in --film is replaced by the number of the part.
     /// Exit status: 0 done, 75 try again, 2 wrong input.
     #[arg(help_heading = "Films and parts", long, value_name = "I/N", conflicts_with_all = ["resume", "region", "time", "error", "json", "error_image", "error_metric"])]
     pub part: Option<String>,
-    /// What is divided into parts.
-    #[arg(help_heading = "Films and parts", long, value_name = "WHAT", value_enum, default_value_t = PartBy::Samples, requires = "part")]
-    pub part_by: PartBy,
+    /// What is divided into parts [default: samples; the frames of a sequence].
+    #[arg(help_heading = "Films and parts", long, value_name = "WHAT", value_enum, requires = "part")]
+    pub part_by: Option<PartBy>,
     /// Seconds between two saves of the film of a part.
     #[arg(help_heading = "Films and parts", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive, default_value_t = 60.0, requires = "part")]
     pub save_every: f64,
@@ -197,7 +206,7 @@ impl RenderCommand {
         if scenes.next().is_some() {
             return Err(Failure::Usage("--part works with one scene only".to_owned()));
         }
-        let output = match (&self.output, render.part_by) {
+        let output = match (&self.output, render.part_by()) {
             (Some(_), PartBy::Samples | PartBy::Tiles) => {
                 let message =
                     "a part has no image of its own: omit -o, and use `firstlight merge --image` for all parts";
@@ -262,6 +271,16 @@ impl RenderArgs {
     /// Whether the image goes to standard output.
     pub fn to_stdout(&self) -> bool {
         self.output == Path::new(STDOUT)
+    }
+
+    /// Whether several images of the scene are rendered.
+    pub fn is_sequence(&self) -> bool {
+        self.turntable.is_some() || self.bookmarks.is_some() || self.frames.is_some()
+    }
+
+    /// What is divided into parts.
+    pub fn part_by(&self) -> PartBy {
+        self.part_by.unwrap_or(if self.is_sequence() { PartBy::Frames } else { PartBy::Samples })
     }
 
     /// Name of the output for messages.

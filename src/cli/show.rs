@@ -5,7 +5,7 @@ use super::console::{inform, remark};
 use super::failure::Failure;
 use super::number::{between, counted, samples_per_pixel};
 use super::render;
-use super::render_args::{PartBy, RenderArgs, free_name};
+use super::render_args::{RenderArgs, free_name};
 use super::stop::Stop;
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
@@ -161,6 +161,8 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         region: None,
         bookmarks: None,
         frames: None,
+        fps: None,
+        video: None,
         resume: false,
         overwrite: OverwriteArgs::default(),
         spp: None,
@@ -180,7 +182,7 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         exposure: 0.0,
         json: false,
         part: None,
-        part_by: PartBy::Samples,
+        part_by: None,
         save_every: 60.0,
     };
     render::run_one(&args, stop)

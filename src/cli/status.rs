@@ -60,6 +60,9 @@ impl Parts {
 pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     let folder = &args.folder;
     let (job, rounds) = (Job::read(folder)?, Rounds::read(folder)?);
+    if let Some((start, end)) = job.frames {
+        return frames(args, &job, &rounds, end - start);
+    }
     let (number, is_done) = rounds.open().map_or((rounds.0.len(), true), |number| (number, false));
     let round = rounds.get(number).expect("there is one at least");
     let parts = if is_done { Parts::default() } else { Parts::of(folder, &job, number, round) };
@@ -101,6 +104,35 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
         "round {number}, samples {samples}: {done} of {count} parts done, {begun} begun, {:.0} %{left}",
         100.0 * share
     ))
+}
+
+/// How many frames of an animation are there.
+fn frames(args: &StatusArgs, job: &Job, rounds: &Rounds, n: u32) -> Result<(), Failure> {
+    if args.image.is_some() {
+        return Err(Failure::Usage("--image shows one image: the frames of this job are images themselves".to_owned()));
+    }
+    let folder = &args.folder;
+    let missing = job.missing_frames(folder);
+    let done = n - missing.len() as u32;
+    let since = rounds.get(1).map_or(0, |round| round.since);
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    let left = (done > 0).then(|| now.saturating_sub(since) as f64 * missing.len() as f64 / f64::from(done));
+    if args.json {
+        return print(serde_json::json!({
+            "done": missing.is_empty(),
+            "frames": n,
+            "frames_done": done,
+            "parts": job.parts,
+            "spp": job.spp,
+            "seconds_left_in_round": left.filter(|_| !missing.is_empty()),
+        }));
+    }
+    print(format!("{}: {}, {n} frames in {} parts", folder.display(), job.scene, job.parts))?;
+    let Some(next) = missing.first() else {
+        return print(format!("done: {}", folder.join("frames").display()));
+    };
+    let left = left.map_or_else(String::new, |seconds| format!(", about {} left", duration(seconds)));
+    print(format!("{done} of {n} frames done{left}; the first that is missing is frame {next}"))
 }
 
 /// Such as `40 s`, `12 min` or `3.5 h`.

@@ -4,7 +4,8 @@
 use super::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
 use super::console::inform;
 use super::failure::Failure;
-use super::number::{at_least_one, between, parse_positive, parse_share, parse_size, parse_stops};
+use super::frames::{FramesArg, parse_frames};
+use super::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
 use super::render::Command;
 use super::render_args::file_stem;
 use super::work::render_words;
@@ -21,6 +22,7 @@ pub const EXAMPLES: &str = "\
 Examples:
   firstlight submit slurm scene.ron --size 3840x2160 --parts 64 --spp 1024
   firstlight submit slurm scene.ron --parts 64 --error 0.5% --max-spp 8192
+  firstlight submit slurm scene.ron --frames 0..240 --parts 60 --spp 256
   firstlight submit kubernetes scene.ron --parts 20 --image registry/firstlight:1 --dry-run
   firstlight status firstlight-job-scene --image so-far.png";
 
@@ -49,6 +51,12 @@ pub struct SubmitArgs {
     /// Samples per pixel after which no other round follows.
     #[arg(long, value_name = "N", requires = "error", default_value_t = 16_384, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     max_spp: u32,
+    /// Render frames A to B-1 of the animation to FOLDER/frames, in place of one image.
+    #[arg(long, value_name = "A..B|N", value_parser = parse_frames, conflicts_with_all = ["error", "at"])]
+    frames: Option<FramesArg>,
+    /// Frames per second [default: from the scene file, else 24].
+    #[arg(long, value_name = "N", requires = "frames", value_parser = parse_fps)]
+    fps: Option<f64>,
     /// Write the folder, and submit nothing.
     #[arg(long)]
     dry_run: bool,
@@ -143,6 +151,15 @@ impl From<EngineArg> for Engine {
     }
 }
 
+impl SubmitArgs {
+    /// Which frames, as options of `render`.
+    fn frame_words(&self) -> Vec<String> {
+        let frames = self.frames.map(FramesArg::range).map(|frames| format!("{}..{}", frames.start, frames.end));
+        let options = [("--frames", frames), ("--fps", self.fps.map(|fps| fps.to_string()))];
+        options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?])).flatten().collect()
+    }
+}
+
 pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
     let title = file_stem(&args.scene.scene).to_string_lossy().into_owned();
     let engine = Engine::from(args.engine);
@@ -158,10 +175,14 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         Some(_) => Job::first_round(args.parts, args.max_spp),
         None => super::render_args::DEFAULT_SPP,
     });
-    if u64::from(args.parts) > u64::from(spp) && args.error.is_none() {
+    let frames = args.frames.map(FramesArg::range);
+    if let Some(n) = frames.as_ref().map(ExactSizeIterator::len).filter(|&n| args.parts as usize > n) {
+        return Err(Failure::Usage(format!("--parts: {} parts of {n} frames: use at most {n} parts", args.parts)));
+    }
+    if u64::from(args.parts) > u64::from(spp) && args.error.is_none() && frames.is_none() {
         return Err(Failure::Usage(format!("--parts: {} parts of {spp} samples: use at most {spp} parts", args.parts)));
     }
-    make_folders(&folder)?;
+    make_folders(&folder, frames.is_some())?;
     let (scene, environment) = pack(&args.scene, &folder)?;
     let environment = environment.into_iter().flat_map(|path| ["--env".to_owned(), path]);
     let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
@@ -174,11 +195,17 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
             _ => this.unwrap_or_else(|| "firstlight".to_owned()),
         }),
         scene,
-        options: open_words(&args.scene.how).into_iter().chain(args.look.words()).chain(environment).collect(),
+        options: open_words(&args.scene.how)
+            .into_iter()
+            .chain(args.look.words())
+            .chain(environment)
+            .chain(args.frame_words())
+            .collect(),
         parts: args.parts,
         spp,
         error: args.error,
         max_spp: args.max_spp.max(spp),
+        frames: frames.map(|frames| (frames.start, frames.end)),
     };
     // Checks that the parts will be able to parse the arguments.
     Command::parse(&render_words(&job))?;
@@ -201,8 +228,9 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
     // Last: this file marks the folder as a job.
     job.write(&folder)?;
     let (name, parts) = (folder.display(), job.parts);
+    let frames = job.frames.map_or_else(String::new, |(start, end)| format!("{} frames, ", end - start));
     inform(format_args!(
-        "{name}: {parts} parts, {} samples per pixel{}",
+        "{name}: {frames}{parts} parts, {} samples per pixel{}",
         job.spp,
         if job.error.is_some() { " in the first round" } else { "" }
     ));
@@ -213,8 +241,8 @@ fn not_utf8(path: &Path) -> Failure {
     Failure::Failed(format!("{}: the name of the folder is not UTF-8", path.display()))
 }
 
-fn make_folders(folder: &Path) -> Result<(), Failure> {
-    for folder in [folder.join("parts"), folder.join("log")] {
+fn make_folders(folder: &Path, has_frames: bool) -> Result<(), Failure> {
+    for folder in [folder.join(if has_frames { "frames" } else { "parts" }), folder.join("log")] {
         std::fs::create_dir_all(&folder).map_err(|source| Failure::from(WriteError::NoFolder { folder, source }))?;
     }
     Ok(())

@@ -99,14 +99,23 @@ impl Work {
         }
         let count = self.job.parts_of(&round.range());
         if part.index >= count || round.merged {
-            let (part, samples) = (part.number(), in_words(&[round.range()]));
-            inform(format_args!("part {part}/{parts} of round {number}, samples {samples}: there is nothing to do"));
+            let what = match self.job.frames {
+                Some(_) => "frames".to_owned(),
+                None => format!("samples {}", in_words(&[round.range()])),
+            };
+            let part = part.number();
+            inform(format_args!("part {part}/{parts} of round {number}, {what}: there is nothing to do"));
             return Ok(());
         }
         let mut words = render_words(&self.job);
-        words.extend(["--samples".to_owned(), format!("{}..{}", round.samples.0, round.samples.1)]);
         words.extend(["--part".to_owned(), format!("{}/{count}", part.number())]);
-        words.extend(["--film".to_owned(), self.job.film_of(number, "{part}")]);
+        words.extend(match self.job.frames {
+            Some(_) => ["--spp".to_owned(), self.job.spp.to_string(), "-o".to_owned(), self.job.image_of(None)],
+            None => {
+                let samples = format!("{}..{}", round.samples.0, round.samples.1);
+                ["--samples".to_owned(), samples, "--film".to_owned(), self.job.film_of(number, "{part}")]
+            }
+        });
         words.extend(threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
         // The paths of a job are relative to its folder.
         let moved = std::env::set_current_dir(&self.folder);
@@ -130,6 +139,9 @@ impl Work {
             inform(format_args!("round {number} is merged already"));
             self.tell_next(&self.rounds);
             return Ok(());
+        }
+        if let Some((start, end)) = self.job.frames {
+            return self.count_frames(number, end - start, allow_missing);
         }
         let all = self.folder.join(ALL[0]);
         let claim = WholeFile::claim(&all, Replace::Anything)?;
@@ -179,6 +191,22 @@ impl Work {
             rounds.0.push(Round::beginning(round.samples.1..end));
         }
         rounds.write(&self.folder)?;
+        self.tell_next(&rounds);
+        Ok(())
+    }
+
+    /// Images of frames need no merge: the round is done when all are there.
+    fn count_frames(&self, number: usize, n: u32, allow_missing: bool) -> Result<(), Failure> {
+        let missing = self.job.missing_frames(&self.folder);
+        if let Some(first) = missing.first().filter(|_| !allow_missing) {
+            let n_missing = missing.len();
+            let message = format!("error: {n_missing} of {n} frames are missing, the first is frame {first}");
+            return Err(Failure::Retry(message));
+        }
+        let mut rounds = self.rounds.clone();
+        rounds.0[number - 1].merged = true;
+        rounds.write(&self.folder)?;
+        inform(format_args!("{} of {n} frames are there", n as usize - missing.len()));
         self.tell_next(&rounds);
         Ok(())
     }

@@ -123,6 +123,7 @@ mod tests {
             spp: 16,
             error,
             max_spp: 64,
+            frames: None,
         }
     }
 

@@ -58,6 +58,9 @@ pub struct Job {
     pub error: Option<f64>,
     /// Samples per pixel after which no other round follows.
     pub max_spp: u32,
+    /// Frames of an animation in place of one image: the first, and the one after the last. They have one round.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<(u32, u32)>,
 }
 
 /// A range of samples that is divided into parts and merged.
@@ -146,6 +149,9 @@ impl Job {
         if job.format > FORMAT {
             return content("was written by a newer version of firstlight");
         }
+        if job.frames.is_some_and(|(start, end)| start >= end) {
+            return content("has no frames");
+        }
         if job.parts == 0 || job.spp == 0 || job.max_spp < job.spp {
             return content("has no parts, or no samples");
         }
@@ -163,7 +169,21 @@ impl Job {
 
     /// Parts of a round with these samples: no more than there are samples.
     pub fn parts_of(&self, samples: &Range<u32>) -> u32 {
-        self.parts.min(samples.len() as u32)
+        let n = self.frames.map_or(samples.len() as u32, |(start, end)| end - start);
+        self.parts.min(n)
+    }
+
+    /// The image of a frame, as `render --frames` numbers it; of none, what all of them are called after.
+    pub fn image_of(&self, frame: Option<u32>) -> String {
+        let last = self.frames.map_or(0, |(_, end)| end.saturating_sub(1));
+        let digits = last.to_string().len().max(4);
+        frame.map_or_else(|| "frames/frame.png".to_owned(), |frame| format!("frames/frame-{frame:0digits$}.png"))
+    }
+
+    /// Frames whose images are not there.
+    pub fn missing_frames(&self, folder: &Path) -> Vec<u32> {
+        let (start, end) = self.frames.unwrap_or_default();
+        (start..end).filter(|&frame| !folder.join(self.image_of(Some(frame))).is_file()).collect()
     }
 
     /// The film of one part of a round, or all of them with `{part}`.
@@ -250,6 +270,7 @@ mod tests {
             spp: Job::first_round(12, 1000),
             error,
             max_spp: 1000,
+            frames: None,
         }
     }
 
@@ -269,6 +290,17 @@ mod tests {
         assert!(job.most_rounds() >= ends.len());
         assert_eq!(super::tests::job(None).next_end(16, Some(32)), None);
         assert_eq!(super::tests::job(None).most_rounds(), 1);
+    }
+
+    #[test]
+    fn frames_are_divided_and_counted_by_their_images() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = Job { frames: Some((8, 12)), ..job(None) };
+        assert_eq!((job.parts_of(&(0..16)), job.image_of(Some(9))), (4, "frames/frame-0009.png".to_owned()));
+        assert_eq!(Job { frames: Some((0, 20_000)), ..job.clone() }.image_of(Some(9)), "frames/frame-00009.png");
+        std::fs::create_dir(folder.path().join("frames")).unwrap();
+        std::fs::write(folder.path().join(job.image_of(Some(9))), "").unwrap();
+        assert_eq!(job.missing_frames(folder.path()), [8, 10, 11]);
     }
 
     #[test]

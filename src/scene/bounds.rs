@@ -116,8 +116,11 @@ pub(crate) fn check_span(field: &'static str, seconds: f64) -> Result<(), BadVal
     Err(BadValue::out_of_range(field, number(seconds), rule))
 }
 
-/// Checks a number of frames per second.
-pub(crate) fn check_fps(fps: f64) -> Result<(), BadValue> {
+/// Whether there may be so many frames per second.
+///
+/// # Errors
+/// If it is out of range.
+pub fn check_fps(fps: f64) -> Result<(), BadValue> {
     let good = (1e-3..=1e4).contains(&fps);
     if good { Ok(()) } else { Err(BadValue::out_of_range("fps", number(fps), "lie between 0.001 and 10000")) }
 }

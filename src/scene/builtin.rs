@@ -49,6 +49,11 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
         "a mesh of 344,064 triangles above 10,000 spheres",
         include_str!("../../assets/scenes/ten-thousand-balls.ron"),
     ),
+    (
+        "carousel",
+        "an animation: a sphere orbits a turning ring, and the camera moves",
+        include_str!("../../assets/scenes/carousel.ron"),
+    ),
 ];
 
 /// The text of a built-in scene; `None` if there is no such scene.

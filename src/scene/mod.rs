@@ -57,7 +57,7 @@ mod write_error;
 
 pub use animation::{Animation, Moment, show_moment};
 pub use bad_value::BadValue;
-pub use bounds::{check_film_size, check_max_depth, check_stops};
+pub use bounds::{check_film_size, check_fps, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use camera::camera_part;
 pub use choice::ModelChoice;

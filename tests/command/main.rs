@@ -7,6 +7,7 @@ mod cli;
 mod cli_simplify;
 mod explain;
 mod faults;
+mod frames;
 mod pack;
 mod parts;
 mod report;

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 const SMALL: &str = "--size 40x33";
 
-fn run_in(folder: &Path, line: &str, variables: &[(&str, &str)]) -> Output {
+pub fn run_in(folder: &Path, line: &str, variables: &[(&str, &str)]) -> Output {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("firstlight"));
     command.current_dir(folder).args(line.split_whitespace()).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     for name in ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX", "FIRSTLIGHT_PART", "FIRSTLIGHT_PARTS"] {

@@ -109,6 +109,11 @@ impl Track {
 }
 
 impl Animation {
+    /// Whether anything changes in time.
+    pub fn moves(&self) -> bool {
+        !self.tracks.is_empty()
+    }
+
     /// Seconds from the first frame to the end.
     pub fn length(&self) -> f64 {
         let ends = self.tracks.iter().filter_map(|track| track.curve.keys.last().map(|&(time, _)| time));
