@@ -71,7 +71,7 @@ pub fn lines(text: &str) -> Vec<String> {
 
 /// Prints a part of a command's result.
 ///
-/// Whoever closed the pipe (`| head`) has read enough, which is no failure.
+/// A closed pipe (`| head`) is not an error.
 pub fn print(message: impl Message) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{}", message.text()).and_then(|()| out.flush()) {
@@ -92,7 +92,7 @@ pub fn print_bytes(bytes: &[u8]) -> io::Result<()> {
     }
 }
 
-/// Whether standard output is a terminal, which bytes of a picture would upset.
+/// Whether standard output is a terminal, which should not receive the bytes of an image.
 pub fn prints_to_terminal() -> bool {
     io::stdout().is_terminal()
 }

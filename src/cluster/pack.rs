@@ -2,7 +2,7 @@
 //! with checksums.
 //!
 //! Files keep their places relative to each other, so what names them is not changed: model files name their own libraries
-//! and images. Only a scene file that names files by absolute paths is written anew. The package of the same files has the
+//! and images. Only a scene file that names files by absolute paths is rewritten. The package of the same files has the
 //! same bytes.
 
 use crate::scene::file::SceneFile;

@@ -1,7 +1,7 @@
 //! LDR-FLIP: the perceived difference when flipping between two images.
 //!
 //! Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images". Two pipelines: colours are filtered
-//! with the contrast sensitivity of the eye and compared in a perceptual space; edges and points are compared by
+//! with the contrast sensitivity of human vision and compared in a perceptual space; edges and points are compared by
 //! position. Where features differ, the colour difference is amplified. All filters are sums of separable products.
 
 use glam::{Mat3, Vec3};

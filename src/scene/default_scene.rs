@@ -1,4 +1,4 @@
-//! A default scene for a model: ground, sky, key light, and a camera that frames it.
+//! A default scene for a model: ground, environment, key light, and a camera that frames it.
 
 use super::file::{CameraPart, DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
 use super::meshes::LoadedMesh;
@@ -57,7 +57,7 @@ fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> Objec
     }
 }
 
-/// Adds a sky and a key light to a scene.
+/// Adds an environment and a key light to a scene.
 pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
     let name = new_material(file, KEY_LIGHT, key_material());
     file.objects.push(key_light(name, bounds, DVec3::ONE));

@@ -1,6 +1,6 @@
 //! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file.
 //!
-//! What the file lacks is added as for other models ([`super::default_scene`]): a sky and a key light if it has no
+//! What the file lacks is added as for other models ([`super::default_scene`]): an environment and a key light if it has no
 //! light, a camera if it has none, and a ground if it has neither.
 
 use super::choice::ModelChoice;

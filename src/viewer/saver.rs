@@ -108,7 +108,7 @@ impl Saver {
         });
     }
 
-    /// Saves the film that will come as a linear picture with layers of what it shows.
+    /// Saves the film that will come as a linear image with layers of what it shows.
     pub fn save_layers(
         &mut self,
         film: Receiver<Film>,

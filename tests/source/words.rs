@@ -1,4 +1,4 @@
-//! Words that have a better one, in whatever users read: texts of the program and of the documentation.
+//! Words that have a better one, in whatever users read: texts of the program, doc comments, and the documentation.
 
 use crate::docs::page::{expect_none, files, read, without_code};
 use std::collections::BTreeSet;
@@ -132,6 +132,31 @@ fn help(source: &str) -> Vec<(usize, String)> {
     lines.filter_map(|(line, n)| Some((n, line.trim().strip_prefix("/// ")?.to_owned()))).collect()
 }
 
+/// Doc comments of public items and of modules, each with its line. Names of code, in backquotes, are left out later.
+fn doc_comments(source: &str) -> Vec<(usize, String)> {
+    let source = source.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    let mut found = Vec::new();
+    let mut pending: Vec<(usize, String)> = Vec::new();
+    for (line, n) in source.lines().zip(1..) {
+        let line = line.trim();
+        if let Some(text) = line.strip_prefix("//!") {
+            found.push((n, text.trim().to_owned()));
+        } else if let Some(text) = line.strip_prefix("///") {
+            pending.push((n, text.trim().to_owned()));
+        } else if !line.starts_with("#[") && !line.is_empty() {
+            // Fields and variants of public types have no `pub` of their own in enums: all that is not private is read.
+            let is_private = ["fn ", "struct ", "enum ", "const ", "static ", "type ", "trait ", "mod "]
+                .iter()
+                .any(|word| line.starts_with(word));
+            if !is_private {
+                found.append(&mut pending);
+            }
+            pending.clear();
+        }
+    }
+    found
+}
+
 /// A field, a scene or a part of a film by its name alone, or a whole scene.
 fn is_grammar(text: &str) -> bool {
     // Names that options had.
@@ -174,6 +199,39 @@ fn texts_of_the_program_are_in_words_of_the_field() {
         }
     }
     expect_none(problems);
+}
+
+#[test]
+fn doc_comments_are_in_words_of_the_field() {
+    let scenes = scene_names();
+    let mut problems = Vec::new();
+    for path in files("src", &[".rs"]).into_iter().chain(files("crates", &[".rs"])) {
+        let source = read(&path).text;
+        let mut in_code = false;
+        for (line, text) in doc_comments(&source) {
+            if text.starts_with("```") {
+                in_code = !in_code;
+                continue;
+            }
+            if in_code {
+                continue;
+            }
+            for (word, better) in retired_words(&text, &scenes) {
+                problems.push(format!("{path}:{line}: `{word}`: say {better}: {text}"));
+            }
+        }
+    }
+    expect_none(problems);
+}
+
+#[test]
+fn doc_comments_of_public_items_are_found() {
+    let source = "//! Of a module.\n\n/// Of a lamp.\n#[derive(Debug)]\npub struct A {\n    /// A field.\n    pub a: u32,\n}\n\n\
+                  /// Private.\nfn f() {}\n// No doc.\n/// A variant.\nB,\n";
+    let found = doc_comments(source);
+    let texts: Vec<&str> = found.iter().map(|(_, text)| text.as_str()).collect();
+    assert_eq!(texts, ["Of a module.", "Of a lamp.", "A field.", "A variant."]);
+    assert_eq!(found[1].0, 3);
 }
 
 #[test]

@@ -259,7 +259,7 @@ pub enum Material<P: Params = InSnapshot> {
         two_sided: bool,
     },
     /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
-    /// is constant: see [`Emission::of`].
+    /// is constant: see `Emission::of`.
     Blend {
         /// Share of `b`, 0..1.
         weight: P::Scalar,

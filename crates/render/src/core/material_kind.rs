@@ -2,26 +2,26 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The kinds of [`Material`].
+/// The kinds of [`Material`](super::material::Material).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaterialKind {
-    /// Emits light: [`Material::Emissive`].
+    /// Emits light: `Material::Emissive`.
     Emissive,
-    /// Lambertian reflection: [`Material::Diffuse`].
+    /// Lambertian reflection: `Material::Diffuse`.
     Diffuse,
-    /// Perfect mirror: [`Material::Mirror`].
+    /// Perfect mirror: `Material::Mirror`.
     Mirror,
-    /// Smooth dielectric: [`Material::Glass`].
+    /// Smooth dielectric: `Material::Glass`.
     Glass,
-    /// GGX microfacets that reflect and refract: [`Material::RoughGlass`].
+    /// GGX microfacets that reflect and refract: `Material::RoughGlass`.
     RoughGlass,
-    /// GGX microfacets: [`Material::Metal`].
+    /// GGX microfacets: `Material::Metal`.
     Metal,
-    /// The classic local model: [`Material::Phong`].
+    /// The classic local model: `Material::Phong`.
     Phong,
-    /// Layers of dielectric, metal, sheen and coat: [`Material::Principled`].
+    /// Layers of dielectric, metal, sheen and coat: `Material::Principled`.
     Principled,
-    /// Weighted sum of two materials: [`Material::Blend`].
+    /// Weighted sum of two materials: `Material::Blend`.
     Blend,
 }
 

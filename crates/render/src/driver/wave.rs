@@ -181,7 +181,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Returns the pass for the same image at another moment. It uses the guiding cache of this pass, which changes
-    /// sampling densities only.
+    /// sampling pdfs only.
     pub fn of_moment<'b>(&self, moment: &'b Prepared) -> Pass<'b>
     where
         'a: 'b,
