@@ -59,7 +59,7 @@ pub struct OpenArgs {
     /// Up axis of a model [default: detected from its shape].
     #[arg(long, value_enum)]
     pub up: Option<UpArg>,
-    /// Camera of a glTF model to look through, by name [default: the first].
+    /// Camera of a glTF model or of `cameras` in a scene file, by name [default: the first, or `camera`].
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Moment of the animation, in seconds [default: that of the scene file; the stored pose of a glTF model].
@@ -116,6 +116,8 @@ pub enum FilterArg {
     Box,
     Tent,
     Gaussian,
+    // As scene files spell it.
+    #[value(alias = "blackman_harris")]
     BlackmanHarris,
     Mitchell,
 }

@@ -34,7 +34,7 @@ pub enum LayerArg {
     Material,
     /// Variance of albedo, normal, depth and position, of those that are given.
     Variance,
-    /// Samples of each pixel.
+    /// Number of samples of each pixel.
     Samples,
     /// Estimated relative error of each pixel: 0.05 is 5 %.
     Error,

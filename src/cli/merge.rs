@@ -39,7 +39,7 @@ pub struct MergeArgs {
     /// Samples that the films must have together [default: from the first to the last that any film has].
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
     samples: Option<Range<u32>>,
-    /// Merge although samples are missing; the counts of what is there are kept.
+    /// Merge even if samples are missing; the film records which ones it has.
     #[arg(long)]
     allow_missing: bool,
     /// Merge only the I-th of N groups of the films, or auto for the task of an array job

@@ -103,9 +103,9 @@ enum CliCommand {
     /// Write a job that renders a scene in many parts, and submit it to Slurm, Kubernetes or a render farm.
     #[command(after_help = submit::EXAMPLES)]
     Submit(submit::SubmitArgs),
-    /// Show how far a job is.
+    /// Show the progress of a job.
     Status(status::StatusArgs),
-    /// Do what an engine is asked for in the folder of a job: a part, a merge.
+    /// Render or merge parts in the folder of a job; engines run this.
     Work(work::WorkArgs),
     /// Stress-test the renderer: count leaks, self-intersections, missed hits, wrong depths, non-finite samples and lost energy.
     Stability(stability::StabilityArgs),

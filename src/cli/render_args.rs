@@ -74,7 +74,7 @@ pub struct RenderArgs {
     pub error_image: Option<PathBuf>,
     #[command(flatten)]
     pub layers: LayerArgs,
-    /// Samples per pixel that albedo, normal, depth, position, object and material are made of [default: 16].
+    /// Samples per pixel of the layers albedo, normal, depth, position, object and material [default: 16].
     #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = between::<u32>(1, 65_536))]
     pub layer_samples: Option<u32>,
     /// Save the image denoised: raw and filtered combined, so that it converges to the raw image
@@ -127,9 +127,9 @@ pub struct RenderArgs {
     /// Stop when the estimated relative error of the image is at most this: 1% or 0.01.
     #[arg(help_heading = "When to stop", long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
     pub error: Option<f64>,
-    /// Take as many samples of every pixel [default: more where the error is larger, except with --samples]
+    /// Take the same number of samples in every pixel [default: more where the error is larger, except with --samples]
     ///
-    /// --spp is the mean over the image then.
+    /// Without this option --spp is the mean over the image.
     #[arg(help_heading = "Allocation of samples", long, conflicts_with = "error_metric")]
     pub uniform: bool,
     /// The error that the allocation of samples minimises [default: relmse].

@@ -43,8 +43,8 @@ pub struct ReportArgs {
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Output folder for the HTML page and the CSV table.
-    #[arg(long, value_name = "DIR", default_value = "report")]
-    out: PathBuf,
+    #[arg(short, long, alias = "out", value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
     /// Maximum samples per pixel [default: 256, unless --time is given].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, 1 << 20))]
     spp: Option<u32>,
@@ -80,10 +80,10 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
         )));
     }
     let given = args.reference.as_deref().map(Reference::read).transpose().map_err(Failure::Failed)?;
-    let folder = OutFolder::new(&args.out)?;
+    let folder = OutFolder::new(&args.output)?;
     let again = folder.clone();
     stop.undo(move || drop(again));
-    let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
+    let (html, table) = (args.output.join("index.html"), args.output.join("steps.csv"));
     let mut files = OverwriteArgs::default().files();
     files.read_all(args.reference.clone())?;
     files.write_all([html.clone(), table.clone()])?;

@@ -25,7 +25,7 @@ pub struct StabilityArgs {
     #[arg(long, conflicts_with_all = ["cases", "replay"])]
     list: bool,
     /// Trace one ray of a case in detail, as named by a finding; use the same --rays as the finding.
-    #[arg(long, requires = "cases", value_name = "STAGE:RAY", value_parser = parse_ray)]
+    #[arg(long, requires = "cases", value_name = "CASE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
     /// Number of worker threads [default: all cores]; the counts do not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
@@ -184,5 +184,5 @@ fn parse_rays(text: &str) -> Result<u64, String> {
 
 fn parse_ray(text: &str) -> Result<(usize, u64), String> {
     let parsed = text.split_once(':').and_then(|(stage, ray)| Some((stage.parse().ok()?, ray.parse().ok()?)));
-    parsed.ok_or_else(|| "expected STAGE:RAY as printed by a finding, such as 12:345".to_owned())
+    parsed.ok_or_else(|| "expected CASE:RAY as printed by a finding, such as 12:345".to_owned())
 }

@@ -92,7 +92,7 @@ struct LookArgs {
     /// Pixel reconstruction filter [default: from the scene].
     #[arg(long, value_enum)]
     filter: Option<FilterArg>,
-    /// Maximum path length in segments.
+    /// Maximum path length in segments; 1 shows only emitters.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_depth: Option<u32>,
     /// Exposure in stops, added to that of the scene.
