@@ -140,7 +140,16 @@ impl RenderJob {
     /// Shows a moment from now on, seconds. The image does not depend on the moments before.
     pub fn set_moment(&mut self, seconds: f64) -> Result<(), Failure> {
         show_moment(&mut self.world, seconds);
-        self.extraction = Extraction::new(&SceneInputs::of(&mut self.world), &self.scene.trees);
+        let inputs = SceneInputs::of(&mut self.world);
+        // Skins and morph targets have other meshes at each moment.
+        self.scene.trees.keep_used(&inputs);
+        for object in &inputs.objects {
+            self.scene
+                .trees
+                .add(&object.shape)
+                .map_err(|reason| Failure::Failed(format!("at {seconds} s: {reason}")))?;
+        }
+        self.extraction = Extraction::new(&inputs, &self.scene.trees);
         for problem in &self.extraction.problems {
             remark(format_args!("warning: at {seconds} s {problem}"));
         }

@@ -73,14 +73,15 @@ impl Sequence {
         [Some(&args.output), args.film.as_ref()].into_iter().flatten().flat_map(move |path| of(path))
     }
 
-    /// What the scene is to be opened with: a glTF file at the moment of the first frame, since it moves from there on.
+    /// What the scene is to be opened with: a glTF file at its first moment, whichever frames are rendered, so that all have
+    /// the same camera, ground and lights where the file has none.
     pub fn opened(&self, args: &RenderArgs) -> Result<RenderArgs, Failure> {
         let mut args = args.clone();
         if self.motion == Motion::Animation
             && let SceneSource::Model(path) = args.scene.source()?
             && ModelFormat::of(&path) == Some(ModelFormat::Gltf)
         {
-            args.scene.how.at = Some(f64::from(self.numbers.start) / args.fps.unwrap_or(DEFAULT_FPS));
+            args.scene.how.at = Some(0.0);
         }
         Ok(args)
     }

@@ -7,12 +7,14 @@ use super::choice::ModelChoice;
 use super::default_scene;
 use super::documents::{Documents, Opened};
 use super::error::{SceneError, suggestion};
-use super::file::{CameraPart, FilmPart, LightPart, Named, ObjectPart, SceneFile, TransformPart};
-use super::gltf::{BuiltMesh, GltfCamera, GltfFacts, GltfProblem, Lens, LightKind, Located, PlacedLight};
+use super::file::{CameraPart, FilmPart, LightPart, Named, ObjectPart, SceneFile};
+use super::gltf::{BuiltMesh, GltfFacts, GltfProblem, Located, PlacedLight};
+use super::gltf_motion::GltfMotion;
+use super::gltf_parts::{camera_of, corners_of, extend, is_placement, light_of, transform};
 use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
@@ -23,6 +25,8 @@ pub(super) struct Generated {
     pub file: SceneFile,
     pub facts: GltfFacts,
     pub warnings: Vec<String>,
+    /// Where a moment was asked for.
+    pub motion: Option<GltfMotion>,
 }
 
 /// Options of the scene.
@@ -75,6 +79,7 @@ impl Maker<'_> {
         self.documents.make(&wanted);
 
         let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
+        let mut shown = Vec::new();
         let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
@@ -100,7 +105,9 @@ impl Maker<'_> {
                 warnings.push(self.told(&format!("`{name}` is flattened or too far away, and is left out")));
                 continue;
             }
-            extend(&mut bounds, mesh, &placed.world);
+            let corners = corners_of(mesh);
+            extend(&mut bounds, corners, &placed.world);
+            shown.push((i, corners));
             let names: Vec<String> = (mesh.keys.iter())
                 .map(|key| {
                     let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
@@ -141,7 +148,7 @@ impl Maker<'_> {
 
         let center = 0.5 * (bounds.0 + bounds.1);
         let of_file = assembly.cameras.iter();
-        let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), Self::camera(camera, center))).collect();
+        let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), camera_of(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;
         let has_light = !assembly.lights.is_empty() || emits;
         let mut file = SceneFile {
@@ -169,7 +176,19 @@ impl Maker<'_> {
             default_scene::stand_on_ground(&mut file, bounds);
         }
         file.check().map_err(|error| SceneError::in_file(self.path, error.to_string()))?;
-        Ok(Generated { file, facts, warnings })
+        let motion = match facts.animation_length.filter(|_| choice.at.is_some()) {
+            None => None,
+            Some(length) => {
+                let moved = document.moved_nodes().map_err(wrong)?;
+                let (objects, boxes) = shown.into_iter().unzip();
+                let is_seen = |(i, light): (usize, &PlacedLight)| (light.light.intensity != Vec3::ZERO).then_some(i);
+                let lights = assembly.lights.iter().enumerate().filter_map(is_seen).collect();
+                let camera = chosen.and_then(|chosen| cameras.iter().position(|(_, part)| std::ptr::eq(part, chosen)));
+                let camera = camera.filter(|&camera| moved[assembly.cameras[camera].node as usize]);
+                Some(GltfMotion { opened: self.opened.clone(), objects, boxes, lights, camera, moved, length })
+            }
+        };
+        Ok(Generated { file, facts, warnings, motion })
     }
 
     fn told(&self, what: &str) -> String {
@@ -222,34 +241,10 @@ impl Maker<'_> {
         }
     }
 
-    fn camera(camera: &GltfCamera, center: DVec3) -> CameraPart {
-        /// Degrees.
-        const WIDEST: f64 = 179.0;
-        const NARROWEST: f64 = 0.01;
-        let depth = (center - camera.eye).dot(camera.forward);
-        let (vfov, orthographic_height) = match camera.lens {
-            Lens::Perspective(yfov) => (yfov, None),
-            // In perspective, with the same height at the distance of the scene's centre.
-            Lens::Orthographic(half) => (2.0 * (half / depth.max(half)).atan(), Some(2.0 * half)),
-        };
-        CameraPart {
-            look_at: None,
-            forward: Some(camera.forward),
-            pivot_distance: (depth > SceneFile::MIN_SIZE && depth < SceneFile::MAX_COORDINATE).then_some(depth),
-            up: camera.up,
-            vfov: vfov.to_degrees().clamp(NARROWEST, WIDEST),
-            orthographic_height,
-            ..CameraPart::looking_at(camera.eye, camera.eye + camera.forward)
-        }
-    }
-
     fn lights(&self, lights: &[PlacedLight], warnings: &mut Vec<String>) -> Vec<LightPart> {
         let mut parts = Vec::new();
         for (i, placed) in lights.iter().enumerate() {
             let name = Some(placed.name.clone().unwrap_or_else(|| format!("light {}", i + 1)));
-            let position = placed.world.translation;
-            let direction = placed.world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
-            let intensity = Rgb(placed.light.intensity);
             if placed.light.intensity == Vec3::ZERO {
                 continue;
             }
@@ -257,24 +252,7 @@ impl Maker<'_> {
                 let name = crate::printable::name(name.as_deref().unwrap_or_default()).into_owned();
                 warnings.push(self.told(&format!("the range of light `{name}` is not used: light goes on for ever")));
             }
-            parts.push(match placed.light.kind {
-                LightKind::Point => LightPart::Point { name, position, intensity, radius: 0.0 },
-                LightKind::Spot { inner, outer } => LightPart::Spot {
-                    name,
-                    position,
-                    direction,
-                    intensity,
-                    inner_angle: inner.to_degrees(),
-                    outer_angle: outer.to_degrees(),
-                    transform: TransformPart::default(),
-                },
-                LightKind::Directional => LightPart::Directional {
-                    name,
-                    direction,
-                    irradiance: intensity,
-                    transform: TransformPart::default(),
-                },
-            });
+            parts.push(light_of(placed, name));
         }
         parts
     }
@@ -287,35 +265,6 @@ fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
         Some(end) if at > end => Some(format!("the animations end at {end} s: at {at} s the model is as at their end")),
         Some(_) if at < 0.0 => Some(format!("the animations begin at 0 s: at {at} s the model is as at their start")),
         Some(_) => None,
-    }
-}
-
-/// Whether an object may have this transform.
-fn is_placement(world: &DAffine3) -> bool {
-    let determinant = world.matrix3.determinant().abs();
-    world.is_finite()
-        && world.translation.abs().max_element() <= SceneFile::MAX_COORDINATE
-        && (SceneFile::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
-}
-
-fn transform(world: &DAffine3) -> TransformPart {
-    if *world == DAffine3::IDENTITY {
-        return TransformPart::default();
-    }
-    let (m, t) = (world.matrix3.transpose(), world.translation);
-    let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
-    let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
-    TransformPart { matrix, ..TransformPart::default() }
-}
-
-/// Extends `bounds` by the corners of the mesh's box.
-fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
-    let around = mesh.mesh.bounds();
-    let (min, max) = (around.min.as_dvec3() + mesh.mesh.center, around.max.as_dvec3() + mesh.mesh.center);
-    for i in 0..8 {
-        let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
-        let corner = world.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
-        *bounds = (bounds.0.min(corner), bounds.1.max(corner));
     }
 }
 

@@ -96,6 +96,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mut scene = resolve(source, made.file, None, folder, options, &documents)?;
             scene.warnings.splice(0..0, made.warnings);
             scene.facts = Some(made.facts);
+            scene.motion = made.motion.map(Arc::new);
             scene
         }
         SceneSource::Model(path) => {

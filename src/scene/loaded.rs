@@ -4,6 +4,7 @@ use super::choice::ModelChoice;
 use super::components::Balls;
 use super::file::SceneFile;
 use super::gltf::GltfFacts;
+use super::gltf_motion::GltfMotion;
 use super::image_metadata::ImageMetadata;
 use super::meshes::LoadedMesh;
 use super::source::{SceneSource, UpAxis};
@@ -43,6 +44,8 @@ pub struct LoadedScene {
     pub choice: ModelChoice,
     /// The contents of a glTF file that was opened by itself.
     pub facts: Option<GltfFacts>,
+    /// What its animations move, if a moment was asked for.
+    pub(super) motion: Option<Arc<GltfMotion>>,
     /// The metadata of the image that was opened.
     pub shot: Option<ImageMetadata>,
     /// Time for reading and parsing.
@@ -67,6 +70,7 @@ impl LoadedScene {
             environment: None,
             choice: ModelChoice::DEFAULT,
             facts: None,
+            motion: None,
             shot: None,
             load_seconds: 0.0,
             build_seconds: 0.0,

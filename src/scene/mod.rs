@@ -21,6 +21,8 @@ pub mod file;
 mod fingerprint;
 pub mod gltf;
 mod gltf_mesh;
+mod gltf_motion;
+mod gltf_parts;
 mod gltf_scene;
 pub mod image_metadata;
 pub mod input_file;

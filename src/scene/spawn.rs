@@ -1,6 +1,6 @@
 //! From a loaded scene to entities.
 
-use super::animation::{Animation, Entities, Moment, of_part, place};
+use super::animation::{Animation, Entities, ModelMotion, Moment, of_part, place};
 use super::camera::{camera, unit};
 use super::components::{
     ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
@@ -12,7 +12,7 @@ use super::light::LightKind;
 use super::loaded::LoadedScene;
 use super::own_materials::without_lost_textures;
 use super::placement::Placement;
-use super::sources::{EnvironmentSource, TextureSource};
+use super::sources::{EnvironmentSource, MeshSource, TextureSource};
 use super::units::radians;
 use super::value::{ColorValue, ScalarValue};
 use super::view::View;
@@ -51,6 +51,7 @@ impl LoadedScene {
 
         let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
         let mut objects: HashMap<&str, Entity> = HashMap::new();
+        let mut meshes = Vec::new();
         for (i, object) in self.file.objects.iter().enumerate() {
             let slots = match (object.material(), &self.meshes[i]) {
                 _ if object.slot_materials().is_some() => {
@@ -75,6 +76,9 @@ impl LoadedScene {
                 entity.insert(Name::new(name.to_owned()));
                 objects.insert(name, entity.id());
             }
+            if let ObjectPart::Mesh { source: MeshSource::Gltf { .. }, .. } = object {
+                meshes.push(entity.id());
+            }
             if let ObjectPart::Mesh { source, shading, simplify, material, materials, .. } = object {
                 entity.insert(MeshOrigin {
                     source: source.clone(),
@@ -84,7 +88,7 @@ impl LoadedScene {
                 });
             }
         }
-        let mut entities = Entities { objects, materials, ..Entities::default() };
+        let mut entities = Entities { objects, materials, meshes, ..Entities::default() };
         for part in &self.file.lights {
             let (light, placement) = LightKind::from_part(part);
             let mut entity = world.spawn((placement, next()));
@@ -94,6 +98,7 @@ impl LoadedScene {
             let entity = entity.id();
             LightKind::put(Some(light), world, entity);
             entities.lights.extend(part.name().map(|name| (name, entity)));
+            entities.all_lights.push(entity);
         }
         let (view, projection, lens) = camera(&self.file.camera);
         world.spawn((view, projection, lens, Name::new("camera"), next()));
@@ -104,6 +109,15 @@ impl LoadedScene {
     /// Adds the animation of the file and sets the time that the file specifies.
     fn animate(&self, world: &mut World, entities: &Entities) {
         let part = &self.file.animation;
+        if let Some(motion) = &self.motion {
+            let (objects, lights) = (entities.meshes.clone(), entities.all_lights.clone());
+            let model = ModelMotion { motion: motion.clone(), objects, lights };
+            let animation = of_part(part, &self.file.camera, entities);
+            world.insert_resource(Animation { model: Some(model), ..animation });
+            // It is loaded at this moment.
+            world.insert_resource(Moment(self.choice.at.unwrap_or_default()));
+            return;
+        }
         if *part == AnimationPart::default() {
             world.remove_resource::<Animation>();
             world.insert_resource(Moment::default());

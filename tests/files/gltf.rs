@@ -5,7 +5,8 @@ use firstlight::mesh::Mesh;
 use firstlight::scene::file::{LightPart, MaterialPart, ObjectPart};
 use firstlight::scene::model::{ModelFormat, ModelOptions, load_model};
 use firstlight::scene::{
-    EnvironmentSource, LoadOptions, LoadedScene, ModelChoice, SceneInputs, SceneSource, Shape, load, save_scene,
+    Animation, EnvironmentSource, LoadOptions, LoadedScene, ModelChoice, SceneInputs, SceneSource, Shape, load,
+    save_scene, show_moment,
 };
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -362,6 +363,90 @@ fn poses_are_those_of_the_moment() {
     }
     let facts = open(&kept.1, &ModelChoice::default()).unwrap().facts.unwrap();
     assert_eq!((facts.animations, facts.animation_length), (vec!["all".to_owned()], Some(2.0)));
+}
+
+/// A world that goes from moment to moment is the one that is loaded at the last: nodes, the camera, lights, skins and
+/// morph targets. What does not move is left alone.
+#[test]
+fn a_scene_goes_through_its_animations_without_being_read_again() {
+    let mut writer = animated();
+    let moves = writer.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 2.0, 0.0]);
+    let turns = writer.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
+    let times = writer.floats("SCALAR", &[0.0, 2.0]);
+    writer.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }]);
+    writer.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": 5.0, "spot": { "outerConeAngle": 0.5 } },
+        { "type": "point", "intensity": 3.0 },
+    ] } });
+    let nodes = writer.json["nodes"].as_array_mut().unwrap();
+    nodes.extend([
+        json!({ "name": "carrier", "children": [5, 6, 7] }),
+        json!({ "name": "plain", "mesh": 0, "translation": [1, 0, 0] }),
+        json!({ "name": "eye", "camera": 0, "translation": [0, 0, 9] }),
+        json!({ "name": "spot", "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+        json!({ "name": "still", "mesh": 0, "translation": [7, 0, 0] }),
+        json!({ "name": "lamp", "extensions": { "KHR_lights_punctual": { "light": 1 } } }),
+    ]);
+    writer.json["scenes"] = json!([{ "nodes": [0, 1, 2, 4, 8, 9] }]);
+    let animation = &mut writer.json["animations"][0];
+    animation["samplers"]
+        .as_array_mut()
+        .unwrap()
+        .extend([json!({ "input": times, "output": moves }), json!({ "input": times, "output": turns })]);
+    animation["channels"].as_array_mut().unwrap().extend([
+        json!({ "sampler": 2, "target": { "node": 4, "path": "translation" } }),
+        json!({ "sampler": 3, "target": { "node": 4, "path": "rotation" } }),
+    ]);
+    let kept = keep("a.glb", &writer.glb());
+    let at = |seconds: f64| {
+        let scene = open(&kept.1, &ModelChoice { at: Some(seconds), ..ModelChoice::default() }).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        (world, scene)
+    };
+    let (mut world, scene) = at(0.0);
+    let still =
+        SceneInputs::of(&mut world).objects.iter().find(|it| it.name.as_deref() == Some("still")).unwrap().entity;
+    for seconds in [0.5, 1.75, 0.25, 9.0] {
+        world.clear_trackers();
+        show_moment(&mut world, seconds);
+        let touched = world.entity(still).get_ref::<firstlight::scene::Placement>().unwrap();
+        assert!(!bevy_ecs::change_detection::DetectChanges::is_changed(&touched));
+        let (mut direct, loaded) = at(seconds);
+        let (here, there) = (SceneInputs::of(&mut world), SceneInputs::of(&mut direct));
+        // Its pivot is the middle of the boxes, of which skins and morph targets have those of the first moment.
+        let seen = |inputs: &SceneInputs| {
+            inputs.camera.map(|it| (it.view.eye, it.view.forward, it.view.up, it.projection.vfov_deg)).unwrap()
+        };
+        assert_eq!(seen(&here), seen(&there));
+        let lights = |inputs: &SceneInputs| inputs.lights.iter().map(|it| (it.light, it.placement)).collect::<Vec<_>>();
+        assert_eq!(lights(&here), lights(&there), "{seconds}");
+        assert_eq!(here.objects.len(), 4);
+        for (a, b) in here.objects.iter().zip(&there.objects) {
+            let (Shape::Mesh(mesh), Shape::Mesh(other)) = (&a.shape, &b.shape) else { panic!() };
+            assert_eq!((a.placement, &mesh.positions, &mesh.normals), (b.placement, &other.positions, &other.normals));
+        }
+        // A scene file that is saved of it shows this moment.
+        let part = firstlight::scene::Description::of(&mut world, Some(&scene));
+        let expected = firstlight::scene::Description::of(&mut direct, Some(&loaded));
+        assert_eq!(part.file.objects, expected.file.objects);
+        assert_eq!(part.file.animation, Default::default());
+        // Without touching a world, all but the vertices.
+        let (mut base, _) = at(0.0);
+        let inputs = SceneInputs::of(&mut base);
+        let then = base.resource::<Animation>().inputs_at(&inputs, seconds);
+        assert_eq!((lights(&then), seen(&then)), (lights(&there), seen(&there)));
+        assert!(then.objects.iter().zip(&there.objects).all(|(a, b)| a.placement == b.placement));
+    }
+    let animation = world.resource::<Animation>();
+    assert_eq!((animation.length(), animation.n_frames()), (2.0, 48));
+    assert!(animation.is_moving_during(1.0..=1.1) && !animation.is_moving_during(2.0..=3.0));
+    // The stored pose is no moment.
+    let stored = open(&kept.1, &ModelChoice::default()).unwrap();
+    let mut world = bevy_ecs::world::World::new();
+    stored.spawn(&mut world);
+    assert!(world.get_resource::<Animation>().is_none());
 }
 
 #[test]

@@ -8,6 +8,7 @@
 
 mod described;
 mod key;
+mod model;
 mod moment;
 mod property;
 mod set;
@@ -15,6 +16,7 @@ mod written;
 
 pub(super) use described::Moved;
 pub use key::{Curve, Interpolation, Key, KeyValue};
+pub(super) use model::ModelMotion;
 pub use moment::{Moment, show_moment};
 pub(super) use moment::{place, rest_camera};
 pub use property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty, Quantity};
@@ -37,6 +39,8 @@ pub struct Animation {
     pub camera: CameraPart,
     /// At most one per property.
     pub tracks: Vec<Track>,
+    /// Animations of the glTF file that the scene was made from.
+    pub(in crate::scene) model: Option<ModelMotion>,
 }
 
 /// Exposure time, centred at the time of the image.
@@ -111,13 +115,14 @@ impl Track {
 impl Animation {
     /// Whether anything changes in time.
     pub fn moves(&self) -> bool {
-        !self.tracks.is_empty()
+        !self.tracks.is_empty() || self.model.is_some()
     }
 
     /// Seconds from the first frame to the end.
     pub fn length(&self) -> f64 {
         let ends = self.tracks.iter().filter_map(|track| track.curve.keys.last().map(|&(time, _)| time));
-        self.duration.unwrap_or_else(|| ends.fold(0.0, f64::max))
+        let model = self.model.as_ref().map_or(0.0, ModelMotion::length);
+        self.duration.unwrap_or_else(|| ends.fold(model, f64::max))
     }
 
     /// Time of a frame, seconds.
@@ -143,6 +148,7 @@ impl Animation {
 
     /// Whether anything may change within this range of seconds; never false if something does.
     pub fn is_moving_during(&self, seconds: RangeInclusive<f64>) -> bool {
-        self.tracks.iter().any(|track| track.curve.is_moving_during(&seconds))
+        let by_model = self.model.as_ref().is_some_and(|model| model.is_moving_during(&seconds));
+        by_model || self.tracks.iter().any(|track| track.curve.is_moving_during(&seconds))
     }
 }

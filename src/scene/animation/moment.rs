@@ -1,6 +1,7 @@
 //! The state of a scene at a given time.
 
-use super::{Animation, CameraProperty, Channel};
+use super::set::put;
+use super::{Animation, CameraProperty, Channel, ModelMotion};
 use crate::scene::camera::{camera, camera_part};
 use crate::scene::components::{Shape, SurfaceMaterial};
 use crate::scene::file::CameraPart;
@@ -8,8 +9,7 @@ use crate::scene::inputs::{CameraInput, SceneInputs};
 use crate::scene::light::LightKind;
 use crate::scene::placement::Placement;
 use crate::scene::view::{Lens, Projection, View};
-use bevy_ecs::component::Mutable;
-use bevy_ecs::prelude::{Component, Entity, Resource, World};
+use bevy_ecs::prelude::{Entity, Resource, World};
 use std::collections::HashMap;
 
 /// Current time of a world, seconds.
@@ -20,6 +20,9 @@ impl Animation {
     /// The inputs of a snapshot at a time; the result does not depend on the time that `inputs` are of.
     pub fn inputs_at(&self, inputs: &SceneInputs, seconds: f64) -> SceneInputs {
         let mut inputs = inputs.clone();
+        if let Some(model) = &self.model {
+            model.set_inputs(&mut inputs, seconds);
+        }
         let objects: HashMap<Entity, usize> = of_entities(inputs.objects.iter().map(|object| object.entity));
         let lights: HashMap<Entity, usize> = of_entities(inputs.lights.iter().map(|light| light.entity));
         let materials: HashMap<Entity, usize> = of_entities(inputs.materials.iter().map(|material| material.entity));
@@ -51,12 +54,16 @@ impl Animation {
     }
 
     fn moves_camera(&self) -> bool {
-        self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
+        self.model.as_ref().is_some_and(ModelMotion::moves_camera)
+            || self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
     }
 
     /// The camera at a time, as in a scene file.
     pub fn camera_at(&self, seconds: f64) -> CameraPart {
         let mut part = self.camera.clone();
+        if let Some(model) = self.model.as_ref().filter(|model| model.moves_camera()) {
+            part = model.camera_at(part, seconds);
+        }
         for track in &self.tracks {
             if let Channel::Camera(property) = track.channel {
                 property.set(&mut part, track.at(seconds));
@@ -79,6 +86,9 @@ pub fn show_moment(world: &mut World, seconds: f64) {
 /// Sets the time without first storing changes of the camera, as needed for a new scene.
 pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
     let Some(animation) = world.remove_resource::<Animation>() else { return };
+    if let Some(model) = &animation.model {
+        model.set_world(world, seconds);
+    }
     for track in &animation.tracks {
         let value = track.at(seconds);
         match track.channel {
@@ -152,13 +162,5 @@ pub(in crate::scene) fn rest_camera(
         None => {
             CameraPart { look_at: None, forward: Some(view.forward), pivot_distance: Some(view.pivot_distance), ..part }
         }
-    }
-}
-
-fn put<T: Component<Mutability = Mutable> + PartialEq>(world: &mut World, entity: Entity, value: T) {
-    if let Some(mut old) = world.get_mut::<T>(entity)
-        && *old != value
-    {
-        *old = value;
     }
 }

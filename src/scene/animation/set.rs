@@ -5,7 +5,18 @@ use crate::render::{self, Param, Params};
 use crate::scene::file::CameraPart;
 use crate::scene::light::LightKind;
 use crate::scene::placement::{Linear, Placement};
+use bevy_ecs::component::Mutable;
+use bevy_ecs::prelude::{Component, Entity, World};
 use glam::DVec3;
+
+/// Replaces a component by another value; one that is equal is not touched.
+pub(super) fn put<T: Component<Mutability = Mutable> + PartialEq>(world: &mut World, entity: Entity, value: T) {
+    if let Some(mut old) = world.get_mut::<T>(entity)
+        && *old != value
+    {
+        *old = value;
+    }
+}
 
 impl CameraProperty {
     /// Sets this field.

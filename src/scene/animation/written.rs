@@ -12,6 +12,10 @@ pub(in crate::scene) struct Entities<'a> {
     pub objects: HashMap<&'a str, Entity>,
     pub lights: HashMap<&'a str, Entity>,
     pub materials: HashMap<&'a str, Entity>,
+    /// Meshes of glTF files, in the order of the scene.
+    pub meshes: Vec<Entity>,
+    /// In the order of the scene.
+    pub all_lights: Vec<Entity>,
 }
 
 /// The tracks of a checked file; those whose name does not exist are omitted.
@@ -35,6 +39,7 @@ pub(in crate::scene) fn of_part(part: &AnimationPart, camera: &CameraPart, entit
         shutter: part.shutter_seconds.map_or(Shutter::Share(part.shutter.unwrap_or(0.0)), Shutter::Seconds),
         camera: camera.clone(),
         tracks: part.tracks.iter().filter_map(track).collect(),
+        model: None,
     }
 }
 
@@ -47,6 +52,10 @@ pub(in crate::scene) fn to_part(
     at: f64,
     mut name: impl FnMut(Channel) -> Option<String>,
 ) -> AnimationPart {
+    // What a glTF file moves cannot be written: a scene that is made from it shows a moment.
+    if animation.tracks.is_empty() && animation.model.is_some() {
+        return AnimationPart::default();
+    }
     let (shutter, shutter_seconds) = match animation.shutter {
         Shutter::Share(share) => ((share != 0.0).then_some(share), None),
         Shutter::Seconds(seconds) => (None, Some(seconds)),

@@ -44,7 +44,7 @@ enum Interpolation {
 
 impl Document {
     /// The time at which the last animation ends, seconds; `None` without animations.
-    pub(super) fn animation_length(&self) -> Option<f64> {
+    pub(in crate::scene) fn animation_length(&self) -> Option<f64> {
         let inputs = self.root.animations.iter().flat_map(|animation| &animation.samplers);
         let ends = inputs.filter_map(|sampler| self.floats::<1>(sampler.input).ok()?.last().copied());
         ends.map(|[end]| f64::from(end)).reduce(f64::max)
@@ -109,6 +109,26 @@ impl Document {
             }
         }
         Ok(pose)
+    }
+
+    /// Whether animations move each node, or one that it hangs from. Joints of skins are not looked at.
+    ///
+    /// # Errors
+    /// If an animation is invalid.
+    pub(in crate::scene) fn moved_nodes(&self) -> Result<Vec<bool>, Located> {
+        let pose = self.pose(Some(0.0))?;
+        let nodes = &self.root.nodes;
+        let mut moved: Vec<bool> = (0..nodes.len() as u32).map(|node| pose.of(node).is_some()).collect();
+        let mut todo: Vec<u32> = (0..nodes.len() as u32).filter(|&node| moved[node as usize]).collect();
+        while let Some(node) = todo.pop() {
+            for &child in &nodes[node as usize].children {
+                if let Some(moved) = moved.get_mut(child as usize).filter(|moved| !**moved) {
+                    *moved = true;
+                    todo.push(child);
+                }
+            }
+        }
+        Ok(moved)
     }
 
     fn three(&self, output: u32, times: &[f64], how: Interpolation, at: f64) -> Result<DVec3, Wrong> {

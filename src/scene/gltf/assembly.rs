@@ -23,6 +23,7 @@ pub(in crate::scene) struct PlacedMesh {
     pub name: Option<String>,
     pub key: MeshKey,
     pub world: DAffine3,
+    pub node: u32,
 }
 
 /// A light in the world; its axis is −z of its own coordinates.
@@ -32,6 +33,7 @@ pub(in crate::scene) struct PlacedLight {
     pub name: Option<String>,
     pub light: GltfLight,
     pub world: DAffine3,
+    pub node: u32,
 }
 
 /// The contents of the scene of a file.
@@ -76,7 +78,7 @@ impl Document {
             let named = |name: &Option<String>| name.clone().filter(|name| !name.is_empty());
             if let Some(light) = self.light_of(node)? {
                 let name = named(&json.name).or_else(|| light.name.clone());
-                found.lights.push(PlacedLight { name, light, world });
+                found.lights.push(PlacedLight { name, light, world, node });
             }
             let Some(mesh) = json.mesh else { continue };
             let name = named(&json.name).or_else(|| self.root.meshes.get(mesh as usize).and_then(|m| named(&m.name)));
@@ -91,7 +93,7 @@ impl Document {
                     let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
                     return Err((place("nodes", node), problem));
                 }
-                found.meshes.push(PlacedMesh { name: name.clone(), key, world: world * instance });
+                found.meshes.push(PlacedMesh { name: name.clone(), key, world: world * instance, node });
             }
         }
         Ok(found)

@@ -27,6 +27,8 @@ pub struct GltfCamera {
     pub up: DVec3,
     /// Its projection.
     pub lens: Lens,
+    /// Index of its node.
+    pub node: u32,
 }
 
 impl Document {
@@ -59,7 +61,7 @@ impl Document {
             let up = (up - up.dot(forward) * forward).normalize_or(forward.any_orthonormal_vector());
             let own = [&json.name, &camera.name].into_iter().flatten().find(|name| !name.is_empty()).cloned();
             let name = names.free(&own.unwrap_or_else(|| format!("camera {}", cameras.len() + 1)));
-            cameras.push(GltfCamera { name, eye: world.translation, forward, up, lens });
+            cameras.push(GltfCamera { name, eye: world.translation, forward, up, lens, node });
         }
         Ok(cameras)
     }
