@@ -41,7 +41,7 @@ pub fn check_scenes<'a>(scenes: impl Iterator<Item = &'a SceneArgs>) -> Result<(
         let source = scene.source()?;
         // Other problems are found when the file is read.
         if let Some(path) = source.path().filter(|path| !path.exists()) {
-            problems.push(format!("{}: no such file", path.display()));
+            problems.push(format!("{}: cannot be read: no such file", path.display()));
         }
     }
     if problems.is_empty() { Ok(()) } else { Err(Failure::Problems(problems)) }

@@ -24,6 +24,9 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("{}: the name of a scene file must end in .ron", args.output.display())));
     }
     let mut files = OverwriteArgs::default().files();
+    if let Some(path) = args.scene.source()?.path() {
+        files.read(path)?;
+    }
     files.write(&args.output)?;
     // It may have been written by hand.
     if !args.overwrite && !files.replaced().is_empty() {

@@ -108,7 +108,10 @@ fn all_missing_scenes_are_named_before_work_begins() {
         let output = run(path, line);
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{line}: {said}");
-        assert_eq!(said, "error: one.ron: no such file\nerror: two.obj: no such file\n", "{line}");
+        assert_eq!(
+            said, "error: one.ron: cannot be read: no such file\nerror: two.obj: cannot be read: no such file\n",
+            "{line}"
+        );
     }
     assert_eq!(std::fs::read_dir(path).unwrap().count(), 0, "nothing was rendered");
 }

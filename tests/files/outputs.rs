@@ -168,12 +168,12 @@ fn a_render_says_what_it_replaces() {
     let (_folder, path) = room();
     let line = "render room.ron -o a.png --spp 2";
     assert!(!does(&path, line).contains("replaced"));
-    assert!(does(&path, line).contains("replaced the existing file"));
+    assert!(does(&path, line).contains("replaced the existing a.png"));
     let out = run(&path, &format!("{line} --error-picture e.exr --json"));
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(json["replaced"], serde_json::json!(["a.png"]));
     let said = does(&path, &format!("{line} --error-picture e.exr"));
-    assert!(said.contains("replaced a.png, e.exr"), "{said}");
+    assert!(said.contains("replaced the existing a.png, e.exr"), "{said}");
     std::fs::write(path.join("turn-0002.png"), "old").unwrap();
     let said = does(&path, "render room.ron -o turn.png --spp 1 --turntable 3");
     assert!(said.contains("3 frames, replacing 1 existing file"), "{said}");
