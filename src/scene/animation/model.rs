@@ -75,7 +75,7 @@ impl ModelMotion {
         }
     }
 
-    /// Moves nodes, and makes the meshes of skins and morph targets anew.
+    /// Moves nodes, and makes the meshes of skins and morph targets again.
     pub(super) fn set_world(&self, world: &mut World, seconds: f64) {
         let Some(moment) = self.motion.at(seconds) else { return };
         for (i, placement) in moment.objects {
