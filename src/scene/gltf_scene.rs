@@ -258,12 +258,12 @@ impl Maker<'_> {
     }
 }
 
-/// A warning for a time, in seconds, outside of the animations of a model.
-fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
+/// Returns a warning for a time, in seconds, outside of the animations of a scene.
+pub(super) fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
     match length {
-        None => Some(format!("has no animations: at {at} s it is as it is stored")),
-        Some(end) if at > end => Some(format!("the animations end at {end} s: at {at} s the model is as at their end")),
-        Some(_) if at < 0.0 => Some(format!("the animations begin at 0 s: at {at} s the model is as at their start")),
+        None => Some(format!("has no animation: {at} s shows the stored pose")),
+        Some(end) if at > end => Some(format!("the animation ends at {end} s: {at} s shows its end")),
+        Some(_) if at < 0.0 => Some(format!("the animation begins at 0 s: {at} s shows its start")),
         Some(_) => None,
     }
 }

@@ -287,6 +287,12 @@ impl LoadedScene {
             Some(at) => {
                 let wrong = |bad| SceneError::in_file(self.source.title(), bad);
                 check_moment("--at", at).map_err(wrong)?;
+                let of_tracks = self.file.animation.tracks.iter().filter_map(|track| track.keys().last());
+                let end =
+                    self.file.animation.duration.unwrap_or_else(|| of_tracks.map(|key| key.0).fold(0.0, f64::max));
+                if let Some(ignored) = gltf_scene::beyond_animation(at.max(0.0), Some(end)) {
+                    self.warnings.push(format!("{}: {ignored}", self.source.title()));
+                }
                 self.file.animation.at = at;
             }
             None => {}

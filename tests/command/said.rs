@@ -125,6 +125,12 @@ fn options_without_effect_are_told() {
     assert_eq!(said, "warning: cornell: --up has no effect on a built-in scene\n");
     assert_eq!(does(path, "info tent.obj --up z").1, "");
     assert_eq!(does(path, "info cornell").1, "");
+    let moving = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)),
+        animation: (tracks: [camera(property: vfov, keys: [(0, 30), (2.5, 60)])]))";
+    std::fs::write(path.join("moving.ron"), moving).unwrap();
+    let (_, said) = does(path, "info moving.ron --at 99");
+    assert_eq!(said, "warning: moving.ron: the animation ends at 2.5 s: 99 s shows its end\n");
+    assert_eq!(does(path, "info moving.ron --at 2.5").1, "");
 }
 
 #[test]

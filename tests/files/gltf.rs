@@ -363,6 +363,16 @@ fn poses_are_those_of_the_moment() {
     }
     let facts = open(&kept.1, &ModelChoice::default()).unwrap().facts.unwrap();
     assert_eq!((facts.animations, facts.animation_length), (vec!["all".to_owned()], Some(2.0)));
+    // A time beyond them has no effect of its own, and that is told.
+    for (time, is_told) in [(9.0, true), (2.0, false), (0.5, false)] {
+        let choice = ModelChoice { at: Some(time), ..ModelChoice::default() };
+        let warnings = open(&kept.1, &choice).unwrap().warnings.join("; ");
+        assert_eq!(
+            warnings.contains(&format!("the animation ends at 2 s: {time} s shows its end")),
+            is_told,
+            "{warnings}"
+        );
+    }
 }
 
 /// A world that goes from moment to moment is the one that is loaded at the last: nodes, the camera, lights, skins and
