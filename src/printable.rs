@@ -2,7 +2,7 @@
 //!
 //! Names of materials and objects, paths, and lines of files of unknown origin may hold anything: escape sequences that
 //! rewrite what stands on a terminal, marks that turn the order of letters round, line ends that forge a message.
-//! Everything that the program says passes [`line()`], which the [`console`](crate::console) and the messages of a session
+//! Everything that the program says passes [`line()`], which the `console` and the messages of a session
 //! see to; [`name`] is for a name that is set in columns or in a list of its own.
 
 use std::borrow::Cow;
