@@ -297,7 +297,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
     if args.json {
         let seconds = (features_seconds, cpu_seconds);
-        print(json(&job, &report, seconds, (&film, is_dark), denoised_error, files.replaced(), stopped))?;
+        print(json(&job, &report, seconds, (&film, region, is_dark), denoised_error, files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output_name(), job.size);
         let seconds = report.seconds;
@@ -379,13 +379,20 @@ fn json(
     job: &RenderJob,
     report: &OfflineReport,
     (features_seconds, cpu_seconds): (f64, Option<f64>),
-    (film, is_dark): (&Film, bool),
+    (film, region, is_dark): (&Film, Option<&Region>, bool),
     denoised_error: Option<f64>,
     replaced: &[PathBuf],
     stopped: bool,
 ) -> serde_json::Value {
     let replaced: Vec<_> = replaced.iter().map(|path| path.to_string_lossy()).collect();
-    let error = film.error_estimate().filter(|_| !is_dark);
+    let error = film.error_estimate_in(region).filter(|_| !is_dark);
+    let of_region = region.map(|region| {
+        let size = region.end - region.start;
+        serde_json::json!({
+            "x": region.start.x, "y": region.start.y, "width": size.x, "height": size.y,
+            "spp": film.spp_in(Some(region)),
+        })
+    });
     let (least, mean, most) = film.sample_counts();
     let places = |samples: &[BadSample]| -> Vec<_> {
         samples.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect()
@@ -411,6 +418,8 @@ fn json(
             "shadow": report.rays.shadow,
         },
         "mrays_per_s": report.rays.total() as f64 / report.seconds.max(1e-9) * 1e-6,
+        // With a region, its own error.
+        "region": of_region,
         "estimated_error": error.map(|error| error.relative),
         "estimated_error_denoised": denoised_error,
         "estimated_error_95": error.map(|error| [error.low, error.high]),

@@ -78,6 +78,9 @@ fn a_region_is_told_with_its_own_samples_and_where_it_was_cut() {
     let (_, said) = does(path, &format!("{line} --region 32,0,40,20"));
     assert!(said.contains("8 samples per pixel in the region of 64 x 32 at 32,0, at least 1 elsewhere"), "{said}");
     assert!(!said.contains("warning"), "{said}");
+    let (told, _) = does(path, &format!("{line} --region 32,0,40,20 --json"));
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(told["region"], serde_json::json!({ "x": 32, "y": 0, "width": 64, "height": 32, "spp": 8 }));
     let (_, said) = does(path, &format!("{line} --region 80,50,40,20"));
     assert!(
         said.contains("warning: --region reaches beyond the image of 96 x 64 pixels: it is cut to 80,50,16,14"),
