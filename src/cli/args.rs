@@ -2,7 +2,7 @@
 
 use super::console::remark;
 use super::failure::Failure;
-use super::number::parse_seconds;
+use super::number::parse_seconds, parse_shutter;
 use clap::{Args, ValueEnum};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
@@ -65,6 +65,9 @@ pub struct OpenArgs {
     /// Moment of the animation, in seconds [default: that of the scene file; the stored pose of a glTF model].
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
     pub at: Option<f64>,
+    /// Exposure time as a share of the time of a frame, 0 to 1: what moves in it is blurred [default: that of the scene file]
+    #[arg(long, value_name = "SHARE", value_parser = parse_shutter, allow_negative_numbers = true)]
+    pub shutter: Option<f64>,
     /// Variant of a glTF model's materials, by name.
     #[arg(long, value_name = "NAME")]
     pub variant: Option<String>,
@@ -82,6 +85,7 @@ impl OpenArgs {
         ModelChoice {
             camera: self.camera.clone(),
             at: self.at,
+            shutter: self.shutter,
             variant: self.variant.clone(),
             allow_outside: self.allow_outside,
         }

@@ -54,7 +54,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let size = args.size.map_or(UVec2::new(width, height), UVec2::from);
     check_pixel(args.pixel, size)?;
     let inputs = SceneInputs::of(&mut world);
-    let extraction = Extraction::new(&inputs, &scene.trees);
+    let extraction = Extraction::of_world(&mut world, &inputs, &scene.trees);
     for problem in &extraction.problems {
         remark(format_args!("warning: {problem}"));
     }

@@ -125,6 +125,7 @@ fn open_words(how: &OpenArgs) -> Vec<String> {
         ("--up", up),
         ("--camera", how.camera.clone()),
         ("--at", how.at.map(|at| at.to_string())),
+        ("--shutter", how.shutter.map(|share| share.to_string())),
         ("--variant", how.variant.clone()),
     ];
     let given = options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?]));

@@ -96,7 +96,7 @@ impl Scene {
         inputs.camera.ok_or(Error::NoCamera)?.check()?;
         let mut trees = self.loaded.as_ref().map(|loaded| loaded.trees.clone()).unwrap_or_default();
         add_trees(&mut trees, &inputs);
-        let extraction = Extraction::new(&inputs, &trees);
+        let extraction = Extraction::of_world(&mut world, &inputs, &trees);
         let of_scene = world.get_resource::<Rendering>().map(|of_scene| of_scene.0).unwrap_or_default();
         let shot = self.loaded.as_ref().and_then(|loaded| loaded.shot.as_ref());
         let settings = options.settings(of_scene, shot.map(|shot| shot.allocation));

@@ -6,6 +6,7 @@ use super::worker::{ViewOptions, Worker};
 use crate::render::{Display, Integrator, Prepared, RenderSettings};
 use crate::scene::{ExtentCache, Extraction, LoadedScene, SceneInputs, Shape, Trees};
 use bevy_ecs::prelude::Resource;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -84,6 +85,8 @@ pub struct RenderState {
     pub inputs: SceneInputs,
     pub extraction: Option<Extraction>,
     pub trees: Trees,
+    /// The exposure interval in seconds, if anything moves in it.
+    pub(super) exposure: Option<RangeInclusive<f64>>,
     pub(super) extents: ExtentCache,
     pub(super) look: ViewOptions,
     pub(super) settings: RenderSettings,

@@ -12,8 +12,9 @@ use super::status::{MessageKind, Picture, Status};
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, MaterialSlots, Ordinal, Placement, PointLight,
-    Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees, View,
+    Animation, CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, MaterialSlots, Moment, Ordinal,
+    Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees,
+    View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
@@ -113,6 +114,7 @@ pub fn rebuild(
     mut touched: Touched,
     queries: SceneQueries,
     rendering: Option<Res<Rendering>>,
+    time: (Option<Res<Animation>>, Option<Res<Moment>>),
     beside: Res<BackgroundTasks>,
     renderer: Res<Renderer>,
     clock: Res<Clock>,
@@ -143,6 +145,9 @@ pub fn rebuild(
     if let Some(cause) = shown.adopted.take() {
         changes.add_scene(cause);
     }
+    let (animation, seconds) = (time.0.as_deref(), time.1.map_or(0.0, |moment| moment.0));
+    let exposure = animation.and_then(|animation| animation.open_shutter(seconds));
+    let other_exposure = shown.exposure != exposure;
     // Touched values are often equal to the previous ones; only differences count.
     let environment_changed = queries.environment() != shown.inputs.environment;
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
@@ -179,6 +184,9 @@ pub fn rebuild(
             }
             (Some(_), None) => false,
         };
+        if let Some(extraction) = extraction {
+            extraction.expose(animation, seconds, inputs, trees);
+        }
         if rebuilt {
             trees.keep_used(inputs);
             around.extent = extents.extent(inputs);
@@ -188,12 +196,22 @@ pub fn rebuild(
             }
         }
     }
+    if other_exposure {
+        shown.exposure = exposure;
+        if !changes.restarts() {
+            changes.add(Level::Restart, "shutter");
+        }
+    }
+    if other_exposure && let RenderState { inputs, extraction: Some(extraction), trees, .. } = &mut *shown {
+        extraction.expose(animation, seconds, inputs, trees);
+    }
     if std::mem::take(&mut shown.better_trees)
-        && let RenderState { extraction: Some(extraction), trees, generation, .. } = &mut *shown
+        && let RenderState { inputs, extraction: Some(extraction), trees, generation, .. } = &mut *shown
     {
         // The same hits, found faster: no sample is lost, and no restart is reported. After a restart it comes with the
         // job.
         extraction.take_trees(trees);
+        extraction.expose(animation, seconds, inputs, trees);
         if !changes.restarts() {
             renderer.0.set_prepared(*generation, extraction.prepared.clone());
         }

@@ -1,4 +1,4 @@
-//! Selection of the contents of a model file: camera, time and variant.
+//! Selection of the contents of a scene or model file: camera, time, exposure time and variant.
 
 /// Which camera, time and material variant of a glTF file to open, and which files it may read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -7,6 +7,8 @@ pub struct ModelChoice {
     pub camera: Option<String>,
     /// Time in the animations, seconds; `None`: the pose stored in the file.
     pub at: Option<f64>,
+    /// Exposure time as a fraction of the frame duration, 0..1; `None`: that of the scene.
+    pub shutter: Option<f64>,
     /// Name of the material variant; `None`: the default materials.
     pub variant: Option<String>,
     /// Whether the model may refer to files outside of its folder.
@@ -15,5 +17,5 @@ pub struct ModelChoice {
 
 impl ModelChoice {
     /// No selection.
-    pub const DEFAULT: Self = Self { camera: None, at: None, variant: None, allow_outside: false };
+    pub const DEFAULT: Self = Self { camera: None, at: None, shutter: None, variant: None, allow_outside: false };
 }

@@ -35,6 +35,7 @@ pub enum SnapshotPart {
 }
 
 /// A snapshot and the data needed to update parts of it.
+#[derive(Clone, Debug)]
 pub struct Extraction {
     /// Metres: the world-space position of the origin of the snapshot.
     pub origin: DVec3,

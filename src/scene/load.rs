@@ -1,6 +1,6 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
-use super::bounds::check_moment;
+use super::bounds::check_moment, check_shutter_share;
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::choice::ModelChoice;
 use super::components::{Balls, Shape};
@@ -129,6 +129,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     if scene.facts.is_none() {
         scene.choose(options.choice())?;
     }
+    scene.expose(options.choice())?;
     scene.load_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     scene.build_trees(options)?;
@@ -174,6 +175,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     if scene.facts.is_none() {
         scene.choose(options.choice())?;
     }
+    scene.expose(options.choice())?;
     scene.shot = Some(shot);
     Ok(scene)
 }
@@ -274,6 +276,19 @@ fn resolve(
 }
 
 impl LoadedScene {
+    /// Sets the chosen exposure time; warns if nothing can move.
+    fn expose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
+        let Some(share) = choice.shutter else { return Ok(()) };
+        check_shutter_share(share).map_err(|bad| SceneError::in_file(self.source.title(), bad))?;
+        let animation = &mut self.file.animation;
+        if !animation.tracks.is_empty() {
+            (animation.shutter, animation.shutter_seconds) = (Some(share), None);
+        } else if share > 0.0 {
+            self.warnings.push(format!("{} has no animation: the shutter has no effect", self.source.title()));
+        }
+        Ok(())
+    }
+
     /// Selects the chosen camera; warns about choices that only glTF models support.
     fn choose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
         if choice.variant.is_some() {

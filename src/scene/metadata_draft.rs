@@ -109,6 +109,7 @@ impl MetadataDraft {
             let is_own = |it: &LoadedScene| {
                 it.environment.is_some()
                     || it.choice.at.is_some()
+                    || it.choice.shutter.is_some()
                     || it.choice.variant.is_some()
                     || it.shot.as_ref().is_some_and(|shot| shot.text.is_some())
             };

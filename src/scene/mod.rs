@@ -36,6 +36,7 @@ mod meshes;
 mod metadata_draft;
 pub mod model;
 pub mod obj;
+mod open_shutter;
 mod orientation;
 mod outputs;
 mod own_materials;

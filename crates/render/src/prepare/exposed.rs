@@ -6,26 +6,10 @@
 //! over time.
 
 use crate::core::settings::RenderSettings;
-use crate::prepare::prepared::Prepared;
+use crate::prepare::prepared::{Moments, Prepared};
 use crate::sampling::{Sampler, hash_u32};
 
-/// A scene that moves while the shutter is open.
-pub trait Moments: Sync {
-    /// Returns the scene at a moment.
-    ///
-    /// Must be a pure function; the camera must pass [`Camera::check`](crate::core::camera::Camera::check).
-    ///
-    /// - `open`: the moment as a fraction of the shutter interval, in `[0, 1)`.
-    fn at(&self, open: f64) -> Prepared;
-}
-
-impl<F: Fn(f64) -> Prepared + Sync> Moments for F {
-    fn at(&self, open: f64) -> Prepared {
-        self(open)
-    }
-}
-
-/// A scene as the film sees it. A reference to a [`Prepared`] converts to a scene that stands still.
+/// A scene as the film sees it. A reference to a [`Prepared`] converts to it.
 #[derive(Clone, Copy)]
 pub struct Exposed<'a> {
     middle: &'a Prepared,
@@ -66,8 +50,9 @@ impl<'a> Exposed<'a> {
 }
 
 impl<'a> From<&'a Prepared> for Exposed<'a> {
+    /// It moves if [`Prepared::with_moments`] says so.
     fn from(scene: &'a Prepared) -> Self {
-        Self::still(scene)
+        Self { middle: scene, moments: scene.moments() }
     }
 }
 

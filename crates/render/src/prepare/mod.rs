@@ -20,5 +20,5 @@ pub(crate) mod plan_cache;
 pub(crate) mod prepared;
 pub(crate) mod surface_table;
 
-pub use exposed::{Exposed, Moments, moment_of_sample};
-pub use prepared::{Features, Prepared};
+pub use exposed::{Exposed, moment_of_sample};
+pub use prepared::{Features, Moments, Prepared};

@@ -17,6 +17,7 @@ use crate::prepare::surface_table::SurfaceTable;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch};
 use glam::Vec3;
+use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -27,6 +28,33 @@ pub struct Prepared {
     snapshot: Snapshot,
     pub(crate) surfaces: Arc<SurfaceTable>,
     pub(crate) tables: Arc<Tables>,
+    /// `None` if nothing moves while the shutter is open.
+    moments: Option<SharedMoments>,
+}
+
+/// A scene that moves while the shutter is open.
+pub trait Moments: Send + Sync {
+    /// Returns the scene at a moment.
+    ///
+    /// Must be a pure function; the camera must pass [`Camera::check`](crate::core::camera::Camera::check).
+    ///
+    /// - `open`: the moment as a fraction of the shutter interval, in `[0, 1)`.
+    fn at(&self, open: f64) -> Prepared;
+}
+
+impl<F: Fn(f64) -> Prepared + Send + Sync> Moments for F {
+    fn at(&self, open: f64) -> Prepared {
+        self(open)
+    }
+}
+
+#[derive(Clone)]
+struct SharedMoments(Arc<dyn Moments>);
+
+impl fmt::Debug for SharedMoments {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("moments")
+    }
 }
 
 impl Deref for Prepared {
@@ -87,28 +115,39 @@ impl Prepared {
     pub fn new(snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading));
-        Self { snapshot, surfaces, tables }
+        Self { snapshot, surfaces, tables, moments: None }
     }
 
     /// Returns the same objects with other materials and lights.
     pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
         let tables = Arc::new(Tables::build(&self.geometry, &shading));
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
-        Self { snapshot, tables, surfaces: self.surfaces.clone() }
+        Self { snapshot, tables, surfaces: self.surfaces.clone(), moments: None }
     }
 
     /// Returns the same scene with other trees of the same meshes: all hits are the same, and so are the tables.
     pub fn with_trees(&self, geometry: Arc<Geometry>) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&geometry.tree));
         let snapshot = Snapshot { geometry, ..self.snapshot.clone() };
-        Self { snapshot, surfaces, tables: self.tables.clone() }
+        Self { snapshot, surfaces, tables: self.tables.clone(), moments: None }
     }
 
     /// Returns the same scene with another camera.
     pub fn with_camera(&self, camera: Camera) -> Self {
-        let mut seen = self.clone();
+        let mut seen = self.with_moments(None);
         seen.snapshot.camera = camera;
         seen
+    }
+
+    /// The same scene, which moves while the shutter is open or, with `None`, stands still. All other changes of a
+    /// scene make it stand still.
+    pub fn with_moments(&self, moments: Option<Arc<dyn Moments>>) -> Self {
+        Self { moments: moments.map(SharedMoments), ..self.clone() }
+    }
+
+    /// How it moves while the shutter is open; `None` if it stands still.
+    pub fn moments(&self) -> Option<&dyn Moments> {
+        self.moments.as_ref().map(|moments| &*moments.0)
     }
 
     /// Features that the scene uses.
