@@ -2,7 +2,7 @@
 
 use super::console::remark;
 use super::failure::Failure;
-use super::number::parse_seconds, parse_shutter;
+use super::number::{parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};

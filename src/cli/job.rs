@@ -18,7 +18,7 @@ use firstlight::render::{
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     Animation, DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft,
-    Rendering, SceneInputs, SnapshotPart, show_moment,
+    Moment, Rendering, SceneInputs, SnapshotPart, show_moment,
 };
 use glam::UVec2;
 use std::path::Path;
@@ -52,7 +52,8 @@ impl RenderJob {
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
         let start = Instant::now();
-        let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+        let inputs = SceneInputs::of(&mut world);
+        let extraction = Extraction::of_world(&mut world, &inputs, &scene.trees);
         let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
         tracing::info!(
             "{}: loaded in {:.3} s, kd-trees built in {build_seconds:.3} s; {} threads, {:?}",
@@ -109,7 +110,10 @@ impl RenderJob {
             self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
         }
         let inputs = SceneInputs::of(&mut self.world);
-        self.extraction.update(SnapshotPart::Camera, &inputs, &self.scene.trees);
+        let Self { world, extraction, scene, .. } = self;
+        extraction.update(SnapshotPart::Camera, &inputs, &scene.trees);
+        let seconds = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+        extraction.expose(world.get_resource::<Animation>(), seconds, &inputs, &scene.trees);
         self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
     }
 
@@ -149,7 +153,7 @@ impl RenderJob {
                 .add(&object.shape)
                 .map_err(|reason| Failure::Failed(format!("at {seconds} s: {reason}")))?;
         }
-        self.extraction = Extraction::new(&inputs, &self.scene.trees);
+        self.extraction = Extraction::of_world(&mut self.world, &inputs, &self.scene.trees);
         for problem in &self.extraction.problems {
             remark(format_args!("warning: at {seconds} s {problem}"));
         }

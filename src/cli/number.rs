@@ -46,6 +46,8 @@ pub fn at_least_one(text: &str) -> Result<u32, String> {
 pub fn parse_fps(text: &str) -> Result<f64, String> {
     let fps = text.parse::<f64>().map_err(|_| "must be a number of frames per second".to_owned())?;
     check_fps(fps).map(|()| fps).map_err(|error| error.to_string())
+}
+
 /// Parses the share of the time of a frame during which the shutter is open.
 pub fn parse_shutter(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

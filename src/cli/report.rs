@@ -15,7 +15,8 @@ use firstlight::report::{
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
-    BUILTIN_SCENES, DisplaySettings, Extraction, Files, FilmSize, LoadedScene, Rendering, SceneInputs, Trees,
+    Animation, BUILTIN_SCENES, DisplaySettings, Extraction, Files, FilmSize, LoadedScene, Moment, Rendering,
+    SceneInputs, Trees,
 };
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -197,6 +198,8 @@ fn duration(seconds: f64) -> String {
 struct ReportScene {
     title: String,
     inputs: SceneInputs,
+    animation: Option<Animation>,
+    moment: Moment,
     trees: Trees,
     settings: RenderSettings,
     developing: DisplaySettings,
@@ -209,7 +212,7 @@ impl ReportScene {
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
         let inputs = SceneInputs::of(&mut world);
-        let extraction = Extraction::new(&inputs, &scene.trees);
+        let extraction = Extraction::of_world(&mut world, &inputs, &scene.trees);
         for problem in &extraction.problems {
             remark(format_args!("warning: {problem}"));
         }
@@ -233,6 +236,8 @@ impl ReportScene {
         Ok(Self {
             title: scene.source.title(),
             inputs,
+            animation: world.get_resource().cloned(),
+            moment: world.get_resource().copied().unwrap_or_default(),
             trees: scene.trees.clone(),
             settings,
             developing: *world.resource(),
@@ -313,7 +318,9 @@ impl ReportScene {
     /// A new snapshot each time: data that a rendering gathers about a scene and caches (such as the sources of
     /// caustics) must be gathered, and its time counted, for each curve.
     fn prepared(&self) -> Prepared {
-        Extraction::new(&self.inputs, &self.trees).prepared
+        let mut extraction = Extraction::new(&self.inputs, &self.trees);
+        extraction.expose(self.animation.as_ref(), self.moment.0, &self.inputs, &self.trees);
+        extraction.prepared
     }
 
     fn measure_curve(

@@ -1,6 +1,6 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
-use super::bounds::check_moment, check_shutter_share;
+use super::bounds::{check_moment, check_shutter_share};
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::choice::ModelChoice;
 use super::components::{Balls, Shape};
