@@ -44,7 +44,7 @@ fn preparation(n: u32) -> f64 {
     let object = Object { mesh: Some(mesh), ..Object::plain(0) };
     let grey = Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) };
     let shading = Arc::new(Shading::new(vec![grey], Vec::new(), Environment::Constant(Vec3::ONE)));
-    let moment = |open: f32| {
+    let moment = |open: f32, before: Option<&Prepared>| {
         let shape = |i: u32| {
             let place = Vec3::new((i % 100) as f32, 0.3 * open * (i % 7) as f32, (i / 100) as f32) * 2.0;
             let turn = Quat::from_rotation_y(open + i as f32);
@@ -52,13 +52,17 @@ fn preparation(n: u32) -> f64 {
         };
         let geometry = Geometry::build((0..n).map(shape).collect(), vec![object.clone(); n as usize]);
         let snapshot = Snapshot { geometry: Arc::new(geometry), shading: shading.clone(), camera: eye() };
-        Prepared::new(snapshot)
+        match before {
+            None => Prepared::new(snapshot),
+            Some(before) => before.with_snapshot(snapshot),
+        }
     };
+    let middle = moment(0.5, None);
     let rounds = 200_000 / n.max(100);
     let mut times = Vec::new();
     for _ in 0..ROUNDS {
         let before = cpu_seconds().expect("a system that tells CPU time");
-        (0..rounds).for_each(|i| drop(black_box(moment(i as f32 / rounds as f32))));
+        (0..rounds).for_each(|i| drop(black_box(moment(i as f32 / rounds as f32, Some(&middle)))));
         times.push((cpu_seconds().expect("a system that tells CPU time") - before) / f64::from(rounds));
     }
     median(&mut times)

@@ -64,10 +64,11 @@ enum MaterialKey {
 impl Extraction {
     /// Builds everything. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
-        Self::about(origin_for(&camera_of(inputs).view), inputs, trees)
+        Self::about(origin_for(&camera_of(inputs).view), inputs, trees, None)
     }
 
-    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees) -> Self {
+    /// - `before`: the same scene at another time, whose tables are shared as far as they are equal.
+    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees, before: Option<&Prepared>) -> Self {
         let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
@@ -118,15 +119,12 @@ impl Extraction {
         let geometry = Geometry::build(geometry.0, geometry.1);
         let shading = shading_of(inputs, &mut materials, origin);
         let camera = camera_in(&camera_of(inputs), origin);
-        Self {
-            origin,
-            prepared: Prepared::new(Snapshot::new(geometry, shading, camera)),
-            problems,
-            entities,
-            delta_lights,
-            ids: materials.ids,
-            order: materials.order,
-        }
+        let snapshot = Snapshot::new(geometry, shading, camera);
+        let prepared = match before {
+            None => Prepared::new(snapshot),
+            Some(before) => before.with_snapshot(snapshot),
+        };
+        Self { origin, prepared, problems, entities, delta_lights, ids: materials.ids, order: materials.order }
     }
 
     /// The entity of each material of the snapshot: the material itself, or the light that emits; `None` for the
@@ -185,7 +183,7 @@ impl Extraction {
     pub fn at(&self, animation: &Animation, inputs: &SceneInputs, trees: &Trees, seconds: f64) -> Prepared {
         let then = animation.inputs_at(inputs, seconds);
         if then.objects != inputs.objects || !same_shapes(&then.lights, &inputs.lights) {
-            return Self::about(self.origin, &then, trees).prepared;
+            return Self::about(self.origin, &then, trees, Some(&self.prepared)).prepared;
         }
         let mut prepared = self.prepared.clone();
         if then.lights != inputs.lights || then.materials != inputs.materials {

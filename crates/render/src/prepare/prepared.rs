@@ -81,7 +81,7 @@ pub(crate) struct Tables {
     pub(crate) lights: LightTable,
     pub(crate) bodies: Bodies,
     pub(crate) contacts: Contacts,
-    pub(crate) environment_sampler: Option<EnvironmentSampler>,
+    pub(crate) environment_sampler: Option<Arc<EnvironmentSampler>>,
     pub(crate) materials: MaterialTable,
     pub(crate) classic: ClassicTable,
     /// Specular casters, if there are any.
@@ -114,15 +114,22 @@ impl Prepared {
     /// Builds all tables of a snapshot; the time grows with its objects, lights and textures.
     pub fn new(snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
-        let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading));
+        let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, None));
         Self { snapshot, surfaces, tables, moments: None }
     }
 
     /// Returns the same objects with other materials and lights.
     pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
-        let tables = Arc::new(Tables::build(&self.geometry, &shading));
+        let tables = Arc::new(Tables::build(&self.geometry, &shading, Some(self)));
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
         Self { snapshot, tables, surfaces: self.surfaces.clone(), moments: None }
+    }
+
+    /// Returns the tables for another snapshot; those of the environment are shared if it is the same.
+    pub fn with_snapshot(&self, snapshot: Snapshot) -> Self {
+        let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
+        let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, Some(self)));
+        Self { snapshot, surfaces, tables, moments: None }
     }
 
     /// Returns the same scene with other trees of the same meshes: all hits are the same, and so are the tables.
@@ -200,11 +207,16 @@ impl Prepared {
 }
 
 impl Tables {
-    fn build(geometry: &Geometry, shading: &Shading) -> Self {
+    /// - `before`: a scene that may have the same environment, whose tables are then shared.
+    fn build(geometry: &Geometry, shading: &Shading, before: Option<&Prepared>) -> Self {
         let Shading { materials, textures, environment, air, delta_lights } = shading;
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, textures, delta_lights);
-        let environment_sampler = EnvironmentSampler::build(environment);
+        let before = before.filter(|before| is_same(&before.shading.environment, environment));
+        let (ambient, environment_sampler) = match before.map(|before| &before.tables) {
+            Some(tables) => (tables.ambient.clone(), tables.environment_sampler.clone()),
+            None => (AmbientLight::of(environment), EnvironmentSampler::build(environment).map(Arc::new)),
+        };
         let bodies = Bodies::build(geometry, materials);
         let contacts = Contacts::build(geometry, materials);
         let mut casters = CasterTable::build(geometry, materials, &lights);
@@ -221,7 +233,7 @@ impl Tables {
             cutouts: materials.iter().any(Material::is_cutout),
         };
         Self {
-            ambient: AmbientLight::of(environment),
+            ambient,
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             cutouts: materials.iter().map(Material::is_cutout).collect(),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
@@ -238,5 +250,21 @@ impl Tables {
             casters,
             features,
         }
+    }
+}
+
+/// Whether two environments are equal; images only if they are shared.
+fn is_same(a: &Environment, b: &Environment) -> bool {
+    match (a, b) {
+        (Environment::Black, Environment::Black) => true,
+        (Environment::Constant(a), Environment::Constant(b)) => a == b,
+        (
+            Environment::Gradient { zenith, horizon, ground },
+            Environment::Gradient { zenith: z, horizon: h, ground: g },
+        ) => (zenith, horizon, ground) == (z, h, g),
+        (Environment::Image { image, scale, rotation }, Environment::Image { image: other, scale: s, rotation: r }) => {
+            Arc::ptr_eq(image, other) && (scale, rotation) == (s, r)
+        }
+        _ => false,
     }
 }
