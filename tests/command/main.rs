@@ -8,6 +8,7 @@ mod cli_simplify;
 mod explain;
 mod faults;
 mod frames;
+mod motion_blur;
 mod pack;
 mod parts;
 mod report;

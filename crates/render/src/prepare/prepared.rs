@@ -19,6 +19,7 @@ use firstlight_kdtree::{Hit, HitBatch, RayBatch};
 use glam::Vec3;
 use std::fmt;
 use std::ops::Deref;
+use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 
 /// A scene ready for rendering: a [`Snapshot`], to which it dereferences, and its tables, which are shared like its
@@ -50,6 +51,10 @@ impl<F: Fn(f64) -> Prepared + Send + Sync> Moments for F {
 
 #[derive(Clone)]
 struct SharedMoments(Arc<dyn Moments>);
+
+// Moments are pure functions: a panic leaves nothing half done.
+impl UnwindSafe for SharedMoments {}
+impl RefUnwindSafe for SharedMoments {}
 
 impl fmt::Debug for SharedMoments {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
