@@ -281,10 +281,14 @@ impl LoadedScene {
         let Some(share) = choice.shutter else { return Ok(()) };
         check_shutter_share(share).map_err(|bad| SceneError::in_file(self.source.title(), bad))?;
         let animation = &mut self.file.animation;
-        if !animation.tracks.is_empty() {
+        if !animation.tracks.is_empty() || self.motion.is_some() {
             (animation.shutter, animation.shutter_seconds) = (Some(share), None);
         } else if share > 0.0 {
-            self.warnings.push(format!("{} has no animation: the shutter has no effect", self.source.title()));
+            let reason = match &self.facts {
+                Some(facts) if facts.animation_length.is_some() => "shows its stored pose without --at",
+                _ => "has no animation",
+            };
+            self.warnings.push(format!("{} {reason}: the shutter has no effect", self.source.title()));
         }
         Ok(())
     }

@@ -53,7 +53,7 @@ pub(in crate::scene) fn to_part(
     mut name: impl FnMut(Channel) -> Option<String>,
 ) -> AnimationPart {
     // What a glTF file moves cannot be written: a scene that is made from it shows a moment.
-    if animation.tracks.is_empty() && animation.model.is_some() {
+    if animation.tracks.is_empty() && animation.model.is_some() && animation.shutter == Shutter::default() {
         return AnimationPart::default();
     }
     let (shutter, shutter_seconds) = match animation.shutter {
