@@ -5,8 +5,10 @@ use firstlight::frame::{
 };
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::render::Film;
+use firstlight::scene::animation::Shutter;
 use firstlight::scene::{
-    Extraction, LoadOptions, Material, Rendering, SceneInputs, SceneSource, Shape, SurfaceMaterial, UpAxis, View, load,
+    Animation, Extraction, LoadOptions, Material, Rendering, SceneInputs, SceneSource, Shape, SurfaceMaterial, UpAxis,
+    View, load,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -415,4 +417,44 @@ fn a_million_metres_away_is_the_same_picture() {
     let (here, there) = (means("here.ron", 0.0), means("there.ron", 2.0_f64.powi(22)));
     assert_eq!((here.0.x, there.0.x), (0.0, 2.0_f64.powi(22)), "the origin goes along");
     assert_eq!(here.1, there.1);
+}
+
+#[test]
+fn a_scene_with_a_shutter_is_blurred_as_on_the_command_line_and_restarts_when_the_shutter_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("moving.ron");
+    let text = r#"(
+        camera: (eye: (0, 0.5, 5), look_at: (0, 0.5, 0)),
+        environment: constant(1),
+        materials: {"m": diffuse(albedo: 0.2)},
+        objects: [sphere(name: "s", center: (0, 0.5, 0), radius: 0.5, material: "m")],
+        animation: (at: 0.5, fps: 1, shutter: 1, tracks: [
+            object(name: "s", property: translate, keys: [(0, (-1, 0.5, 0)), (1, (1, 0.5, 0))]),
+        ]),
+    )"#;
+    std::fs::write(&path, text).unwrap();
+    let source = SceneSource::Scene(path);
+    let film_of = |shutter| {
+        let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        world.resource_mut::<Animation>().shutter = shutter;
+        let inputs = SceneInputs::of(&mut world);
+        let extraction = Extraction::of_world(&mut world, &inputs, &scene.trees);
+        let mut film = Film::new(40, 30);
+        let settings = world.resource::<Rendering>().0;
+        render_offline(&extraction.prepared, &settings, &mut film, spp(8), |_| true);
+        film.means()
+    };
+    let mut driver = Driver::new(40, 30, spp(8));
+    driver.session.open(source.clone());
+    driver.run_until(|session| session.status().done && session.is_idle());
+    let blurred = film_of(Shutter::Share(1.0));
+    assert!(driver.session.film_snapshot().unwrap().means() == blurred);
+
+    let generation = driver.session.picture().generation;
+    driver.session.world_mut().resource_mut::<Animation>().shutter = Shutter::Share(0.0);
+    driver.run_until(|session| session.picture().generation > generation && session.status().done && session.is_idle());
+    let sharp = film_of(Shutter::Share(0.0));
+    assert!(driver.session.film_snapshot().unwrap().means() == sharp && sharp != blurred);
 }
