@@ -91,26 +91,48 @@ impl Texels {
     /// Pixel `i`, linear, with alpha.
     #[inline]
     pub fn texel(&self, i: usize, encoding: Encoding) -> Vec4 {
+        let [texel] = self.texels([i], encoding);
+        texel
+    }
+
+    /// Several pixels, likewise.
+    #[inline]
+    pub(crate) fn texels<const N: usize>(&self, places: [usize; N], encoding: Encoding) -> [Vec4; N] {
         match self {
             Self::U8 { channels, data } => {
-                let curve = match encoding {
-                    Encoding::Auto => srgb_bytes(),
-                    Encoding::Linear => linear_bytes(),
-                };
-                let pixel = &data[i * channels..][..*channels];
-                widened(pixel, |value| curve[usize::from(value)], |alpha| linear_bytes()[usize::from(alpha)])
+                let alphas = linear_bytes();
+                let curve = if encoding == Encoding::Auto { srgb_bytes() } else { alphas };
+                let (color, alpha) = (|value: u8| curve[usize::from(value)], |value: u8| alphas[usize::from(value)]);
+                places.map(|i| widened(pixel(data, *channels, i), color, alpha))
             }
             Self::U16 { channels, data } => {
                 let share = |value: u16| f32::from(value) / 65535.0;
-                let pixel = &data[i * channels..][..*channels];
                 match encoding {
-                    Encoding::Auto => widened(pixel, |value| srgb_words()[usize::from(value)], share),
-                    Encoding::Linear => widened(pixel, share, share),
+                    Encoding::Auto => {
+                        let curve = srgb_words();
+                        places.map(|i| widened(pixel(data, *channels, i), |value| curve[usize::from(value)], share))
+                    }
+                    Encoding::Linear => places.map(|i| widened(pixel(data, *channels, i), share, share)),
                 }
             }
-            Self::F32(data) => data[i].extend(1.0),
+            Self::F32(data) => places.map(|i| data[i].extend(1.0)),
         }
     }
+
+    /// Bits of the first channel of pixel `i`.
+    #[inline(always)]
+    pub(crate) fn bits(&self, i: usize) -> u32 {
+        match self {
+            Self::U8 { channels, data } => data[i * channels].into(),
+            Self::U16 { channels, data } => data[i * channels].into(),
+            Self::F32(data) => data[i].x.to_bits(),
+        }
+    }
+}
+
+#[inline(always)]
+fn pixel<T>(data: &[T], channels: usize, i: usize) -> &[T] {
+    &data[i * channels..][..channels]
 }
 
 /// Expands to RGBA: grey is used for all three colours; alpha is 1 if there is none.

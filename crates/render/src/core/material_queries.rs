@@ -108,6 +108,14 @@ impl Material {
         self.any_texture(materials, &mut |id| textures[id as usize].asks_for_more_than_uv())
     }
 
+    /// Calls `visit` with each texture of it and of its parts; one that it uses twice comes twice.
+    pub(crate) fn for_each_texture(&self, materials: &[Self], mut visit: impl FnMut(TextureId)) {
+        self.any_texture(materials, &mut |id| {
+            visit(id);
+            false
+        });
+    }
+
     fn any_texture(&self, materials: &[Self], is_so: &mut impl FnMut(TextureId) -> bool) -> bool {
         self.params().into_iter().any(|(_, param)| match param {
             Param::Reflectance(ColorInput::Texture(id))

@@ -124,7 +124,11 @@ impl Texture {
     /// Evaluates the colour at a point.
     #[inline]
     pub fn eval(&self, point: impl Into<TexturePoint>) -> Vec3 {
-        let point = point.into();
+        self.chosen(self.texel(&point.into())) * self.tint
+    }
+
+    /// What the texture shows at a place, before a channel is chosen and tinted.
+    pub(crate) fn texel(&self, point: &TexturePoint) -> Vec4 {
         let uv = point.uv[usize::from(self.uv_set.min(1))];
         let p = Vec2::from(self.pattern_coordinates(uv.to_array()));
         let mut texel = match &self.pattern {
@@ -142,7 +146,37 @@ impl Texture {
         if self.vertex_colors {
             texel *= point.color;
         }
-        self.chosen(texel) * self.tint
+        texel
+    }
+
+    /// Reads a part of each row of texels that [`Self::texel`] reads, so that they are in the cache afterwards. The
+    /// result has no meaning.
+    #[inline]
+    pub(crate) fn touch(&self, point: &TexturePoint) -> u32 {
+        let TexturePattern::Image { image, wrap, .. } = &self.pattern else { return 0 };
+        let uv = point.uv[usize::from(self.uv_set.min(1))];
+        let ([above, _, below, _], _) = image.places(self.pattern_coordinates(uv.to_array()).into(), *wrap);
+        image.texels.bits(above) ^ image.texels.bits(below)
+    }
+
+    /// Bytes of its image in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        if let TexturePattern::Image { image, .. } = &self.pattern { image.bytes() } else { 0 }
+    }
+
+    /// Whether [`Self::texel`] is the same for both at every point.
+    #[inline]
+    pub(crate) fn has_texels_of(&self, other: &Self) -> bool {
+        use TexturePattern::Image;
+        let is_same_pattern = match (&self.pattern, &other.pattern) {
+            (
+                Image { image: a, encoding, wrap, smooth },
+                Image { image: b, encoding: other_encoding, wrap: other_wrap, smooth: other_smooth },
+            ) => Arc::ptr_eq(a, b) && (encoding, wrap, smooth) == (other_encoding, other_wrap, other_smooth),
+            _ => false,
+        };
+        let point = |texture: &Self| (texture.uv_set, texture.uv_matrix, texture.uv_offset, texture.vertex_colors);
+        is_same_pattern && point(self) == point(other)
     }
 
     /// Whether the colours are those of the pattern at the first surface coordinates.
@@ -155,7 +189,8 @@ impl Texture {
         self.uv_set != 0 || self.vertex_colors
     }
 
-    fn chosen(&self, texel: Vec4) -> Vec3 {
+    #[inline]
+    pub(crate) fn chosen(&self, texel: Vec4) -> Vec3 {
         match self.channel {
             None => texel.truncate(),
             Some(Channel::R) => Vec3::splat(texel.x),
@@ -195,31 +230,50 @@ pub(crate) fn is_even_square<R: Elementary>([x, y]: [R; 2]) -> R::Mask {
 }
 
 impl ImageTexture {
-    fn texel(&self, x: i64, y: i64, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
-        let x = wrap[0].apply(x, i64::from(self.width));
-        let y = wrap[1].apply(y, i64::from(self.height));
-        self.texels.texel((y * i64::from(self.width) + x) as usize, encoding)
-    }
-
     fn nearest(&self, uv: Vec2, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
-        let (x, y) = (uv.x * self.width as f32, (1.0 - uv.y) * self.height as f32);
-        self.texel(x.floor() as i64, y.floor() as i64, wrap, encoding)
+        let (x, y) = (floor(uv.x * self.width as f32), floor((1.0 - uv.y) * self.height as f32));
+        let [column, row] = [wrap[0].apply(x, self.width), wrap[1].apply(y, self.height)];
+        let [texel] = self.texels.texels([row * self.width as usize + column], encoding);
+        texel
     }
 
     fn bilinear(&self, uv: Vec2, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
+        let (places, [fx, fy]) = self.places(uv, wrap);
+        let [a, b, c, d] = self.texels.texels(places, encoding);
+        a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
+    }
+
+    /// The four texels around a place, two per row, and how far it is from the first along both axes, 0..=1.
+    #[inline(always)]
+    fn places(&self, uv: Vec2, wrap: [Wrap; 2]) -> ([usize; 4], [f32; 2]) {
         let (x, y) = (uv.x * self.width as f32 - 0.5, (1.0 - uv.y) * self.height as f32 - 0.5);
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let (x, y) = (x.floor() as i64, y.floor() as i64);
-        let row = |y| self.texel(x, y, wrap, encoding).lerp(self.texel(x + 1, y, wrap, encoding), fx);
-        row(y).lerp(row(y + 1), fy)
+        let (left, top) = (floor(x), floor(y));
+        let columns = [left, left.saturating_add(1)].map(|x| wrap[0].apply(x, self.width));
+        let rows = [top, top.saturating_add(1)].map(|y| wrap[1].apply(y, self.height) * self.width as usize);
+        let places = [rows[0] + columns[0], rows[0] + columns[1], rows[1] + columns[0], rows[1] + columns[1]];
+        // Limited for places beyond all integers and for those that are no number.
+        (places, [x - left as f32, y - top as f32].map(|part| if part > 0.0 { part.min(1.0) } else { 0.0 }))
     }
 }
 
+/// The next integer below, at the ends of its range for what lies outside of it. Without SSE 4.1, [`f32::floor`] is a call.
+#[inline(always)]
+fn floor(x: f32) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero.saturating_sub(i64::from(x < towards_zero as f32))
+}
+
 impl Wrap {
-    fn apply(self, i: i64, n: i64) -> i64 {
+    /// The texel at place `i` of a row or column of `n`.
+    #[inline(always)]
+    fn apply(self, i: i64, n: u32) -> usize {
+        // Most lookups are inside of the image, and a division is slow.
+        if (i as u64) < u64::from(n) { i as usize } else { self.outside(i, i64::from(n)) as usize }
+    }
+
+    #[inline(never)]
+    fn outside(self, i: i64, n: i64) -> i64 {
         match self {
-            // Most lookups are inside of the image, and a division is slow.
-            _ if (0..n).contains(&i) => i,
             Self::Repeat => i.rem_euclid(n),
             Self::Clamp => i.clamp(0, n - 1),
             Self::Mirror => {
@@ -279,5 +333,58 @@ mod tests {
         let tinted = Texture { tint: Vec3::new(0.5, 1.0, 2.0), vertex_colors: true, ..texture };
         assert_eq!(tinted.eval(point), Vec3::new(0.25, 0.2, 0.0));
         assert_eq!(tinted.mean(), Vec3::new(0.5, 0.2, 0.0));
+    }
+
+    #[test]
+    fn lookups_are_those_of_single_texels() {
+        let bytes =
+            |channels: usize| Texels::U8 { channels, data: (0..15 * channels).map(|i| (i * 37) as u8).collect() };
+        let words = Texels::U16 { channels: 3, data: (0..45).map(|i| (i * 1499) as u16).collect() };
+        let floats = Texels::F32((0..15).map(|i| Vec3::new(i as f32, 0.5, 2.0 * i as f32)).collect());
+        for texels in [bytes(1), bytes(2), bytes(3), bytes(4), words, floats] {
+            let image = Arc::new(ImageTexture { width: 5, height: 3, texels });
+            for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].map(|u| [u, Wrap::Mirror]) {
+                for (encoding, smooth) in [(Encoding::Auto, true), (Encoding::Linear, true), (Encoding::Auto, false)] {
+                    let pattern = TexturePattern::Image { image: image.clone(), encoding, wrap, smooth };
+                    let texture = Texture::new(pattern);
+                    for i in 0..60 {
+                        let uv = Vec2::new(-2.0 + 0.07 * i as f32, 1.9 - 0.11 * i as f32);
+                        let expected = reference(&image, uv, wrap, encoding, smooth);
+                        assert_eq!(texture.texel(&uv.into()), expected, "{uv}, {wrap:?}, {encoding:?}, {smooth}");
+                    }
+                    for uv in [f32::MAX, f32::MIN, 1e15, f32::INFINITY].map(Vec2::splat) {
+                        texture.touch(&uv.into());
+                        let texel = texture.texel(&uv.into());
+                        assert!(texel.is_finite() && texel.max_element() <= 28.0, "{uv}: {texel}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// One texel at a time, with remainders wherever it is.
+    fn reference(image: &ImageTexture, uv: Vec2, wrap: [Wrap; 2], encoding: Encoding, smooth: bool) -> Vec4 {
+        let wrapped = |wrap: Wrap, i: i64, n: u32| match wrap {
+            Wrap::Repeat => i.rem_euclid(n.into()),
+            Wrap::Clamp => i.clamp(0, i64::from(n) - 1),
+            Wrap::Mirror => {
+                let n = i64::from(n);
+                // Even periods run forwards, odd ones backwards.
+                if i.div_euclid(n) % 2 == 0 { i.rem_euclid(n) } else { n - 1 - i.rem_euclid(n) }
+            }
+        };
+        let at = |x: i64, y: i64| {
+            let (x, y) = (wrapped(wrap[0], x, image.width), wrapped(wrap[1], y, image.height));
+            image.texels.texel((y * i64::from(image.width) + x) as usize, encoding)
+        };
+        let (x, y) = (uv.x * image.width as f32, (1.0 - uv.y) * image.height as f32);
+        if !smooth {
+            return at(x.floor() as i64, y.floor() as i64);
+        }
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let (x, y) = (x.floor() as i64, y.floor() as i64);
+        let row = |y| at(x, y).lerp(at(x + 1, y), fx);
+        row(y).lerp(row(y + 1), fy)
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod delta_lines;
 pub(crate) mod exposed;
 pub(crate) mod guide;
 pub(crate) mod instance_table;
+pub(crate) mod large_textures;
 pub(crate) mod light;
 pub(crate) mod material_table;
 pub(crate) mod plan_cache;

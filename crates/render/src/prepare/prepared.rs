@@ -11,6 +11,7 @@ use crate::prepare::bound::radiance_bound;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
 use crate::prepare::contacts::{ContactScene, Contacts};
+use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::LightTable;
 use crate::prepare::material_table::MaterialTable;
 use crate::prepare::surface_table::SurfaceTable;
@@ -77,6 +78,7 @@ pub(crate) struct Tables {
     pub(crate) ambient: AmbientLight,
     /// Per material: whether it is textured, and so needs texture coordinates.
     pub(crate) textured: Vec<bool>,
+    pub(crate) large_textures: LargeTextures,
     /// Per material: whether its surfaces may be cut out, see [`Material::is_cutout`].
     pub(crate) cutouts: Vec<bool>,
     /// Per material: whether it needs tangents.
@@ -240,6 +242,7 @@ impl Tables {
         Self {
             ambient,
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
+            large_textures: LargeTextures::build(materials, textures),
             cutouts: materials.iter().map(Material::is_cutout).collect(),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())

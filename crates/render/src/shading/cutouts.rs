@@ -4,11 +4,12 @@
 //! fractional, the decision is random: it is a hash of the ray and the hit, so that a ray gets the same answer in every
 //! query, and on average the transmitted share of light continues. Scenes without such surfaces have no cost.
 
-use crate::core::material::{Material, MaterialId};
+use crate::core::material::{Material, MaterialId, ScalarInput};
+use crate::core::texture::TexturePoint;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{hash_combine, hash_u32};
-use crate::shading::vertex::{Vertex, material_of};
-use firstlight_kdtree::geometry::Ray;
+use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
+use firstlight_kdtree::geometry::{Ray, robust};
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 
 /// Maximum number of surfaces that a ray may pass: bounds the work, far above any real scene.
@@ -86,18 +87,35 @@ impl Prepared {
     }
 
     /// Returns the continuation of a ray behind its hit, if that is cut out.
+    #[inline]
     fn onwards(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
         let id = material_of(self, hit);
-        if !self.tables.cutouts[id as usize] {
-            return None;
-        }
+        if self.tables.cutouts[id as usize] { self.behind_cutout(id, ray, hit) } else { None }
+    }
+
+    fn behind_cutout(&self, id: MaterialId, ray: &Ray, hit: &Hit) -> Option<Ray> {
+        let material = &self.shading.materials[id as usize];
+        let Material::Principled { two_sided, opacity, opacity_cutoff, .. } = material else { return None };
         let length = ray.dir.length();
         let unit = Ray { dir: ray.dir / length, ..*ray };
-        let vertex = Vertex::new(self, &unit, &Hit { t: hit.t * length, ..*hit }, id);
-        if self.is_there(id, &vertex, || chance(ray, hit)) {
-            return None;
+        let of_unit = Hit { t: hit.t * length, ..*hit };
+        // Most hits are decided by their side: a whole vertex, with its textures, costs several times as much.
+        let point = self.geometry.tree.surface_point(&unit, &of_unit);
+        let front = (-unit.dir).dot(point.geometric_normal) >= 0.0;
+        if *two_sided || front || material.is_clear() {
+            let opacity = match opacity {
+                ScalarInput::Constant(opacity) => *opacity,
+                ScalarInput::Texture(_) => opacity.eval(self, self.texture_point(id, &unit, &of_unit)),
+            };
+            let is_there = match opacity_cutoff {
+                Some(cutoff) => opacity >= *cutoff,
+                None => opacity >= 1.0 || chance(ray, hit) < opacity,
+            };
+            if is_there {
+                return None;
+            }
         }
-        let origin = vertex.passing(ray.dir);
+        let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
         Some(if ray.t_max.is_finite() {
             // Ends exactly at the end of the first ray, wherever it starts.
             Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
@@ -106,17 +124,11 @@ impl Prepared {
         })
     }
 
-    /// - `u`: uniform in `[0, 1)`, evaluated only for fractional opacity.
-    fn is_there(&self, id: MaterialId, vertex: &Vertex, u: impl FnOnce() -> f32) -> bool {
-        let material = &self.shading.materials[id as usize];
-        let Material::Principled { two_sided, opacity, opacity_cutoff, .. } = material else { return true };
-        if !two_sided && !vertex.front && !material.is_clear() {
-            return false;
-        }
-        let opacity = opacity.eval(self, vertex.texture_point);
-        match opacity_cutoff {
-            Some(cutoff) => opacity >= *cutoff,
-            None => opacity >= 1.0 || u() < opacity,
+    /// Returns the point of a hit for texture lookups; `ray` is of unit length.
+    fn texture_point(&self, id: MaterialId, ray: &Ray, hit: &Hit) -> TexturePoint {
+        match &self.geometry.objects[hit.object as usize].mesh {
+            Some(mesh) => mesh_texture_point(mesh, hit),
+            None => Vertex::new(self, ray, hit, id).texture_point,
         }
     }
 }

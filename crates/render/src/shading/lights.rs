@@ -11,6 +11,9 @@ use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, select};
 use glam::Vec3;
 
+/// Where a shadow ray ends, `None` for light from outside the scene, and the light that arrives from there.
+pub(crate) type LightPoint = (Option<Vec3>, LightSample);
+
 /// Samples a point on a light, or a direction of the environment, which has no target. Uses two pairs of dimensions.
 #[inline]
 pub(crate) fn choose_light_point(
@@ -20,7 +23,7 @@ pub(crate) fn choose_light_point(
     normal: Vec3,
     sampler: &Sampler,
     dimension: u32,
-) -> Option<(Option<Vec3>, LightSample)> {
+) -> Option<LightPoint> {
     let u = sampler.pair(dimension + DIM_LIGHT_POINT);
     let tables = &*scene.tables;
     let share = environment_share(scene);

@@ -12,6 +12,7 @@ pub(crate) mod guided;
 pub(crate) mod interface;
 pub(crate) mod layer_albedo;
 pub(crate) mod lights;
+mod lookups;
 pub(crate) mod medium;
 pub(crate) mod metal;
 pub(crate) mod mis_state;

@@ -9,6 +9,7 @@ use crate::shading::dielectric::reflect;
 use crate::shading::tangent::{self, Tangent};
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
 use firstlight_kdtree::{Hit, Shape};
+use firstlight_mesh::Mesh;
 use firstlight_simd::{Real, Vector3, three};
 use glam::{Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};
@@ -51,9 +52,7 @@ impl Vertex {
         let side = if front { 1.0 } else { -1.0 };
         let geometric_normal = side * point.geometric_normal;
         let mut smooth_normal = geometric_normal;
-        let mut uv = Vec2::new(hit.u, hit.v);
-        let mut uv2 = None;
-        let mut color = Vec4::ONE;
+        let mut texture_point = TexturePoint::from(Vec2::new(hit.u, hit.v));
         let mut lift = Vec3::ZERO;
         let mut tangent = Tangent::default();
         let asks_for_tangent = scene.tables.with_tangents[material as usize];
@@ -78,15 +77,7 @@ impl Vertex {
                     let normals = [a, b, c].map(|i| (turn * mesh.normals[i]).into());
                     lift = world_from_object.transform_vector3(lift_of(&corners, &normals, &weights.to_array()).into());
                 }
-                if !mesh.uvs.is_empty() {
-                    uv = interpolated(&mesh.uvs, [a, b, c], weights);
-                }
-                if !mesh.uvs2.is_empty() {
-                    uv2 = Some(interpolated(&mesh.uvs2, [a, b, c], weights));
-                }
-                if !mesh.colors.is_empty() {
-                    color = interpolated(&mesh.colors, [a, b, c], weights);
-                }
+                texture_point = mesh_texture_point(mesh, hit);
                 if asks_for_tangent {
                     let normal = side * smooth_normal;
                     tangent = Tangent::of_mesh(mesh, [a, b, c], weights, world_from_object, normal);
@@ -95,7 +86,7 @@ impl Vertex {
             Shape::Plane { point: origin, normal } => {
                 let frame = Frame::around(*normal);
                 let local = point.position - *origin;
-                uv = Vec2::new(local.dot(frame.x), local.dot(frame.y));
+                texture_point = Vec2::new(local.dot(frame.x), local.dot(frame.y)).into();
                 tangent = Tangent::new(frame.x, 1.0);
             }
             // Longitude and latitude cost as much as everything else.
@@ -104,7 +95,7 @@ impl Vertex {
             Shape::Sphere { .. } => {
                 let turned = geometry.objects[hit.object as usize].turned;
                 let outwards = turned.map_or(point.geometric_normal, |map| map * point.geometric_normal);
-                uv = sphere_uv(outwards);
+                texture_point = sphere_uv(outwards).into();
                 let east = tangent_of_sphere(outwards);
                 tangent = Tangent::new(turned.map_or(east, |map| map.transpose() * east), 1.0);
             }
@@ -112,7 +103,7 @@ impl Vertex {
                 // Spheres are scaled uniformly, so the transpose is the inverse up to a factor.
                 let m = world_from_object.matrix3;
                 let outwards = (m.transpose() * point.geometric_normal).normalize();
-                uv = sphere_uv(outwards);
+                texture_point = sphere_uv(outwards).into();
                 tangent = Tangent::new((m * tangent_of_sphere(outwards)).normalize(), 1.0);
             }
             Shape::Quad { edge_u, .. } => tangent = Tangent::new(*edge_u, 1.0),
@@ -120,7 +111,6 @@ impl Vertex {
         }
         let (position, error) = (point.position, point.error);
         let normal = geometric_normal;
-        let texture_point = TexturePoint { uv: [uv, uv2.unwrap_or(uv)], color };
         let mut vertex = Self {
             position,
             error,
@@ -254,6 +244,17 @@ pub(crate) fn lift_of<R: Real>(corners: &[Vector3<R>; 3], normals: &[Vector3<R>;
     // The weighted vertices give the point itself: the projections remain.
     let lifts = three!(|k| normals[k] * (-weights[k] * (point - corners[k]).dot(normals[k]).at_most(0.0)));
     lifts[0] + lifts[1] + lifts[2]
+}
+
+/// Returns the point of a hit on a mesh for texture lookups.
+#[inline]
+pub(crate) fn mesh_texture_point(mesh: &Mesh, hit: &Hit) -> TexturePoint {
+    let corners = mesh.triangles[hit.prim as usize].map(|i| i as usize);
+    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+    let uv = if mesh.uvs.is_empty() { Vec2::new(hit.u, hit.v) } else { interpolated(&mesh.uvs, corners, weights) };
+    let uv2 = if mesh.uvs2.is_empty() { uv } else { interpolated(&mesh.uvs2, corners, weights) };
+    let color = if mesh.colors.is_empty() { Vec4::ONE } else { interpolated(&mesh.colors, corners, weights) };
+    TexturePoint { uv: [uv, uv2], color }
 }
 
 /// Interpolates a mesh attribute at a point of a triangle.

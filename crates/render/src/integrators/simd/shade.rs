@@ -115,8 +115,15 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
         if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
             let lit = mask & surface.non_specular;
             if lit != 0 {
-                let points =
-                    s.call(LightPoints { scene, techniques, mask: lit, place: &place, sampler: &sampler, dimension });
+                let points = s.call(LightPoints {
+                    scene,
+                    techniques,
+                    mask: lit,
+                    position: place.position,
+                    normal: place.normal,
+                    sampler: &sampler,
+                    dimension,
+                });
                 let (wi, found) = (points.wi, points.found);
                 let (value, pdf) = eval::<S, KIND>(&surface, &place, wi);
                 let pdf = hints.mixed(s, wi, pdf);

@@ -5,6 +5,7 @@ use super::layers::{Inside, Principled, Transmission};
 use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
+use crate::shading::lookups::Lookups;
 use crate::shading::sheen;
 use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
@@ -50,14 +51,15 @@ pub(crate) fn principled_at(
     else {
         return None;
     };
-    let point = vertex.texture_point;
-    let share = |input: &ScalarInput| input.eval(scene, point).clamp(0.0, 1.0);
-    let color = |input: &ColorInput| input.eval(scene, point).clamp(Vec3::ZERO, Vec3::ONE);
-    let (base, metallic, transmitting) = (color(base_color), share(metallic), share(transmission));
+    let lookups = Lookups::new(scene, vertex.texture_point);
+    let share = |input: &ScalarInput| lookups.scalar(*input).clamp(0.0, 1.0);
+    let color = |input: &ColorInput| lookups.color(*input).clamp(Vec3::ZERO, Vec3::ONE);
+    let (base, metallic) = (color(base_color), share(metallic));
     let alpha = share(roughness).powi(2);
+    let transmitting = share(transmission);
     let specular = share(specular);
     let at_normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
-    let facing = (at_normal * specular_color.eval(scene, point).max(Vec3::ZERO)).min(Vec3::ONE) * specular;
+    let facing = (at_normal * lookups.color(*specular_color).max(Vec3::ZERO)).min(Vec3::ONE) * specular;
     let film_share = share(iridescence);
     let (facing, metal) = if film_share > 0.0 {
         let nanometres = iridescence_min + (iridescence_max - iridescence_min) * share(iridescence_map);

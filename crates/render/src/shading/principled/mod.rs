@@ -16,6 +16,7 @@ pub(crate) mod at;
 mod iridescence;
 pub(crate) mod layers;
 mod seen;
+mod viewed;
 
 use crate::shading::interface::Interface;
 use crate::shading::scatter::{BsdfSample, Scatter};

@@ -3,13 +3,13 @@
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::arrays::LightLanes;
+use crate::prepare::light::emitter::LightSample;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
-use crate::shading::lights::choose_light_point;
+use crate::shading::lights::{LightPoint, choose_light_point};
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
+use firstlight_simd::{Bits, Float, InstructionSet, Kernel, LANES, Mask, Simd, Vector, dispatch};
 use glam::Vec3;
 
 /// A light sample per lane.
@@ -28,7 +28,9 @@ pub(crate) struct LightPoints<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,
     pub mask: Mask,
-    pub place: &'a SurfaceLanes<S>,
+    pub position: Vector<S>,
+    /// Not zero.
+    pub normal: Vector<S>,
     pub sampler: &'a SamplerLanes<S>,
     pub dimension: u32,
 }
@@ -44,7 +46,7 @@ impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
 
 #[inline(always)]
 fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
-    let &LightPoints { scene, techniques, mask, place, sampler, dimension } = asked;
+    let &LightPoints { scene, techniques, mask, position, normal, sampler, dimension } = asked;
     let tables = &*scene.tables;
     if tables.environment_sampler.is_none() {
         let u = sampler.pair(dimension + DIM_LIGHT_POINT);
@@ -52,12 +54,12 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
         if tables.lights.selects_apart() {
             u_select = sampler.single(dimension + DIM_LIGHT);
         }
-        let found = tables.lights.sample_lanes(techniques, mask, place.position, place.normal, u_select, u);
+        let found = tables.lights.sample_lanes(techniques, mask, position, normal, u_select, u);
         if let Some(LightLanes { found, target, wi, pdf, radiance, is_far }) = found {
             return FoundLights { found, infinite: is_far, target, wi, pdf, radiance };
         }
     }
-    let (positions, normals) = (place.position.to_arrays(), place.normal.to_arrays());
+    let (positions, normals) = (position.to_arrays(), normal.to_arrays());
     let parts = [sampler.stream.to_array(), sampler.reversed_index.to_array(), sampler.screen.to_array()];
     let mut arrays = [[0.0; LANES]; 10];
     let (mut found, mut infinite) = (0, 0);
@@ -81,5 +83,152 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
         wi: Vector::from_arrays(s, &[d, e, f]),
         pdf: Float::load(s, &pdf),
         radiance: Vector::from_arrays(s, &[g, h, i]),
+    }
+}
+
+/// A place on a surface that asks for a point on a light: its position, its normal, which is zero for light on both
+/// sides, and the sampler of its path.
+pub(crate) type LitPlace = (Vec3, Vec3, Sampler);
+
+/// As [`choose_light_point`] for each place, with the same result.
+pub(crate) fn choose_light_points(
+    set: InstructionSet,
+    scene: &Prepared,
+    techniques: &Techniques,
+    dimension: u32,
+    places: &[Option<LitPlace>; LANES],
+) -> [Option<LightPoint>; LANES] {
+    let mut points = [None; LANES];
+    let mut lanes = LitLanes::default();
+    for (lane, place) in places.iter().enumerate() {
+        let Some((position, normal, sampler)) = place else { continue };
+        if *normal == Vec3::ZERO {
+            points[lane] = choose_light_point(scene, techniques, *position, *normal, sampler, dimension);
+        } else {
+            lanes.push(lane, *position, *normal, sampler);
+        }
+    }
+    if lanes.mask != 0 {
+        let (lanes, points) = (&lanes, &mut points);
+        dispatch!(
+            set,
+            choose(
+                scene: &Prepared,
+                techniques: &Techniques,
+                dimension: u32,
+                lanes: &LitLanes,
+                points: &mut [Option<LightPoint>; LANES],
+            )
+        );
+    }
+    points
+}
+
+/// Places by component.
+#[derive(Default)]
+struct LitLanes {
+    mask: Mask,
+    positions: [[f32; LANES]; 3],
+    normals: [[f32; LANES]; 3],
+    samplers: [[u32; LANES]; 3],
+}
+
+impl LitLanes {
+    fn push(&mut self, lane: usize, position: Vec3, normal: Vec3, sampler: &Sampler) {
+        self.mask |= 1 << lane;
+        for k in 0..3 {
+            self.positions[k][lane] = position[k];
+            self.normals[k][lane] = normal[k];
+            self.samplers[k][lane] = sampler.parts()[k];
+        }
+    }
+}
+
+#[inline(always)]
+fn choose<S: Simd>(
+    s: S,
+    scene: &Prepared,
+    techniques: &Techniques,
+    dimension: u32,
+    lanes: &LitLanes,
+    points: &mut [Option<LightPoint>; LANES],
+) {
+    let [stream, reversed_index, screen] = lanes.samplers.each_ref().map(|part| Bits::load(s, part));
+    let sampler = &SamplerLanes { stream, reversed_index, screen };
+    let [position, normal] = [&lanes.positions, &lanes.normals].map(|values| Vector::from_arrays(s, values));
+    let found = s.call(LightPoints { scene, techniques, mask: lanes.mask, position, normal, sampler, dimension });
+    let [target, wi, radiance] = [found.target, found.wi, found.radiance].map(|values| values.to_arrays());
+    let pdf = found.pdf.to_array();
+    for lane in lanes_of(found.found & lanes.mask) {
+        let at = |values: &[[f32; LANES]; 3]| Vec3::new(values[0][lane], values[1][lane], values[2][lane]);
+        let is_far = found.infinite & (1 << lane) != 0;
+        let sample = LightSample { target: at(&target), wi: at(&wi), pdf: pdf[lane], radiance: at(&radiance), is_far };
+        points[lane] = Some(((!is_far).then_some(sample.target), sample));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::environment::Environment;
+    use crate::core::material::{ColorInput, Material};
+    use crate::core::snapshot::Object;
+    use crate::test_scene::prepared;
+    use firstlight_kdtree::Shape;
+
+    /// Spheres and quads that emit light, `n` of them.
+    fn scene_of(n: u32) -> Prepared {
+        let materials = vec![Material::Emissive { radiance: ColorInput::Constant(Vec3::new(3.0, 2.0, 1.0)) }];
+        let shapes = (0..n).map(|i| {
+            let u = Sampler::new(3, i, 0, 0).pair(0);
+            let at = Vec3::new(6.0 * u.x - 3.0, 4.0 + i as f32 % 3.0, 6.0 * u.y - 3.0);
+            match i % 2 {
+                0 => Shape::Sphere { center: at, radius: 0.1 + 0.2 * u.x },
+                _ => Shape::Quad { corner: at, edge_u: Vec3::X * (0.2 + u.y), edge_v: Vec3::Z * 0.5 },
+            }
+        });
+        let objects = (0..n).map(|_| Object::plain(0)).collect();
+        prepared(shapes.collect(), objects, materials, Environment::Black)
+    }
+
+    #[test]
+    fn points_for_sixteen_places_are_those_for_each_place() {
+        let techniques = Techniques::default();
+        // One light, a few, which are selected by estimates, and many, which are selected by the tree.
+        for n in [1, 5, 40] {
+            let scene = scene_of(n);
+            let mut n_found = 0;
+            for first in 0..40 {
+                let places: [Option<LitPlace>; LANES] = std::array::from_fn(|lane| {
+                    let sampler = Sampler::new(11, first, lane as u32, 0);
+                    let (u, v) = (sampler.pair(20), sampler.pair(21));
+                    let position = Vec3::new(8.0 * u.x - 4.0, 3.0 * v.x, 8.0 * u.y - 4.0);
+                    // Some ask for light on both sides, some for none.
+                    let normal =
+                        if lane % 5 == 3 { Vec3::ZERO } else { Vec3::new(u.y - 0.5, 0.7, v.y - 0.5).normalize() };
+                    (lane % 7 != 6).then_some((position, normal, sampler))
+                });
+                let points = choose_light_points(InstructionSet::detect(), &scene, &techniques, 3, &places);
+                for set in InstructionSet::available() {
+                    let again = choose_light_points(set, &scene, &techniques, 3, &places);
+                    assert_eq!(format!("{points:?}"), format!("{again:?}"), "{set:?}");
+                }
+                for (place, point) in places.iter().zip(points) {
+                    let expected = place.and_then(|(position, normal, sampler)| {
+                        choose_light_point(&scene, &techniques, position, normal, &sampler, 3)
+                    });
+                    assert_eq!(point.is_some(), expected.is_some());
+                    let (Some((target, sample)), Some((expected_target, expected))) = (point, expected) else {
+                        continue;
+                    };
+                    n_found += 1;
+                    assert_eq!(target.is_some(), expected_target.is_some());
+                    assert!((sample.pdf / expected.pdf - 1.0).abs() < 1e-3, "{} for {}", sample.pdf, expected.pdf);
+                    assert!(sample.wi.distance(expected.wi) < 1e-3, "{} for {}", sample.wi, expected.wi);
+                    assert!(sample.radiance.distance(expected.radiance) < 1e-4);
+                }
+            }
+            assert!(n_found > 300, "{n} lights: {n_found}");
+        }
     }
 }

@@ -1,0 +1,344 @@
+//! Shading of hits one at a time: of all materials without SIMD code, and of all others as the reference of tests.
+
+use super::PathWave;
+use crate::core::material::{Material, MaterialId};
+use crate::core::settings::RenderSettings;
+use crate::core::techniques::Techniques;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::MisBounce;
+use crate::integrators::survival::{ROULETTE_GRACE, Survival};
+use crate::prepare::prepared::Prepared;
+use crate::shading::blend::Blend;
+use crate::shading::bsdf::Lobe;
+use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
+use crate::shading::guided::Guided;
+use crate::shading::lights::{LightPoint, choose_light_point, emitter_weight, light_weight};
+use crate::shading::paths::Path;
+use crate::shading::principled::at::principled_at;
+use crate::shading::principled::layers::Principled;
+use crate::shading::scatter::Scatter;
+use crate::shading::sides::Sides;
+use crate::shading::simd::lights::choose_light_points;
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::vertex::{Vertex, mesh_texture_point};
+use firstlight_kdtree::Hit;
+use firstlight_kdtree::geometry::Ray;
+use firstlight_simd::LANES;
+use glam::Vec3;
+
+impl PathWave {
+    /// Shades the hits on materials of a kind: emission, a light sample and a bounce.
+    ///
+    /// Lights are sampled for sixteen of them together, where there is SIMD code for it.
+    pub(super) fn shade_one_by_one(
+        &mut self,
+        scene: &Prepared,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        kind: usize,
+        radiance: &mut [Vec3],
+    ) {
+        let techniques = &settings.techniques;
+        let n = self.sorted.of_kind(kind).len();
+        let mut surfaces = Vec::with_capacity(n.min(LANES));
+        for first in (0..n).step_by(LANES) {
+            self.touch_textures(scene, &self.sorted.of_kind(kind)[first..n.min(first + LANES)]);
+            for k in first..n.min(first + LANES) {
+                let i = self.sorted.of_kind(kind)[k] as usize;
+                surfaces.extend(self.surface_at(scene, depth, settings, caustics, i, radiance));
+            }
+            let lights = light_points(scene, settings, first_dimension(depth), &surfaces);
+            for (surface, light) in surfaces.drain(..).zip(lights) {
+                let Surface { path, vertex, hit, material, bsdf } = &surface;
+                let step = PathStep {
+                    scene,
+                    techniques,
+                    path,
+                    vertex,
+                    hit,
+                    material: *material,
+                    depth,
+                    caustics,
+                    is_told: false,
+                };
+                match bsdf {
+                    Bsdf::Lobe(lobe) => self.scatter_told(step, lobe, light),
+                    Bsdf::Blend(blend) => self.scatter_told(step, blend, light),
+                    Bsdf::Layers(layers) => {
+                        self.scatter_told(step, &layers.seen_along(vertex.wo, vertex.normal), light)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Reads texels of several hits at once, which waits for memory once, and not again and again while they are shaded.
+    ///
+    /// - `order`: at most [`LANES`] hits.
+    fn touch_textures(&self, scene: &Prepared, order: &[u32]) {
+        let large = &scene.tables.large_textures;
+        if large.is_empty() {
+            return;
+        }
+        let mut points = [None; LANES];
+        for (point, &i) in points.iter_mut().zip(order) {
+            let textures = large.of(self.sorted.materials[i as usize]);
+            if !textures.is_empty()
+                && let Some(hit) = self.hits.get(i as usize)
+                && let Some(mesh) = &scene.geometry.objects[hit.object as usize].mesh
+            {
+                *point = Some((textures, mesh_texture_point(mesh, &hit)));
+            }
+        }
+        let mut bits = 0;
+        for (textures, point) in points.iter().flatten() {
+            for &id in *textures {
+                bits ^= scene.shading.textures[id as usize].touch(point);
+            }
+        }
+        std::hint::black_box(bits);
+    }
+
+    /// Adds the emission of a hit; returns how it scatters, unless the path ends there.
+    fn surface_at(
+        &mut self,
+        scene: &Prepared,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        i: usize,
+        radiance: &mut [Vec3],
+    ) -> Option<Surface> {
+        let techniques = &settings.techniques;
+        let mut path = self.paths.get(i);
+        let ray = self.paths.rays.get(i);
+        let hit = self.hits.get(i)?;
+        if scene.tables.features.media {
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
+        }
+        let material = self.sorted.materials[i];
+        let vertex = Vertex::new(scene, &ray, &hit, material);
+        if let Some(emission) = scene.tables.emission[material as usize]
+            && (vertex.front || emission.two_sided)
+        {
+            let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
+            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, &vertex));
+            radiance[path.slot as usize] += path.throughput * weight * vertex.emitted(scene, &emission);
+        }
+        if depth == settings.max_depth {
+            return None;
+        }
+        let mut sides = (scene.tables.features.glass)
+            .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
+        let bsdf = match &scene.shading.materials[material as usize] {
+            Material::Principled { .. } => {
+                Bsdf::Layers(principled_at(scene, material, &vertex, &mut sides.as_mut(), 0, true)?)
+            }
+            Material::Blend { .. } | Material::Phong { .. } => {
+                Bsdf::Blend(blend_at(scene, material, &vertex, sides.as_mut())?)
+            }
+            _ => Bsdf::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?),
+        };
+        Some(Surface { path, vertex, hit, material, bsdf })
+    }
+
+    /// Scatters with guiding distributions, if there are any.
+    #[inline]
+    fn scatter_told(&mut self, step: PathStep, bsdf: &impl Scatter, light: Option<LightPoint>) {
+        let PathStep { path, vertex, depth, .. } = step;
+        let hints = step.caustics.filter(|_| bsdf.has_non_specular());
+        match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
+            Some(hints) => self.scatter(PathStep { is_told: true, ..step }, &Guided { surface: bsdf, hints }, light),
+            None => self.scatter(step, bsdf, light),
+        }
+    }
+
+    #[inline]
+    fn scatter(&mut self, step: PathStep, bsdf: &impl Scatter, light: Option<LightPoint>) {
+        if let Some(light) = light {
+            self.add_light(&step, bsdf, light);
+        }
+        self.bounce(&step, bsdf);
+    }
+
+    /// Light sampling: light from a point on a light, and a shadow ray to it.
+    #[inline]
+    fn add_light(&mut self, step: &PathStep, bsdf: &impl Scatter, (target, sample): LightPoint) {
+        let &PathStep { scene, techniques, path, vertex, .. } = step;
+        let tables = &*scene.tables;
+        let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
+        let through = bsdf.through().filter(|_| sample.wi.dot(vertex.normal) < 0.0);
+        if pdf <= 0.0 || !leads_on(vertex, sample.wi, through.is_some()) {
+            return;
+        }
+        let media = through.map_or(path.media, |interface| interface.beyond);
+        let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
+        let mut light = path.throughput * value * sample.radiance * weight;
+        if light == Vec3::ZERO {
+            return;
+        }
+        if tables.features.glass && target.is_none() {
+            light *= self.sets.environment_scale(media);
+        }
+        if tables.features.media
+            && let Some(target) = target
+        {
+            light *= self.sets.transmittance(media, vertex.position.distance(target));
+        }
+        let origin = if through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        let shadow_ray = match target {
+            // `dir` leads to the light's own bounded point, where the ray ends: t = 1, excluded.
+            Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
+            None => Ray::new(origin, sample.wi),
+        };
+        self.shadows.push(&shadow_ray, path.slot, light);
+    }
+
+    /// Samples the continuation of the path, with Russian roulette.
+    #[inline]
+    fn bounce(&mut self, step: &PathStep, bsdf: &impl Scatter) {
+        let &PathStep { scene, techniques, vertex, material, depth, .. } = step;
+        let mut path = *step.path;
+        let (sampler, dimension) = (path.sampler, step.dimension());
+        let u = sampler.pair(dimension + DIM_DIRECTION);
+        let u_lobe = || sampler.single(dimension + DIM_LOBE);
+        let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
+        if !leads_on(vertex, sample.wi, sample.through.is_some()) {
+            return;
+        }
+        path.throughput *= sample.weight;
+        if let Some(through) = sample.through {
+            path.media = through.beyond;
+        }
+        if let Some(pass) = step.caustics {
+            let bounce = MisBounce {
+                vertex,
+                hit: step.hit,
+                eye: (depth == 1).then_some(path.position),
+                wi: sample.wi,
+                pdf: sample.pdf,
+                through: sample.through,
+                blended: scene.shading.materials[material as usize].is_blended(),
+                before: step.path.media,
+                after: path.media,
+            };
+            let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
+            path.track = pass.follow(track, &bounce, || {
+                let normal =
+                    if sample.through.is_some() { vertex.normal_from_behind(sample.wi) } else { vertex.normal };
+                bsdf.eval(sample.wi, vertex.wo, normal).1
+            });
+        }
+        if let Some(most_kept) = Survival::at(depth, scene, techniques).share {
+            // Throughput inside glass contains 1/n², which is restored on leaving: it must not count as a loss.
+            let ior = if scene.tables.features.glass { self.sets.ior(path.media) } else { 1.0 };
+            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
+            let survival = most.min(most_kept);
+            if survival < 1.0 {
+                if sampler.single(dimension + DIM_ROULETTE) >= survival {
+                    return;
+                }
+                path.throughput /= survival;
+            }
+        }
+        if path.throughput == Vec3::ZERO {
+            return;
+        }
+        path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
+        path.position = vertex.position;
+        path.normal = lit_side(vertex, bsdf);
+        let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        self.next.push(&Ray::new(origin, sample.wi), &path);
+    }
+}
+
+/// The side for light sampling: the normal, or zero for both sides.
+#[inline]
+fn lit_side(vertex: &Vertex, bsdf: &impl Scatter) -> Vec3 {
+    if bsdf.through().is_some() { Vec3::ZERO } else { vertex.normal }
+}
+
+/// Whether a direction leads to the intended side of the true surface.
+#[inline]
+fn leads_on(vertex: &Vertex, wi: Vec3, passes: bool) -> bool {
+    if passes { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) }
+}
+
+/// One vertex of one path.
+struct PathStep<'a> {
+    scene: &'a Prepared,
+    techniques: &'a Techniques,
+    path: &'a Path,
+    vertex: &'a Vertex,
+    hit: &'a Hit,
+    material: MaterialId,
+    /// Number of segments so far.
+    depth: u32,
+    caustics: Option<&'a CausticPass<'a>>,
+    /// Whether directions are sampled with guiding.
+    is_told: bool,
+}
+
+impl PathStep<'_> {
+    /// First sample dimension of this vertex.
+    fn dimension(&self) -> u32 {
+        first_dimension(self.depth)
+    }
+}
+
+/// A hit that scatters.
+struct Surface {
+    path: Path,
+    vertex: Vertex,
+    hit: Hit,
+    material: MaterialId,
+    bsdf: Bsdf,
+}
+
+/// How a surface scatters.
+enum Bsdf {
+    Lobe(Lobe),
+    Blend(Blend),
+    Layers(Principled),
+}
+
+impl Surface {
+    /// The side for light sampling, see [`lit_side`]; `None` where all scattering is specular.
+    fn lit_side(&self) -> Option<Vec3> {
+        fn side(vertex: &Vertex, bsdf: &impl Scatter) -> Option<Vec3> {
+            bsdf.has_non_specular().then(|| lit_side(vertex, bsdf))
+        }
+        match &self.bsdf {
+            Bsdf::Lobe(lobe) => side(&self.vertex, lobe),
+            Bsdf::Blend(blend) => side(&self.vertex, blend),
+            Bsdf::Layers(layers) => side(&self.vertex, layers),
+        }
+    }
+}
+
+/// A point on a light for each surface that light sampling can light.
+///
+/// - `surfaces`: at most [`LANES`].
+fn light_points(
+    scene: &Prepared,
+    settings: &RenderSettings,
+    dimension: u32,
+    surfaces: &[Surface],
+) -> [Option<LightPoint>; LANES] {
+    let techniques = &settings.techniques;
+    let mut places = [None; LANES];
+    if scene.tables.features.light_sampling && techniques.light_sampling {
+        for (place, surface) in places.iter_mut().zip(surfaces) {
+            let normal = surface.lit_side();
+            *place = normal.map(|normal| (surface.vertex.position, normal, surface.path.sampler));
+        }
+    }
+    match settings.simd {
+        Some(set) => choose_light_points(set, scene, techniques, dimension, &places),
+        None => places.map(|place| {
+            let (position, normal, sampler) = place?;
+            choose_light_point(scene, techniques, position, normal, &sampler, dimension)
+        }),
+    }
+}
