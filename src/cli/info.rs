@@ -325,7 +325,8 @@ fn facts_rows(facts: &GltfFacts, row: &mut impl FnMut(&str, String)) {
         let shown: Vec<_> = names.iter().map(|name| printable::name(name)).collect();
         if shown.is_empty() { "none".to_owned() } else { shown.join(", ") }
     };
-    row("model", format!("{} × mesh in the file, {} × placed", facts.meshes, facts.instances));
+    let meshes = if facts.meshes == 1 { "1 mesh".to_owned() } else { format!("{} meshes", facts.meshes) };
+    row("model", format!("{meshes} in the file, {}", counted(facts.instances, "instance")));
     row("cameras", names(&facts.cameras));
     row("model lights", names(&facts.lights));
     row("variants", names(&facts.variants));
