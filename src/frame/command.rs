@@ -163,10 +163,15 @@ pub enum Command {
         #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
-    /// Show the animations of the open glTF model at another time.
+    /// Show the animation at another time.
     SetMoment {
-        /// Time in seconds; `None` for the stored pose.
+        /// Time in seconds; `None` for the stored pose of a glTF model.
         seconds: Option<f64>,
+    },
+    /// Advance the time of the animation, from its end on at its start.
+    AdvanceMoment {
+        /// Seconds.
+        seconds: f64,
     },
     /// Set when to stop.
     SetTarget(Target),
@@ -246,7 +251,7 @@ impl Command {
             // A size of zero is a minimised window.
             Self::Resize { width, height } => check_film_size((*width).max(1), (*height).max(1)),
             Self::SetTarget(target) => target.check(),
-            Self::SetMoment { seconds: Some(seconds) } if !seconds.is_finite() => {
+            Self::SetMoment { seconds: Some(seconds) } | Self::AdvanceMoment { seconds } if !seconds.is_finite() => {
                 let allowed = "be a finite number of seconds".to_owned();
                 Err(BadValue::OutOfRange { field: "at", value: seconds.to_string(), allowed })
             }

@@ -10,7 +10,7 @@
 use super::rig::Rig;
 use super::selection::Selection;
 use crate::scene::{
-    DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection,
+    DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Moment, Ordinal, Placement, PointLight, Projection,
     SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::name::Name;
@@ -40,6 +40,7 @@ struct State {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
     camera: Option<(Entity, Rig)>,
+    moment: Option<Moment>,
 }
 
 impl State {
@@ -245,6 +246,7 @@ pub fn notice(
     mut directional_lights: RemovedComponents<DirectionalLight>,
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
+    moment: Option<Res<Moment>>,
     mut had_environment: Local<bool>,
     mut history: ResMut<History>,
 ) {
@@ -252,7 +254,8 @@ pub fn notice(
     let removed = shapes.read().count() + materials.read().count() + lights + names.read().count();
     let environment_changed = environment.as_ref().is_some_and(|environment| environment.is_changed())
         || std::mem::replace(&mut *had_environment, environment.is_some()) != environment.is_some();
-    if removed > 0 || environment_changed || !parts.is_empty() {
+    let moment_changed = moment.is_some_and(|moment| moment.is_changed());
+    if removed > 0 || environment_changed || moment_changed || !parts.is_empty() {
         history.touched = true;
     }
     if !camera.is_empty() {
@@ -276,7 +279,8 @@ pub fn remember(world: &mut World) {
         .iter(world)
         .min_by_key(|(entity, ordinal, ..)| (ordinal.map_or(u32::MAX, |ordinal| ordinal.0), *entity))
         .map(|(entity, _, view, projection, lens)| (entity, Rig { view: *view, projection: *projection, lens: *lens }));
-    let state = State { entities, environment: world.get_resource::<SceneEnvironment>().cloned(), camera };
+    let environment = world.get_resource::<SceneEnvironment>().cloned();
+    let state = State { entities, environment, camera, moment: world.get_resource::<Moment>().copied() };
     world.resource_mut::<History>().record(state);
     remember_selection(world);
 }
@@ -343,6 +347,9 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     {
         world.insert_resource(environment.clone());
     }
+    if let Some(moment) = wanted.moment.filter(|_| wanted.moment != now.moment) {
+        world.insert_resource(moment);
+    }
     if let Some((entity, rig)) = wanted.camera.filter(|_| wanted.camera != now.camera) {
         put(world, entity, &Some(rig.view));
         put(world, entity, &Some(rig.projection));
@@ -382,6 +389,9 @@ fn put<T: Component<Mutability = bevy_ecs::component::Mutable> + Clone + Partial
 
 /// Returns a label of the change, and the key by which it merges with following steps.
 fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
+    if old.moment != new.moment {
+        return ("time of the animation".to_owned(), Some("time of the animation".to_owned()));
+    }
     if !Arc::ptr_eq(&old.entities, &new.entities) && old.entities != new.entities {
         return what_changed_in_entities(&old.entities, &new.entities);
     }

@@ -122,7 +122,8 @@ impl CommandParams<'_, '_> {
                     self.set_rig(Rig { lens, ..framed });
                 }
             }
-            Command::SetMoment { seconds } => self.moment.0 = Some(seconds),
+            Command::SetMoment { seconds } => *self.moment = WantedMoment { at: Some(seconds), advance: 0.0 },
+            Command::AdvanceMoment { seconds } => self.moment.advance += seconds,
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {

@@ -6,12 +6,15 @@
 use super::Waker;
 use super::adopt::adopt_again;
 use super::background::BackgroundTasks;
+use super::history::History;
 use super::input::ModelUp;
 use super::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment};
 use super::saving::SavedAs;
 use super::status::{MessageKind, Status};
 use super::watch::Watch;
-use crate::scene::{Description, LoadOptions, LoadedScene, ModelChoice, SceneContent, SceneError, SceneSource, load};
+use crate::scene::{
+    Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
+};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -125,7 +128,23 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     if world.resource::<BackgroundTasks>().is_loading() {
         return;
     }
-    let Some(at) = world.resource_mut::<WantedMoment>().0.take() else { return };
+    let WantedMoment { at, advance } = std::mem::take(&mut *world.resource_mut::<WantedMoment>());
+    if let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves()) {
+        let length = animation.length();
+        let shown = world.resource::<Moment>().0;
+        match at {
+            Some(None) => {}
+            None if advance == 0.0 => return,
+            _ => {
+                let at = at.flatten().unwrap_or(shown);
+                let wanted = at + advance;
+                // Past its end it starts over.
+                let wraps = advance != 0.0 && length > 0.0 && !(0.0..length).contains(&wanted);
+                return set_moment(world, if wraps { wanted.rem_euclid(length) } else { wanted.max(0.0) });
+            }
+        }
+    }
+    let Some(at) = at else { return };
     if at == current.choice.at {
         return;
     }
@@ -144,6 +163,19 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     let (aspect, pool) = (world.resource::<PictureSize>().aspect(), world.resource::<Renderer>().0.pool());
     let known = Some(current.clone());
     world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);
+}
+
+/// Shows another time of an animation whose scene is in the world. That is no change of the scene, though it can be undone.
+fn set_moment(world: &mut World, seconds: f64) {
+    if world.resource::<Moment>().0 == seconds {
+        return;
+    }
+    let was_saved = !world.resource::<History>().is_unsaved();
+    crate::scene::show_moment(world, seconds);
+    let content = History::content(world);
+    if was_saved {
+        world.resource_mut::<History>().mark_clean(content);
+    }
 }
 
 /// Watches the files of the open scene, if it has changed.
@@ -180,6 +212,11 @@ fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<Pa
 
 /// Whether the world differs from the opened and the saved scene; the view does not count.
 fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
+    // At another time everything that moves differs from what was opened.
+    if world.get_resource::<Animation>().is_some_and(Animation::moves) {
+        History::content(world);
+        return world.resource::<History>().is_unsaved();
+    }
     let description = Description::of(world, Some(current));
     let now = SceneContent::of(world, &description).fingerprint();
     let clean = world.resource::<SavedAs>().content;
@@ -214,7 +251,12 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         }
     };
     let names = names_of(&world.resource::<HotReload>().reading);
+    let shown = world.get_resource::<Moment>().copied();
+    let keeps_moment = scene.file.animation.at == old.file.animation.at;
     adopt_again(world, old, scene, format!("{names} reloaded"), now);
+    if let Some(Moment(seconds)) = shown.filter(|_| keeps_moment && world.contains_resource::<Animation>()) {
+        set_moment(world, seconds);
+    }
     world.resource_mut::<Status>().say(now, MessageKind::Note, format!("reloaded {names} (changed on disk)"));
 }
 

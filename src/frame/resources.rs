@@ -73,7 +73,12 @@ pub struct CurrentScene(pub Arc<LoadedScene>);
 /// The requested time of the open model's animations in seconds, or `Some(None)` for the stored pose; `None` once it is
 /// being loaded.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
-pub struct WantedMoment(pub Option<Option<f64>>);
+pub struct WantedMoment {
+    /// Seconds, or `None` for the stored pose of a glTF model.
+    pub at: Option<Option<f64>>,
+    /// Seconds by which to advance.
+    pub advance: f64,
+}
 
 /// Number of scenes that have been opened so far.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]

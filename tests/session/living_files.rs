@@ -1,7 +1,9 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
 use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
-use firstlight::scene::{ColorParam, LoadOptions, Material, SceneInputs, SceneSource, Shape, SurfaceMaterial, load};
+use firstlight::scene::{
+    ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
+};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
@@ -411,4 +413,67 @@ fn another_moment_moves_the_model_and_keeps_the_view() {
     let told = |session: &Session| session.status().messages.iter().any(|told| told.text.contains("unsaved changes"));
     driver.run_until(told);
     assert_eq!(place(&mut driver), DVec3::Y);
+}
+
+const MOVING: &str = r#"(
+    camera: (eye: (0, 1, 6), look_at: (0, 0.5, 0)),
+    environment: constant(1),
+    materials: { "red": diffuse(albedo: 0.5) },
+    objects: [sphere(name: "ball", center: (-2, 0, 0), radius: 0.5, material: "red")],
+    animation: (tracks: [
+        object(name: "ball", property: translate, keys: [(0, (-2, 0, 0)), (2, (2, 0, 0))]),
+        camera(property: vfov, keys: [(0, 40), (2, 20)]),
+    ]),
+)"#;
+
+#[test]
+fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("moving.ron");
+    std::fs::write(&path, MOVING).unwrap();
+    let mut driver = Driver::open(SceneSource::Scene(path.clone()), 1, 2);
+    driver.run_until(|session| session.world().contains_resource::<CurrentScene>() && session.status().spp >= 2);
+    driver.settle();
+    let shown = |driver: &mut Driver| {
+        let inputs = SceneInputs::of(driver.session.world_mut());
+        let seconds = driver.session.world().resource::<Moment>().0;
+        (seconds, inputs.objects[0].placement.translation.x, inputs.camera.unwrap().projection.vfov_deg)
+    };
+    assert_eq!(shown(&mut driver), (0.0, -2.0, 40.0));
+    driver.session.send(Command::SetMoment { seconds: Some(0.5) });
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
+    // It converges as any other, and nothing has to be saved.
+    driver.settle();
+    assert!(driver.session.status().spp >= 2 && !driver.session.has_unsaved_edits());
+    // Playing adds up, and starts over at the end.
+    for seconds in [0.25, 0.75] {
+        driver.session.send(Command::AdvanceMoment { seconds });
+        driver.frame();
+    }
+    assert_eq!(shown(&mut driver), (1.5, 1.0, 25.0));
+    driver.session.send(Command::AdvanceMoment { seconds: 1.0 });
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
+    assert!(!driver.session.has_unsaved_edits());
+    // All of that is one step.
+    driver.session.send(Command::Edit(Edit::Undo));
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.0, -2.0, 40.0));
+    driver.session.send(Command::Edit(Edit::Redo));
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
+    // A file that changes is shown at the same moment.
+    std::fs::write(&path, MOVING.replace("(2, (2, 0, 0))", "(2, (6, 0, 0))")).unwrap();
+    driver.run_until(|session| session.status().messages.iter().any(|told| told.text.contains("reloaded")));
+    assert_eq!(shown(&mut driver), (0.5, 0.0, 35.0));
+    // An edit has to be saved, at whatever moment.
+    let id = SceneInputs::of(driver.session.world_mut()).objects[0].entity.to_bits();
+    driver.session.send(Command::Edit(Edit::Select { id, add: false }));
+    driver.session.send(Command::Edit(Edit::Move { by: DVec3::Y }));
+    driver.frame();
+    assert!(driver.session.has_unsaved_edits());
+    driver.session.send(Command::SetMoment { seconds: Some(1.0) });
+    driver.frame();
+    assert!(driver.session.has_unsaved_edits());
 }

@@ -32,6 +32,10 @@ impl App {
             self.input.toggle_spin(now);
             self.needs_tick = true;
         }
+        if asked.toggle_play {
+            self.input.toggle_play(now);
+            self.needs_tick = true;
+        }
         if asked.toggle_brush {
             self.toggle_brush(now);
         }

@@ -46,6 +46,7 @@ impl App {
             reaction: &self.reaction,
             speed: self.input.speed(),
             spinning: self.input.is_spinning(),
+            playing: self.input.is_playing(),
             orbits: self.input.orbits(),
             navigation: self.input.navigation(),
             place: self.input.place(),

@@ -56,6 +56,8 @@ pub struct Input {
     speed: f64,
     /// Start of the part of the turntable rotation that has not been counted.
     spin: Option<Instant>,
+    /// Until when the time of the animation has been advanced, if it plays.
+    play: Option<Instant>,
     /// Whether a drag with the left button orbits the pivot instead of turning the camera.
     orbits: bool,
     /// Whether the mouse moves the view without a button.
@@ -109,6 +111,7 @@ impl Input {
             cursor: [0.0; 2],
             speed: 1.0,
             spin: None,
+            play: None,
             orbits: false,
             captured: false,
             focuses: false,
@@ -151,7 +154,7 @@ impl Input {
 
     /// Whether a movement key is down, so that time alone changes the view.
     pub fn is_moving(&self) -> bool {
-        !self.held.is_empty() || self.spin.is_some()
+        !self.held.is_empty() || self.spin.is_some() || self.play.is_some()
     }
 
     /// Starts or stops the turntable.
@@ -162,6 +165,16 @@ impl Input {
 
     pub fn is_spinning(&self) -> bool {
         self.spin.is_some()
+    }
+
+    /// Starts or stops the animation.
+    pub fn toggle_play(&mut self, now: Instant) {
+        self.count(now);
+        self.play = if self.play.is_some() { None } else { Some(now) };
+    }
+
+    pub fn is_playing(&self) -> bool {
+        self.play.is_some()
     }
 
     /// Toggles whether a plain drag orbits the pivot or looks around; returns true for orbiting.
@@ -404,6 +417,10 @@ impl Input {
             let since = std::mem::replace(since, now);
             let seconds = now.saturating_duration_since(since).as_secs_f64();
             add(&mut self.sum.orbit, [SPIN_RATE_DEG * seconds, 0.0]);
+        }
+        if let Some(since) = &mut self.play {
+            let since = std::mem::replace(since, now);
+            self.sum.play += now.saturating_duration_since(since).as_secs_f64();
         }
         for i in 0..self.held.len() {
             let held = &mut self.held[i];

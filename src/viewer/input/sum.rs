@@ -12,6 +12,8 @@ pub struct Sum {
     pub roll: f64,
     pub dolly: f64,
     pub zoom: f64,
+    /// Seconds of the animation.
+    pub play: f64,
     pub pace: Option<[f64; 2]>,
     pub pick: Option<([f64; 2], bool)>,
     pub focus: Option<[f64; 2]>,
@@ -45,6 +47,7 @@ impl Sum {
         push(self.roll != 0.0, Command::Roll { angle_deg: self.roll });
         push(self.dolly != 0.0, Command::Dolly { factor: self.dolly.exp() });
         push(self.zoom != 0.0, Command::Zoom { factor: self.zoom.exp() });
+        push(self.play != 0.0, Command::AdvanceMoment { seconds: self.play });
         if let Some(([x, y], add)) = self.pick {
             commands.push(Command::Edit(Edit::PickAt { x, y, add }));
         }

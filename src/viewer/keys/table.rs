@@ -348,6 +348,10 @@ pub static BINDINGS: &[KeyGroup] = &[
                 effect: "integrator, when to stop (error, time, samples), threads, size of saved images",
             },
             Binding {
+                triggers: &[Trigger::Mouse("Panel: Animation")],
+                effect: "time of the animation: play, pause, choose; where the scene has one",
+            },
+            Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],
                 effect: "position, target, field of view, fly speed, drag, navigation preset (Blender, Maya)",
             },

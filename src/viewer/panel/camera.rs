@@ -93,30 +93,6 @@ fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     });
 }
 
-/// The time of the animations, if the open model has any.
-pub fn moment(ui: &mut Ui, session: &Session, asked: &mut Asked) {
-    let Some(scene) = session.world().get_resource::<CurrentScene>() else { return };
-    let Some(length) = scene.0.facts.as_ref().and_then(|facts| facts.animation_length) else { return };
-    let at = scene.0.choice.at;
-    rows(ui, "moment", |ui| {
-        row_with_hint(ui, "moment", "seconds into the animations of the model", |ui| {
-            if let Some(seconds) = slider(ui, at.unwrap_or(0.0), 0.0..=length.max(1e-3), false) {
-                asked.send(Command::SetMoment { seconds: Some(seconds) });
-            }
-        });
-        row_with_hint(ui, "pose", "of the animations at that moment, or as the file stores it", |ui| {
-            ui.horizontal(|ui| {
-                for (label, seconds) in [("stored", None), ("animated", Some(at.unwrap_or(0.0)))] {
-                    let is_chosen = at.is_none() == seconds.is_none();
-                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
-                        asked.send(Command::SetMoment { seconds });
-                    }
-                }
-            })
-        });
-    });
-}
-
 /// Views to go to, and the turntable.
 pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
@@ -135,7 +111,6 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
         asked.toggle_spin |= turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked();
     });
     cameras(ui, session, asked);
-    moment(ui, session, asked);
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;

@@ -15,6 +15,7 @@
 //! | `statistics` | figures |
 //! | `list`, `swatch`, `widgets` | building blocks |
 
+mod animation;
 mod camera;
 mod lights;
 mod list;
@@ -93,6 +94,8 @@ pub struct Around<'a> {
     pub reaction: &'a Reaction,
     pub speed: f64,
     pub spinning: bool,
+    /// Whether the animation plays.
+    pub playing: bool,
     /// Whether a drag orbits the pivot.
     pub orbits: bool,
     /// The preset of keys and gestures.
@@ -113,6 +116,7 @@ pub struct Asked {
     pub commands: Vec<Command>,
     pub speed: Option<f64>,
     pub toggle_spin: bool,
+    pub toggle_play: bool,
     pub toggle_drag: bool,
     pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
@@ -133,8 +137,9 @@ impl Asked {
 }
 
 /// The sections of the panel, from the top; the list of keys mentions each.
-pub const SECTIONS: [&str; 14] = [
+pub const SECTIONS: [&str; 15] = [
     "Render",
+    "Animation",
     "Camera",
     "Views",
     "Lens",
@@ -171,8 +176,11 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Leaves space for the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
-            let [render, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
+            let [render, animation, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
+            if animation::exists(session) {
+                section(ui, animation, true, |ui| animation::time_line(ui, session, around, asked));
+            }
             section(ui, camera, false, |ui| camera::camera(ui, session, around, asked));
             section(ui, views, false, |ui| camera::views(ui, session, around, asked));
             section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
