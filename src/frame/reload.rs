@@ -12,6 +12,7 @@ use super::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment}
 use super::saving::SavedAs;
 use super::status::{MessageKind, Status};
 use super::watch::Watch;
+use crate::scene::bounds::MOST_SECONDS;
 use crate::scene::{
     Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
 };
@@ -140,7 +141,10 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
                 let wanted = at + advance;
                 // Past its end it starts over.
                 let wraps = advance != 0.0 && length > 0.0 && !(0.0..length).contains(&wanted);
-                return set_moment(world, if wraps { wanted.rem_euclid(length) } else { wanted.max(0.0) });
+                return set_moment(
+                    world,
+                    if wraps { wanted.rem_euclid(length) } else { wanted.clamp(0.0, MOST_SECONDS) },
+                );
             }
         }
     }
@@ -170,6 +174,8 @@ fn set_moment(world: &mut World, seconds: f64) {
     if world.resource::<Moment>().0 == seconds {
         return;
     }
+    // Edits of this frame count.
+    History::content(world);
     let was_saved = !world.resource::<History>().is_unsaved();
     crate::scene::show_moment(world, seconds);
     let content = History::content(world);

@@ -476,4 +476,15 @@ fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
     driver.session.send(Command::SetMoment { seconds: Some(1.0) });
     driver.frame();
     assert!(driver.session.has_unsaved_edits());
+    // Also one of the very frame in which the moment changes.
+    driver.session.send(Command::Edit(Edit::Undo));
+    driver.session.send(Command::Edit(Edit::Undo));
+    driver.frame();
+    assert!(!driver.session.has_unsaved_edits());
+    driver.session.send(Command::Edit(Edit::Select { id, add: false }));
+    driver.session.send(Command::Edit(Edit::Move { by: DVec3::Y }));
+    driver.session.send(Command::SetMoment { seconds: Some(1e300) });
+    driver.frame();
+    assert!(driver.session.has_unsaved_edits());
+    assert_eq!(shown(&mut driver).0, 1e6);
 }
