@@ -273,8 +273,10 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     };
     let (status, said) = run(&["--replay", "session.rec", "-o", "a.exr", "--spp", "5", "--threads", "1"]);
     let broken = "warning: the recording is incomplete: its last line is not the end of a session\n";
-    let replayed = "a.exr: 33 x 21, 5 samples per pixel; replayed 10 commands in 10 frames from session.rec\n";
-    assert_eq!((status, said), (Some(0), format!("{broken}{replayed}")));
+    // How many frames passed while the scene was loaded depends on the machine.
+    let replayed = format!("{broken}a.exr: 33 x 21, 5 samples per pixel; replayed 10 commands in ");
+    assert!(status == Some(0) && said.starts_with(&replayed), "{said}");
+    assert!(said.ends_with(" frames from session.rec\n"), "{said}");
     let picture = image::open(path.join("a.exr")).unwrap().into_rgb32f();
     assert!(picture.pixels().zip(shown.means()).all(|(pixel, mean)| pixel.0 == mean.to_array()));
     // The picture at its end opens as any other.
