@@ -15,7 +15,7 @@ const PAUSE: Duration = Duration::from_millis(150);
 
 /// A watch on files; dropping it ends the thread.
 pub struct Watch {
-    sender: Option<Sender<Vec<PathBuf>>>,
+    sender: Option<Sender<Vec<(PathBuf, Stamp)>>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -25,7 +25,7 @@ impl Watch {
     /// # Errors
     /// If no thread can be started.
     pub fn start(changed: impl Fn(Vec<PathBuf>) + Send + 'static) -> Result<Self, String> {
-        let (sender, receiver) = channel::<Vec<PathBuf>>();
+        let (sender, receiver) = channel::<Vec<(PathBuf, Stamp)>>();
         let work = move || {
             // Per file: the known stamp, and the one that was seen last.
             let mut files: BTreeMap<PathBuf, (Stamp, Stamp)> = BTreeMap::new();
@@ -37,13 +37,7 @@ impl Watch {
                 };
                 match news {
                     Ok(paths) => {
-                        files = paths
-                            .into_iter()
-                            .map(|path| {
-                                let now = stamp(&path);
-                                (path, (now, now))
-                            })
-                            .collect();
+                        files = paths.into_iter().map(|(path, now)| (path, (now, now))).collect();
                         continue;
                     }
                     Err(RecvTimeoutError::Timeout) => {}
@@ -76,8 +70,13 @@ impl Watch {
     /// Replaces the watched files; their present state is the reference.
     pub fn set(&self, paths: Vec<PathBuf>) {
         if let Some(sender) = &self.sender {
+            // Stamped here: the thread of a busy machine would take a change of the next moment for the present state.
+            let stamped = |path: PathBuf| {
+                let now = stamp(&path);
+                (path, now)
+            };
             // The thread ends only when the sender is dropped.
-            let _ = sender.send(paths);
+            let _ = sender.send(paths.into_iter().map(stamped).collect());
         }
     }
 }
