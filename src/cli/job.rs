@@ -198,12 +198,12 @@ impl RenderJob {
 
     /// The denoised film; `None` if it is not requested or `stop` returned true.
     pub fn denoised(&self, args: &RenderArgs, film: &Film, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
-        if !args.denoise {
+        if !args.wants_denoised() {
             return None;
         }
         let (prepared, size) = (&self.extraction.prepared, UVec2::new(film.width(), film.height()));
-        let features = gather_guides(prepared, &self.settings, size, FEATURE_SAMPLES, stop)?;
-        denoise_film(prepared, film, &features, stop)
+        let guides = gather_guides(prepared, &self.settings, size, FEATURE_SAMPLES, stop)?;
+        denoise_film(film, &guides, stop)
     }
 
     /// Writes an image with its metadata to a file or to standard output.
@@ -218,7 +218,8 @@ impl RenderJob {
         let mut note = self.note(film, path);
         if !args.layers.is_empty() {
             let layers = args.layers.of(film);
-            let picture = LayeredPicture { film, features, layers: &layers, note: Some(&note) };
+            let denoised = denoised.map(|denoised| &denoised.color[..]);
+            let picture = LayeredPicture { film, features, denoised, layers: &layers, note: Some(&note) };
             return match args.to_stdout() {
                 true => print_bytes(&picture.bytes(path)?),
                 false => Ok(picture.write(path, replace)?),
@@ -279,7 +280,7 @@ pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
     let others = [
         film.then_some(Purpose::FilmFile),
         args.layers.have_features().then_some(Purpose::Layers),
-        args.denoise.then_some(Purpose::Denoised),
+        args.wants_denoised().then_some(Purpose::Denoised),
     ];
     std::iter::once(picture).chain(others.into_iter().flatten()).collect()
 }

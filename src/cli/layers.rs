@@ -38,6 +38,8 @@ pub enum LayerArg {
     Samples,
     /// Estimated relative error of each pixel: 0.05 is 5 %.
     Error,
+    /// Light without most of its noise: raw and filtered combined.
+    Denoised,
 }
 
 impl From<LayerArg> for PictureLayer {
@@ -53,6 +55,7 @@ impl From<LayerArg> for PictureLayer {
             LayerArg::Variance => Self::Variance,
             LayerArg::Samples => Self::Samples,
             LayerArg::Error => Self::Error,
+            LayerArg::Denoised => Self::Denoised,
         }
     }
 }
@@ -66,6 +69,10 @@ impl LayerArgs {
     /// Whether a layer needs feature buffers.
     pub fn have_features(&self) -> bool {
         self.layers.iter().any(|&layer| PictureLayer::from(layer).is_feature())
+    }
+
+    pub fn has_denoised(&self) -> bool {
+        self.layers.contains(&LayerArg::Denoised)
     }
 
     pub fn has_error(&self) -> bool {
@@ -94,6 +101,10 @@ impl LayerArgs {
 
     /// Fails if feature layers are requested but the film was rendered without them.
     pub fn check_kept(&self, features: Option<&FeatureLayers>) -> Result<(), Failure> {
+        if self.has_denoised() {
+            let message = "--layers: denoised needs the scene: render with --resume and --layers denoised";
+            return Err(Failure::Usage(message.to_owned()));
+        }
         if self.have_features() && features.is_none() {
             let message = "the films have no such layers: render one of them with --film and the same --layers";
             return Err(Failure::Failed(message.to_owned()));

@@ -129,7 +129,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         } else {
             let layers = args.layers.of(&film);
             let features = features.as_ref();
-            LayeredPicture { film: &film, features, layers: &layers, note: Some(&note) }
+            LayeredPicture { film: &film, features, denoised: None, layers: &layers, note: Some(&note) }
                 .write(path, files.replace())?;
         }
     }

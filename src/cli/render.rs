@@ -255,7 +255,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         write_film_with_features(&film, features.as_ref(), &note, file)?;
     }
     let denoised = job.denoised(args, &film, &asked);
-    if args.denoise && denoised.is_none() {
+    if args.wants_denoised() && denoised.is_none() {
         remark(format_args!("warning: stopped before the image was denoised: {} is raw", args.output_name()));
     }
     job.write(args, (&film, features.as_ref()), denoised.as_ref(), &args.output, files.replace())?;

@@ -268,6 +268,11 @@ impl RenderCommand {
 }
 
 impl RenderArgs {
+    /// Whether the image, or a layer of it, is denoised.
+    pub fn wants_denoised(&self) -> bool {
+        self.denoise || self.layers.has_denoised()
+    }
+
     /// Whether the image goes to standard output.
     pub fn to_stdout(&self) -> bool {
         self.output == Path::new(STDOUT)

@@ -5,7 +5,7 @@
 //! same list of commands always gives the same image.
 
 use super::rig::Rig;
-use super::{Bookmarks, Edit, Target};
+use super::{Bookmarks, Denoising, Edit, Target};
 use crate::render::{Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
 use bevy_ecs::message::Message;
@@ -182,6 +182,10 @@ pub enum Command {
     },
     /// Set what is displayed in place of the image, see [`Inspection`].
     SetInspection(Inspection),
+    /// Displays the image raw, denoised, or half and half.
+    SetDenoising(Denoising),
+    /// The next of denoised, raw and split; no inspection is displayed then.
+    NextDenoising,
     /// Tint the pixels in focus, and draw the focal plane.
     SetSharpZone {
         /// Whether they are displayed.

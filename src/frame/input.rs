@@ -15,7 +15,7 @@ use super::scene_bounds::SceneBounds;
 use super::selection::{Picked, Selection, pick};
 use super::status::{MessageKind, Status};
 use super::views::{Bookmarks, ViewTrail};
-use crate::render::ToneCurve;
+use crate::render::{Inspection, ToneCurve};
 use crate::scene::bounds::MOST_STOPS;
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
@@ -128,6 +128,15 @@ impl CommandParams<'_, '_> {
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {
                 let look = super::ViewOptions { inspection, ..self.looking.0 };
+                self.looking.set_if_neq(ViewMode(look));
+            }
+            Command::SetDenoising(denoising) => {
+                let look = super::ViewOptions { denoising, ..self.looking.0 };
+                self.looking.set_if_neq(ViewMode(look));
+            }
+            Command::NextDenoising => {
+                let denoising = self.looking.0.denoising.next();
+                let look = super::ViewOptions { inspection: Inspection::Picture, denoising, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::SetSharpZone { shown } => {

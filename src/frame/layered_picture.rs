@@ -7,6 +7,7 @@
 //! | albedo, and its variance | `albedo.R` …, `albedo_variance.R` … |
 //! | normal, position | `normal.X` …, `position.X` … |
 //! | depth, coverage, samples, error | `depth.Z`, `coverage.Y`, `samples.Y`, `error.Y` |
+//! | denoised radiance | `denoised.R` … |
 //! | objects, materials | `CryptoObject00.R` …, `CryptoMaterial00.R` … (Cryptomatte, see [`super::cryptomatte`]) |
 //!
 //! All channels are 32-bit floats with lossless compression. Start reading at [`LayeredPicture::write`].
@@ -21,6 +22,7 @@ use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
 };
+use glam::Vec3;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -50,11 +52,13 @@ pub enum PictureLayer {
     Samples,
     /// Estimated relative error per pixel.
     Error,
+    /// Denoised radiance.
+    Denoised,
 }
 
 impl PictureLayer {
     /// All layers.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
@@ -65,6 +69,7 @@ impl PictureLayer {
         Self::Variance,
         Self::Samples,
         Self::Error,
+        Self::Denoised,
     ];
 
     /// Name for the user, lower case.
@@ -80,6 +85,7 @@ impl PictureLayer {
             Self::Variance => "variance",
             Self::Samples => "samples",
             Self::Error => "error",
+            Self::Denoised => "denoised",
         }
     }
 
@@ -98,13 +104,14 @@ impl PictureLayer {
             Self::Variance => channels.iter().any(|channel| channel.contains("_variance.")),
             Self::Samples => has("samples.Y"),
             Self::Error => has("error.Y"),
+            Self::Denoised => has("denoised.R"),
         };
         Self::ALL.into_iter().filter(is_there).collect()
     }
 
     /// Whether the layer comes from feature buffers; the others come from the film.
     pub fn is_feature(self) -> bool {
-        !matches!(self, Self::Samples | Self::Error)
+        !matches!(self, Self::Samples | Self::Error | Self::Denoised)
     }
 }
 
@@ -115,6 +122,8 @@ pub struct LayeredPicture<'a> {
     pub film: &'a Film,
     /// Features of the same image; required by layers that are features.
     pub features: Option<&'a FeatureLayers>,
+    /// Denoised radiance of each pixel, row by row from the top; required by that layer.
+    pub denoised: Option<&'a [Vec3]>,
     /// The requested layers.
     pub layers: &'a [PictureLayer],
     /// Metadata of the image.
@@ -213,6 +222,10 @@ impl LayeredPicture<'_> {
         }
         if self.has(PictureLayer::Error) {
             channels.push(("error.Y".to_owned(), relative_errors(self.film)?));
+        }
+        if let Some(colors) = self.denoised.filter(|_| self.has(PictureLayer::Denoised)) {
+            let channel = |name: &str, c: usize| (name.to_owned(), colors.iter().map(|color| color[c]).collect());
+            channels.extend([channel("denoised.R", 0), channel("denoised.G", 1), channel("denoised.B", 2)]);
         }
         Some(channels)
     }

@@ -17,6 +17,7 @@ mod background;
 mod camera_path;
 mod command;
 mod cryptomatte;
+mod denoising;
 mod edit;
 mod explain;
 mod feature_layers;
@@ -53,6 +54,7 @@ mod worker;
 
 pub use camera_path::{along, turntable};
 pub use command::Command;
+pub use denoising::Denoising;
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use feature_layers::{FeatureLayers, FeatureNames};

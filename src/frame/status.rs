@@ -1,5 +1,6 @@
 //! Output of a session: the image and the status.
 
+use super::denoising::Denoising;
 use super::rig::Rig;
 use crate::printable;
 use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, Legend, RayCounts, Region};
@@ -24,6 +25,8 @@ pub struct Picture {
     pub spp: u32,
     /// The displayed view, which may lag behind the requested one.
     pub inspection: Inspection,
+    /// How it is denoised, if it is the image itself, which may not be what was last requested.
+    pub denoising: Denoising,
     /// Colour scale of the view, if it has one.
     pub legend: Option<Legend>,
     /// Increases with every image, also within a generation.
@@ -67,6 +70,8 @@ pub struct Status {
     pub estimated_error: Option<f64>,
     /// How caustics are rendered, if the scene may have any and it is known.
     pub caustics: Option<CausticChoice>,
+    /// How the image is denoised.
+    pub denoising: Denoising,
     /// Relative error of the denoised image, if that is displayed.
     pub denoised_error: Option<f64>,
     /// Cause of the last restart.

@@ -383,7 +383,7 @@ pub fn present(
     (status.rays, status.elapsed) = (stats.rays, stats.elapsed);
     status.estimated_error = stats.error;
     status.caustics = stats.caustics;
-    status.denoised_error = stats.denoised_error;
+    (status.denoising, status.denoised_error) = (stats.denoising, stats.denoised_error);
     status.camera_mrays = per_second(stats.recent_rays.camera);
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);

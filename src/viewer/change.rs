@@ -72,13 +72,14 @@ impl PictureChange {
 
 /// Whether the image is shown, without inspection or overlay.
 fn is_plain(session: &Session) -> bool {
-    session.world().resource::<ViewMode>().0 == ViewOptions::default()
+    let looking = session.world().resource::<ViewMode>().0;
+    looking == ViewOptions { denoising: looking.denoising, ..ViewOptions::default() }
 }
 
 /// Computes the difference; `None` for images of different sizes.
 fn difference(a: &Picture, b: &Picture) -> Option<Difference> {
     let size = (a.width, a.height);
-    if size != (b.width, b.height) || a.rgba.len() != b.rgba.len() || a.rgba.is_empty() {
+    if size != (b.width, b.height) || a.denoising != b.denoising || a.rgba.len() != b.rgba.len() || a.rgba.is_empty() {
         return None;
     }
     let (mut sum, mut plain) = (0u64, 0u64);

@@ -4,9 +4,12 @@ use crate::frame::{
     FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
     render_offline_until,
 };
-use crate::render::{Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, worker_threads};
+use crate::render::{
+    Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, denoise_film, gather_guides, worker_threads,
+};
 use crate::scene::file::check_film_size;
-use crate::scene::{ImageSamples, MetadataDraft};
+use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
+use glam::{UVec2, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,6 +47,27 @@ pub struct Shown {
     pub size: (u32, u32),
 }
 
+/// How an image is denoised before it is saved.
+pub struct DenoiseWith {
+    /// The scene that the film shows.
+    pub prepared: Prepared,
+    pub settings: RenderSettings,
+    pub threads: usize,
+}
+
+impl DenoiseWith {
+    /// `None` if the window was closed meanwhile, or the system has no threads: then the image is saved raw.
+    fn denoise(&self, film: &Film, ending: &AtomicBool) -> Option<Vec<Vec3>> {
+        let stop = || ending.load(Ordering::Relaxed);
+        let pool = worker_threads().num_threads(self.threads).build().ok()?;
+        let size = UVec2::new(film.width(), film.height());
+        pool.install(|| {
+            let guides = gather_guides(&self.prepared, &self.settings, size, FEATURE_SAMPLES, &stop)?;
+            denoise_film(film, &guides, &stop).map(|denoised| denoised.color)
+        })
+    }
+}
+
 pub struct Saver {
     /// Whether the window is closed: long renders end early.
     ending: Arc<AtomicBool>,
@@ -66,17 +90,18 @@ impl Saver {
     /// number; a PNG with `size` pixels.
     pub fn save(
         &mut self,
-        film: Receiver<Film>,
+        (film, denoise): (Receiver<Film>, Option<DenoiseWith>),
         draft: Option<MetadataDraft>,
         display: Display,
         size: (u32, u32),
         scene: &str,
         format: PictureFormat,
     ) {
-        let (folder, stem) = (self.folder.clone(), file_stem(scene));
+        let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
             let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
-            print(&folder, &stem, &film, draft, &display, size, format)
+            let denoised = denoise.and_then(|with| with.denoise(&film, &ending));
+            print(&folder, &stem, (&film, denoised.as_deref()), draft, &display, size, format)
         });
     }
 
@@ -104,7 +129,7 @@ impl Saver {
             if film.spp() == 0 {
                 return Err(failed(&"the window was closed before every pixel had a sample"));
             }
-            print(&folder, &stem, &film, draft, &display, size, format)
+            print(&folder, &stem, (&film, None), draft, &display, size, format)
         });
     }
 
@@ -129,11 +154,18 @@ impl Saver {
             let gather = || FeatureLayers::gather(&prepared, names, &settings, of_film, FEATURE_SAMPLES, &stop);
             let features = pool.install(gather).ok_or_else(|| failed(&"the window was closed"))?;
             let knows_error = film.error_estimate().is_some();
+            let with = DenoiseWith { prepared: prepared.clone(), settings, threads };
+            let denoised = with.denoise(&film, &ending).ok_or_else(|| failed(&"the window was closed"))?;
             let is_known = |layer: &PictureLayer| knows_error || *layer != PictureLayer::Error;
             let layers: Vec<PictureLayer> = PictureLayer::ALL.into_iter().filter(is_known).collect();
             let (coarse, note) = metadata_of(&folder, &stem, &film, draft, &display, size);
-            let picture =
-                LayeredPicture { film: &film, features: Some(&features), layers: &layers, note: note.as_deref() };
+            let picture = LayeredPicture {
+                film: &film,
+                features: Some(&features),
+                denoised: Some(&denoised),
+                layers: &layers,
+                note: note.as_deref(),
+            };
             Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse })?)
         });
     }
@@ -174,14 +206,19 @@ impl Saver {
 fn print(
     folder: &Path,
     stem: &str,
-    film: &Film,
+    (film, denoised): (&Film, Option<&[Vec3]>),
     draft: Option<MetadataDraft>,
     display: &Display,
     size: (u32, u32),
     format: PictureFormat,
 ) -> Saved {
-    let (coarse, note) = metadata_of(folder, stem, film, draft, display, size);
-    let print = Print { film, display, size, note: note.as_deref(), denoised: None };
+    let (coarse, mut note) = metadata_of(folder, stem, film, draft, display, size);
+    if denoised.is_some()
+        && let Some(raw) = note.as_deref().and_then(|note| ImageMetadata::from_note(note).ok())
+    {
+        note = Some(ImageMetadata { denoised: Some("own".to_owned()), ..raw }.to_note());
+    }
+    let print = Print { film, display, size, note: note.as_deref(), denoised };
     Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
 
@@ -256,7 +293,7 @@ mod tests {
         );
         for _ in 0..8 {
             let film = ready(Film::new(3, 2));
-            saver.save(film, None, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
+            saver.save((film, None), None, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
         }
         let saved = saver.finish().into_iter().map(|saved| saved.unwrap());
         let mut saved: Vec<PathBuf> = saved.inspect(|kept| assert!(!kept.coarse)).map(|kept| kept.path).collect();
@@ -278,7 +315,7 @@ mod tests {
         let extraction = Extraction::new(&inputs, &loaded.trees);
         let mut saver = Saver::new(folder.path(), Arc::new(|| ()));
         // The error is known from the second sample on.
-        for (spp, n_layers) in [(1, 9), (4, 10)] {
+        for (spp, n_layers) in [(1, 10), (4, 11)] {
             let settings = RenderSettings::default();
             let (prepared, names) = (extraction.prepared.clone(), FeatureNames::of(&extraction, &inputs));
             let mut film = Film::new(9, 7);
@@ -294,12 +331,12 @@ mod tests {
     #[test]
     fn a_failure_is_told() {
         let mut saver = Saver::new(Path::new("/no/such/folder"), Arc::new(|| ()));
-        saver.save(ready(Film::new(1, 1)), None, Display::default(), (1, 1), "gallery", PictureFormat::Exr);
+        saver.save((ready(Film::new(1, 1)), None), None, Display::default(), (1, 1), "gallery", PictureFormat::Exr);
         let [Err(error)] = &saver.finish()[..] else { panic!("it cannot have been saved") };
         assert!(error.contains("/no/such/folder"), "{error}");
 
         let (_, never) = channel();
-        saver.save(never, None, Display::default(), (1, 1), "gallery", PictureFormat::Png);
+        saver.save((never, None), None, Display::default(), (1, 1), "gallery", PictureFormat::Png);
         assert_eq!(saver.finish(), [Err("there was no image to save".to_owned())]);
     }
 

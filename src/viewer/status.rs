@@ -1,6 +1,6 @@
 //! Text of the status line: quality of the image, and settings.
 
-use crate::frame::{Status, f_number, f_stop};
+use crate::frame::{Denoising, Status, f_number, f_stop};
 use crate::render::{Integrator, ToneCurve};
 use std::fmt::Write as _;
 
@@ -35,6 +35,10 @@ pub fn figures(status: &Status) -> String {
     write!(line, "   error {error}{place}").expect("a string takes all");
     if let Some(denoised) = status.denoised_error {
         write!(line, " (denoised {})", percent(denoised)).expect("a string takes all");
+    }
+    // Raw is what the figures are of; everything else is named.
+    if status.denoising != Denoising::Raw {
+        write!(line, "   {}", status.denoising.label()).expect("a string takes all");
     }
     if !status.restart_cause.is_empty() {
         write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
@@ -152,6 +156,15 @@ mod tests {
         assert!(figures(&status).starts_with("512 spp in the region   12.3 s"));
         assert!(figures(&status).contains("error 1.2 % in the region"));
         status.region = None;
+        (status.denoising, status.estimated_error, status.denoised_error) =
+            (Denoising::Denoised, Some(0.02), Some(0.004));
+        assert!(
+            figures(&status).contains("error 2.0 % (denoised 0.40 %)   denoised   restarted"),
+            "{}",
+            figures(&status)
+        );
+        status.denoising = Denoising::Split;
+        assert!(figures(&status).contains("   raw | denoised   "));
         status.done = true;
         assert!(figures(&status).starts_with("finished   37 spp"));
         status.paused = true;

@@ -43,6 +43,28 @@ fn layers_of(path: &Path) -> (BTreeMap<String, Vec<f32>>, BTreeMap<String, Strin
 
 const ALL: &str = "albedo,normal,depth,position,coverage,object,material,variance,samples,error";
 
+/// The raw image with the denoised one beside it: the same numbers as with `--denoise`; without a scene there is none.
+#[test]
+fn the_denoised_layer_is_the_denoised_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "render cornell --size 24x16 --spp 4";
+    does(path, &format!("{scene} -o both.exr --layers denoised --film film.exr"));
+    does(path, &format!("{scene} -o denoised.exr --denoise"));
+    does(path, &format!("{scene} -o raw.exr"));
+    let [both, denoised, raw] = ["both.exr", "denoised.exr", "raw.exr"].map(|name| layers_of(&path.join(name)).0);
+    for channel in ["R", "G", "B"] {
+        assert_eq!(both[channel], raw[channel]);
+        assert_eq!(both[&format!("denoised.{channel}")], denoised[channel]);
+        assert_ne!(both[channel], denoised[channel]);
+    }
+    does(path, "render cornell --size 24x16 --samples 4..8 -o rest.exr --film rest-film.exr");
+    let refused = run(path, "merge film.exr rest-film.exr -o merged.exr --image image.exr --layers denoised");
+    assert!(!refused.status.success());
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(message.contains("denoised needs the scene"), "{message}");
+}
+
 /// Names as other programs expect them; sizes, ranges and sums as they must be.
 #[test]
 fn layers_have_the_names_and_numbers_that_other_programs_expect() {

@@ -1,15 +1,17 @@
 //! Denoised pictures of scenes against references: better than the raw ones, from one sample to many.
 
 use crate::common::*;
-use firstlight::render::{Denoised, Environment, Film, Prepared, RenderSettings, advance, denoise_film, gather_guides};
+use firstlight::render::{
+    Denoised, Environment, Film, Prepared, RenderSettings, advance, denoise_film, gather_guides, smooth_film,
+};
 use glam::{UVec2, Vec3};
 
 const SIZE: (u32, u32) = (64, 48);
 
 fn denoised(scene: &Prepared, film: &Film) -> Denoised {
     let settings = RenderSettings::default();
-    let features = gather_guides(scene, &settings, UVec2::from(SIZE), 16, &|| false).expect("nothing stops it");
-    denoise_film(scene, film, &features, &|| false).expect("nothing stops it")
+    let guides = gather_guides(scene, &settings, UVec2::from(SIZE), 16, &|| false).expect("nothing stops it");
+    denoise_film(film, &guides, &|| false).expect("nothing stops it")
 }
 
 fn relative_mse(colors: &[Vec3], reference: &[Vec3]) -> f64 {
@@ -59,6 +61,31 @@ fn no_number_of_samples_makes_it_worse_than_raw() {
         let told = found.error / error.sqrt();
         println!("{spp}: {} told {told}", error / raw);
         assert!(spp < 16 || (0.65..1.5).contains(&told), "{spp} samples: told {} for {}", found.error, error.sqrt());
+    }
+}
+
+/// An image of a moving camera: one sample per pixel, and what its own paths note of surfaces.
+#[test]
+fn a_coarse_film_is_smoothed_from_its_first_sample_on() {
+    let scene = room();
+    let settings = RenderSettings::default();
+    let mut reference = Film::new(SIZE.0, SIZE.1);
+    advance(&scene, &RenderSettings { seed: 99, ..settings }, &mut reference, 512, &|| false);
+    for simd in [settings.simd, None] {
+        let settings = RenderSettings { simd, ..settings };
+        let mut plain = Film::new(SIZE.0, SIZE.1);
+        advance(&scene, &settings, &mut plain, 1, &|| false);
+        assert_eq!(smooth_film(&scene, &settings, &plain, &|| false), None, "nothing was noted");
+        let mut film = Film::new(SIZE.0, SIZE.1);
+        film.note_surfaces();
+        advance(&scene, &settings, &mut film, 1, &|| false);
+        assert_eq!(film.means(), plain.means(), "noting changes no sample");
+        let smooth = smooth_film(&scene, &settings, &film, &|| false).expect("surfaces are noted");
+        let (raw, error) = (relative_mse(&film.means(), &reference.means()), relative_mse(&smooth, &reference.means()));
+        assert!(error < 0.4 * raw, "{error} of {raw}");
+        assert_eq!(smooth_film(&scene, &settings, &film, &|| true), None);
+        film.clear();
+        assert_eq!(smooth_film(&scene, &settings, &film, &|| false), None, "a film that is cleared notes nothing");
     }
 }
 

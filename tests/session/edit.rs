@@ -3,8 +3,8 @@
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
-    Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
-    SessionOptions, Target, wanted_mesh,
+    Bookmarks, Command, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection,
+    Session, SessionOptions, Target, wanted_mesh,
 };
 use firstlight::render::{Inspection, Integrator, MaterialKind};
 use firstlight::scene::{
@@ -364,6 +364,34 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     driver.edit([Edit::Undo]);
     driver.until(Session::is_idle);
     assert_eq!((driver.get::<Shape>("serpent"), count(&driver)), (whole, n_objects));
+}
+
+/// Samples stay, the raw image comes back byte for byte, and what is displayed is named.
+#[test]
+fn the_denoised_image_keeps_all_samples_and_has_an_error() {
+    let mut driver = Driver::open("gallery");
+    let (raw, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
+    assert_eq!(driver.session.picture().denoising, Denoising::Raw);
+    driver.session.send(Command::SetDenoising(Denoising::Denoised));
+    driver.until(|session| session.status().denoised_error.is_some() && session.is_idle());
+    let denoised = driver.session.picture().rgba.clone();
+    assert_ne!(denoised, raw);
+    assert_eq!([driver.session.status().denoising, driver.session.picture().denoising], [Denoising::Denoised; 2]);
+    driver.session.send(Command::SetDenoising(Denoising::Split));
+    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Split);
+    let (picture, width) = (driver.session.picture(), 4 * driver.session.picture().width as usize);
+    let middle = width / 8 * 4;
+    for ((row, raw), denoised) in picture.rgba.chunks(width).zip(raw.chunks(width)).zip(denoised.chunks(width)) {
+        assert_eq!((&row[..middle], &row[middle + 4..]), (&raw[..middle], &denoised[middle + 4..]));
+    }
+    driver.session.send(Command::NextDenoising);
+    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
+    assert_eq!((&driver.session.picture().rgba, driver.session.status().denoised_error), (&raw, None));
+    assert_eq!((driver.session.status().restarts, driver.session.status().spp), (restarts, 2));
+    // A moving camera: the coarse image is smoothed, and named so.
+    driver.session.send(Command::SetDenoising(Denoising::Denoised));
+    driver.session.send(Command::Turn { yaw_deg: 5.0, pitch_deg: 0.0 });
+    driver.until(|session| session.status().restarts > restarts && session.status().denoised_error.is_some());
 }
 
 #[test]

@@ -37,8 +37,8 @@ const LAYERS: [(&str, &[&str]); 25] = [
     (SHADING, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE]),
     (INTEGRATORS, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING]),
     (FILM, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS]),
-    // It knows slices, and what the film says of its variance.
-    (DENOISE, &[FILM]),
+    // It knows slices, and what the film says of its variance and of surfaces.
+    (DENOISE, &[SIMD, FILM]),
     (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM, DENOISE]),
     // `lib.rs`, which shows what the folders have.
     ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),

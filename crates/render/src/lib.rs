@@ -34,9 +34,9 @@ pub use crate::core::techniques::Techniques;
 pub use crate::core::texture::{
     Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
 };
-pub use denoise::{DenoiseInput, Denoised, Guides, denoise};
+pub use denoise::{DenoiseInput, Denoised, Guides, MovingInput, denoise, smooth_moving};
 pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
-pub use driver::denoised::{denoise_film, gather_guides};
+pub use driver::denoised::{DenoiseSource, SurfaceGuides, denoise_film, denoise_source, gather_guides};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::inspect::{
@@ -45,6 +45,7 @@ pub use driver::inspect::{
 pub use driver::renderer::{advance, advance_region};
 pub use driver::report::{BadSample, PassReport};
 pub use driver::single::replay_sample;
+pub use driver::smooth::smooth_film;
 pub use driver::threads::worker_threads;
 pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_colors, develop_pixel, encode_srgb};
 pub use film::error::{MergeError, RecordError};
@@ -57,6 +58,7 @@ pub use film::record::{
 };
 pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};
+pub use film::surfaces::PixelSurface;
 pub use film::tiles::Film;
 pub use integrators::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
 pub use prepare::light::LightTable;

@@ -7,11 +7,14 @@
 //! This file is the handle used by the session; `thread` is the thread itself, `show` makes the images, and `idle`
 //! keeps memory.
 
+mod denoised;
+mod denoiser;
 mod idle;
 mod show;
 mod thread;
 mod views;
 
+use super::denoising::Denoising;
 use super::{LatencyHistogram, Picture, Target};
 use crate::render::{
     BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
@@ -28,10 +31,13 @@ use std::time::{Duration, Instant};
 /// tree builds while an image waits.
 const BESIDE: &str = "beside";
 const WORKERS: &str = "firstlight";
+const DENOISE: &str = "denoise";
 
 /// Niceness of yielding threads: a third of the default weight. It is the same for both pools, so that samples of the
 /// previous image do not slow down tree builds.
 const NICENESS: i32 = 5;
+/// Niceness of the threads that denoise while others add samples: a third of the weight of those.
+const DENOISE_NICENESS: i32 = 10;
 
 /// Called when there are new results.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -51,6 +57,8 @@ pub struct Job {
 pub struct ViewOptions {
     /// What is displayed in place of the image.
     pub inspection: Inspection,
+    /// Of the image itself, where no inspection is displayed.
+    pub denoising: Denoising,
     /// Tints the pixels in focus and draws the focal plane.
     pub sharp_zone: bool,
 }
@@ -92,7 +100,9 @@ pub struct Stats {
     pub error: Option<f64>,
     /// How caustics are rendered, if the scene may have any; for the film at full resolution.
     pub caustics: Option<CausticChoice>,
-    /// Relative error of the denoised image, if that is displayed.
+    /// How the displayed image is denoised.
+    pub denoising: Denoising,
+    /// Relative error of the denoised image, if that is displayed and known.
     pub denoised_error: Option<f64>,
     /// Rays of the latest steps, and the time that they took in seconds.
     pub recent_rays: RayCounts,
@@ -186,6 +196,18 @@ struct Shared {
     yielding: bool,
 }
 
+impl Shared {
+    /// A denoised image is there: a sleeping thread takes it at once, another one after its next step.
+    fn tell_of_result(&self) {
+        let inbox = lock(&self.inbox);
+        if self.sleeping.load(Ordering::Acquire) {
+            self.interrupt.store(true, Ordering::Release);
+        }
+        drop(inbox);
+        self.arrived.notify_all();
+    }
+}
+
 /// Handle of the render thread.
 pub struct Worker {
     shared: Arc<Shared>,
@@ -205,8 +227,8 @@ impl Worker {
             sleeping: AtomicBool::new(false),
             seen: AtomicU64::new(0),
             outbox: Mutex::default(),
-            pool: Mutex::new(make_pool(threads, WORKERS, yielding)?),
-            beside: Mutex::new(make_pool(threads, BESIDE, yielding)?),
+            pool: Mutex::new(make_pool(threads, WORKERS, yielding.then_some(NICENESS))?),
+            beside: Mutex::new(make_pool(threads, BESIDE, yielding.then_some(NICENESS))?),
             cancels: Mutex::default(),
             waker,
             yielding,
@@ -214,8 +236,11 @@ impl Worker {
         let thread = std::thread::Builder::new()
             .name("firstlight render".to_owned())
             .spawn({
-                let shared = shared.clone();
-                move || thread::Loop::new(&shared, target).run()
+                let (shared, of_denoiser) = (shared.clone(), shared.clone());
+                move || {
+                    let denoiser = denoiser::Denoiser::start(yielding, move || of_denoiser.tell_of_result());
+                    thread::Loop::new(&shared, denoiser, target).run();
+                }
             })
             .map_err(|error| format!("cannot start the render thread: {error}"))?;
         Ok(Self { shared, thread: Some(thread) })
@@ -334,13 +359,13 @@ impl Drop for Worker {
     }
 }
 
-fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<rayon::ThreadPool>, String> {
+fn make_pool(threads: usize, name: &'static str, niceness: Option<i32>) -> Result<Arc<rayon::ThreadPool>, String> {
     worker_threads()
         .num_threads(threads)
         .thread_name(move |i| format!("{name} {i}"))
         .start_handler(move |_| {
-            if yielding {
-                yield_to_others();
+            if let Some(niceness) = niceness {
+                yield_to_others(niceness);
             }
         })
         .build()
@@ -349,12 +374,12 @@ fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<r
 }
 
 /// Lowers the priority of this thread, so that it gets the processor time that others leave.
-fn yield_to_others() {
+fn yield_to_others(_niceness: i32) {
     // Niceness per thread exists on Linux only.
     #[cfg(target_os = "linux")]
     {
         // Niceness may always be raised; if it fails, the priority stays as it is.
-        let _ = rustix::process::setpriority_process(None, NICENESS);
+        let _ = rustix::process::setpriority_process(None, _niceness);
     }
 }
 

@@ -2,17 +2,11 @@
 
 use super::thread::Loop;
 use super::views::ViewKey;
-use super::{Stats, lock};
-use crate::render::{
-    FEATURE_SAMPLES, Inspected, Inspection, denoise_film, depths, develop, develop_colors, gather_guides, inspect,
-    tint_sharp_zone,
-};
+use super::{Denoising, Stats, lock};
+use crate::render::{Inspected, Inspection, depths, inspect, tint_sharp_zone};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
-
-/// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples.
-const SAMPLES_FIRST: u32 = 4;
 
 impl Loop<'_> {
     /// Develops the film and hands the image over, unless the previous image has not been taken yet and `last` is
@@ -20,15 +14,12 @@ impl Loop<'_> {
     pub(super) fn show(&mut self, last: bool) {
         let film = self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref());
         let (Some(job), Some((divider, film))) = (&self.job, film) else { return };
-        // Coarse images are never denoised, for latency.
-        let denoises = self.look.inspection == Inspection::Denoised && *divider == 1;
         let key = ViewKey {
             generation: job.generation,
             inspection: self.look.inspection,
             size: UVec2::new(film.width(), film.height()),
         };
         let stats = Stats {
-            denoised_error: self.stats.denoised_error.filter(|_| denoises),
             film_width: film.width(),
             film_height: film.height(),
             divider: *divider,
@@ -47,42 +38,34 @@ impl Loop<'_> {
                 return;
             }
         }
-        let waits = |&(of, until): &(ViewKey, Instant)| of == key && Instant::now() < until;
-        if denoises && !last && !self.redraw && self.views.denoised.as_ref().is_some_and(waits) {
-            return;
+        if !last && !self.redraw && self.is_displayed(*divider, key) {
+            // The figures beside it are new.
+            return self.wake();
         }
         let start = Instant::now();
         let pool = lock(&self.shared.pool).clone();
         let (width, height) = (job.width, job.height);
-        let picture = &mut self.spare;
+        let mut rgba = std::mem::take(&mut self.spare.rgba);
+        let mut smoothed = None;
         let interrupt = &self.shared.interrupt;
         // Another view or job has arrived: this image would not be displayed.
         let stop = || interrupt.load(Ordering::Relaxed);
         let mut legend = None;
-        if denoises {
-            let known = self.views.guides.take().filter(|(of, _)| *of == key).map(|(_, guides)| guides);
-            let made = pool.install(|| {
-                let gather = || gather_guides(&job.prepared, &job.settings, key.size, FEATURE_SAMPLES, &stop);
-                let guides = known.or_else(gather)?;
-                let denoised = denoise_film(&job.prepared, film, &guides, &stop)?;
-                develop_colors(&denoised.color, key.size.into(), &self.display, (width, height), &mut picture.rgba);
-                Some((guides, denoised.error))
-            });
-            let Some((guides, error)) = made else { return };
-            self.views.guides = Some((key, guides));
-            let now = Instant::now();
-            self.views.denoised = Some((key, now + SAMPLES_FIRST * (now - start)));
-            self.stats.denoised_error = Some(error);
-            lock(&self.shared.outbox).stats.denoised_error = Some(error);
-        } else if matches!(self.look.inspection, Inspection::Picture | Inspection::Denoised) {
-            pool.install(|| develop(film, &self.display, width, height, &mut picture.rgba));
+        let (mut denoising, mut denoised_error) = (Denoising::Raw, None);
+        if self.look.inspection == Inspection::Picture {
+            let develop = || self.develop_wanted((*divider, film), key, (width, height), &mut rgba);
+            let Some(developed) = pool.install(develop) else { return };
+            (denoising, denoised_error) = developed;
+            if denoised_error.is_none() {
+                smoothed = Some(start.elapsed());
+            }
         } else {
             let known = self.views.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
             let view = known
                 .map(|(_, view)| view)
                 .or_else(|| pool.install(|| inspect(key.inspection, &job.prepared, &job.settings, film, &stop)));
             let Some(view) = view else { return };
-            enlarge(&view, width, height, &mut picture.rgba);
+            enlarge(&view, width, height, &mut rgba);
             legend = view.legend;
             self.views.inspected = Some((key, view));
         }
@@ -95,19 +78,25 @@ impl Loop<'_> {
             let camera = &job.prepared.camera;
             let zone = camera.sharp_zone(height);
             let size = UVec2::new(width, height);
-            pool.install(|| tint_sharp_zone(&mut picture.rgba, size, &depths, key.size, zone, camera.focus_distance));
+            pool.install(|| tint_sharp_zone(&mut rgba, size, &depths, key.size, zone, camera.focus_distance));
             self.views.depths = Some((key, depths));
         }
         self.n_pictures += 1;
+        let picture = &mut self.spare;
         (picture.width, picture.height, picture.number) = (width, height, self.n_pictures);
-        let is_raw = self.look.inspection == Inspection::Denoised && !denoises;
-        picture.inspection = if is_raw { Inspection::Picture } else { self.look.inspection };
-        picture.legend = legend;
+        (picture.inspection, picture.denoising, picture.legend) = (self.look.inspection, denoising, legend);
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
+        picture.rgba = rgba;
+        (self.stats.denoising, self.stats.denoised_error) = (denoising, denoised_error);
+        let divider = *divider;
+        if let Some(took) = smoothed.filter(|_| denoising != Denoising::Raw) {
+            self.note_smoothing(divider, key, took);
+        }
         {
             let mut outbox = lock(&self.shared.outbox);
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
+            (outbox.stats.denoising, outbox.stats.denoised_error) = (denoising, denoised_error);
         }
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;

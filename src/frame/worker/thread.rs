@@ -1,8 +1,9 @@
 //! The loop of the render thread: reads messages, executes the scheduler's next step, hands over images, and sleeps.
 
+use super::denoiser::Denoiser;
 use super::idle::IdleFilms;
 use super::views::Views;
-use super::{Answer, BESIDE, Job, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
+use super::{Answer, BESIDE, Denoising, Job, NICENESS, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
 use crate::render::{Display, Film, Region, SampleAllocation, advance_region, explain, known_caustic_choice};
@@ -26,6 +27,7 @@ pub struct Loop<'a> {
     pub(super) display: Display,
     pub(super) look: ViewOptions,
     pub(super) views: Views,
+    pub(super) denoiser: Denoiser,
     /// Region that gets all samples, in fractions of the image.
     region: Option<[f64; 4]>,
     /// Whether the film has tiles that are ahead because of a region.
@@ -48,7 +50,7 @@ pub struct Loop<'a> {
 }
 
 impl<'a> Loop<'a> {
-    pub fn new(shared: &'a Shared, target: Target) -> Self {
+    pub fn new(shared: &'a Shared, denoiser: Denoiser, target: Target) -> Self {
         Self {
             shared,
             clock: Instant::now(),
@@ -57,6 +59,7 @@ impl<'a> Loop<'a> {
             display: Display::default(),
             look: ViewOptions::default(),
             views: Views::default(),
+            denoiser,
             region: None,
             is_uneven: false,
             question: None,
@@ -136,6 +139,7 @@ impl<'a> Loop<'a> {
         }
         if let Some(job) = orders.job {
             let size = (job.width, job.height);
+            self.denoiser.want(job.generation);
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
@@ -215,9 +219,9 @@ impl<'a> Loop<'a> {
     }
 
     fn set_threads(&mut self, threads: usize) {
-        let yielding = self.shared.yielding;
+        let niceness = self.shared.yielding.then_some(NICENESS);
         let pools =
-            make_pool(threads, WORKERS, yielding).and_then(|pool| Ok((pool, make_pool(threads, BESIDE, yielding)?)));
+            make_pool(threads, WORKERS, niceness).and_then(|pool| Ok((pool, make_pool(threads, BESIDE, niceness)?)));
         match pools {
             Ok((pool, beside)) => {
                 self.stats.threads = pool.current_num_threads();
@@ -250,6 +254,10 @@ impl<'a> Loop<'a> {
                 },
             };
             film.set_preview(divider > 1);
+            if self.wanted_denoising() != Denoising::Raw {
+                let pool = lock(&self.shared.pool).clone();
+                pool.install(|| film.note_surfaces());
+            }
             match self.film.replace((divider, film)) {
                 Some(old) if old.1.spp() > 0 => self.previous = Some(old),
                 old => old.into_iter().for_each(|(_, film)| self.idle.keep(film)),
@@ -320,6 +328,10 @@ impl<'a> Loop<'a> {
         }
         self.hand_out(false);
         self.answer(false);
+        self.take_settled();
+        if !replaced {
+            self.request_denoised(false);
+        }
         if !replaced && (self.redraw || (is_due && self.previous.is_none())) {
             let finished = Instant::now();
             self.show(false);
@@ -376,6 +388,8 @@ impl<'a> Loop<'a> {
         // Without a film, the requests fail instead of waiting forever.
         self.to_keep.clear();
         self.question = None;
+        self.take_settled();
+        self.request_denoised(true);
         let shown = {
             let stats = &lock(&self.shared.outbox).stats;
             stats.asleep && (stats.generation, stats.threads) == (self.stats.generation, self.stats.threads)
@@ -387,7 +401,7 @@ impl<'a> Loop<'a> {
             self.wake();
         }
         let mut inbox = lock(&self.shared.inbox);
-        while !self.shared.interrupt.load(Ordering::Acquire) {
+        while !self.shared.interrupt.load(Ordering::Acquire) && !self.denoiser.has_result() {
             self.shared.sleeping.store(true, Ordering::Release);
             inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
         }

@@ -1,8 +1,8 @@
 //! Cached results computed from the film or the scene.
 
-use crate::render::{FeatureBuffers, Inspected, Inspection};
+use crate::render::{Denoised, Inspected, Inspection};
 use glam::UVec2;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Cached results; each has the key that it is valid for.
 #[derive(Default)]
@@ -11,10 +11,12 @@ pub struct Views {
     pub inspected: Option<(ViewKey, Inspected)>,
     /// Depth per pixel of the film.
     pub depths: Option<(ViewKey, Vec<f32>)>,
-    /// Feature buffers for the denoiser.
-    pub guides: Option<(ViewKey, FeatureBuffers)>,
-    /// When denoising may run again: samples come first.
-    pub denoised: Option<(ViewKey, Instant)>,
+    /// The latest denoised image.
+    pub settled: Option<Settled>,
+    /// When the film may be denoised again: samples come first.
+    pub settle_again: Option<Instant>,
+    /// When a film at full resolution may be smoothed again.
+    pub smooth_again: Option<(ViewKey, Instant)>,
 }
 
 /// Identifies what a cached result was computed for.
@@ -23,4 +25,13 @@ pub struct ViewKey {
     pub generation: u64,
     pub inspection: Inspection,
     pub size: UVec2,
+}
+
+/// A denoised image.
+pub struct Settled {
+    pub key: ViewKey,
+    pub spp: u32,
+    pub denoised: Denoised,
+    /// Without the feature buffers, which are gathered once per view.
+    pub took: Duration,
 }

@@ -3,12 +3,12 @@
 use super::App;
 use crate::console;
 use crate::frame::{
-    Command, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
+    Command, Denoising, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
 };
 use crate::render::{Inspection, Integrator};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
-use crate::viewer::saver::{Larger, Saved, Shown, new_scene_file};
+use crate::viewer::saver::{DenoiseWith, Larger, Saved, Shown, new_scene_file};
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, panel};
 use std::path::{Path, PathBuf};
@@ -257,7 +257,14 @@ impl App {
             self.saver.save_larger(larger, draft, display, &scene, format);
             return;
         }
-        self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
+        // A PNG looks like the window; linear light is what the samples say.
+        let is_denoised = !linear && self.session.world().resource::<ViewMode>().0.denoising != Denoising::Raw;
+        let denoise = self.session.rendered().filter(|_| is_denoised).map(|(prepared, settings)| DenoiseWith {
+            prepared,
+            settings,
+            threads: self.session.status().threads,
+        });
+        self.saver.save((self.session.keep_film(), denoise), draft, display, size, &scene, format);
     }
 
     /// Saves the image with all layers, in the size of the window.

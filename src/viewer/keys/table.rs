@@ -251,8 +251,8 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "show the image" },
             Binding {
-                triggers: &[named(NamedKey::F2, Action::Inspect(Inspection::Denoised))],
-                effect: "show the denoised image, the raw one",
+                triggers: &[named(NamedKey::F2, Action::Send(Command::NextDenoising))],
+                effect: "show the image denoised, raw on the left and denoised on the right, raw",
             },
             Binding {
                 triggers: &[text("j", Action::Explain)],

@@ -1,8 +1,8 @@
 //! Rendering and display settings.
 
-use super::widgets::{number, row, rows, slider, whole};
+use super::widgets::{number, row, row_with_hint, rows, slider, whole};
 use super::{Around, Asked};
-use crate::frame::{Command, Session, StopAt, Target, ViewMode};
+use crate::frame::{Command, Denoising, Session, StopAt, Target, ViewMode};
 use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::Rendering;
 use crate::viewer::status::tone_curve;
@@ -148,6 +148,15 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             })
         });
         let looking = session.world().resource::<ViewMode>().0;
+        row_with_hint(ui, "noise", "raw and denoised image: F2", |ui| {
+            ui.horizontal(|ui| {
+                for denoising in Denoising::ALL {
+                    if ui.selectable_label(looking.denoising == denoising, denoising.label()).clicked() {
+                        asked.send(Command::SetDenoising(denoising));
+                    }
+                }
+            })
+        });
         row(ui, "show", |ui| {
             let shown = looking.inspection;
             egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {

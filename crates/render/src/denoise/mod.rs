@@ -1,5 +1,6 @@
 //! Denoiser with an error estimate: a filter guided by feature buffers (`regression`), and a combination of raw and
 //! filtered image that converges to the limit of the raw image (`combine`).
+//! For images that are shown for a moment there is a filter of a few milliseconds (`moving`).
 //!
 //! Pure functions of slices. Every pixel is a fixed sequence of operations, so the result depends neither on threads
 //! nor on the instruction set. Start reading at [`denoise`].
@@ -9,9 +10,11 @@ mod combine;
 mod fit;
 mod input;
 mod moments;
+mod moving;
 mod regression;
 
 pub use input::{DenoiseInput, Guides};
+pub use moving::{MovingInput, smooth_moving};
 
 use glam::Vec3;
 

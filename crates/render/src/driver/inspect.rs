@@ -23,8 +23,6 @@ pub enum Inspection {
     /// The image itself.
     #[default]
     Picture,
-    /// The denoised image, see [`denoise_film`](crate::driver::denoised::denoise_film).
-    Denoised,
     /// Shading normals in camera space: red is right, green up, blue towards the viewer; half intensity is zero.
     Normals,
     /// Depth along the view axis, metres.
@@ -47,9 +45,8 @@ pub enum Inspection {
 
 impl Inspection {
     /// All views, in the order of menus.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 10] = [
         Self::Picture,
-        Self::Denoised,
         Self::Normals,
         Self::Depth,
         Self::Albedo,
@@ -65,7 +62,6 @@ impl Inspection {
     pub fn label(self) -> &'static str {
         match self {
             Self::Picture => "image",
-            Self::Denoised => "denoised",
             Self::Normals => "normals",
             Self::Depth => "depth",
             Self::Albedo => "albedo",
@@ -80,7 +76,7 @@ impl Inspection {
 
     /// Whether the view changes with every sample.
     pub fn is_of_film(self) -> bool {
-        matches!(self, Self::Picture | Self::Denoised | Self::Error | Self::Samples | Self::Luminance)
+        matches!(self, Self::Picture | Self::Error | Self::Samples | Self::Luminance)
     }
 }
 
@@ -125,8 +121,8 @@ pub fn inspect(
     };
     let plain = |rgb| Inspected { width, height, rgb, legend: None };
     Some(match kind {
-        // These are developed from radiance instead.
-        Inspection::Picture | Inspection::Denoised => plain(Vec::new()),
+        // This is developed from radiance instead.
+        Inspection::Picture => plain(Vec::new()),
         Inspection::Normals => plain(first_hits(snapshot, size, stop, |seen| match seen {
             Some((vertex, _)) => {
                 let camera = &snapshot.camera;

@@ -9,5 +9,6 @@ pub(crate) mod moving;
 pub(crate) mod renderer;
 pub(crate) mod report;
 pub(crate) mod single;
+pub(crate) mod smooth;
 pub(crate) mod threads;
 pub(crate) mod wave;

@@ -1,12 +1,13 @@
 //! One pass over the film: takes missing samples of its tiles, in parallel on the current rayon pool.
 
-use crate::core::settings::{RenderSettings, SampleAllocation};
+use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::driver::caustic_choice::plan_of_film;
 use crate::driver::moving::advance_moving;
 use crate::driver::report::PassReport;
 use crate::driver::wave::{Pass, Wave};
 use crate::film::region::Region;
 use crate::film::round::Round;
+use crate::film::surfaces::SurfaceSums;
 use crate::film::tile::FilmTile;
 use crate::film::tiles::Film;
 use crate::integrators::caustics::pilot::prepare_guide;
@@ -53,7 +54,8 @@ pub fn advance_region<'a>(
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
     let size = UVec2::new(film.width(), film.height());
     let Some(plan) = plan_of_film(snapshot, settings, film, stop) else { return PassReport::default() };
-    let pass = Pass::new(snapshot, settings, size, plan);
+    let mut pass = Pass::new(snapshot, settings, size, plan);
+    pass.notes_surfaces = film.notes_surfaces() && settings.integrator == Integrator::Path;
     let metric = match settings.allocation {
         SampleAllocation::Adaptive(metric) if region.is_none() => Some(metric),
         SampleAllocation::Adaptive(_) if film.round.is_some() => {
@@ -173,9 +175,12 @@ fn advance_tile(
         return report;
     }
     wave.take_tile(tile);
+    let emits = |material: u32| pass.snapshot.tables.emission[material as usize].is_some();
     while missing.iter().any(|missing| *missing > 0) {
         wave.take_runs(tile, &missing);
         let (mut radiance, runs) = (std::mem::take(&mut wave.radiance), std::mem::take(&mut wave.runs));
+        let notes_surfaces = pass.notes_surfaces && runs.iter().any(|run| run.sample < SurfaceSums::MOST);
+        wave.note_surfaces(notes_surfaces);
         let Some(rays) = wave.trace(pass, &runs, &mut radiance, stop) else {
             report.completed = false;
             break;
@@ -188,6 +193,9 @@ fn advance_tile(
                 of_block += 1;
             }
             let seen = &radiance[run.slot as usize..][..run.pixels.len()];
+            if let Some(noted) = wave.path.first_surfaces.as_ref().filter(|_| run.sample < SurfaceSums::MOST) {
+                tile.add_surfaces(of_block, &noted.seen[run.slot as usize..][..run.pixels.len()], &emits);
+            }
             report.add_sample(tile, of_block, run.sample, seen, bound);
             missing[of_block] -= 1;
             runs_left = rest;

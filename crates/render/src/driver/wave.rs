@@ -53,6 +53,13 @@ impl Wave {
         Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
     }
 
+    /// Turns the noting of first surfaces on or off.
+    pub fn note_surfaces(&mut self, notes: bool) {
+        if notes != self.path.first_surfaces.is_some() {
+            self.path.first_surfaces = notes.then(Box::default);
+        }
+    }
+
     /// Returns one run of all pixels per sample; the slots of consecutive runs are `stride` apart.
     pub fn runs_of(&self, samples: Range<u32>, stride: u32) -> Vec<Run> {
         let all = 0..self.pixels.local.len();
@@ -140,7 +147,7 @@ impl Wave {
 
 /// Input of all tiles.
 pub(super) struct Pass<'a> {
-    snapshot: &'a Prepared,
+    pub snapshot: &'a Prepared,
     pub settings: &'a RenderSettings,
     pub caustics: Option<CausticPass<'a>>,
     pub plan: CausticPlan,
@@ -151,6 +158,8 @@ pub(super) struct Pass<'a> {
     pub bound: Option<f32>,
     /// Depth from which on all paths are subject to Russian roulette.
     pub endless: u32,
+    /// Whether the film gets the first surfaces of the first samples.
+    pub notes_surfaces: bool,
 }
 
 impl<'a> Pass<'a> {
@@ -177,7 +186,7 @@ impl<'a> Pass<'a> {
             .filter(|_| settings.integrator == Integrator::Path)
             .map(|bound| bound * filter.scale() * snapshot.tables.bodies.environment_scale(&camera_media));
         let endless = endless_depth(snapshot);
-        Self { snapshot, settings, caustics, plan, camera_media, filter, size, bound, endless }
+        Self { snapshot, settings, caustics, plan, camera_media, filter, size, bound, endless, notes_surfaces: false }
     }
 
     /// Returns the pass for the same image at another moment. It uses the guiding cache of this pass, which changes

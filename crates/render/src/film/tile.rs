@@ -1,10 +1,13 @@
 //! The pixels of one tile: the unit that a worker owns while it adds samples.
 
+use crate::core::material::MaterialId;
 use crate::film::block::{BLOCK_PIXELS, BLOCK_SIZE, Block, Steps};
 use crate::film::estimate::local_level;
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
 use crate::film::region::Region;
+use crate::film::surfaces::SurfaceSums;
+use crate::integrators::seen::Seen;
 use glam::{DVec3, UVec2, Vec3};
 use std::collections::TryReserveError;
 
@@ -28,6 +31,8 @@ pub(crate) struct FilmTile {
     pub half_steps: Vec<Vec3>,
     /// The same for light tracing.
     pub light: TileLight,
+    /// What the first samples of each pixel see; empty where nobody asks.
+    pub surfaces: Vec<SurfaceSums>,
 }
 
 /// Error statistics of light tracing in a tile.
@@ -76,7 +81,8 @@ impl FilmTile {
         let starts = |length: u32| (0..length).step_by(BLOCK_SIZE as usize);
         let blocks = starts(size.y).flat_map(|y| starts(size.x).map(move |x| UVec2::new(x, y)));
         let blocks = blocks.map(|start| Block::new(start, (size - start).min(UVec2::splat(BLOCK_SIZE)))).collect();
-        Ok(Self { origin, size, blocks, sums, bad: Vec::new(), before, last, half_steps, light: TileLight::default() })
+        let (bad, surfaces, light) = (Vec::new(), Vec::new(), TileLight::default());
+        Ok(Self { origin, size, blocks, sums, bad, before, last, half_steps, light, surfaces })
     }
 
     /// Reserves the memory for light tracing.
@@ -89,13 +95,14 @@ impl FilmTile {
 
     /// Removes all samples; the next one has number `first`.
     pub fn clear(&mut self, first: u32) {
-        let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light } = self;
+        let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light, surfaces } = self;
         blocks.iter_mut().for_each(|block| block.clear(first));
         sums.fill(ExactSum::default());
         bad.clear();
         before.clear();
         last.clear();
         half_steps.clear();
+        surfaces.clear();
         light.clear();
     }
 
@@ -155,6 +162,15 @@ impl FilmTile {
         of.spp += 1;
         if let Some(last) = of.ranges.last_mut() {
             last.end += 1;
+        }
+    }
+
+    /// Adds the first surfaces of one sample of every pixel of a block, row by row.
+    ///
+    /// - `emits`: whether a material is that of an emitter.
+    pub fn add_surfaces(&mut self, block: usize, seen: &[Seen], emits: &impl Fn(MaterialId) -> bool) {
+        for (local, seen) in self.blocks[block].locals(self.size.x).zip(seen) {
+            self.surfaces[local].add(seen, seen.material != Seen::NONE && emits(seen.material));
         }
     }
 

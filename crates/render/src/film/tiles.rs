@@ -344,10 +344,14 @@ impl Film {
         self.light.as_ref().map_or(DVec3::ZERO, |layer| layer.mean((y * self.width + x) as usize))
     }
 
+    /// The tiles that have pixels of a row, from the left.
+    pub(crate) fn tiles_of_row(&self, y: u32) -> &[FilmTile] {
+        &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize]
+    }
+
     /// Mean radiance of the pixels of one row, from the left.
     pub fn row(&self, y: u32) -> impl Iterator<Item = Vec3> {
-        let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
-        tiles.iter().flat_map(move |tile| {
+        self.tiles_of_row(y).iter().flat_map(move |tile| {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
             (first..first + tile.size.x as usize)
                 .zip(tile.origin.x..)
@@ -357,8 +361,7 @@ impl Film {
 
     /// Like [`Self::row`], passing column and radiance to `take`: faster where whole images are read.
     pub(crate) fn for_each_in_row(&self, y: u32, mut take: impl FnMut(usize, Vec3)) {
-        let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
-        for tile in tiles {
+        for tile in self.tiles_of_row(y) {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
             for block in tile.blocks_in_row(y - tile.origin.y) {
                 let columns = block.start.x..block.start.x + block.size.x;

@@ -2,6 +2,7 @@
 
 pub(crate) mod caustics;
 pub(crate) mod features;
+pub(crate) mod first_surfaces;
 pub(crate) mod path;
 pub(crate) mod phong;
 pub(crate) mod record;

@@ -13,6 +13,7 @@ use crate::core::counts::RayCounts;
 use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::first_surfaces::FirstSurfaces;
 use crate::integrators::record::Record;
 use crate::integrators::simd::shade::KindHits;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
@@ -71,6 +72,8 @@ pub(crate) struct PathWave {
     pub record: Option<Box<Record>>,
     /// Counts the cost if present.
     pub work: Option<Box<Work>>,
+    /// Notes what the paths see, likewise.
+    pub first_surfaces: Option<Box<FirstSurfaces>>,
 }
 
 /// Index of misses in [`SortedHits::of_kind`]; materials have [`Material::kind`](crate::core::material::Material::kind) + 1.
@@ -100,6 +103,9 @@ impl PathWave {
         self.paths.start(radiance.len(), scene.tables.features.glass, caustics.is_some());
         start(&mut self.paths);
         self.paths.begin_in(self.camera);
+        if let Some(surfaces) = &mut self.first_surfaces {
+            surfaces.start(radiance.len());
+        }
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
         for depth in 1..=settings.max_depth {
             if self.paths.is_empty() {
@@ -153,6 +159,9 @@ impl PathWave {
         let set = settings.simd.unwrap_or(InstructionSet::Portable);
         let kinds = &scene.tables.materials.kinds;
         self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
+        if let Some(surfaces) = &mut self.first_surfaces {
+            surfaces.see(scene, settings.simd, depth, &self.paths, &self.hits, &self.sorted);
+        }
         let is_last = depth == settings.max_depth;
         let emitters_have_lanes = scene.tables.lights.has_lanes()
             && !scene.tables.materials.textured_emission

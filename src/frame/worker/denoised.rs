@@ -1,0 +1,170 @@
+//! When the film is denoised, and which denoised image is displayed.
+//!
+//! Images of a moving camera are smoothed at once, by the render thread. At full resolution the settled filter runs
+//! beside the samples ([`super::denoiser`]) on a copy of the film, first at once and then each time that the film has a
+//! quarter more samples; until its first result, images are smoothed.
+
+use super::denoiser::Request;
+use super::thread::Loop;
+use super::views::{Settled, ViewKey};
+use super::{Denoising, lock};
+use crate::render::{DenoiseSource, Film, Inspection, develop, develop_colors, smooth_film};
+use glam::UVec2;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples.
+const SAMPLES_FIRST: u32 = 4;
+
+impl Loop<'_> {
+    /// The noise that the image is to be displayed with; raw where something else is displayed.
+    pub(super) fn wanted_denoising(&self) -> Denoising {
+        if self.look.inspection == Inspection::Picture { self.look.denoising } else { Denoising::Raw }
+    }
+
+    /// Takes over a denoised image of the current view.
+    pub(super) fn take_settled(&mut self) {
+        let Some(settled) = self.denoiser.take() else { return };
+        if self.settled_key().is_some_and(|key| key == settled.key) {
+            self.views.settle_again = Some(Instant::now() + SAMPLES_FIRST * settled.took);
+            self.redraw |= self.wanted_denoising() != Denoising::Raw;
+            self.views.settled = Some(settled);
+        }
+    }
+
+    /// Identifies denoised images of the film at full resolution.
+    fn settled_key(&self) -> Option<ViewKey> {
+        let (job, (divider, film)) = (self.job.as_ref()?, self.film.as_ref()?);
+        let size = UVec2::new(film.width(), film.height());
+        (*divider == 1).then_some(ViewKey { generation: job.generation, inspection: Inspection::Picture, size })
+    }
+
+    /// Has the film denoised if it is time.
+    ///
+    /// - `is_last`: no samples will follow, so that it is time whenever there are new ones.
+    pub(super) fn request_denoised(&mut self, is_last: bool) {
+        if self.wanted_denoising() == Denoising::Raw {
+            return;
+        }
+        let (Some(job), Some((1, film)), Some(key)) = (&self.job, &self.film, self.settled_key()) else { return };
+        let spp = film.spp_in(self.active_region().as_ref());
+        let before = self.views.settled.as_ref().filter(|settled| settled.key == key).map_or(0, |settled| settled.spp);
+        let is_soon = before > 0 && self.views.settle_again.is_some_and(|at| Instant::now() < at);
+        let is_due = spp > before && (is_last || (!is_soon && 4 * u64::from(spp) >= 5 * u64::from(before)));
+        if film.spp() == 0 || !is_due || self.denoiser.is_busy() {
+            return;
+        }
+        let pool = lock(&self.shared.pool).clone();
+        self.denoiser.request(Request {
+            key,
+            source: pool.install(|| DenoiseSource::of(film)),
+            prepared: job.prepared.clone(),
+            settings: job.settings,
+            spp,
+            threads: pool.current_num_threads(),
+        });
+    }
+
+    /// Develops the image as it is wanted and can be had now, and returns how that is, with the error of the denoised
+    /// image; `None` if another view or job has arrived meanwhile.
+    pub(super) fn develop_wanted(
+        &self,
+        (divider, film): (u32, &Film),
+        key: ViewKey,
+        (width, height): (u32, u32),
+        rgba: &mut Vec<u8>,
+    ) -> Option<(Denoising, Option<f64>)> {
+        let wanted = self.wanted_denoising();
+        let Some(job) = self.job.as_ref().filter(|_| wanted != Denoising::Raw) else {
+            develop(film, &self.display, width, height, rgba);
+            return Some((Denoising::Raw, None));
+        };
+        // A coarse image is displayed whatever comes next, or nothing would be displayed during a long movement.
+        let stop = || divider == 1 && self.shared.interrupt.load(Ordering::Relaxed);
+        let settled = self.views.settled.as_ref().filter(|settled| divider == 1 && settled.key == key);
+        if let Some(settled) = settled.filter(|settled| wanted == Denoising::Denoised && self.is_overtaken(settled)) {
+            develop(film, &self.display, width, height, rgba);
+            return Some((Denoising::Raw, Some(settled.denoised.error)));
+        }
+        let smoothed = match settled {
+            Some(_) => None,
+            None => smooth_film(&job.prepared, &job.settings, film, &stop),
+        };
+        let colors = settled.map(|settled| &settled.denoised.color).or(smoothed.as_ref());
+        let Some(colors) = colors else {
+            if stop() {
+                return None;
+            }
+            develop(film, &self.display, width, height, rgba);
+            return Some((Denoising::Raw, None));
+        };
+        develop_colors(colors, key.size.into(), &self.display, (width, height), rgba);
+        if wanted == Denoising::Split {
+            let mut raw = Vec::new();
+            develop(film, &self.display, width, height, &mut raw);
+            split(rgba, &raw, width as usize);
+        }
+        Some((wanted, settled.map(|settled| settled.denoised.error)))
+    }
+
+    /// Whether the samples since an image was denoised have made the raw image the better one, as far as both errors
+    /// are known. A busy machine may leave no time for denoising.
+    fn is_overtaken(&self, settled: &Settled) -> bool {
+        self.active_region().is_none() && self.stats.error.is_some_and(|raw| raw < settled.denoised.error)
+    }
+
+    /// Whether an image of the film would look like the one before or come too soon after it.
+    pub(super) fn is_displayed(&self, divider: u32, key: ViewKey) -> bool {
+        if divider > 1 || self.wanted_denoising() == Denoising::Raw {
+            return false;
+        }
+        let settled = self.views.settled.as_ref().filter(|settled| settled.key == key);
+        let too_soon =
+            self.views.smooth_again.is_some_and(|(of, until): (ViewKey, Instant)| of == key && Instant::now() < until);
+        match settled {
+            Some(settled) => self.wanted_denoising() == Denoising::Denoised && !self.is_overtaken(settled),
+            None => too_soon,
+        }
+    }
+
+    /// Notes how long an image of the film at full resolution took, if it was smoothed: samples come first.
+    pub(super) fn note_smoothing(&mut self, divider: u32, key: ViewKey, took: Duration) {
+        if divider == 1 && self.wanted_denoising() != Denoising::Raw {
+            self.views.smooth_again = Some((key, Instant::now() + SAMPLES_FIRST * took));
+        }
+    }
+}
+
+/// Puts the left half of the raw image over the denoised one, with a line between the two.
+fn split(rgba: &mut [u8], raw: &[u8], width: usize) {
+    let middle = width / 2;
+    for (to, from) in rgba.chunks_exact_mut(4 * width).zip(raw.chunks_exact(4 * width)) {
+        to[..4 * middle].copy_from_slice(&from[..4 * middle]);
+        to[4 * middle..4 * (middle + 1)].fill(255);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split;
+
+    #[test]
+    fn the_left_half_is_raw_and_a_line_lies_between() {
+        for width in [1, 2, 5] {
+            let (mut rgba, raw) = (vec![2; 4 * width * 3], vec![1; 4 * width * 3]);
+            split(&mut rgba, &raw, width);
+            for row in rgba.chunks_exact(4 * width) {
+                let expected = (0..width).flat_map(|x| {
+                    [if x < width / 2 {
+                        1
+                    } else if x == width / 2 {
+                        255
+                    } else {
+                        2
+                    }; 4]
+                });
+                assert_eq!(row, expected.collect::<Vec<u8>>());
+            }
+        }
+    }
+}
