@@ -8,6 +8,7 @@ mod colors;
 mod deviation;
 mod faults;
 mod measure;
+mod mikktspace;
 mod normals;
 pub mod procedural;
 pub mod simplify;

@@ -1,56 +1,11 @@
 //! Tangents from texture coordinates, as normal maps expect them.
 //!
-//! Source: Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited" (MikkTSpace), in the crate `bevy_mikktspace`.
+//! Source: MikkTSpace, see [`super::mikktspace`].
 
 use super::Mesh;
-use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
+use super::mikktspace::corner_tangents;
 use glam::{Vec3, Vec4};
 use std::collections::HashMap;
-
-/// A mesh while the tangents of its corners are computed.
-struct Corners<'a> {
-    mesh: &'a Mesh,
-    /// Three per triangle.
-    tangents: Vec<Vec4>,
-}
-
-impl Corners<'_> {
-    fn vertex(&self, face: usize, corner: usize) -> usize {
-        self.mesh.triangles[face][corner] as usize
-    }
-}
-
-impl Geometry for Corners<'_> {
-    fn num_faces(&self) -> usize {
-        self.mesh.triangles.len()
-    }
-
-    fn num_vertices_of_face(&self, _face: usize) -> usize {
-        3
-    }
-
-    fn position(&self, face: usize, corner: usize) -> [f32; 3] {
-        self.mesh.positions[self.vertex(face, corner)].to_array()
-    }
-
-    fn normal(&self, face: usize, corner: usize) -> [f32; 3] {
-        self.mesh.normals[self.vertex(face, corner)].to_array()
-    }
-
-    fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
-        self.mesh.uvs[self.vertex(face, corner)].to_array()
-    }
-
-    fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
-        let normal = self.mesh.normals[self.vertex(face, corner)];
-        let encoded = tangent.map_or(Vec4::ZERO, |tangent| Vec4::from(tangent.tangent_encoded()));
-        let sign = if encoded.w < 0.0 { -1.0 } else { 1.0 };
-        // Where the texture coordinates have no direction, an arbitrary tangent is used.
-        let direction = encoded.truncate().try_normalize().filter(|direction| direction.is_finite());
-        let direction = direction.unwrap_or_else(|| normal.any_orthonormal_vector());
-        self.tangents[3 * face + corner] = direction.extend(sign);
-    }
-}
 
 impl Mesh {
     /// Adds tangents for the first texture coordinate; vertices whose corners differ in their tangent are split.
@@ -60,15 +15,14 @@ impl Mesh {
         if self.normals.len() != self.positions.len() || self.uvs.len() != self.positions.len() {
             return self;
         }
-        let along = |normal: &Vec3| normal.any_orthonormal_vector().extend(1.0);
-        let tangents = vec![Vec4::X; 3 * self.triangles.len()];
-        let mut corners = Corners { mesh: &self, tangents };
-        // It fails for no mesh that passes `validate`; if it does, an arbitrary tangent is better than none.
-        if generate_tangents(&mut corners).is_err() {
-            self.tangents = self.normals.iter().map(along).collect();
-            return self;
+        // Where the texture coordinates have no direction, an arbitrary tangent is used.
+        let along = |normal: &Vec3| normal.any_orthonormal_vector();
+        let mut corners = corner_tangents(&self);
+        for (tangent, &vertex) in corners.iter_mut().zip(self.triangles.as_flattened()) {
+            let direction = tangent.truncate().try_normalize().filter(|direction| direction.is_finite());
+            let direction = direction.unwrap_or_else(|| along(&self.normals[vertex as usize]));
+            *tangent = direction.extend(if tangent.w < 0.0 { -1.0 } else { 1.0 });
         }
-        let corners = corners.tangents;
         let n = self.positions.len();
         let mut of_vertex: Vec<Option<Vec4>> = vec![None; n];
         // By vertex and tangent: the copy that has it.
@@ -91,8 +45,11 @@ impl Mesh {
                 }
             }
         }
-        let mut tangents: Vec<Vec4> =
-            of_vertex.iter().zip(&self.normals).map(|(known, normal)| known.unwrap_or_else(|| along(normal))).collect();
+        let mut tangents: Vec<Vec4> = of_vertex
+            .iter()
+            .zip(&self.normals)
+            .map(|(known, normal)| known.unwrap_or_else(|| along(normal).extend(1.0)))
+            .collect();
         tangents.resize(n + sources.len(), Vec4::X);
         for ((_, bits), copy) in &copies {
             tangents[*copy as usize] = Vec4::from(bits.map(f32::from_bits));
