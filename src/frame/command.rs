@@ -230,6 +230,10 @@ pub enum Command {
     PreviousView,
     /// Return to the view before [`Command::PreviousView`].
     NextView,
+    /// Look through the next camera of the scene, in the order of the file.
+    NextCamera,
+    /// Look through the previous camera of the scene.
+    PreviousCamera,
     /// Edit the scene.
     Edit(Edit),
     /// Open a scene file, a model or, if there is no such file, the built-in scene of that name.

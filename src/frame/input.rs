@@ -7,11 +7,12 @@ use super::explain::Explaining;
 use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
 use super::resources::{
-    Clock, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
-    WantedMoment,
+    Clock, CurrentScene, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt,
+    Threads, ViewMode, WantedMoment,
 };
 use super::saving::Saving;
 use super::scene_bounds::SceneBounds;
+use super::scene_cameras::{beside, cameras_of};
 use super::selection::{Picked, Selection, pick};
 use super::status::{MessageKind, Status};
 use super::views::{Bookmarks, ViewTrail};
@@ -58,6 +59,7 @@ pub struct CommandParams<'w, 's> {
     saving: ResMut<'w, Saving>,
     moment: ResMut<'w, WantedMoment>,
     renderer: Res<'w, Renderer>,
+    scene: Option<Res<'w, CurrentScene>>,
     clock: Res<'w, Clock>,
     up: Res<'w, ModelUp>,
 }
@@ -173,6 +175,8 @@ impl CommandParams<'_, '_> {
                 Some(rig) => self.set_rig(rig),
                 None => self.note("no next view".to_owned()),
             },
+            Command::NextCamera => self.look_through_camera(false),
+            Command::PreviousCamera => self.look_through_camera(true),
             Command::Edit(edit) => self.edits.0.push(edit),
             Command::ToggleTurntable => {
                 self.around.turning = match self.around.turning {
@@ -241,6 +245,18 @@ impl CommandParams<'_, '_> {
             view.set_if_neq(rig.view);
             projection.set_if_neq(rig.projection);
             lens.set_if_neq(rig.lens);
+        }
+    }
+
+    /// Looks through the camera of the scene after or before the present one.
+    fn look_through_camera(&mut self, backwards: bool) {
+        let cameras = self.scene.as_deref().map(|scene| cameras_of(&scene.0)).unwrap_or_default();
+        let Some(rig) = self.rig() else { return };
+        if cameras.len() < 2 && cameras.first().is_none_or(|camera| camera.rig.view == rig.view) {
+            self.note("the scene has no other camera".to_owned());
+        } else if let Some(camera) = beside(cameras, &rig, backwards) {
+            self.set_rig(camera.rig);
+            self.note(camera.announcement());
         }
     }
 

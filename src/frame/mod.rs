@@ -42,6 +42,7 @@ mod resources;
 mod rig;
 mod saving;
 mod scene_bounds;
+mod scene_cameras;
 mod scheduler;
 mod selection;
 mod session;

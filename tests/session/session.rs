@@ -389,6 +389,42 @@ fn clicking_finds_depths_and_framing_finds_the_scene() {
 }
 
 #[test]
+fn the_cameras_of_a_scene_follow_each_other_and_the_first_one_follows_the_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("views.ron");
+    let scene = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), \
+        cameras: { \"side\": (eye: (5, 0, 0), look_at: (0, 0, 0)), \
+                   \"plan\": (eye: (0, 5, 0), look_at: (0, 0, 0), up: (0, 0, -1), orthographic_height: 4) }, \
+        materials: { \"grey\": diffuse(albedo: 0.5) }, \
+        objects: [ sphere(center: (0, 0, 0), radius: 1, material: \"grey\") ])";
+    std::fs::write(&path, scene).unwrap();
+    let mut driver = Driver::new(32, 32, spp(1));
+    driver.session.open(SceneSource::Scene(path));
+    driver.run_until(|session| session.status().done && session.is_idle());
+    let mut eyes = Vec::new();
+    for command in [Command::NextCamera, Command::NextCamera, Command::NextCamera, Command::PreviousCamera] {
+        driver.session.send(command);
+        driver.frame();
+        eyes.push(driver.session.status().rig.view.eye.to_array());
+    }
+    assert_eq!(eyes, [[5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 5.0], [0.0, 5.0, 0.0]]);
+    assert!(driver.say(MessageKind::Note).contains(&"camera `plan`"), "{:?}", driver.session.status().messages);
+    // From a view that is none of them, to the first one.
+    driver.session.send(Command::Dolly { factor: 0.5 });
+    driver.session.send(Command::NextCamera);
+    driver.frame();
+    assert_eq!(driver.session.status().rig.view.eye.to_array(), [0.0, 0.0, 5.0]);
+    // A scene with one camera.
+    driver.open("cornell");
+    driver.run_until(|session| session.status().scene == "cornell" && session.status().done && session.is_idle());
+    let view = driver.session.status().rig.view;
+    driver.session.send(Command::NextCamera);
+    driver.frame();
+    assert_eq!(driver.session.status().rig.view, view);
+    assert!(driver.say(MessageKind::Note).contains(&"the scene has no other camera"));
+}
+
+#[test]
 fn a_million_metres_away_is_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     // The camera's numbers have no rounding at either place.

@@ -155,6 +155,13 @@ pub static BINDINGS: &[KeyGroup] = &[
                 effect: "go to the previous view, and forward again",
             },
             Binding {
+                triggers: &[
+                    shifted(Typed::Named(NamedKey::F3), false, Action::Send(Command::NextCamera)),
+                    shifted(Typed::Named(NamedKey::F3), true, Action::Send(Command::PreviousCamera)),
+                ],
+                effect: "look through the next camera of the scene, the previous one",
+            },
+            Binding {
                 triggers: &[Trigger::Digit {
                     ctrl: true,
                     shift: false,

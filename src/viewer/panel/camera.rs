@@ -84,7 +84,11 @@ fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
         ui.weak("cameras");
         for (name, part) in scene.0.file.cameras.iter() {
             let Ok((view, projection, lens)) = part.components() else { continue };
-            if ui.button(&*printable::name(name)).on_hover_text("look through this camera of the scene").clicked() {
+            if ui
+                .button(&*printable::name(name))
+                .on_hover_text("look through this camera of the scene (F3: the next one)")
+                .clicked()
+            {
                 asked.send(Command::SetView(view));
                 asked.send(Command::SetProjection(projection));
                 asked.send(Command::SetLens(lens));
