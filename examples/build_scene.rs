@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let mut material = |material: Material| world.spawn(SurfaceMaterial(material)).id();
     let gray = material(Material::Diffuse { albedo: Vec3::splat(0.6).into() });
-    let glass = material(Material::Glass { ior: 1.5, absorption: Vec3::ZERO });
+    let glass = material(Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 });
     let light = material(Material::Emissive { radiance: Vec3::splat(12.0).into() });
 
     world.spawn((Shape::Plane { normal: DVec3::Y }, MaterialSlots(vec![gray])));

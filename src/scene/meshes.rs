@@ -288,6 +288,7 @@ impl LoadedMesh {
             Some(4 | 6 | 7 | 9) => MaterialPart::Glass {
                 ior: material.ior.filter(|ior| *ior > 0.0).unwrap_or(1.5),
                 absorption: Rgb::default(),
+                dispersion: 0.0,
             },
             _ => {
                 let plain = share(material.diffuse.unwrap_or(Vec3::splat(0.6)));

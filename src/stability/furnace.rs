@@ -19,7 +19,7 @@ type PlacedShape = (Shape, u32, Option<Arc<Mesh>>);
 const MODES: [(Integrator, bool); 3] = [(Integrator::Path, true), (Integrator::Path, false), (Integrator::Phong, true)];
 
 pub fn glass(ior: f32) -> Material {
-    Material::Glass { ior, absorption: Vec3::ZERO }
+    Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 }
 }
 
 fn metal(alpha: f32) -> Material {
@@ -261,12 +261,17 @@ fn random_scene(seed: u64) -> LightCase {
     let mut roughening = Random::new(0x20_0676, seed);
     let mut is_lossy = false;
     for material in &mut materials {
-        if let Material::Glass { ior, absorption } = *material
+        if let Material::Glass { ior, absorption, .. } = *material
             && roughening.below(6) == 0
         {
             let alpha = [0.0, 1e-4, 1e-3, 0.03, 0.2, 0.5, 1.0][roughening.below(7)];
-            *material =
-                Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption, compensate: false };
+            *material = Material::RoughGlass {
+                alpha: ScalarInput::Constant(alpha),
+                ior,
+                absorption,
+                dispersion: 0.0,
+                compensate: false,
+            };
             is_lossy = true;
         }
     }

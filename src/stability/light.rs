@@ -141,7 +141,7 @@ fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Ma
 
 /// Nested glass, coincident surfaces, indices next to 1, and angles close to total reflection.
 pub fn glass() -> Vec<LightCase> {
-    let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO };
+    let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 };
     let mut pictures = vec![
         furnace(
             "four nested spheres",

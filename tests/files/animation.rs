@@ -193,9 +193,11 @@ fn what_moves_keeps_its_keys_under_a_new_name() {
     assert_eq!(again.get::<Placement>(ball).unwrap().translation, DVec3::new(2.0, 0.5, 1.0));
     assert!(animation.tracks.iter().any(|track| matches!(track.channel, Channel::Material(..))));
     // A material of another kind has no such number any more: that is told.
-    world
-        .entity_mut(red)
-        .insert(SurfaceMaterial(firstlight::scene::Material::Glass { ior: 1.5, absorption: Vec3::ZERO }));
+    world.entity_mut(red).insert(SurfaceMaterial(firstlight::scene::Material::Glass {
+        ior: 1.5,
+        absorption: Vec3::ZERO,
+        dispersion: 0.0,
+    }));
     let description = Description::of(&mut world, Some(&loaded));
     assert_eq!(description.losses.len(), 1, "{:?}", description.losses);
     assert!(description.losses[0].contains("`albedo`") && description.losses[0].contains("`ruby`"));

@@ -569,7 +569,11 @@ fn variants_and_what_is_not_modelled_are_told() {
     let (day, night) = (with("day").unwrap(), with("night").unwrap());
     assert_eq!((material(&day).as_deref(), material(&night).as_deref()), (Some("white"), Some("black")));
     let told = night.warnings.join("\n");
-    assert!(told.contains("`black`: dispersion is not modelled") && told.contains("`EXT_from_the_future`"), "{told}");
+    assert!(
+        told.contains("`black`: its dispersion is not used: it has no volume")
+            && told.contains("`EXT_from_the_future`"),
+        "{told}"
+    );
     assert!(with("dusk").err().unwrap().contains("there is no variant `dusk`"));
     writer.json["extensionsRequired"] = json!(["EXT_from_the_future"]);
     let error = refusal(&writer.glb());

@@ -119,7 +119,7 @@ proptest! {
         let glass = SceneInputs::of(&mut world).materials.into_iter();
         for material in glass {
             if let Some(mut material) = world.get_mut::<SurfaceMaterial>(material.entity)
-                && let Material::Glass { ior: old, absorption } = &mut material.0
+                && let Material::Glass { ior: old, absorption, .. } = &mut material.0
             {
                 (*old, *absorption) = (ior, Vec3::splat(intensity));
             }
@@ -199,7 +199,11 @@ fn files_that_a_scene_points_at_are_found_from_its_new_place() {
 
     // A material of the mesh's own file is edited: all of them are then written, one for each slot.
     let slots = SceneInputs::of(&mut world).objects[0].slots.clone();
-    world.entity_mut(slots[1]).insert(SurfaceMaterial(Material::Glass { ior: 1.7, absorption: Vec3::ZERO }));
+    world.entity_mut(slots[1]).insert(SurfaceMaterial(Material::Glass {
+        ior: 1.7,
+        absorption: Vec3::ZERO,
+        dispersion: 0.0,
+    }));
     let (mut again, loaded) = through_a_file(&mut world, &scene, &path.join("new/edited.ron"));
     assert_same(&mut world, &mut again, "edited slots");
     assert_eq!(picture(&mut world, &scene), picture(&mut again, &loaded));

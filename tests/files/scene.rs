@@ -98,7 +98,9 @@ fn everything_that_a_file_can_say_reaches_the_renderer() {
     assert_eq!((world_from_object.transform_point3(center), radius), (Vec3::new(3.0, 0.0, 0.0), 0.5));
 
     let material = |object: usize| &prepared.shading.materials[prepared.geometry.objects[object].materials[0] as usize];
-    assert!(matches!(material(0), Material::Glass { ior: 1.4, absorption } if *absorption == Vec3::new(2.0, 1.0, 3.0)));
+    assert!(
+        matches!(material(0), Material::Glass { ior: 1.4, absorption, .. } if *absorption == Vec3::new(2.0, 1.0, 3.0))
+    );
     let Material::Diffuse { albedo: ColorInput::Texture(tiles) } = material(1) else { panic!("{:?}", material(1)) };
     let tiles = &prepared.shading.textures[*tiles as usize];
     assert!(matches!(tiles.pattern, TexturePattern::Checker { a, .. } if a == Vec3::splat(0.9)));

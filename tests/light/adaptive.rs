@@ -112,7 +112,7 @@ fn portions_interruptions_and_the_way_over_the_disk_change_nothing() {
 fn a_rare_caustic_keeps_its_mean() {
     const RENDERS: u32 = 120;
     let lamp = sphere(Vec3::new(0.4, 2.4, 0.3), 0.3);
-    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
     let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (lamp, 1), (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)];
     let eye = camera(Vec3::new(0.3, 1.6, 4.0), Vec3::new(0.0, 0.3, 0.0), 30.0);
     let scene = scene(shapes, vec![diffuse(0.6), emissive(10.0), glass], Environment::Black, eye);

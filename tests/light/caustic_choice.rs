@@ -24,7 +24,7 @@ fn eye() -> Camera {
 
 /// A glass sphere and a mirror on a floor, with a wall behind them.
 fn still_life(light: Shape, radiance: f32, sky: f32) -> Prepared {
-    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
     let mirror = Material::Mirror { reflectance: firstlight::render::ColorInput::Constant(Vec3::splat(0.9)) };
     scene(
         vec![

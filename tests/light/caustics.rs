@@ -10,7 +10,7 @@ use firstlight::render::{
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::sync::Arc;
 
-const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
 
 fn mirror(reflectance: f32) -> Material {
     Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(reflectance)) }
@@ -105,7 +105,7 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
 /// Paths from the light are joined to a camera inside of glass from within that glass alone.
 #[test]
 fn a_camera_under_water_sees_the_same_with_and_without_them() {
-    let water = Material::Glass { ior: 1.33, absorption: Vec3::new(0.3, 0.1, 0.02) };
+    let water = Material::Glass { ior: 1.33, absorption: Vec3::new(0.3, 0.1, 0.02), dispersion: 0.0 };
     let shapes = vec![
         (sphere(Vec3::ZERO, 2.0), 0),
         (sphere(Vec3::new(0.0, -0.9, -0.3), 0.7), 1),
@@ -220,7 +220,7 @@ fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Prepared {
     let mut parts = bodies;
     parts.push((plane(Vec3::new(0.0, -1.1, 0.0), Vec3::Y), Object::plain(0)));
     parts.push((quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), Object::plain(1)));
-    let glass = Material::Glass { ior, absorption: Vec3::ZERO };
+    let glass = Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 };
     let materials = vec![diffuse(0.5), emissive(10.0), glass.clone(), glass];
     let (shapes, objects) = parts.into_iter().unzip();
     let geometry = Geometry::build(shapes, objects);

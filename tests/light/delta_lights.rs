@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
 
 fn point(position: Vec3, intensity: f32) -> DeltaLight {
     DeltaLight::Point { position, intensity: Vec3::splat(intensity) }

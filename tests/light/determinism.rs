@@ -24,7 +24,7 @@ pub fn busy_scene() -> Prepared {
         vec![
             diffuse(0.7),
             emissive(6.0),
-            Material::Glass { ior: 1.5, absorption: Vec3::splat(0.3) },
+            Material::Glass { ior: 1.5, absorption: Vec3::splat(0.3), dispersion: 0.0 },
             Material::Phong {
                 diffuse: ColorInput::Constant(Vec3::new(0.2, 0.3, 0.6)),
                 ambient: 0.8,

@@ -18,7 +18,7 @@ fn mirror(reflectance: f32) -> Material {
 }
 
 fn glass(ior: f32, absorption: f32) -> Material {
-    Material::Glass { ior, absorption: Vec3::splat(absorption) }
+    Material::Glass { ior, absorption: Vec3::splat(absorption), dispersion: 0.0 }
 }
 
 fn ahead(vfov: f32) -> firstlight::render::Camera {

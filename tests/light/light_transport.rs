@@ -48,8 +48,8 @@ fn white_furnace_returns_exactly_what_falls_in() {
     let materials = [
         ("diffuse", diffuse(1.0)),
         ("mirror", Material::Mirror { reflectance: ColorInput::Constant(Vec3::ONE) }),
-        ("glass", Material::Glass { ior: 1.5, absorption: Vec3::ZERO }),
-        ("glass of index 1", Material::Glass { ior: 1.0, absorption: Vec3::ZERO }),
+        ("glass", Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 }),
+        ("glass of index 1", Material::Glass { ior: 1.0, absorption: Vec3::ZERO, dispersion: 0.0 }),
     ];
     for (name, material) in materials {
         let scene = scene(
@@ -143,7 +143,7 @@ fn absorption_follows_beer_and_lambert() {
     // Straight through the middle of a sphere of index 1: only absorption is left.
     let scene = scene(
         vec![(sphere(Vec3::ZERO, 1.0), 0)],
-        vec![Material::Glass { ior: 1.0, absorption: Vec3::new(0.2, 0.5, 0.0) }],
+        vec![Material::Glass { ior: 1.0, absorption: Vec3::new(0.2, 0.5, 0.0), dispersion: 0.0 }],
         Environment::Constant(Vec3::ONE),
         camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 0.01),
     );
@@ -196,7 +196,7 @@ fn one_sample_can_be_replayed_alone() {
             (sphere(Vec3::new(0.0, 1.0, 0.0), 0.5), 2),
             (sphere(Vec3::Y * 4.0, 0.5), 1),
         ],
-        vec![diffuse(0.5), emissive(5.0), Material::Glass { ior: 1.5, absorption: Vec3::ZERO }],
+        vec![diffuse(0.5), emissive(5.0), Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 }],
         Environment::Constant(Vec3::splat(0.1)),
         camera(Vec3::new(0.0, 1.0, 3.0), Vec3::new(0.0, 0.7, 0.0), 40.0),
     );

@@ -9,6 +9,7 @@ mod caustics;
 mod delta_lights;
 mod denoise;
 mod determinism;
+mod dispersion;
 mod features;
 mod filters;
 mod lanes;

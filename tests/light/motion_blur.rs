@@ -195,7 +195,7 @@ fn moving_light(open: f64) -> Prepared {
 fn moving_glass(open: f64) -> Prepared {
     let open = open as f32;
     let mirror = Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(0.9)) };
-    let glass = Material::Glass { ior: 1.5, absorption: Vec3::new(0.1, 0.6, 0.9) };
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::new(0.1, 0.6, 0.9), dispersion: 0.0 };
     let back = quad(Vec3::new(-2.0, 0.0, -1.2), Vec3::X * 4.0, Vec3::Y * 3.0);
     let ball = sphere(Vec3::new(-0.6 + 1.2 * open, 0.5 + 0.4 * open, 0.1), 0.4);
     let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (lamp(), 1), (back, 3), (ball, 2)];

@@ -48,7 +48,12 @@ fn light_paths_through_the_lens_keep_the_mean() {
         (sphere(Vec3::new(0.8, 2.5, 0.6), 0.35), 3),
     ];
     let mirror = Material::Mirror { reflectance: firstlight::render::ColorInput::Constant(Vec3::splat(0.9)) };
-    let materials = vec![diffuse(0.7), Material::Glass { ior: 1.5, absorption: Vec3::ZERO }, mirror, emissive(20.0)];
+    let materials = vec![
+        diffuse(0.7),
+        Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 },
+        mirror,
+        emissive(20.0),
+    ];
     for lens_radius in [0.0, 0.25] {
         let scene = scene(shapes.clone(), materials.clone(), Environment::Black, parallel(2.4, lens_radius));
         assert!(scene.features().caustics);

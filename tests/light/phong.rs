@@ -142,7 +142,7 @@ fn a_white_furnace_stays_white() {
         compensate: false,
     };
     let mirror = Material::Mirror { reflectance: ColorInput::Constant(Vec3::ONE) };
-    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
     let view = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 28.0);
     let even = Environment::Constant(Vec3::ONE);
     let materials = [
@@ -176,7 +176,7 @@ fn a_white_furnace_stays_white() {
 #[test]
 fn fifty_shells_of_glass_do_not_multiply_the_rays() {
     let shells = (0..50).map(|i| (sphere(Vec3::ZERO, 1.0 - 0.019 * i as f32), i % 2)).collect();
-    let materials = [1.5, 1.0].map(|ior| Material::Glass { ior, absorption: Vec3::ZERO }).into();
+    let materials = [1.5, 1.0].map(|ior| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 }).into();
     let view = camera(Vec3::new(0.0, 0.4, 4.0), Vec3::ZERO, 30.0);
     let scene = scene(shells, materials, Environment::Constant(Vec3::ONE), view);
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
@@ -262,7 +262,7 @@ fn air_dims_lights_alike_in_both_models() {
 fn glass_dims_shadows_and_does_not_blacken_them() {
     let light = sphere(Vec3::new(0.0, 4.0, 0.0), POINT);
     let at = |absorption: f32, blocker: bool| {
-        let glass = Material::Glass { ior: 1.5, absorption: Vec3::splat(absorption) };
+        let glass = Material::Glass { ior: 1.5, absorption: Vec3::splat(absorption), dispersion: 0.0 };
         let mut shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (light.clone(), 1)];
         if blocker {
             shapes.push((sphere(Vec3::Y * 2.0, 0.5), 2));
@@ -300,8 +300,12 @@ fn the_same_bits_with_any_threads_and_tiles() {
         fresnel: Fresnel::Schlick,
         compensate: false,
     };
-    let materials =
-        vec![phong(0.6, 0.3, 0.0), emissive(6.0), Material::Glass { ior: 1.5, absorption: Vec3::ONE }, metal];
+    let materials = vec![
+        phong(0.6, 0.3, 0.0),
+        emissive(6.0),
+        Material::Glass { ior: 1.5, absorption: Vec3::ONE, dispersion: 0.0 },
+        metal,
+    ];
     let view = camera(Vec3::new(0.0, 2.0, 6.0), Vec3::Y * 0.8, 40.0);
     let scene = scene(shapes, materials, Environment::Constant(Vec3::splat(0.2)), view);
     let picture = |threads: usize, tile: u32, step: u32| {

@@ -237,7 +237,13 @@ fn layers_that_say_no_more_look_like_the_simpler_material() {
         fresnel: Fresnel::Schlick,
         compensate: true,
     };
-    let glass = Material::RoughGlass { alpha: constant(0.16), ior: 1.5, absorption: Vec3::ZERO, compensate: true };
+    let glass = Material::RoughGlass {
+        alpha: constant(0.16),
+        ior: 1.5,
+        absorption: Vec3::ZERO,
+        dispersion: 0.0,
+        compensate: true,
+    };
     let pairs = [
         (principled(0.7, |l| (l.metallic, l.roughness) = (1.0, 0.4)), metal(0.7)),
         (principled(0.7, |_| {}), diffuse(0.7)),

@@ -16,7 +16,8 @@ const NEVER: fn() -> bool = || false;
 fn room(glass: bool) -> Prepared {
     let lamp: Shape = quad(Vec3::new(-0.3, 2.6, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
     let ball = (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), if glass { 2 } else { 0 });
-    let materials = vec![diffuse(0.6), emissive(20.0), Material::Glass { ior: 1.5, absorption: Vec3::ZERO }];
+    let materials =
+        vec![diffuse(0.6), emissive(20.0), Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 }];
     let eye = camera(Vec3::new(0.3, 1.6, 4.0), Vec3::new(0.0, 0.4, 0.0), 40.0);
     scene(vec![(plane(Vec3::ZERO, Vec3::Y), 0), (lamp, 1), ball], materials, Environment::Black, eye)
 }

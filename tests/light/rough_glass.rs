@@ -8,11 +8,17 @@ use firstlight::render::{
 use glam::Vec3;
 
 fn rough(alpha: f32, ior: f32) -> Material {
-    Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption: Vec3::ZERO, compensate: false }
+    Material::RoughGlass {
+        alpha: ScalarInput::Constant(alpha),
+        ior,
+        absorption: Vec3::ZERO,
+        dispersion: 0.0,
+        compensate: false,
+    }
 }
 
 fn smooth(ior: f32) -> Material {
-    Material::Glass { ior, absorption: Vec3::ZERO }
+    Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 }
 }
 
 fn mirror() -> Material {
@@ -69,6 +75,7 @@ fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> P
         alpha: ScalarInput::Constant(alpha),
         ior: 1.33,
         absorption: Vec3::new(0.8, 0.3, 0.1),
+        dispersion: 0.0,
         compensate: true,
     };
     let materials = vec![
@@ -222,8 +229,13 @@ fn in_an_even_world_it_takes_light_away_and_adds_none() {
 #[test]
 fn compensated_it_can_hardly_be_seen_in_an_even_world() {
     for (alpha, ior) in [(0.05, 1.5), (0.3, 1.5), (0.3, 0.7), (1.0, 1.5), (0.6, 2.0)] {
-        let material =
-            Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption: Vec3::ZERO, compensate: true };
+        let material = Material::RoughGlass {
+            alpha: ScalarInput::Constant(alpha),
+            ior,
+            absorption: Vec3::ZERO,
+            dispersion: 0.0,
+            compensate: true,
+        };
         let eye = camera(Vec3::new(0.0, 0.4, 4.0), Vec3::ZERO, 20.0);
         let scene = scene(vec![(sphere(Vec3::ZERO, 1.0), 0)], vec![material], Environment::Constant(Vec3::ONE), eye);
         let (mean, error) = picture_mean(&render(&scene, &RenderSettings::default(), 16, 16, 256).0);

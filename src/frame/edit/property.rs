@@ -33,6 +33,8 @@ pub enum Property {
     Ior,
     /// Absorption per metre.
     Absorption,
+    /// Dispersion of glass: 20 divided by the Abbe number, 0 or more.
+    Dispersion,
     /// Phong: reflected share of the ambient light, 0..1.
     Ambient,
     /// Phong: specular share, 0..1.
@@ -106,6 +108,7 @@ impl Property {
             "alpha" => Self::Alpha,
             "ior" => Self::Ior,
             "absorption" => Self::Absorption,
+            "dispersion" => Self::Dispersion,
             "ambient" => Self::Ambient,
             "specular" => Self::Specular,
             "shininess" => Self::Shininess,

@@ -122,6 +122,7 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
         Param::Ior(ior) => *ior = number.clamp(0.1, 10.0),
         Param::Exponent(exponent) => *exponent = number.clamp(1.0, 1e5),
         Param::Absorption(absorption) => *absorption = value.max(DVec3::ZERO).as_vec3(),
+        Param::Dispersion(old) => *old = number.clamp(0.0, 40.0),
         Param::Thickness(old) => *old = number.max(0.0),
         Param::Number(old) => *old = number.clamp(-1e3, 1e3),
         Param::Flag(old) => *old = number != 0.0,

@@ -123,6 +123,8 @@ properties! {
         Alpha = "alpha": Number,
         /// Index of refraction.
         Ior = "ior": Number,
+        /// Of glass or a principled material: 20 divided by the Abbe number.
+        Dispersion = "dispersion": Number,
         /// Per metre.
         Absorption = "absorption": Color,
         /// Of a classic material.

@@ -95,6 +95,7 @@ impl MaterialProperty {
             | Param::Number(old)
             | Param::Ior(old)
             | Param::Exponent(old)
+            | Param::Dispersion(old)
             | Param::Thickness(old) => *old = number,
             Param::Cutoff(old) => *old = Some(number),
             Param::Absorption(old) => *old = color.into(),

@@ -195,6 +195,10 @@ impl Check<'_> {
             Param::Thickness(value) if !(value.is_finite() && *value >= 0.0) => {
                 self.wrong(path, format!("`{field}` is {value}, but must be finite and at least 0"));
             }
+            Param::Dispersion(value) if !(value.is_finite() && *value >= 0.0) => {
+                let message = format!("`{field}` is {value}, but must be finite and at least 0: 20 / Abbe number");
+                self.wrong(path, message);
+            }
             Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
                 self.wrong(path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
             }
@@ -202,6 +206,7 @@ impl Check<'_> {
             Param::Part(_)
             | Param::ConstantShare(_)
             | Param::Thickness(_)
+            | Param::Dispersion(_)
             | Param::Exponent(_)
             | Param::Ior(_)
             | Param::Flag(_)

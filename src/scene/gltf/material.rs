@@ -83,6 +83,7 @@ pub(super) struct GltfMaterial {
     /// Radians.
     pub anisotropy_rotation: f32,
     pub anisotropy_texture: Option<TextureUse>,
+    pub dispersion: f32,
     /// Unsupported features; the text follows the name of the material.
     pub notes: Vec<String>,
 }
@@ -193,6 +194,7 @@ impl Document {
             anisotropy: unit(anisotropy.number("anisotropyStrength", 0.0)),
             anisotropy_rotation: anisotropy.number("anisotropyRotation", 0.0),
             anisotropy_texture: texture(anisotropy.texture("anisotropyTexture").as_ref())?,
+            dispersion: extension("dispersion").number("dispersion", 0.0).max(0.0),
             notes: Vec::new(),
         };
         let with_volume = json.extensions.contains_key("KHR_materials_volume");
@@ -203,8 +205,8 @@ impl Document {
         if !(ior >= 1.0) {
             notes.push(format!("an index of refraction of {ior} is not modelled: 1.5 is used"));
         }
-        if extension("dispersion").number("dispersion", 0.0) > 0.0 {
-            notes.push("dispersion is not modelled".to_owned());
+        if material.dispersion > 0.0 && !with_volume {
+            notes.push("its dispersion is not used: it has no volume".to_owned());
         }
         if clearcoat.texture("clearcoatNormalTexture").and_then(|normal| normal.scale).is_some_and(|s| s != 1.0) {
             notes.push("the scale of its clear-coat normals is not used".to_owned());

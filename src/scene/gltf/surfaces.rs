@@ -282,6 +282,7 @@ fn surface(
         transmission,
         thin_walled,
         absorption,
+        dispersion,
         anisotropy,
         anisotropy_rotation,
         anisotropy_map,
@@ -329,6 +330,7 @@ fn surface(
     *thin_walled = material.transmission > 0.0 && material.thickness == 0.0;
     if material.transmission > 0.0 && material.thickness > 0.0 {
         *absorption = Rgb(absorption_of(material));
+        *dispersion = material.dispersion;
         // Light leaves a solid through the back of its surface.
         *two_sided = true;
     }
@@ -381,12 +383,12 @@ fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
         && material.anisotropy == 0.0
         && material.emission == Vec3::ZERO
         && !material.unlit;
-    let (ior, absorption) = (material.ior, Rgb(absorption_of(material)));
+    let (ior, absorption, dispersion) = (material.ior, Rgb(absorption_of(material)), material.dispersion);
     is_plain.then(|| match material.roughness {
-        0.0 => MaterialPart::Glass { ior, absorption },
+        0.0 => MaterialPart::Glass { ior, absorption, dispersion },
         roughness => {
             let alpha = ScalarValue::Number(roughness * roughness);
-            MaterialPart::RoughGlass { alpha, ior, absorption, compensate: true }
+            MaterialPart::RoughGlass { alpha, ior, absorption, dispersion, compensate: true }
         }
     })
 }

@@ -124,6 +124,9 @@ impl Scale {
                 ("roughness", "0: mirror, 1: rough; its square is the width α of the GGX lobe", 0.032..=1.0)
             }
             Property::Ior => ("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", 1.0..=2.5),
+            Property::Dispersion => {
+                ("dispersion", "20 / Abbe number: glass 0.3 to 0.8, diamond 0.36; more exaggerates", 0.0..=10.0)
+            }
             Property::Ambient => ("ambient", "ambient reflectance", 0.0..=1.0),
             Property::Specular => ("specular", "specular reflectance", 0.0..=1.0),
             Property::Shininess => ("shininess", "Phong exponent", 1.0..=10_000.0),
@@ -212,6 +215,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
             Param::Share(ScalarParam::Number(value))
             | Param::Number(value)
             | Param::Thickness(value)
+            | Param::Dispersion(value)
             | Param::ConstantShare(value)
             | Param::Ior(value)
             | Param::Exponent(value) => *value,

@@ -130,6 +130,9 @@ pub enum Material<P: Params = InSnapshot> {
         /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
+        /// Dispersion: 20 divided by the Abbe number, 0 for none; see [`Material::iors`].
+        #[serde(default, skip_serializing_if = "is_default")]
+        dispersion: f32,
     },
     /// Dielectric with GGX microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
     RoughGlass {
@@ -141,6 +144,9 @@ pub enum Material<P: Params = InSnapshot> {
         /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
+        /// Dispersion, as for glass.
+        #[serde(default, skip_serializing_if = "is_default")]
+        dispersion: f32,
         /// Compensate the energy that single scattering loses, after Kulla and Conty 2017.
         #[serde(default, skip_serializing_if = "is_default")]
         compensate: bool,
@@ -199,6 +205,9 @@ pub enum Material<P: Params = InSnapshot> {
         /// Absorption inside, per metre (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
+        /// Dispersion of what is transmitted by a solid, as for glass.
+        #[serde(default, skip_serializing_if = "is_default")]
+        dispersion: f32,
         /// Anisotropy, 0..1: the ratio of the widths along the tangent and across grows from 1 to 1/α; see
         /// `KHR_materials_anisotropy`.
         #[serde(default = "zero", skip_serializing_if = "is_zero")]
@@ -306,13 +315,16 @@ macro_rules! params_of {
             Material::Metal { alpha, reflectance, fresnel: _, compensate: _ } => {
                 vec![("alpha", Param::Share(alpha)), ("reflectance", Param::Reflectance(reflectance))]
             }
-            Material::Glass { ior, absorption } => {
-                vec![("ior", Param::Ior(ior)), ("absorption", Param::Absorption(absorption))]
-            }
-            Material::RoughGlass { alpha, ior, absorption, compensate: _ } => vec![
+            Material::Glass { ior, absorption, dispersion } => vec![
+                ("ior", Param::Ior(ior)),
+                ("absorption", Param::Absorption(absorption)),
+                ("dispersion", Param::Dispersion(dispersion)),
+            ],
+            Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: _ } => vec![
                 ("alpha", Param::Share(alpha)),
                 ("ior", Param::Ior(ior)),
                 ("absorption", Param::Absorption(absorption)),
+                ("dispersion", Param::Dispersion(dispersion)),
             ],
             Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => vec![
                 ("specular", Param::Share(specular)),
@@ -333,6 +345,7 @@ macro_rules! params_of {
                 transmission,
                 thin_walled,
                 absorption,
+                dispersion,
                 anisotropy,
                 anisotropy_rotation,
                 anisotropy_map,
@@ -362,6 +375,7 @@ macro_rules! params_of {
                 ("transmission", Param::Share(transmission)),
                 ("thin_walled", Param::Flag(thin_walled)),
                 ("absorption", Param::Absorption(absorption)),
+                ("dispersion", Param::Dispersion(dispersion)),
                 ("anisotropy", Param::Share(anisotropy)),
                 ("anisotropy_rotation", Param::Number(anisotropy_rotation)),
                 ("anisotropy_map", Param::Map(anisotropy_map)),
@@ -428,11 +442,14 @@ impl<P: Params> Material<P> {
                 fresnel: *fresnel,
                 compensate: *compensate,
             },
-            Self::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: rgb(absorption) },
-            Self::RoughGlass { alpha, ior, absorption, compensate } => Material::RoughGlass {
+            Self::Glass { ior, absorption, dispersion } => {
+                Material::Glass { ior: *ior, absorption: rgb(absorption), dispersion: *dispersion }
+            }
+            Self::RoughGlass { alpha, ior, absorption, dispersion, compensate } => Material::RoughGlass {
                 alpha: to.scalar(alpha),
                 ior: *ior,
                 absorption: rgb(absorption),
+                dispersion: *dispersion,
                 compensate: *compensate,
             },
             Self::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => Material::Phong {
@@ -454,6 +471,7 @@ impl<P: Params> Material<P> {
                 transmission,
                 thin_walled,
                 absorption,
+                dispersion,
                 anisotropy,
                 anisotropy_rotation,
                 anisotropy_map,
@@ -483,6 +501,7 @@ impl<P: Params> Material<P> {
                 transmission: to.scalar(transmission),
                 thin_walled: *thin_walled,
                 absorption: rgb(absorption),
+                dispersion: *dispersion,
                 anisotropy: to.scalar(anisotropy),
                 anisotropy_rotation: *anisotropy_rotation,
                 anisotropy_map: to.color(anisotropy_map),
@@ -558,11 +577,12 @@ impl<P: Params> Material<P> {
                 fresnel: Fresnel::Schlick,
                 compensate: true,
             },
-            MaterialKind::Glass => Self::Glass { ior: glass_ior(), absorption: P::Rgb::default() },
+            MaterialKind::Glass => Self::Glass { ior: glass_ior(), absorption: P::Rgb::default(), dispersion: 0.0 },
             MaterialKind::RoughGlass => Self::RoughGlass {
                 alpha: P::Scalar::from(0.04),
                 ior: glass_ior(),
                 absorption: P::Rgb::default(),
+                dispersion: 0.0,
                 compensate: true,
             },
             MaterialKind::Phong => Self::Phong {
@@ -592,6 +612,7 @@ impl<P: Params> Material<P> {
             transmission: zero(),
             thin_walled: false,
             absorption: P::Rgb::default(),
+            dispersion: 0.0,
             anisotropy: zero(),
             anisotropy_rotation: 0.0,
             anisotropy_map: along_tangent(),

@@ -83,6 +83,8 @@ pub enum Param<Color, Scalar, Number, Flag, Cutoff, Rgb, Part> {
     Exponent(Number),
     /// A thickness, 0 or more, nanometres.
     Thickness(Number),
+    /// 20 divided by the Abbe number, 0 or more.
+    Dispersion(Number),
     /// Absorption per metre.
     Absorption(Rgb),
     /// Another material, as a part of a blend.

@@ -35,6 +35,29 @@ impl Material {
         }
     }
 
+    /// Whether its inside refracts red, green and blue light differently.
+    pub(crate) fn disperses(&self) -> bool {
+        match self {
+            Self::Glass { dispersion, .. }
+            | Self::RoughGlass { dispersion, .. }
+            | Self::Principled { dispersion, .. } => self.is_clear() && *dispersion > 0.0,
+            _ => false,
+        }
+    }
+
+    /// Indices of refraction for red, green and blue light.
+    ///
+    /// A dispersion of 20 / V, where V is the Abbe number (n_d − 1) / (n_F − n_C), puts n_C and n_F at red and blue and
+    /// n_d at green (`KHR_materials_dispersion`). No index crosses 1.
+    ///
+    /// - `ior`: for green, above 0; `dispersion`: 0 or more.
+    pub fn iors(ior: f32, dispersion: f32) -> [f32; 3] {
+        /// Difference of indices between green and red over that between green and 1.
+        const HALF_SPREAD: f32 = 0.5 / 20.0;
+        let half = (ior - 1.0) * (HALF_SPREAD * dispersion).min(1.0);
+        [ior - half, ior, (ior + half).max(0.1 * ior)]
+    }
+
     /// Whether it, or a part of it, is specular everywhere: a mirror or glass.
     pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {

@@ -18,6 +18,7 @@ impl Material {
             transmission: ScalarInput::Constant(transmission),
             thin_walled: false,
             absorption,
+            dispersion,
             anisotropy: ScalarInput::Constant(0.0),
             anisotropy_rotation: _,
             anisotropy_map: _,
@@ -61,9 +62,9 @@ impl Material {
             Self::Metal { alpha, reflectance: base_color, fresnel: Fresnel::Schlick, compensate: true }
         } else if metallic <= 0.0 && transmission >= 1.0 && base_color == ColorInput::Constant(Vec3::ONE) {
             if alpha < SMALLEST_ALPHA {
-                Self::Glass { ior, absorption }
+                Self::Glass { ior, absorption, dispersion }
             } else {
-                Self::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption, compensate: true }
+                Self::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption, dispersion, compensate: true }
             }
         } else {
             self
@@ -101,7 +102,7 @@ mod tests {
             set(m, "transmission", 1.0);
             set(m, "roughness", 0.0);
         });
-        assert_eq!(glass, Material::Glass { ior: 1.5, absorption: Vec3::ZERO });
+        assert_eq!(glass, Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 });
         let rough = with(|m| set(m, "transmission", 1.0));
         assert!(matches!(rough, Material::RoughGlass { alpha: ScalarInput::Constant(0.25), compensate: true, .. }));
         assert!(matches!(with(|m| set(m, "specular", 0.0)), Material::Diffuse { .. }));

@@ -26,6 +26,7 @@ pub(crate) struct Bodies {
 #[derive(Clone, Copy, Debug)]
 struct BodyRow {
     ior: f32,
+    dispersion: f32,
     absorption: Vec3,
     /// Number of rows of the body.
     n_leaves: u32,
@@ -92,7 +93,7 @@ impl Bodies {
             let first = rows.len() as u32;
             let leaves = leaves_of(materials, *material);
             let n_leaves = leaves.len() as u32;
-            rows.extend(leaves.into_iter().map(|(ior, absorption)| BodyRow { ior, absorption, n_leaves }));
+            rows.extend(leaves.into_iter().map(|leaf| BodyRow { n_leaves, ..leaf }));
             match of {
                 BodyPart::Object(object) => of_object[*object as usize] = BodySurface::One(first),
                 BodyPart::Open(objects) => {
@@ -142,20 +143,33 @@ impl Bodies {
         Boundary { body, front }
     }
 
-    /// Index of refraction of a body that was entered through one transparent part of its material.
-    pub fn ior(&self, boundary: Boundary, leaf: u32) -> f32 {
-        self.rows[(boundary.body + leaf) as usize].ior
+    /// Indices of refraction of a body that was entered through one transparent part of its material: that of all
+    /// light, and those of red, green and blue.
+    pub fn iors(&self, row: u32) -> [f32; 4] {
+        let BodyRow { ior, dispersion, .. } = self.rows[row as usize];
+        let [red, green, blue] = Material::iors(ior, dispersion);
+        [ior, red, green, blue]
     }
 
-    /// Index of refraction, and absorption per metre.
-    pub fn medium(&self, row: u32) -> (f32, Vec3) {
-        let BodyRow { ior, absorption, .. } = self.rows[row as usize];
-        (ior, absorption)
+    /// Absorption per metre.
+    pub fn absorption(&self, row: u32) -> Vec3 {
+        self.rows[row as usize].absorption
+    }
+
+    /// Whether one transparent part of a body disperses light.
+    pub fn disperses_in(&self, row: u32) -> bool {
+        self.rows[row as usize].dispersion > 0.0
+    }
+
+    /// Whether a transparent part of a body disperses light.
+    pub fn disperses(&self, body: u32) -> bool {
+        let n = self.n_leaves(body) as usize;
+        self.rows[body as usize..][..n].iter().any(|row| row.dispersion > 0.0)
     }
 
     /// n² of the medium where these bodies overlap.
     pub fn environment_scale(&self, rows: &[u32]) -> f32 {
-        rows.last().map_or(1.0, |&row| self.medium(row).0.powi(2))
+        rows.last().map_or(1.0, |&row| self.rows[row as usize].ior.powi(2))
     }
 
     pub fn n_leaves(&self, body: u32) -> u32 {
@@ -239,15 +253,17 @@ fn winding(tree: &SceneTree, point: Vec3, counts: &dyn Fn(&Hit) -> bool) -> i32 
     windings[1].max(0)
 }
 
-/// Index and absorption of each transparent part of a material, in the order of shading.
-fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<(f32, Vec3)> {
-    match &materials[id as usize] {
+/// The rows of a body of this material, in the order of shading.
+fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
+    let material = &materials[id as usize];
+    let row = |ior: f32, dispersion: f32, absorption: Vec3| vec![BodyRow { ior, dispersion, absorption, n_leaves: 1 }];
+    match material {
         Material::Blend { a, b, .. } => [leaves_of(materials, *a), leaves_of(materials, *b)].concat(),
         material if !material.is_clear() => Vec::new(),
-        Material::Glass { ior, absorption }
-        | Material::RoughGlass { ior, absorption, .. }
-        | Material::Phong { ior, absorption, .. }
-        | Material::Principled { ior, absorption, .. } => vec![(*ior, *absorption)],
+        Material::Glass { ior, absorption, dispersion }
+        | Material::RoughGlass { ior, absorption, dispersion, .. }
+        | Material::Principled { ior, absorption, dispersion, .. } => row(*ior, *dispersion, *absorption),
+        Material::Phong { ior, absorption, .. } => row(*ior, 0.0, *absorption),
         _ => Vec::new(),
     }
 }

@@ -32,7 +32,8 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
     match &materials[id as usize] {
         Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => at_most_one(color),
         Material::Metal { reflectance, compensate: false, .. } => at_most_one(reflectance),
-        Material::Glass { .. } | Material::RoughGlass { compensate: false, .. } => true,
+        // A path of one channel has three times its light.
+        glass @ (Material::Glass { .. } | Material::RoughGlass { compensate: false, .. }) => !glass.disperses(),
         Material::Emissive { .. } => true,
         Material::Phong { diffuse, specular, .. } => {
             at_most_one(diffuse) && matches!(specular, ScalarInput::Constant(_)) && is_even(diffuse)
@@ -87,7 +88,7 @@ mod tests {
 
     #[test]
     fn samples_above_the_bound_are_counted_with_their_places() {
-        let mut scene = scene(Material::Glass { ior: 1.5, absorption: Vec3::ZERO });
+        let mut scene = scene(Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 });
         let run = |scene: &Prepared| {
             let mut film = Film::new(8, 4);
             (advance(scene, &RenderSettings::default(), &mut film, 2, &|| false), film)

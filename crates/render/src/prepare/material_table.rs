@@ -52,6 +52,7 @@ pub(crate) const COATED: usize = MaterialKind::N;
 impl MaterialTable {
     pub fn build(geometry: &Geometry, materials: &[Material], textures: &[Texture]) -> Self {
         let asks_for_more = |id: MaterialId| materials[id as usize].asks_for_more_than_uv(materials, textures);
+        let disperses = materials.iter().any(Material::disperses);
         let mut table = Self::default();
         let mut parts_of_classics = Vec::new();
         for (id, material) in (0..).zip(materials) {
@@ -79,6 +80,8 @@ impl MaterialTable {
                 _ => {}
             }
             let kind = match material.kind() {
+                // The SIMD code keeps all channels together.
+                MaterialKind::Glass if disperses => MaterialKind::Blend as usize,
                 // The SIMD code supports one pair of texture coordinates: materials that need more are shaded like
                 // blends of many parts.
                 kind if kind != MaterialKind::Emissive && asks_for_more(id) => MaterialKind::Blend as usize,

@@ -103,6 +103,8 @@ pub(crate) struct Tables {
 pub struct Features {
     /// Some surface transmits paths, so paths keep track of their media.
     pub glass: bool,
+    /// Some glass disperses light, so paths may be limited to one channel.
+    pub dispersion: bool,
     /// There is absorption between surfaces: by glass or by air.
     pub media: bool,
     /// Some light can be sampled.
@@ -232,6 +234,7 @@ impl Tables {
         }
         let features = Features {
             glass: materials.iter().any(Material::is_clear),
+            dispersion: materials.iter().any(Material::disperses),
             media: materials.iter().any(Material::absorbs) || *air != Vec3::ZERO,
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),

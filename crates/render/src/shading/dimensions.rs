@@ -10,6 +10,9 @@ pub(crate) const DIM_LIGHT: u32 = 2;
 pub(crate) const DIM_LOBE: u32 = 3;
 pub(crate) const DIM_ROULETTE: u32 = 4;
 
+/// Dimension of the channel to which dispersion limits a path, beyond those of all vertices.
+pub(crate) const DIM_CHANNEL: u32 = u32::MAX - 1;
+
 /// Returns the first dimension of the vertex at the end of segment `depth`.
 pub(crate) fn first_dimension(depth: u32) -> u32 {
     CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS

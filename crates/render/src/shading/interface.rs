@@ -1,12 +1,31 @@
 //! Media on the two sides of a surface that a path meets.
 
-/// A set of media, by its index in the [`crate::shading::medium::MediumSets`] of one worker.
+/// A set of media, and the channel of a path that dispersion has limited to one: four times the index of the set in the
+/// [`crate::shading::medium::MediumSets`] of one worker, plus 0 for all channels, or 1, 2, 3 for red, green, blue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct MediumId(pub u32);
 
 impl MediumId {
     /// The empty set: outside of all bodies.
     pub const OUTSIDE: Self = Self(0);
+
+    /// The same media for a path of all channels.
+    #[inline]
+    pub fn of_all_channels(self) -> Self {
+        Self(self.0 & !3)
+    }
+
+    /// 0 for all channels, or 1, 2, 3.
+    #[inline]
+    pub fn channel(self) -> u32 {
+        self.0 & 3
+    }
+
+    /// The same media for a path of this channel, 0 to 3.
+    #[inline]
+    pub fn in_channel(self, channel: u32) -> Self {
+        Self(self.0 & !3 | channel)
+    }
 }
 
 /// The interface that a path finds at the surface of a transparent body.

@@ -20,7 +20,10 @@ use rustc_hash::FxHashMap;
 /// The ids of sets differ between workers, but only their equality matters.
 #[derive(Debug, Default)]
 pub(crate) struct MediumSets {
-    sets: Vec<MediumSet>,
+    /// Rows of [`crate::prepare::bodies::Bodies`] of each set, ascending: the last one determines the medium.
+    sets: Vec<Box<[u32]>>,
+    /// Four per set, by [`MediumId`].
+    media: Vec<Medium>,
     ids: FxHashMap<Box<[u32]>, MediumId>,
     /// By previous set and crossed boundary; `None` if the path leaves a body that is not in the set.
     crossings: FxHashMap<(MediumId, u32, bool), Option<MediumId>>,
@@ -30,10 +33,8 @@ pub(crate) struct MediumSets {
 /// Maximum number of sets per worker.
 const MOST_SETS: usize = 1 << 16;
 
-#[derive(Debug)]
-struct MediumSet {
-    /// Rows of [`crate::prepare::bodies::Bodies`], ascending: the last one determines the medium.
-    rows: Box<[u32]>,
+#[derive(Clone, Copy, Debug)]
+struct Medium {
     ior: f32,
     /// Absorption per metre.
     absorption: Vec3,
@@ -47,6 +48,7 @@ impl MediumSets {
     pub fn start(&mut self, scene: &Prepared, camera: &[u32]) -> MediumId {
         if self.sets.is_empty() || self.sets.len() > MOST_SETS {
             self.sets.clear();
+            self.media.clear();
             self.ids.clear();
             self.crossings.clear();
             self.id_of(scene, Box::default());
@@ -63,7 +65,7 @@ impl MediumSets {
     /// Index of refraction.
     #[inline]
     pub fn ior(&self, id: MediumId) -> f32 {
-        self.sets[id.0 as usize].ior
+        self.media[id.0 as usize].ior
     }
 
     /// Factor n² of environment radiance inside these media, as for a path that entered through surfaces. It is 1
@@ -76,7 +78,7 @@ impl MediumSets {
     /// Transmittance over `distance` metres (Beer–Lambert).
     #[inline]
     pub fn transmittance(&self, id: MediumId, distance: f32) -> Vec3 {
-        let absorption = self.sets[id.0 as usize].absorption;
+        let absorption = self.media[id.0 as usize].absorption;
         if absorption == Vec3::ZERO {
             return Vec3::ONE;
         }
@@ -111,7 +113,8 @@ impl MediumSets {
             // An open surface hit from behind, alone or with others: it refracts, but medium and radiance of the path
             // stay the same.
             None => {
-                let eta = scene.tables.bodies.ior(boundary, leaf) / here;
+                let iors = scene.tables.bodies.iors(boundary.body + leaf);
+                let eta = iors[from.channel() as usize] / here;
                 Interface { eta, squeeze: 1.0, beyond: from }
             }
         }
@@ -124,7 +127,7 @@ impl MediumSets {
         if let Some(&found) = self.crossings.get(&(from, row, front)) {
             return found;
         }
-        let mut rows = self.sets[from.0 as usize].rows.to_vec();
+        let mut rows = self.sets[from.0 as usize / 4].to_vec();
         let beyond = if front {
             rows.insert(rows.partition_point(|&other| other <= row), row);
             Some(self.id_of(scene, rows.into()))
@@ -136,6 +139,7 @@ impl MediumSets {
                 self.id_of(scene, rows.into())
             })
         };
+        let beyond = beyond.map(|beyond| beyond.in_channel(from.channel()));
         self.crossings.insert((from, row, front), beyond);
         beyond
     }
@@ -144,14 +148,38 @@ impl MediumSets {
         if let Some(&id) = self.ids.get(&rows) {
             return id;
         }
-        let id = MediumId(self.sets.len() as u32);
-        let (ior, absorption) = match rows.last() {
-            Some(&row) => scene.tables.bodies.medium(row),
-            None => (1.0, scene.shading.air),
+        let id = MediumId(4 * self.sets.len() as u32);
+        let (iors, absorption) = match rows.last() {
+            Some(&row) => (scene.tables.bodies.iors(row), scene.tables.bodies.absorption(row)),
+            None => ([1.0; 4], scene.shading.air),
         };
         self.ids.insert(rows.clone(), id);
-        self.sets.push(MediumSet { rows, ior, absorption });
+        self.sets.push(rows);
+        self.media.extend(iors.map(|ior| Medium { ior, absorption }));
         id
+    }
+
+    /// Limits a path in the media `from` to one channel at boundaries where light is dispersed; returns its media and
+    /// the factor of its throughput, or `None` if nothing changes.
+    ///
+    /// - `u`: uniform in `[0, 1)`, the same for all vertices of a path.
+    pub fn dispersed(
+        &self,
+        scene: &Prepared,
+        from: MediumId,
+        boundaries: impl IntoIterator<Item = Boundary>,
+        u: impl FnOnce() -> f32,
+    ) -> Option<(MediumId, Vec3)> {
+        let bodies = &scene.tables.bodies;
+        let within = || self.sets[from.0 as usize / 4].last().is_some_and(|&row| bodies.disperses_in(row));
+        if from.channel() != 0 || !(boundaries.into_iter().any(|boundary| bodies.disperses(boundary.body)) || within())
+        {
+            return None;
+        }
+        let channel = ((3.0 * u()) as u32).min(2);
+        let mut factor = [0.0; 3];
+        factor[channel as usize] = 3.0;
+        Some((from.in_channel(1 + channel), factor.into()))
     }
 }
 
@@ -167,8 +195,10 @@ mod tests {
     /// Spheres about the origin with these radii, each with its own glass; the last material is a blend of the first
     /// two.
     fn spheres(radii_and_iors: &[(f32, f32)]) -> Prepared {
-        let mut materials: Vec<Material> =
-            radii_and_iors.iter().map(|&(_, ior)| Material::Glass { ior, absorption: Vec3::ZERO }).collect();
+        let mut materials: Vec<Material> = radii_and_iors
+            .iter()
+            .map(|&(_, ior)| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 })
+            .collect();
         materials.push(Material::Blend { weight: ScalarInput::Constant(0.5), a: 0, b: 1 });
         let shapes: Vec<_> =
             radii_and_iors.iter().map(|&(radius, _)| Shape::Sphere { center: Vec3::ZERO, radius }).collect();
@@ -267,7 +297,7 @@ mod tests {
             vec![quad(o, y, x), quad(o + z, x, y), quad(o, z, y), quad(o + x, y, z), quad(o, x, z), quad(o + y, z, x)];
         shapes.push(Shape::Plane { point: Vec3::Y * 2.0, normal: Vec3::Y });
         let objects = [0, 0, 0, 0, 0, 0, 1].map(Object::plain).into();
-        let glass = |ior| Material::Glass { ior, absorption: Vec3::ZERO };
+        let glass = |ior| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 };
         let scene = of(shapes, objects, vec![glass(1.5), glass(1.3)]);
         let around = |point| scene.tables.bodies.around(&scene.geometry, point);
         assert_eq!(around(Vec3::splat(0.5)), [0, 1]);

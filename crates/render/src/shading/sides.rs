@@ -3,10 +3,13 @@
 use crate::core::material::MaterialId;
 use crate::prepare::bodies::Boundary;
 use crate::prepare::prepared::Prepared;
+use crate::sampling::Sampler;
+use crate::shading::dimensions::DIM_CHANNEL;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use firstlight_kdtree::Hit;
 use firstlight_kdtree::geometry::Ray;
+use glam::Vec3;
 
 /// The media on the two sides of a surface that a path meets.
 pub(crate) struct Sides<'a> {
@@ -32,6 +35,20 @@ impl<'a> Sides<'a> {
         let bodies = &scene.tables.bodies;
         let others = scene.along_with(hit, || *ray);
         Self { sets, here, boundary: bodies.boundary(hit.object, hit.prim, id, front), others }
+    }
+
+    /// Limits a path to one channel if light is dispersed here: `here` becomes its media, and the factor of its
+    /// throughput is returned. Must come before [`Self::interface`].
+    #[inline]
+    pub fn disperse(&mut self, scene: &Prepared, id: MaterialId, sampler: &Sampler) -> Option<Vec3> {
+        let materials = &scene.shading.materials;
+        if !scene.tables.features.dispersion || !materials[id as usize].has_clear_part(materials) {
+            return None;
+        }
+        let boundaries = std::iter::once(self.boundary).chain(self.others.iter().copied());
+        let (here, factor) = self.sets.dispersed(scene, self.here, boundaries, || sampler.single(DIM_CHANNEL))?;
+        self.here = here;
+        Some(factor)
     }
 
     /// Returns the interface of a transparent part of the material; see [`MediumSets::interface`].

@@ -144,7 +144,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let scene = pass.scene;
         let mut open = at.mask;
         if scene.tables.features.glass {
-            lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
+            lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane].of_all_channels() != camera) << lane));
         }
         let offsets = self.lens_offsets(s, &scene.camera);
         let Connection { lens, film: [film_x, film_y], depth } =

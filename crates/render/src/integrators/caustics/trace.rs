@@ -186,13 +186,13 @@ impl LightWave {
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             self.next.start(self.paths.len(), pass.scene.tables.features.glass, false);
             for i in 0..self.paths.len() {
-                let path = LightPath::from(self.paths.get(i));
+                let mut path = LightPath::from(self.paths.get(i));
                 let Some(hit) = self.hits.get(i) else { continue };
                 if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
                     continue;
                 }
                 let ray = self.paths.rays.get(i);
-                let found = surface_at(pass, &mut self.sets, &ray, &hit, path.media);
+                let found = surface_at(pass, &mut self.sets, &ray, &hit, &mut path);
                 let Some((vertex, material, surface)) = found else { continue };
                 if n_vertices > 1 && surface.has_non_specular() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
@@ -292,13 +292,13 @@ impl LightWave {
         if scene.tables.features.media && !(n_vertices == 1 && path.is_far) {
             path.throughput *= self.sets.transmittance(path.media, hit.t);
         }
-        let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, path.media);
+        let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, &mut path);
         let Some((vertex, material, surface)) = found else { return };
         let step =
             LightPathStep { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
         if n_vertices > 1
             && surface.has_non_specular()
-            && (path.media == self.camera || surface.through().is_some())
+            && (path.media.of_all_channels() == self.camera || surface.through().is_some())
             && let Some((ray, film, light, ratio)) = step.join(&surface, &self.sets, self.camera)
         {
             self.arrivals.push(&ray, film, light, [ratio, path.kept]);
@@ -316,13 +316,13 @@ fn first_dimension(n_vertices: u32) -> u32 {
     LINE_DIMENSIONS + (n_vertices - 1) * VERTEX_DIMENSIONS
 }
 
-/// Returns `None` if the surface is black.
+/// Returns `None` if the surface is black. Where light is dispersed, the path is limited to one channel.
 fn surface_at(
     pass: &CausticPass,
     sets: &mut MediumSets,
     ray: &Ray,
     hit: &Hit,
-    media: MediumId,
+    path: &mut LightPath,
 ) -> Option<(Vertex, MaterialId, LightPathSurface)> {
     let scene = pass.scene;
     let material = material_of(scene, hit);
@@ -332,7 +332,13 @@ fn surface_at(
         Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. }
     );
     let glass = scene.tables.features.glass;
-    let mut sides = glass.then(|| Sides::new(scene, sets, media, ray, hit, material, vertex.front));
+    let mut sides = glass.then(|| Sides::new(scene, sets, path.media, ray, hit, material, vertex.front));
+    if let Some(sides) = &mut sides
+        && let Some(factor) = sides.disperse(scene, material, &path.sampler)
+    {
+        path.throughput *= factor;
+        path.media = sides.here;
+    }
     let surface = if is_blend {
         LightPathSurface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
     } else {
@@ -383,7 +389,7 @@ impl LightPathStep<'_> {
         let through = surface.through().filter(|_| to_camera.dot(self.vertex.geometric_normal) < 0.0);
         let before = path.media;
         let after = through.map_or(before, |interface| interface.beyond);
-        if after != media || through.is_some() && before == after {
+        if after.of_all_channels() != media || through.is_some() && before == after {
             return None;
         }
         let vertex =

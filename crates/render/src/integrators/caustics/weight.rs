@@ -103,7 +103,7 @@ impl CausticPass<'_> {
     /// MIS weight of a light that a camera path hits; `None` if light paths cannot find it.
     #[inline]
     pub fn camera_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
-        if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
+        if track.caster == NO_CASTER || track.ratio.is_nan() || media.of_all_channels() != MediumId::OUTSIDE {
             return None;
         }
         let light = self.scene.tables.lights.light_of(hit.object, hit.prim, vertex.front)?;

@@ -131,6 +131,12 @@ impl PathWave {
         }
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
+        if let Some(sides) = &mut sides
+            && let Some(factor) = sides.disperse(scene, material, &path.sampler)
+        {
+            path.throughput *= factor;
+            path.media = sides.here;
+        }
         let bsdf = match &scene.shading.materials[material as usize] {
             Material::Principled { .. } => {
                 Bsdf::Layers(principled_at(scene, material, &vertex, &mut sides.as_mut(), 0, true)?)
