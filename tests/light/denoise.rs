@@ -2,7 +2,8 @@
 
 use crate::common::*;
 use firstlight::render::{
-    Denoised, Environment, Film, Prepared, RenderSettings, advance, denoise_film, gather_guides, smooth_film,
+    Denoised, Environment, Film, MovingFilter, Prepared, RenderSettings, advance, denoise_film, gather_guides,
+    smooth_film,
 };
 use glam::{UVec2, Vec3};
 
@@ -71,21 +72,26 @@ fn a_coarse_film_is_smoothed_from_its_first_sample_on() {
     let settings = RenderSettings::default();
     let mut reference = Film::new(SIZE.0, SIZE.1);
     advance(&scene, &RenderSettings { seed: 99, ..settings }, &mut reference, 512, &|| false);
+    let mut filter = MovingFilter::default();
     for simd in [settings.simd, None] {
         let settings = RenderSettings { simd, ..settings };
         let mut plain = Film::new(SIZE.0, SIZE.1);
         advance(&scene, &settings, &mut plain, 1, &|| false);
-        assert_eq!(smooth_film(&scene, &settings, &plain, &|| false), None, "nothing was noted");
+        assert_eq!(smooth_film(&mut filter, &scene, &settings, &plain, &|| false), None, "nothing was noted");
         let mut film = Film::new(SIZE.0, SIZE.1);
         film.note_surfaces();
         advance(&scene, &settings, &mut film, 1, &|| false);
         assert_eq!(film.means(), plain.means(), "noting changes no sample");
-        let smooth = smooth_film(&scene, &settings, &film, &|| false).expect("surfaces are noted");
-        let (raw, error) = (relative_mse(&film.means(), &reference.means()), relative_mse(&smooth, &reference.means()));
+        let smooth = smooth_film(&mut filter, &scene, &settings, &film, &|| false).expect("surfaces are noted");
+        let (raw, error) = (relative_mse(&film.means(), &reference.means()), relative_mse(smooth, &reference.means()));
         assert!(error < 0.4 * raw, "{error} of {raw}");
-        assert_eq!(smooth_film(&scene, &settings, &film, &|| true), None);
+        assert_eq!(smooth_film(&mut filter, &scene, &settings, &film, &|| true), None);
         film.clear();
-        assert_eq!(smooth_film(&scene, &settings, &film, &|| false), None, "a film that is cleared notes nothing");
+        assert_eq!(
+            smooth_film(&mut filter, &scene, &settings, &film, &|| false),
+            None,
+            "a film that is cleared notes nothing"
+        );
     }
 }
 

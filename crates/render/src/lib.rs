@@ -34,7 +34,7 @@ pub use crate::core::techniques::Techniques;
 pub use crate::core::texture::{
     Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
 };
-pub use denoise::{DenoiseInput, Denoised, Guides, MovingInput, denoise, smooth_moving};
+pub use denoise::{DenoiseInput, Denoised, Guides, MovingFilter, MovingInput, denoise};
 pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
 pub use driver::denoised::{DenoiseSource, SurfaceGuides, denoise_film, denoise_source, gather_guides};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};

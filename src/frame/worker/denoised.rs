@@ -8,7 +8,7 @@ use super::denoiser::Request;
 use super::thread::Loop;
 use super::views::{Settled, ViewKey};
 use super::{Denoising, lock};
-use crate::render::{DenoiseSource, Film, Inspection, develop, develop_colors, smooth_film};
+use crate::render::{DenoiseSource, Film, Inspection, MovingFilter, develop, develop_colors, smooth_film};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -67,8 +67,11 @@ impl Loop<'_> {
 
     /// Develops the image as it is wanted and can be had now, and returns how that is, with the error of the denoised
     /// image; `None` if another view or job has arrived meanwhile.
+    ///
+    /// - `filter`: smooths what is not denoised.
     pub(super) fn develop_wanted(
         &self,
+        filter: &mut MovingFilter,
         (divider, film): (u32, &Film),
         key: ViewKey,
         (width, height): (u32, u32),
@@ -88,9 +91,9 @@ impl Loop<'_> {
         }
         let smoothed = match settled {
             Some(_) => None,
-            None => smooth_film(&job.prepared, &job.settings, film, &stop),
+            None => smooth_film(filter, &job.prepared, &job.settings, film, &stop),
         };
-        let colors = settled.map(|settled| &settled.denoised.color).or(smoothed.as_ref());
+        let colors = settled.map(|settled| settled.denoised.color.as_slice()).or(smoothed);
         let Some(colors) = colors else {
             if stop() {
                 return None;

@@ -53,8 +53,11 @@ impl Loop<'_> {
         let mut legend = None;
         let (mut denoising, mut denoised_error) = (Denoising::Raw, None);
         if self.look.inspection == Inspection::Picture {
-            let develop = || self.develop_wanted((*divider, film), key, (width, height), &mut rgba);
-            let Some(developed) = pool.install(develop) else { return };
+            let mut filter = std::mem::take(&mut self.filter);
+            let develop = || self.develop_wanted(&mut filter, (*divider, film), key, (width, height), &mut rgba);
+            let developed = pool.install(develop);
+            self.filter = filter;
+            let Some(developed) = developed else { return };
             (denoising, denoised_error) = developed;
             if denoised_error.is_none() {
                 smoothed = Some(start.elapsed());

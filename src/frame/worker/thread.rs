@@ -6,7 +6,9 @@ use super::views::Views;
 use super::{Answer, BESIDE, Denoising, Job, NICENESS, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
-use crate::render::{Display, Film, Region, SampleAllocation, advance_region, explain, known_caustic_choice};
+use crate::render::{
+    Display, Film, MovingFilter, Region, SampleAllocation, advance_region, explain, known_caustic_choice,
+};
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
@@ -28,6 +30,8 @@ pub struct Loop<'a> {
     pub(super) look: ViewOptions,
     pub(super) views: Views,
     pub(super) denoiser: Denoiser,
+    /// Smooths images of a moving camera; has memory only once it did.
+    pub(super) filter: MovingFilter,
     /// Region that gets all samples, in fractions of the image.
     region: Option<[f64; 4]>,
     /// Whether the film has tiles that are ahead because of a region.
@@ -60,6 +64,7 @@ impl<'a> Loop<'a> {
             look: ViewOptions::default(),
             views: Views::default(),
             denoiser,
+            filter: MovingFilter::default(),
             region: None,
             is_uneven: false,
             question: None,

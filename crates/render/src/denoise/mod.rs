@@ -14,7 +14,7 @@ mod moving;
 mod regression;
 
 pub use input::{DenoiseInput, Guides};
-pub use moving::{MovingInput, smooth_moving};
+pub use moving::{MovingFilter, MovingInput};
 
 use glam::Vec3;
 
