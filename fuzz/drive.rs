@@ -6,7 +6,9 @@
 
 use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
-use firstlight::render::{CausticPlan, Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
+use firstlight::render::{
+    CausticPlan, Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, Prepared, RenderSettings, advance,
+};
 use firstlight::scene::file::{ObjectPart, SceneFile};
 use firstlight::scene::model::{ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::{
@@ -146,8 +148,10 @@ pub fn film(bytes: &[u8]) {
         return;
     }
     let numbers = [0.0, 1.0, -0.5, f64::INFINITY, f64::NAN, 1e300, 5e-324];
-    let plane = |k: usize| (0..n_pixels as usize).map(|i| numbers[(i * 3 + k) % numbers.len()]).collect();
-    let mut record = FilmRecord { layout, planes: (0..N_PLANES).map(plane).collect() };
+    let plane =
+        |k: usize| -> Vec<f64> { (0..n_pixels as usize).map(|i| numbers[(i * 3 + k) % numbers.len()]).collect() };
+    let changes = Some((0..N_CHANGE_PLANES).map(|k| plane(k).iter().map(|&number| number as f32).collect()).collect());
+    let mut record = FilmRecord { layout, planes: (0..N_PLANES).map(plane).collect(), changes };
     match Film::from_record(&record) {
         Ok(film) => {
             // The sums to the last bit, NaN included; what there is no light or no doubling for is not kept.
@@ -165,7 +169,7 @@ pub fn film(bytes: &[u8]) {
 
 fn go_on(mut film: Film) {
     let spp = film.spp();
-    drop((film.means(), film.error_estimate(), film.n_bad(), film.max_spp()));
+    drop((film.means(), film.error_estimate(), film.half_steps(), film.n_bad(), film.max_spp()));
     // Films that were stopped in the middle of a pass have tiles that must catch up first: that may be long.
     let (least, _, most) = film.sample_counts();
     if film.max_spp() - spp > 8 || spp - spp.min(least) > 8 || film.first_sample() > Film::MAX_SAMPLES / 2 {

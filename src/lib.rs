@@ -26,6 +26,7 @@
 //! | `report`, `stability` (feature `cli`) | error against time; counts of hard cases |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
+//! | `oidn` (feature `cli`) | Open Image Denoise, loaded at run time where it is installed |
 //! | [`printable`], `console` (feature `cli`) | escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
@@ -48,6 +49,10 @@ pub mod cluster;
 pub mod console;
 pub mod embed;
 pub mod frame;
+// Hidden like `console`.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod oidn;
 pub mod prelude;
 pub mod printable;
 // Hidden like `console`.

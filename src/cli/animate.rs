@@ -53,7 +53,7 @@ pub(super) fn animate(
                 let claim = WholeFile::claim(path, replace)?;
                 write_film_with_features(&film, features.as_ref(), &job.note(&film, path), claim)?;
             }
-            let denoised = job.denoised(args, &film, &|| false);
+            let denoised = job.denoised(&film, &mut None, &|| false)?;
             job.write(args, (&film, features.as_ref()), denoised.as_ref(), &path, replace)?;
         }
         stop.has_saved(format!("{} of {n} frames are saved", done + 1));
@@ -92,7 +92,7 @@ fn is_complete(
     let samples = ImageSamples { first: 0, spp: there.spp, uneven: there.uneven };
     let note = job.draft.note(path, job.size, samples, job.display.into());
     let ours = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
-    let ours = ImageMetadata { denoised: args.denoise.then(|| "own".to_owned()), ..ours };
+    let ours = ImageMetadata { denoised: args.denoise.denoise.then(|| args.denoise.name()), ..ours };
     if ours != there || target.spp.is_some_and(|spp| spp != there.spp) {
         return Ok(false);
     }

@@ -1,6 +1,7 @@
 //! A scene that is rendered without a window, and its images.
 
 use super::console::{inform, print_bytes, remark};
+use super::denoising::Denoiser;
 use super::failure::Failure;
 use super::progress::Progress;
 use super::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
@@ -13,7 +14,7 @@ use firstlight::frame::{
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
     Denoised, Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
-    denoise_film, gather_guides,
+    SurfaceGuides, gather_guides,
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
@@ -34,6 +35,8 @@ pub(super) struct RenderJob {
     pub size: (u32, u32),
     pub build_seconds: f64,
     pub draft: MetadataDraft,
+    /// `None` if nothing is denoised.
+    denoiser: Option<Denoiser>,
 }
 
 impl RenderJob {
@@ -43,6 +46,7 @@ impl RenderJob {
         files: &mut Files,
         progress: &Progress,
     ) -> Result<Self, Failure> {
+        let denoiser = Denoiser::of(&args.denoise, args.wants_denoised())?;
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
         let scene = args.scene.load(aspect, files, &|text| progress.stage(text.to_owned()))?;
         if let Some(announcement) = &args.announcement {
@@ -95,7 +99,7 @@ impl RenderJob {
         let size = scaled(size, args.scale)?;
         world.insert_resource(Rendering(settings));
         let draft = MetadataDraft::of(&mut world, Some(&scene));
-        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
+        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft, denoiser })
     }
 
     /// The current camera.
@@ -197,13 +201,20 @@ impl RenderJob {
     }
 
     /// The denoised film; `None` if it is not requested or `stop` returned true.
-    pub fn denoised(&self, args: &RenderArgs, film: &Film, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
-        if !args.wants_denoised() {
-            return None;
+    ///
+    /// - `guides`: of this scene and view, gathered at the first call.
+    pub fn denoised(
+        &self,
+        film: &Film,
+        guides: &mut Option<SurfaceGuides>,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Denoised>, Failure> {
+        let Some(denoiser) = &self.denoiser else { return Ok(None) };
+        if guides.is_none() {
+            let size = UVec2::new(film.width(), film.height());
+            *guides = gather_guides(&self.extraction.prepared, &self.settings, size, FEATURE_SAMPLES, stop);
         }
-        let (prepared, size) = (&self.extraction.prepared, UVec2::new(film.width(), film.height()));
-        let guides = gather_guides(prepared, &self.settings, size, FEATURE_SAMPLES, stop)?;
-        denoise_film(film, &guides, stop)
+        guides.as_ref().map_or(Ok(None), |guides| denoiser.denoise(film, guides, stop))
     }
 
     /// Writes an image with its metadata to a file or to standard output.
@@ -227,7 +238,7 @@ impl RenderJob {
         }
         if denoised.is_some() {
             let raw = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
-            note = ImageMetadata { denoised: Some("own".to_owned()), ..raw }.to_note();
+            note = ImageMetadata { denoised: Some(args.denoise.name()), ..raw }.to_note();
         }
         let denoised = denoised.map(|denoised| &denoised.color[..]);
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note), denoised };

@@ -7,6 +7,7 @@ mod animate;
 mod args;
 mod completions;
 mod console;
+mod denoising;
 mod explain;
 mod failure;
 mod frames;

@@ -3,6 +3,7 @@
 use super::animate::animate;
 use super::args::replaced;
 use super::console::{inform, print, prints_to_terminal, remark};
+use super::denoising::ErrorOf;
 use super::failure::Failure;
 use super::job::{RenderJob, room_to_write};
 use super::number::{percent, samples_per_pixel};
@@ -13,15 +14,16 @@ use super::sequence::Sequence;
 use super::stop::Stop;
 use super::video;
 use firstlight::frame::{
-    OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors,
-    write_film_with_features,
+    OfflineReport, Progress as Measured, Target, read_film_file, render_measured_until, render_offline_until,
+    render_region_until, write_errors, write_film_with_features,
 };
-use firstlight::render::{BadSample, Film, Region, worker_threads};
+use firstlight::render::{BadSample, Denoised, Film, Region, worker_threads};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{Files, SceneSource};
 use glam::{UVec2, Vec3};
 
+use std::cell::Cell;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -200,13 +202,10 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let region = args.region.map(|region| region_in(&film, region)).transpose()?;
-    if args.resume
-        && target.reached(
-            film.spp_in(region.as_ref()),
-            0.0,
-            film.error_estimate_in(region.as_ref()).map(|error| error.relative),
-        )
-    {
+    let of_denoised = args.denoise.error_of == Some(ErrorOf::Denoised);
+    let raw_error =
+        |film: &Film, region| film.error_estimate_in(region).map(|error| error.relative).filter(|_| !of_denoised);
+    if args.resume && target.reached(film.spp_in(region.as_ref()), 0.0, raw_error(&film, region.as_ref())) {
         let message = format!("nothing to render: the film has reached {}", target_in_words(&target));
         progress.suspend(|| inform(message));
     }
@@ -224,24 +223,46 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
     let region = region.as_ref();
     let RenderJob { extraction, settings, .. } = &*job;
-    let report = render_region_until(&extraction.prepared, settings, &mut film, region, target, &asked, |now| {
+    // The denoised image with its samples per pixel, and what guides the denoiser.
+    let (mut denoised, mut guides) = (None, None);
+    let failure = Cell::new(None);
+    let told = |now: Measured| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
         let by_error = target
             .error
-            .zip(now.error)
+            .zip(now.error.filter(|_| !of_denoised))
             .map_or(0.0, |(goal, error)| f64::from(now.spp) / f64::from(error.spp_for(goal)));
         let mrays = now.rays.total() as f64 / now.seconds.max(1e-9) * 1e-6;
         let share = by_spp.max(by_time).max(by_error);
         progress.at(share, format!("{}, {mrays:.1} Mrays/s", samples_per_pixel(now.spp)));
-        true
-    });
+        // A failure of the denoiser ends the render.
+        let failed = failure.take();
+        let goes_on = failed.is_none();
+        failure.set(failed);
+        goes_on
+    };
+    let (scene, settings) = (&extraction.prepared, settings);
+    let report = if of_denoised {
+        let mut error_of = |film: &Film| {
+            let found = job.denoised(film, &mut guides, &asked).unwrap_or_else(|error| {
+                failure.set(Some(error));
+                None
+            })?;
+            Some(denoised.insert((film.spp(), found)).1.error)
+        };
+        render_measured_until(scene, settings, &mut film, target, &mut error_of, &asked, told)
+    } else {
+        render_region_until(scene, settings, &mut film, region, target, &asked, told)
+    };
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     progress.finish();
     // If all samples are black, the error estimate is meaningless.
     let is_dark = extraction.prepared.has_light() && is_black(&film);
     let error = film.error_estimate_in(region).map(|error| error.relative);
-    let reached = target.reached(film.spp_in(region), report.seconds, error);
+    let error_of_denoised = denoised.as_ref().map(|(_, found): &(u32, Denoised)| found.error);
+    let counted = if of_denoised { error_of_denoised } else { error };
+    let reached = target.reached(film.spp_in(region), report.seconds, counted);
     let stopped = stop.is_asked() && !reached;
     if film.spp() == 0 {
         let message = "stopped before every pixel had a sample: nothing was saved";
@@ -254,12 +275,18 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         let note = job.note(&film, file.path());
         write_film_with_features(&film, features.as_ref(), &note, file)?;
     }
-    let denoised = job.denoised(args, &film, &asked);
+    if let Some(failure) = failure.take() {
+        return Err(failure);
+    }
+    let denoised = match denoised.filter(|(spp, _)| *spp == film.spp()) {
+        Some((_, found)) => Some(found),
+        None => job.denoised(&film, &mut guides, &asked)?,
+    };
     if args.wants_denoised() && denoised.is_none() {
         remark(format_args!("warning: stopped before the image was denoised: {} is raw", args.output_name()));
     }
     job.write(args, (&film, features.as_ref()), denoised.as_ref(), &args.output, files.replace())?;
-    let denoised_error = denoised.map(|denoised| denoised.error).filter(|_| !is_dark);
+    let denoised_error = denoised.map(|denoised| (denoised.error, denoised.error_95)).filter(|_| !is_dark);
     if let Some(path) = &args.error_image {
         write_errors(&film, path, files.replace())?;
     }
@@ -286,11 +313,13 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
             first_of(&report.above)
         ));
     }
-    if let (false, Some(wanted), Some(error)) = (stopped, target.error, error)
+    let counted = if of_denoised { denoised_error.map(|(error, _)| error) } else { error };
+    if let (false, Some(wanted), Some(error)) = (stopped, target.error, counted)
         && error > wanted
     {
+        let of_what = if of_denoised { " of the denoised image" } else { "" };
         remark(format_args!(
-            "warning: the estimated error is {}, above the target of {}: allow more time or samples",
+            "warning: the estimated error{of_what} is {}, above the target of {}: allow more time or samples",
             percent(error),
             percent(wanted)
         ));
@@ -303,7 +332,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         let seconds = report.seconds;
         let error = error.filter(|_| !is_dark);
         let error = error.map_or(String::new(), |error| format!(", estimated error {}", percent(error)));
-        let denoised = denoised_error.map_or(String::new(), |error| format!(" (denoised: {})", percent(error)));
+        let denoised = denoised_error.map_or(String::new(), |(error, _)| format!(" (denoised: {})", percent(error)));
         let kept = film_path.map_or(String::new(), |path| format!(", film saved to {}", path.display()));
         let replaced = replaced(files.replaced());
         let spp = match region {
@@ -380,7 +409,7 @@ fn json(
     report: &OfflineReport,
     (features_seconds, cpu_seconds): (f64, Option<f64>),
     (film, region, is_dark): (&Film, Option<&Region>, bool),
-    denoised_error: Option<f64>,
+    denoised_error: Option<(f64, [f64; 2])>,
     replaced: &[PathBuf],
     stopped: bool,
 ) -> serde_json::Value {
@@ -421,8 +450,9 @@ fn json(
         // With a region, its own error.
         "region": of_region,
         "estimated_error": error.map(|error| error.relative),
-        "estimated_error_denoised": denoised_error,
         "estimated_error_95": error.map(|error| [error.low, error.high]),
+        "estimated_error_denoised": denoised_error.map(|(error, _)| error),
+        "estimated_error_denoised_95": denoised_error.map(|(_, interval)| interval),
         "bad_samples": report.n_bad,
         "bad_samples_at": places(&report.bad),
         "samples_above_bound": report.n_above,

@@ -1,6 +1,7 @@
 //! Arguments of `firstlight render`.
 
 use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
+use super::denoising::DenoiseArgs;
 use super::failure::Failure;
 use super::frames::{FramesArg, parse_frames};
 use super::layers::LayerArgs;
@@ -77,11 +78,8 @@ pub struct RenderArgs {
     /// Samples per pixel of the layers albedo, normal, depth, position, object and material [default: 16].
     #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = between::<u32>(1, 65_536))]
     pub layer_samples: Option<u32>,
-    /// Save the image denoised: raw and filtered combined, so that it converges to the raw image
-    ///
-    /// The film stays raw, and --error counts for the raw image.
-    #[arg(help_heading = "Output", long, conflicts_with_all = ["region", "layers"])]
-    pub denoise: bool,
+    #[command(flatten)]
+    pub denoise: DenoiseArgs,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = between::<u32>(1, 100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
@@ -270,7 +268,7 @@ impl RenderCommand {
 impl RenderArgs {
     /// Whether the image, or a layer of it, is denoised.
     pub fn wants_denoised(&self) -> bool {
-        self.denoise || self.layers.has_denoised()
+        self.denoise.denoise || self.layers.has_denoised()
     }
 
     /// Whether the image goes to standard output.
@@ -309,6 +307,7 @@ impl RenderArgs {
     /// Checks that the format supports the requested layers.
     fn check_layers(&self, format: PictureFormat) -> Result<PictureFormat, Failure> {
         self.layers.check()?;
+        self.denoise.check(self.wants_denoised())?;
         if !self.layers.is_empty() && format != PictureFormat::Exr {
             let message = "a .png has no layers: with --layers, choose a name that ends in .exr";
             return Err(Failure::Usage(format!("{}: {message}", self.output_name())));

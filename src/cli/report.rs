@@ -6,12 +6,14 @@ use super::failure::Failure;
 use super::number::{between, parse_positive, parse_size};
 use super::stop::Stop;
 use clap::Args;
+use firstlight::oidn::{Oidn, OidnError};
 use firstlight::render::{
-    ErrorMetric, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
+    ErrorMetric, FEATURE_SAMPLES, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, gather_guides,
+    worker_threads,
 };
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
-    csv, foreign_share, measure_curve, page, summary_text,
+    csv, denoised_curves, foreign_share, measure_curve, page, summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
@@ -167,11 +169,17 @@ fn measure_all(
         let message = format!("references that are not cached take up to {longest} in total, in addition to --time");
         progress.bar.suspend(|| inform(message));
     }
+    // Compared where it is installed.
+    let oidn = match Oidn::load(rayon::current_num_threads()) {
+        Ok(oidn) => Some(oidn),
+        Err(OidnError::Missing) => None,
+        Err(error) => return Err(Failure::Failed(error.to_string())),
+    };
     stop.attend();
     let mut outcomes = Vec::new();
     let mut missing: Option<String> = None;
     for (i, scene) in scenes.iter().enumerate() {
-        let (outcome, lacks) = scene.measure(args, limits, given, &mut progress, stop);
+        let (outcome, lacks) = scene.measure(args, limits, given, oidn.as_ref(), &mut progress, stop);
         outcomes.extend(outcome);
         if let Some(lacks) = lacks {
             let others: Vec<&str> = scenes[i + 1..].iter().map(|scene| scene.title.as_str()).collect();
@@ -252,6 +260,7 @@ impl ReportScene {
         args: &ReportArgs,
         limits: CurveLimits,
         given: Option<&Reference>,
+        oidn: Option<&Oidn>,
         progress: &mut ReportProgress,
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
@@ -290,12 +299,20 @@ impl ReportScene {
                 })
                 .collect()
         };
+        let prepared = self.prepared();
+        let guides = gather_guides(&prepared, &self.settings, self.size.into(), FEATURE_SAMPLES, &|| false)
+            .expect("nothing stops it");
+        let denoised = denoised_curves(&steps, &guides, oidn, &reference.picture, &display).unwrap_or_else(|error| {
+            remark(format_args!("warning: {error}"));
+            Vec::new()
+        });
         let outcome = SceneOutcome {
             title: self.title.clone(),
             width: self.size.0,
             height: self.size.1,
             display,
             curve: measure(&steps),
+            denoised,
             ablations,
             early: picture(steps.iter().rfind(|step| step.spp <= 4)).unwrap_or_else(|| last.clone()),
             foreign_share: given.map(|given| foreign_share(&last, &given.picture)),

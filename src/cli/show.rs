@@ -2,6 +2,7 @@
 
 use super::args::{OverwriteArgs, SceneArgs, replaced};
 use super::console::{inform, remark};
+use super::denoising::DenoiseArgs;
 use super::failure::Failure;
 use super::number::{between, counted, samples_per_pixel};
 use super::render;
@@ -171,7 +172,7 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         error_image: None,
         layers: Default::default(),
         layer_samples: None,
-        denoise: false,
+        denoise: DenoiseArgs::default(),
         threads: args.threads,
         seed: args.seed,
         integrator: None,

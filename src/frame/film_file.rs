@@ -4,12 +4,13 @@
 //! further channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample numbers and the
 //! state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the image metadata
 //! ([`ImageMetadata`]) identifies the scene, and makes the film open like any image. The same attribute has a checksum
-//! of every byte of the file except its own digits, so that any change is detected. Feature buffers, if the film has
-//! them, are further channels ([`FeatureLayers`]).
+//! of every byte of the file except its own digits, so that any change is detected. The last doubling of each pixel, from
+//! which the denoiser knows the noise, and feature buffers ([`FeatureLayers`]), if the film has them, are further
+//! channels, which programs that do not know them skip.
 
 use super::feature_layers::{FeatureHeader, FeatureLayers, LAYERS, channels_of, id_channels, read_layers};
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, NoRoom, OldFilmLayout, Purpose, Room};
+use crate::render::{Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, NoRoom, OldFilmLayout, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
@@ -191,10 +192,11 @@ pub fn write_film_with_features(
     let path = &out.path().to_path_buf();
     let purpose = if features.is_some() { Purpose::Layers } else { Purpose::FilmFile };
     drop(Room::for_files(film.width(), film.height(), &[purpose]).map_err(|error| unwritable(path, error))?);
-    let FilmRecord { layout, planes } = film.to_record();
+    let FilmRecord { layout, planes, changes } = film.to_record();
     let of_features = features.map(FeatureLayers::header);
     let header = Header { format: FORMAT, check: NO_CHECK.to_owned(), layout, features: of_features };
-    let mut bytes = encode(film, &planes, features, note, &header).map_err(|error| unwritable(path, error))?;
+    let mut bytes =
+        encode(film, (&planes, changes), features, note, &header).map_err(|error| unwritable(path, error))?;
     let place = place_of_check(&bytes).expect("the header has just been written");
     let check = checksum(&bytes, &place).to_string();
     bytes[place].copy_from_slice(check.as_bytes());
@@ -205,7 +207,7 @@ pub fn write_film_with_features(
 /// Encodes a whole file in memory.
 fn encode(
     film: &Film,
-    planes: &[Vec<f64>],
+    (planes, changes): (&[Vec<f64>], Option<Vec<Vec<f32>>>),
     features: Option<&FeatureLayers>,
     note: &str,
     header: &Header<impl Serialize>,
@@ -218,6 +220,9 @@ fn encode(
             |shift: u32| FlatSamples::U32(plane.iter().map(|number| (number.to_bits() >> shift) as u32).collect());
         channels.push(AnyChannel::new(format!("{name}.upper").as_str(), half(32)));
         channels.push(AnyChannel::new(format!("{name}.lower").as_str(), half(0)));
+    }
+    for (plane, name) in changes.into_iter().flatten().zip(change_names()) {
+        channels.push(AnyChannel::new(name.as_str(), FlatSamples::F32(plane)));
     }
     if let Some(FeatureLayers { buffers, .. }) = features {
         for (name, numbers) in LAYERS.iter().flat_map(|layer| channels_of(buffers, layer)) {
@@ -441,7 +446,11 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
         return Err(damaged(&WRONG));
     }
     planes.resize_with(N_PLANES, || vec![0.0; n_pixels as usize]);
-    let record = FilmRecord { layout, planes };
+    let of_change = |name: String| match samples(&name) {
+        Some(FlatSamples::F32(numbers)) => Some(numbers.clone()),
+        _ => None,
+    };
+    let record = FilmRecord { layout, planes, changes: change_names().map(of_change).collect() };
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
     let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
     let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its metadata is missing or too long"))?)?;
@@ -460,6 +469,12 @@ fn plane_names() -> impl Iterator<Item = String> {
     ["sum", "rest", "mean", "lamps.sum", "lamps.rest", "lamps.mean"]
         .into_iter()
         .flat_map(|part| ["R", "G", "B"].map(|channel| format!("{part}.{channel}")))
+}
+
+/// Names of [`FilmRecord::changes`].
+fn change_names() -> impl Iterator<Item = String> {
+    let of_part = |part| ["R", "G", "B", "relative"].map(|channel| format!("{part}.{channel}"));
+    ["change", "lamps.change"].into_iter().flat_map(of_part).take(N_CHANGE_PLANES)
 }
 
 /// The checksum of [`OLD_FORMAT`].
@@ -505,6 +520,7 @@ mod tests {
         write_film_file(&film, &note, &folder.path().join("a.exr")).unwrap();
         let whole = std::fs::read(folder.path().join("a.exr")).unwrap();
         let kept = read_bytes(&whole).unwrap();
+        assert!(film.half_steps().is_some() && kept.film.half_steps() == film.half_steps());
         assert!(kept.film.to_record() == film.to_record() && kept.shot.to_note() == note && kept.warning.is_none());
         for at in 0..whole.len() {
             for flip in [1, 2, 0x20, 0x80, 0xff] {
@@ -534,14 +550,15 @@ mod tests {
 
     /// The film as a file of an older format.
     fn old_file(film: &Film, note: &str, format: u32) -> Vec<u8> {
-        let FilmRecord { layout, mut planes } = film.to_record();
+        let FilmRecord { layout, mut planes, .. } = film.to_record();
         planes.truncate(OldFilmLayout::N_PLANES);
         let of_tile = |tile: &TileRecord| OldTileRecord { samples: tile.blocks[0].samples.clone(), bad: vec![] };
         let FilmLayout { width, height, tile_size, tiles, light_traced, .. } = layout;
         let tiles = tiles.iter().map(of_tile).collect();
         let layout = OldFilmLayout { width, height, tile_size, tiles, light_traced };
         let check = if format > OLD_FORMAT { NO_CHECK.to_owned() } else { checksum_of_numbers(&planes).to_string() };
-        let mut bytes = encode(film, &planes, None, note, &Header { format, check, layout, features: None }).unwrap();
+        let mut bytes =
+            encode(film, (&planes, None), None, note, &Header { format, check, layout, features: None }).unwrap();
         if format > OLD_FORMAT {
             let place = place_of_check(&bytes).unwrap();
             let check = checksum(&bytes, &place).to_string();
@@ -558,8 +575,8 @@ mod tests {
             let old = old_file(&film, &note, format);
             let kept = read_bytes(&old).unwrap();
             assert!(kept.film.means() == film.means() && kept.film.spp() == 4);
-            // Its error is known again after the next two doublings.
-            assert!(kept.film.error_estimate().is_none());
+            // Its error is known again after the next two doublings, its noise after the next one.
+            assert!(kept.film.error_estimate().is_none() && kept.film.half_steps().is_none());
             let warning = kept.warning.unwrap_or_default();
             assert_eq!(warning.contains("a.exr: is a film of an older format"), format == OLD_FORMAT, "{warning}");
             // The pixel values are always covered by the checksum, and the two sample counts must agree.

@@ -67,7 +67,9 @@ pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_st
 pub use history::History;
 pub use latency::LatencyHistogram;
 pub use layered_picture::{LayeredPicture, PictureLayer};
-pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
+pub use offline::{
+    OfflineReport, Progress, Target, render_measured_until, render_offline, render_offline_until, render_region_until,
+};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
 pub use recording::check_recordable;
 pub use recovery::{LeftBehind, Recovery};

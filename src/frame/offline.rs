@@ -110,11 +110,45 @@ pub fn render_region_until<'a>(
     region: Option<&Region>,
     target: Target,
     stop: &(dyn Fn() -> bool + Sync),
+    progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    render(scene.into(), settings, (film, region), target, None, stop, progress)
+}
+
+/// Like [`render_offline_until`], where the target error is that of another image made of the film, such as the denoised
+/// one.
+///
+/// - `error_of`: the error of that image, if known; called at 4 samples per pixel, then four times between
+///   two powers of two, so that the result does not depend on the speed of the machine.
+pub fn render_measured_until<'a>(
+    scene: impl Into<Exposed<'a>>,
+    settings: &RenderSettings,
+    film: &mut Film,
+    target: Target,
+    error_of: &mut dyn FnMut(&Film) -> Option<f64>,
+    stop: &(dyn Fn() -> bool + Sync),
+    progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    let spp = film.spp();
+    // A film that is resumed may be there already.
+    let is_look = target.error.is_some() && spp > 0 && next_measurement(spp - 1) == spp;
+    if is_look && target.reached(spp, 0.0, error_of(film)) {
+        return OfflineReport::default();
+    }
+    render(scene.into(), settings, (film, None), target, Some(error_of), stop, progress)
+}
+
+fn render(
+    scene: Exposed,
+    settings: &RenderSettings,
+    (film, region): (&mut Film, Option<&Region>),
+    target: Target,
+    mut error_of: Option<&mut dyn FnMut(&Film) -> Option<f64>>,
+    stop: &(dyn Fn() -> bool + Sync),
     mut progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
     /// Approximate seconds between reports.
     const SLICE: f64 = 0.25;
-    let scene = scene.into();
     let start = Instant::now();
     let deadline =
         target.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).map(|limit| start + limit);
@@ -127,6 +161,7 @@ pub fn render_region_until<'a>(
         let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
         let at_most = before.saturating_add(step).min(goal);
         let look = target.error.map(|error| match settings.allocation {
+            _ if error_of.is_some() => next_measurement(before),
             SampleAllocation::Adaptive(_) if region.is_none() => next_look(before),
             _ => first_worth_a_look(film, region, error, at_most),
         });
@@ -140,7 +175,11 @@ pub fn render_region_until<'a>(
         report.seconds = start.elapsed().as_secs_f64();
         let (spp, seconds, error) = (film.spp_in(region), report.seconds, film.error_estimate_in(region));
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
-        let error = error.map(|error| error.relative).filter(|_| look == Some(spp));
+        let error = match &mut error_of {
+            _ if look != Some(spp) || !go_on || stop() => None,
+            Some(error_of) => error_of(film),
+            None => error.map(|error| error.relative),
+        };
         if !go_on || stop() || target.reached(spp, seconds, error) {
             break;
         }
@@ -158,6 +197,14 @@ pub fn render_region_until<'a>(
 fn next_look(now: u32) -> u32 {
     let step = (1 << now.max(1).ilog2()) / 8;
     let step = step.max(1);
+    (now / step + 1).saturating_mul(step)
+}
+
+/// Returns the next sample count at which the error of another image is measured: four times between two powers of two,
+/// from four samples per pixel on.
+fn next_measurement(now: u32) -> u32 {
+    let now = now.max(3);
+    let step = ((1 << now.ilog2()) / 4).max(1);
     (now / step + 1).saturating_mul(step)
 }
 

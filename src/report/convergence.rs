@@ -2,7 +2,7 @@
 
 use super::curve::{Seconds, seconds_at, seconds_to, slope};
 use super::{Distance, LinearPicture};
-use crate::render::{Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
+use crate::render::{DenoiseSource, Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
 use std::time::{Duration, Instant};
 
 /// Where a curve ends: at the last power of two within both limits, but never before the first step.
@@ -21,6 +21,8 @@ pub struct CurveStep {
     pub spent: Spent,
     pub estimate: Option<ErrorEstimate>,
     pub picture: LinearPicture,
+    /// What the denoiser reads of the film.
+    pub source: DenoiseSource,
 }
 
 /// Cost of the samples so far: rendering alone, without loading, building or comparing.
@@ -89,7 +91,8 @@ pub fn measure_curve(
             camera_paths: rays.camera,
             rays: rays.total(),
         };
-        steps.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
+        let (picture, source) = (LinearPicture::of(&film), DenoiseSource::of(&film));
+        steps.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture, source });
         // The next step takes as long as all steps before it.
         let too_long = limits.seconds.is_some_and(|seconds| 2.0 * spent.wall_seconds > seconds);
         match spp.checked_mul(2) {
@@ -168,6 +171,11 @@ impl ConvergenceCurve {
 
     pub fn last(&self) -> &Step {
         self.steps.last().expect("a curve has at least one step")
+    }
+
+    /// The step with this number of samples per pixel.
+    pub fn at(&self, spp: u32) -> Option<&Step> {
+        self.steps.iter().find(|step| step.spp == spp)
     }
 
     /// Seconds and relMSE of each step.

@@ -6,6 +6,7 @@
 
 mod convergence;
 mod curve;
+mod denoised;
 mod flip;
 mod metrics;
 mod mismatch;
@@ -19,6 +20,7 @@ mod trees;
 
 pub use convergence::{ConvergenceCurve, CurveLimits, CurveStep, Spent, Step, cpu_seconds, measure_curve};
 pub use curve::{Seconds, seconds_to, slope};
+pub use denoised::{DenoisedCurve, DenoisedStep, denoised_curves};
 pub use flip::flip;
 pub use metrics::{Distance, RELATIVE_FLOOR};
 pub use mismatch::{foreign_share, is_another_scene};

@@ -1,6 +1,6 @@
 //! Results of a report for one scene.
 
-use super::{ConvergenceCurve, LinearPicture, Made, is_another_scene};
+use super::{ConvergenceCurve, DenoisedCurve, LinearPicture, Made, is_another_scene};
 use crate::render::Display;
 use std::path::PathBuf;
 
@@ -13,6 +13,8 @@ pub struct SceneOutcome {
     /// How its images are developed.
     pub display: Display,
     pub curve: ConvergenceCurve,
+    /// The same samples, denoised.
+    pub denoised: Vec<DenoisedCurve>,
     pub ablations: Vec<Ablation>,
     pub reference: LinearPicture,
     /// How an own reference was made; `None` for a given one.

@@ -3,7 +3,7 @@
 use super::curve::Seconds;
 use super::outcome::{Ablation, SceneOutcome};
 use super::plot::{Band, Plot, Series, Style, escape, number};
-use super::{ConvergenceCurve, LinearPicture};
+use super::{ConvergenceCurve, DenoisedCurve, LinearPicture};
 use crate::printable;
 use crate::render::{Display, develop_pixel};
 use base64::Engine;
@@ -141,6 +141,7 @@ fn section(outcome: &SceneOutcome) -> String {
     }
     html.push_str("</div>\n");
     html.push_str(&steps_table(&outcome.curve));
+    html.push_str(&denoised_table(outcome));
     if !outcome.ablations.is_empty() {
         html.push_str(&ablation_table(outcome));
     }
@@ -173,11 +174,17 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
     let first = curve.steps.iter().find(|step| step.spp >= 4).unwrap_or(curve.last());
     let ideal = |seconds: f64| (seconds, first.distance.relative_mse * first.spent.seconds() / seconds);
     let series = |label: &str, color, style, points| Series { label: label.to_owned(), color, style, points };
+    // At the time of the samples, without that of the denoiser.
+    let seconds_of = |spp| curve.at(spp).map(|step| step.spent.seconds());
+    let denoised = outcome.denoised.iter().enumerate().map(|(i, DenoisedCurve { name, steps })| {
+        let points = steps.iter().filter_map(|step| Some((seconds_of(step.spp)?, step.distance.relative_mse)));
+        series(name, 2 + i, Style::Thin, points.collect())
+    });
     Plot {
         title: "relMSE against time".to_owned(),
         x_label: "seconds".to_owned(),
         y_label: "relMSE".to_owned(),
-        series: vec![
+        series: [
             series("true error", 0, Style::Measured, curve.points()),
             series(
                 "error estimate with its 95 % interval",
@@ -186,7 +193,10 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
                 estimates().map(|(seconds, e)| (seconds, e.relative.powi(2))).collect(),
             ),
             series("slope −1", 7, Style::Thin, vec![ideal(first.spent.seconds()), ideal(curve.last().spent.seconds())]),
-        ],
+        ]
+        .into_iter()
+        .chain(denoised)
+        .collect(),
         band: Some(Band {
             color: 1,
             points: estimates().map(|(seconds, e)| (seconds, e.low.powi(2), e.high.powi(2))).collect(),
@@ -252,6 +262,28 @@ fn steps_table(curve: &ConvergenceCurve) -> String {
         "<div class=\"wide\"><table>\n<tr><th>spp</th><th>wall s</th><th>CPU s</th><th>M rays/s</th>\
          <th>M paths/s</th><th>relMSE</th><th>error</th><th>RMSE</th><th>FLIP</th><th>estimated error (95 %)</th>\
          <th>estimated / true</th></tr>\n{rows}</table></div>\n"
+    )
+}
+
+/// relMSE of the raw image and of each denoiser, with estimated over true error.
+fn denoised_table(outcome: &SceneOutcome) -> String {
+    let curves = &outcome.denoised;
+    let mut rows = String::new();
+    for raw in &outcome.curve.steps {
+        let cells = curves.iter().map(|curve| {
+            let Some(step) = curve.steps.iter().find(|step| step.spp == raw.spp) else {
+                return "<td>–</td><td>–</td>".to_owned();
+            };
+            let ratio = step.calibration().map_or("–".to_owned(), |ratio| format!("{ratio:.2}"));
+            format!("<td>{}</td><td>{ratio}</td>", number(step.distance.relative_mse))
+        });
+        let cells: String = cells.collect();
+        let _ = writeln!(rows, "<tr><td>{}</td><td>{}</td>{cells}</tr>", raw.spp, number(raw.distance.relative_mse));
+    }
+    let names = curves.iter().map(|curve| format!("<th>{}</th><th>estimated / true</th>", escape(curve.name)));
+    format!(
+        "<div class=\"wide\"><table>\n<tr><th>spp</th><th>raw relMSE</th>{}</tr>\n{rows}</table></div>\n",
+        names.collect::<String>()
     )
 }
 

@@ -5,6 +5,7 @@ mod common;
 
 mod cli;
 mod cli_simplify;
+mod denoising;
 mod explain;
 mod faults;
 mod frames;

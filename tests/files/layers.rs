@@ -65,6 +65,30 @@ fn the_denoised_layer_is_the_denoised_image() {
     assert!(message.contains("denoised needs the scene"), "{message}");
 }
 
+/// A film that is read, or added up from parts, denoises as well as the one that was rendered, and its errors are known.
+#[test]
+fn a_film_that_is_opened_again_denoises_to_the_same_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let of = |name: &str| layers_of(&path.join(name)).0;
+    let layers = "--layers denoised,error";
+    // Light paths in one scene; samples after the last doubling in the other.
+    for (scene, spp) in [("cornell-balls", 8), ("cornell", 6)] {
+        let scene = format!("render {scene} --size 40x24");
+        does(path, &format!("{scene} --spp {spp} -o at-once.exr {layers} --film film.exr --overwrite"));
+        does(path, &format!("render film.exr --spp {spp} --resume -o again.exr {layers} --overwrite"));
+        assert!(of("again.exr") == of("at-once.exr"), "{scene}");
+    }
+    let scene = "render cornell-balls --size 40x24";
+    does(path, &format!("{scene} --samples 0..8 -o at-once.exr {layers} --film film.exr --overwrite"));
+    does(path, &format!("{scene} --samples 0..4 -o part.exr --film part-1.exr"));
+    does(path, &format!("{scene} --samples 4..8 -o part.exr --film part-2.exr --overwrite"));
+    does(path, "merge part-2.exr part-1.exr -o merged.exr");
+    assert!(std::fs::read(path.join("merged.exr")).unwrap() == std::fs::read(path.join("film.exr")).unwrap());
+    does(path, &format!("render merged.exr --spp 8 --resume -o again.exr {layers} --overwrite"));
+    assert!(of("again.exr") == of("at-once.exr"), "merged");
+}
+
 /// Names as other programs expect them; sizes, ranges and sums as they must be.
 #[test]
 fn layers_have_the_names_and_numbers_that_other_programs_expect() {

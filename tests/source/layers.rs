@@ -18,6 +18,7 @@ const INTEGRATORS: &str = "crates/render/src/integrators";
 const FILM: &str = "crates/render/src/film";
 const DENOISE: &str = "crates/render/src/denoise";
 const DRIVER: &str = "crates/render/src/driver";
+const OIDN: &str = "src/oidn";
 const PRINTABLE: &str = "src/printable";
 const CONSOLE: &str = "src/console";
 const SCENE: &str = "src/scene";
@@ -26,7 +27,7 @@ const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 25] = [
+const LAYERS: [(&str, &[&str]); 26] = [
     (SIMD, &[]),
     (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -38,16 +39,17 @@ const LAYERS: [(&str, &[&str]); 25] = [
     (INTEGRATORS, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING]),
     (FILM, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS]),
     // It knows slices, and what the film says of its variance and of surfaces.
-    (DENOISE, &[SIMD, FILM]),
+    (DENOISE, &[SIMD, SAMPLING, FILM]),
     (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM, DENOISE]),
     // `lib.rs`, which shows what the folders have.
     ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),
+    (OIDN, &[]),
     (PRINTABLE, &[]),
     (CONSOLE, &[PRINTABLE]),
     (SCENE, &[PRINTABLE, CONSOLE]),
     (FRAME, &[PRINTABLE, CONSOLE, SCENE]),
     ("src/cluster", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
-    ("src/report", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
+    ("src/report", &[OIDN, PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/stability", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     (EMBED, &[SCENE, FRAME]),
     ("src/prelude", &[SCENE, FRAME, EMBED]),

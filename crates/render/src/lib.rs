@@ -36,7 +36,9 @@ pub use crate::core::texture::{
 };
 pub use denoise::{DenoiseInput, Denoised, Guides, MovingFilter, MovingInput, denoise};
 pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
-pub use driver::denoised::{DenoiseSource, SurfaceGuides, denoise_film, denoise_source, gather_guides};
+pub use driver::denoised::{
+    DenoiseSource, SurfaceGuides, denoise_film, denoise_source, denoise_source_with, gather_guides,
+};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::inspect::{
@@ -53,8 +55,8 @@ pub use film::estimate::ErrorEstimate;
 pub use film::features::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares};
 pub use film::halves::HalfSteps;
 pub use film::record::{
-    BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_PLANES, OldFilmLayout, OldTileRecord, RoundRecord,
-    StepsRecord, TileRecord,
+    BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_CHANGE_PLANES, N_PLANES, OldFilmLayout, OldTileRecord,
+    RoundRecord, StepsRecord, TileRecord,
 };
 pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};

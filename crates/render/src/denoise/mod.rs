@@ -1,5 +1,5 @@
 //! Denoiser with an error estimate: a filter guided by feature buffers (`regression`), and a combination of raw and
-//! filtered image that converges to the limit of the raw image (`combine`).
+//! filtered image that converges to the limit of the raw image (`combine`), with its error (`risk`).
 //! For images that are shown for a moment there is a filter of a few milliseconds (`moving`).
 //!
 //! Pure functions of slices. Every pixel is a fixed sequence of operations, so the result depends neither on threads
@@ -11,7 +11,9 @@ mod fit;
 mod input;
 mod moments;
 mod moving;
+mod noise;
 mod regression;
+mod risk;
 
 pub use input::{DenoiseInput, Guides};
 pub use moving::{MovingFilter, MovingInput};
@@ -28,6 +30,8 @@ pub struct Denoised {
     /// Estimated root of relMSE, like [`ErrorEstimate::relative`](crate::film::estimate::ErrorEstimate::relative) of
     /// the raw image.
     pub error: f64,
+    /// Bounds of an interval that contains the true error with a probability of about 95 %.
+    pub error_95: [f64; 2],
 }
 
 /// Denoises an image, on the current rayon pool; `None` if `stop`, which is called often, returned true.
@@ -38,9 +42,23 @@ pub fn denoise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option
     input.check();
     let found = regression::regression(input, stop)?;
     let filtered = regression::pick(input, &found);
-    let combined = combine::combine(input, &found, &filtered);
-    let combine::Combined { color, share, relative_mse } = combined;
-    Some(Denoised { color, share, error: relative_mse.max(0.0).sqrt() })
+    Some(combine::combine(input, &found.noise, &filtered))
+}
+
+/// Like [`denoise`], with another filter in place of the regression: it gets the radiance of each pixel and returns the
+/// filtered one, or `None`, and is called twice.
+///
+/// # Panics
+/// If a list does not have one entry per pixel.
+pub fn denoise_with(
+    input: &DenoiseInput,
+    filter: &mut dyn FnMut(&[Vec3]) -> Option<Vec<Vec3>>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Denoised> {
+    input.check();
+    let noise = regression::noise(input, stop)?;
+    let filtered = noise.probed(input, filter)?;
+    Some(combine::combine(input, &noise, &filtered))
 }
 
 #[cfg(test)]

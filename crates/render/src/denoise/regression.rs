@@ -13,25 +13,23 @@ use super::blur::blur;
 use super::fit::Fits;
 use super::input::DenoiseInput;
 use super::moments::{Blocks, N_FEATURES, Samples};
+use super::noise::{Filtered, Noise};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// A filtered image.
-pub(super) struct Filtered {
+/// An image filtered by regression.
+pub(super) struct Candidate {
     /// Radiance of each pixel.
     pub color: Vec<Vec3>,
     /// Weight of each pixel's own value in its filtered value, 0..1.
     pub own: Vec<f32>,
 }
 
-/// Both candidates, and the statistics behind them.
+/// Both candidates, and the noise of the raw image.
 pub(super) struct Regression {
     /// From windows of all sizes, and from small windows only.
-    pub candidates: [Filtered; 2],
-    /// Variance of the radiance of each pixel, sum over channels; noisy.
-    pub variance: Vec<f32>,
-    /// Whether a pixel or a neighbour shows an emitter.
-    pub at_emitters: Vec<bool>,
+    pub candidates: [Candidate; 2],
+    pub noise: Noise,
 }
 
 /// Number of window sizes: 3 · 2ᵏ pixels for k in 1..=5.
@@ -46,17 +44,7 @@ const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
 /// Returns `None` if `stop`, which is called once per row, returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Regression> {
-    let n = input.n_pixels();
-    let guides = &input.guides;
-    let at_emitters = near(input, |pixel| guides.emitters[pixel]);
-    let albedo: Vec<Vec3> = guides.albedo.iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
-    let mut samples = samples(input, &albedo, &at_emitters);
-    let mut blocks = Blocks::finest(&samples);
-    if input.half_steps.is_none() {
-        // The only estimate of the noise is the residual of small windows.
-        samples.variance = residuals(&samples, &Fits::of(&blocks, stop)?, stop)?;
-        blocks = Blocks::finest(&samples);
-    }
+    let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
     let mut levels = Vec::new();
     loop {
         levels.push(Fits::of(&blocks, stop)?);
@@ -70,15 +58,46 @@ pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync))
         .map(|y| (!stop()).then(|| (0..input.width).map(|x| predict(&samples, &levels, x, y)).collect()))
         .collect();
     let predicted: Vec<[(Vec3, f32); 2]> = rows?.into_iter().flatten().collect();
-    let candidate = |k: usize| Filtered {
+    let candidate = |k: usize| Candidate {
         color: predicted.iter().zip(&albedo).map(|(of, albedo)| (of[k].0 * *albedo).max(Vec3::ZERO)).collect(),
         own: predicted.iter().map(|of| of[k].1.min(1.0)).collect(),
     };
-    let variance = match input.half_steps {
-        Some(halves) => (0..n).map(|i| halves.variance(i).element_sum()).collect(),
-        None => (0..n).map(|i| samples.variance[i] * albedo[i].length_squared() / 3.0).collect(),
-    };
-    Some(Regression { candidates: [candidate(0), candidate(1)], variance, at_emitters })
+    Some(Regression { candidates: [candidate(0), candidate(1)], noise })
+}
+
+/// The noise of the raw image alone; `None` if `stop` returned true.
+pub(super) fn noise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Noise> {
+    Start::of(input, stop).map(|start| start.noise)
+}
+
+/// What a regression starts from.
+struct Start {
+    samples: Samples,
+    blocks: Blocks,
+    /// Divisors of radiance.
+    albedo: Vec<Vec3>,
+    noise: Noise,
+}
+
+impl Start {
+    fn of(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        let guides = &input.guides;
+        let at_emitters = near(input, |pixel| guides.emitters[pixel]);
+        let albedo: Vec<Vec3> = guides.albedo.iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
+        let mut samples = samples(input, &albedo, &at_emitters);
+        let mut blocks = Blocks::finest(&samples);
+        let n = input.n_pixels();
+        let variance = match input.half_steps {
+            Some(halves) => (0..n).map(|i| halves.variance(i)).collect(),
+            None => {
+                // The only estimate of the noise is the residual of small windows.
+                samples.variance = residuals(&samples, &Fits::of(&blocks, stop)?, stop)?;
+                blocks = Blocks::finest(&samples);
+                (0..n).map(|i| samples.variance[i] / 3.0 * albedo[i] * albedo[i]).collect()
+            }
+        };
+        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters } })
+    }
 }
 
 /// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and −1/2
@@ -175,24 +194,26 @@ fn predict(samples: &Samples, levels: &[Fits], x: usize, y: usize) -> [(Vec3, f3
 pub(super) fn pick(input: &DenoiseInput, found: &Regression) -> Filtered {
     let n = input.n_pixels();
     let [all, small] = &found.candidates;
-    let level = |i: usize| 1.0 / ((all.color[i].element_sum() / 3.0).powi(2) + 0.01);
+    let level = |i: usize| (all.color[i] * all.color[i] + 0.01).recip();
     let smooth = |values: Vec<f32>| blur(&values, input.width, input.height, 1);
-    let risk = |of: &Filtered| {
+    let risk = |of: &Candidate| {
         let of_pixel = |i: usize| {
-            let variance = found.variance[i];
-            level(i) * ((of.color[i] - input.color[i]).length_squared() - variance + 2.0 * of.own[i] * variance)
+            let variance = found.noise.variance[i];
+            let off = of.color[i] - input.color[i];
+            level(i).dot(off * off - (1.0 - 2.0 * of.own[i]) * variance)
         };
         smooth((0..n).into_par_iter().map(of_pixel).collect())
     };
-    let noise = smooth((0..n).into_par_iter().map(|i| level(i) * found.variance[i]).collect());
+    let noise = smooth((0..n).into_par_iter().map(|i| level(i).dot(found.noise.variance[i])).collect());
     let (of_all, of_small) = (risk(all), risk(small));
     let share = |i: usize| {
         let [a, b] = [of_all[i], of_small[i]].map(|risk| (risk.max(0.02 * noise[i]) + 1e-9).powi(2));
         b / (a + b)
     };
     let share = smooth((0..n).into_par_iter().map(share).collect());
+    let own = |i: usize| small.own[i] + (all.own[i] - small.own[i]) * share[i];
     Filtered {
         color: (0..n).map(|i| small.color[i].lerp(all.color[i], share[i])).collect(),
-        own: (0..n).map(|i| small.own[i] + (all.own[i] - small.own[i]) * share[i]).collect(),
+        covariance: (0..n).map(|i| own(i) * found.noise.variance[i]).collect(),
     }
 }

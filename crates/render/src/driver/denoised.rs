@@ -1,8 +1,8 @@
 //! A film as the denoiser takes it: a copy of its means and half steps, and guides from feature buffers.
 
 use crate::core::settings::RenderSettings;
-use crate::denoise::{DenoiseInput, Denoised, Guides, denoise};
-use crate::driver::features::gather_features_and_ids;
+use crate::denoise::{DenoiseInput, Denoised, Guides, denoise, denoise_with};
+use crate::driver::features::gather_features_and_materials_beyond;
 use crate::film::features::{FeatureBuffers, IdShares};
 use crate::film::halves::HalfSteps;
 use crate::film::tiles::Film;
@@ -22,13 +22,13 @@ pub struct SurfaceGuides {
     pub normal: Vec<Vec3>,
     /// Metres along the view axis; infinite where nothing is hit.
     pub depth: Vec<f32>,
-    /// Whether a pixel shows an emitter, in part at least.
+    /// Whether a pixel shows an emitter, in part at least, and be it in a mirror or through glass.
     pub emitters: Vec<bool>,
 }
 
 impl SurfaceGuides {
-    /// The guides in feature buffers of the same scene. Without ids, no pixel counts as an emitter.
-    pub fn of(snapshot: &Prepared, features: FeatureBuffers) -> Self {
+    /// - `features`: of the same scene, with the materials of what is seen in mirrors and through glass.
+    fn of(snapshot: &Prepared, features: FeatureBuffers) -> Self {
         let FeatureBuffers { width, height, albedo, normal, depth, ids, .. } = features;
         let is_emitter = |material: u32| snapshot.tables.emission.get(material as usize).is_some_and(Option::is_some);
         let emits = |shares: &IdShares| shares.iter().any(|(material, _)| is_emitter(material));
@@ -57,7 +57,7 @@ pub fn gather_guides(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<SurfaceGuides> {
     let settings = RenderSettings { seed: settings.seed ^ OTHER_SEED, ..*settings };
-    gather_features_and_ids(snapshot, &settings, size, samples, stop)
+    gather_features_and_materials_beyond(snapshot, &settings, size, samples, stop)
         .map(|features| SurfaceGuides::of(snapshot, features))
 }
 
@@ -82,6 +82,13 @@ impl DenoiseSource {
     pub fn of(film: &Film) -> Self {
         Self { width: film.width(), height: film.height(), color: film.means(), half_steps: film.half_steps() }
     }
+
+    fn input<'a>(&'a self, guides: &'a SurfaceGuides) -> DenoiseInput<'a> {
+        let Self { width, height, color, half_steps } = self;
+        assert_eq!((guides.width, guides.height), (*width, *height), "guides of another image");
+        let (width, height) = (*width as usize, *height as usize);
+        DenoiseInput { width, height, color, half_steps: half_steps.as_ref(), guides: guides.as_guides() }
+    }
 }
 
 /// Denoises what a film showed when it was copied, on the current rayon pool; `None` if `stop`, which is called
@@ -98,10 +105,22 @@ pub fn denoise_source(
     guides: &SurfaceGuides,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Denoised> {
-    let DenoiseSource { width, height, color, half_steps } = source;
-    assert_eq!((guides.width, guides.height), (*width, *height), "guides of another image");
-    let (width, height) = (*width as usize, *height as usize);
-    denoise(&DenoiseInput { width, height, color, half_steps: half_steps.as_ref(), guides: guides.as_guides() }, stop)
+    denoise(&source.input(guides), stop)
+}
+
+/// Like [`denoise_source`], with another filter in place of firstlight's own.
+///
+/// - `filter`: gets the radiance of each pixel, row by row from the top, and returns the filtered one; called twice.
+///
+/// # Panics
+/// If source and guides differ in size.
+pub fn denoise_source_with(
+    source: &DenoiseSource,
+    guides: &SurfaceGuides,
+    filter: &mut dyn FnMut(&[Vec3]) -> Option<Vec<Vec3>>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Denoised> {
+    denoise_with(&source.input(guides), filter, stop)
 }
 
 /// Denoises a film, which stays as it is; see [`denoise_source`].

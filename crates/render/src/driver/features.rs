@@ -41,7 +41,7 @@ pub fn gather_features(
     samples: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
-    gather(snapshot, settings, size, samples, false, stop)
+    gather(snapshot, settings, size, samples, Ids::None, stop)
 }
 
 /// Like [`gather_features`], with the ids of objects and materials.
@@ -55,7 +55,29 @@ pub fn gather_features_and_ids(
     samples: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
-    gather(snapshot, settings, size, samples, true, stop)
+    gather(snapshot, settings, size, samples, Ids::AtCamera, stop)
+}
+
+/// Like [`gather_features_and_ids`], where materials are those of the surfaces to which all other features belong, seen
+/// in mirrors and through glass.
+pub(crate) fn gather_features_and_materials_beyond(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    size: UVec2,
+    samples: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<FeatureBuffers> {
+    gather(snapshot, settings, size, samples, Ids::Beyond, stop)
+}
+
+/// Which ids are gathered.
+#[derive(Clone, Copy, PartialEq)]
+enum Ids {
+    None,
+    /// Object and material that the camera ray hits.
+    AtCamera,
+    /// That object, and the material of the first non-specular surface.
+    Beyond,
 }
 
 /// Rows per band, and columns per part of it: blocks of 4 × 4 rays are traced together.
@@ -70,7 +92,7 @@ fn gather(
     settings: &RenderSettings,
     size: UVec2,
     samples: u32,
-    with_ids: bool,
+    ids: Ids,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
     assert!(size.min_element() > 0 && samples > 0, "{samples} samples of {size} pixels");
@@ -85,12 +107,13 @@ fn gather(
         even_samples: settings.techniques.even_samples,
     };
     let media = snapshot.camera_media();
-    let mut buffers = FeatureBuffers::new(size.x, size.y, samples, with_ids);
+    let mut buffers = FeatureBuffers::new(size.x, size.y, samples, ids != Ids::None);
     let look = Look { snapshot, settings, lens, samples };
     let done = bands_of(&mut buffers).into_par_iter().map_init(
         || {
             let mut worker = Worker::default();
             worker.wave.begin_in(snapshot, &media);
+            worker.wave.materials_beyond = ids == Ids::Beyond;
             worker
         },
         |worker, mut band| {

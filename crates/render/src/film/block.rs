@@ -3,7 +3,7 @@
 //! 8 × 8 pixels are small enough for an allocation to follow shadows and edges, and enough to measure their error.
 
 use crate::film::round::Round;
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use std::ops::Range;
 
 /// Pixels along the side of a block.
@@ -50,6 +50,21 @@ impl Block {
     /// Number of blocks in a tile of this size.
     pub fn count(tile: UVec2) -> usize {
         tile.x.div_ceil(BLOCK_SIZE) as usize * tile.y.div_ceil(BLOCK_SIZE) as usize
+    }
+
+    /// Whether the change of the mean between the halves of `mean_of` samples is measured.
+    pub fn knows_half_step(&self) -> bool {
+        self.steps.at > 0 && self.steps.at == self.mean_of
+    }
+
+    /// The last doubling of a pixel for storage: the change of its mean, and the squared relative one; 0 where there was
+    /// none, `None` if it was not stored.
+    ///
+    /// - `local`: the pixel; `half_steps`, `last`: lists of its tile.
+    pub fn change(&self, local: usize, half_steps: &[Vec3], last: &[f32]) -> Option<[f32; 4]> {
+        let change = if self.knows_half_step() { *half_steps.get(local)? } else { Vec3::ZERO };
+        let relative = if self.steps.at > 0 { *last.get(local)? } else { 0.0 };
+        (!change.is_nan()).then_some([change.x, change.y, change.z, relative])
     }
 
     /// Removes all samples; the next one has number `first`.

@@ -28,7 +28,7 @@ impl HalfSteps {
 
 impl Film {
     /// The last steps of all pixels; `None` before the second sample per pixel, or if a part of the film was read from
-    /// a file and has not doubled since.
+    /// a file of an older format and has not doubled since.
     pub fn half_steps(&self) -> Option<HalfSteps> {
         let n_pixels = self.width() as usize * self.height() as usize;
         let (mut steps, mut scale) = (vec![Vec3::ZERO; n_pixels], vec![1.0_f32; n_pixels]);
@@ -43,7 +43,7 @@ impl Film {
                     Some(_) => *tile.light.half_steps.get(local)?,
                     None => Vec3::ZERO,
                 };
-                if of_camera.is_nan() {
+                if !(of_camera + of_light).is_finite() {
                     return None;
                 }
                 let block = tile.block_of(local);

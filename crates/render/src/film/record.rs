@@ -8,12 +8,16 @@ use crate::film::light_layer::LightLayer;
 use crate::film::round::Round;
 use crate::film::tile::FilmTile;
 use crate::film::tiles::Film;
-use glam::{DVec3, UVec2};
+use glam::{DVec3, UVec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Planes of a record, one number per pixel each: three channels each of the sum, of its rest and of the mean at the
 /// last power of two; then the same nine for light tracing.
 pub const N_PLANES: usize = 18;
+
+/// Planes of the last doubling, one number per pixel each: three channels of the change of the mean and the squared
+/// relative change; then the same four for light tracing.
+pub const N_CHANGE_PLANES: usize = 8;
 
 /// All data of a film.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +26,9 @@ pub struct FilmRecord {
     pub layout: FilmLayout,
     /// [`N_PLANES`] planes, each row by row from the top.
     pub planes: Vec<Vec<f64>>,
+    /// [`N_CHANGE_PLANES`] planes of the last doubling, in the same order, 0 where there was none; `None` if they are not
+    /// known, as in films of older formats. Only the denoiser and the error of single pixels need them.
+    pub changes: Option<Vec<Vec<f32>>>,
 }
 
 /// The data of a film that is not stored per pixel.
@@ -265,7 +272,25 @@ impl Film {
                 }
             }
         }
-        FilmRecord { layout: self.layout(), planes }
+        FilmRecord { layout: self.layout(), planes, changes: self.changes() }
+    }
+
+    /// See [`FilmRecord::changes`].
+    fn changes(&self) -> Option<Vec<Vec<f32>>> {
+        let n_pixels = self.width() as usize * self.height() as usize;
+        let mut planes = vec![vec![0.0; n_pixels]; N_CHANGE_PLANES];
+        for tile in &self.tiles {
+            for local in 0..tile.n_pixels() {
+                let of_camera = tile.block_of(local).change(local, &tile.half_steps, &tile.last)?;
+                let of_light = tile.light.change(local)?;
+                let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
+                let at = (tile.origin.y + y) as usize * self.width() as usize + (tile.origin.x + x) as usize;
+                for (plane, number) in planes.iter_mut().zip(of_camera.into_iter().chain(of_light)) {
+                    plane[at] = number;
+                }
+            }
+        }
+        Some(planes)
     }
 
     /// Restores a film; the inverse of [`Self::to_record`].
@@ -281,7 +306,10 @@ impl Film {
         }
         let n_tiles = u64::from(width.div_ceil(tile_size)) * u64::from(height.div_ceil(tile_size));
         let planes_fit = record.planes.iter().all(|plane| plane.len() as u64 == n_pixels);
-        if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit {
+        let changes_fit = record.changes.as_ref().is_none_or(|planes| {
+            planes.len() == N_CHANGE_PLANES && planes.iter().all(|plane| plane.len() as u64 == n_pixels)
+        });
+        if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit || !changes_fit {
             return Err(RecordError::Size);
         }
         let mut film = Self::with_tile_size(width, height, tile_size);
@@ -301,6 +329,9 @@ impl Film {
             }
             if tile.light.mean_of > 0 {
                 tile.light.before = light_before;
+            }
+            if let Some(planes) = &record.changes {
+                tile.take_changes(planes, width as usize);
             }
         }
         film.round = record.layout.round(&film)?;
@@ -360,6 +391,35 @@ impl FilmTile {
         self.light.mean_of = checked_mean(record.light_mean_of)?;
         self.light.steps = record.light_steps.steps(self.light.mean_of)?;
         Ok(())
+    }
+}
+
+/// Planes of one kind in [`FilmRecord::changes`].
+const OF_LIGHT: usize = 4;
+
+impl FilmTile {
+    /// Restores the last doubling.
+    ///
+    /// - `planes`: as [`FilmRecord::changes`]; `width`: of the film in pixels.
+    fn take_changes(&mut self, planes: &[Vec<f32>], width: usize) {
+        let Self { origin, size, .. } = *self;
+        let at = |local: usize| {
+            let (x, y) = (local as u32 % size.x, local as u32 / size.x);
+            (origin.y + y) as usize * width + (origin.x + x) as usize
+        };
+        let change = |local: usize, first: usize| Vec3::from_array([0, 1, 2].map(|c| planes[first + c][at(local)]));
+        let n = self.n_pixels();
+        if self.blocks.iter().any(|block| block.steps.at > 0) {
+            let known = |local: usize| self.block_of(local).knows_half_step();
+            self.half_steps = (0..n).map(|i| if known(i) { change(i, 0) } else { Vec3::NAN }).collect();
+            self.last = (0..n).map(|local| planes[OF_LIGHT - 1][at(local)]).collect();
+        }
+        if self.light.steps.at > 0 {
+            self.light.last = (0..n).map(|local| planes[N_CHANGE_PLANES - 1][at(local)]).collect();
+        }
+        if self.light.knows_half_step() {
+            self.light.half_steps = (0..n).map(|local| change(local, OF_LIGHT)).collect();
+        }
     }
 }
 

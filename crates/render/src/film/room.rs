@@ -44,7 +44,7 @@ impl Purpose {
         match self {
             Self::Png => 4 + 4 * 3,
             Self::Exr => 12 + 12 + 2 * 12,
-            Self::FilmFile => 8 * 18 + 12 + 12 + 3 * (4 * 39),
+            Self::FilmFile => 8 * 18 + 4 * 8 + 12 + 12 + 3 * (4 * 47),
             Self::Layers => Self::FilmFile.bytes_a_pixel() + FeatureBuffers::BYTES_A_PIXEL as u64 + 3 * (4 * 45),
             Self::Denoised => FeatureBuffers::BYTES_A_PIXEL as u64 + 640,
         }

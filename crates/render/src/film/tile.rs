@@ -56,6 +56,18 @@ impl TileLight {
         if self.mean_of > 0 { self.before[local] } else { DVec3::ZERO }
     }
 
+    /// Like [`Block::knows_half_step`].
+    pub fn knows_half_step(&self) -> bool {
+        self.steps.at > 0 && self.steps.at == self.mean_of
+    }
+
+    /// Like [`Block::change`].
+    pub fn change(&self, local: usize) -> Option<[f32; 4]> {
+        let change = if self.knows_half_step() { *self.half_steps.get(local)? } else { Vec3::ZERO };
+        let relative = if self.steps.at > 0 { *self.last.get(local)? } else { 0.0 };
+        Some([change.x, change.y, change.z, relative])
+    }
+
     fn clear(&mut self) {
         let Self { mean_of, before, last, half_steps, steps } = self;
         before.clear();

@@ -47,6 +47,9 @@ pub(crate) struct FeatureWave {
     seen: Vec<Seen>,
     /// Per slot: depth along the view axis so far in metres, and depth per metre of the present segment.
     way: Vec<(f32, f32)>,
+    /// Whether the material is that of the surface that is seen, in mirrors and through glass too, instead of that which
+    /// the camera ray hits.
+    pub materials_beyond: bool,
 }
 
 impl FeatureWave {
@@ -151,6 +154,9 @@ impl FeatureWave {
         let seen = &mut self.seen[slot];
         (seen.albedo, seen.normal, seen.position) = (albedo, vertex.normal, vertex.position);
         seen.depth = along;
+        if self.materials_beyond {
+            seen.material = material;
+        }
     }
 
     /// Samples the continuation at a purely specular surface, as in the image; `None` at all others.

@@ -1,0 +1,89 @@
+//! The error of the combined image, from its own samples.
+//!
+//! Stein's unbiased risk estimate (1981) subtracts the variance of the raw image from its squared difference to the
+//! filtered one. Where a filter removes nearly all noise, that is the difference of two large numbers, one of which is
+//! known to some tenths only, and wherever the combination has chosen by the same difference, it is too small. So
+//! variance and bias are estimated apart:
+//!
+//! - The variance of the filtered value is its covariance with the raw value, as for all projections.
+//! - Its squared bias is what differs from the raw value by more than noise can, and at least half of its variance:
+//!   windows are weighted by expected squared error, and where that is least, the squared bias of a first-order fit is
+//!   half of the variance, even if too small to be seen.
+//! - The variance of the raw value is averaged over a wide neighbourhood: the narrow one has decided the shares, which
+//!   are raw where its variance is too small at random.
+
+use super::blur::{RADIUS, smooth_apart};
+use super::input::DenoiseInput;
+use super::noise::{Filtered, Noise};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Radius in pixels of the two box filters that average the variance of the raw image.
+const WIDE_RADIUS: usize = 6;
+/// Uncertainty of the squared difference of raw and filtered image without bias, relative to the variance: less than
+/// that is no sign of bias.
+const DIFFERENCE_UNCERTAINTY: f32 = 0.2;
+/// Squared bias that is too small to be seen, relative to the variance of the filtered value.
+const LEAST_BIAS: f32 = 0.5;
+
+/// Standard deviations of parts of the estimate, relative to their mean: of the squared bias, of the error of a tile, and
+/// of the variance of the raw image.
+const BIAS_UNCERTAINTY: f64 = 0.5;
+const TILE_UNCERTAINTY: f64 = 0.5;
+const VARIANCE_UNCERTAINTY: f64 = 0.2;
+/// Side in pixels of the tiles whose errors are independent.
+const TILE: usize = 32;
+
+/// Estimated root of relMSE of the combined image, and the bounds of its interval.
+///
+/// - `share`: filtered share of each pixel.
+pub(super) fn error_of(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, share: &[f32]) -> (f64, [f64; 2]) {
+    let n = input.n_pixels();
+    let weight: Vec<Vec3> = (0..n).into_par_iter().map(|i| one_over_level(input, noise, filtered, i)).collect();
+    let smooth = |radius: usize, of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+        let values: Vec<f32> = (0..n).into_par_iter().map(|i| weight[i].dot(of(i))).collect();
+        smooth_apart(&values, input, &noise.at_emitters, radius)
+    };
+    let variance = smooth(RADIUS, &|i| noise.variance[i]);
+    let wide_variance = smooth(WIDE_RADIUS, &|i| noise.variance[i]);
+    let own = smooth(RADIUS, &|i| filtered.covariance[i]);
+    let difference = smooth(RADIUS, &|i| {
+        let off = input.color[i] - filtered.color[i];
+        off * off
+    });
+    let tiles_x = input.width.div_ceil(TILE);
+    let mut of_tiles = vec![0.0; tiles_x * input.height.div_ceil(TILE)];
+    let mut of_bias = 0.0;
+    for i in 0..n {
+        let (s, rest) = (share[i], 1.0 - share[i]);
+        let own = own[i].max(0.0);
+        let beyond = (difference[i] - variance[i] + own).max(0.0);
+        let doubt = DIFFERENCE_UNCERTAINTY * variance[i];
+        let seen = beyond * beyond / (beyond * beyond + doubt * doubt).max(1e-30);
+        let bias = s * s * (seen * beyond + LEAST_BIAS * own);
+        let risk = rest * rest * wide_variance[i] + (2.0 * rest + s) * s * own + bias;
+        of_tiles[i / input.width / TILE * tiles_x + i % input.width / TILE] += f64::from(risk);
+        of_bias += f64::from(bias);
+    }
+    let sum: f64 = of_tiles.iter().sum();
+    let error = (sum / (3 * n) as f64).max(0.0).sqrt();
+    // On the logarithm, where a sum of positive terms is closer to symmetric.
+    let of_tiles = of_tiles.iter().map(|risk| risk * risk).sum::<f64>().sqrt() * TILE_UNCERTAINTY;
+    let relative = of_tiles.hypot(of_bias * BIAS_UNCERTAINTY) / sum.max(1e-30);
+    let factor = (0.5 * 1.96 * relative.hypot(VARIANCE_UNCERTAINTY)).exp();
+    (error, [error / factor, error * factor])
+}
+
+/// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its
+/// samples if that is brighter. A single bright sample is in one half only. Relative to a filtered image that blurs
+/// lights, their noise would dominate the error of the whole image.
+fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, i: usize) -> Vec3 {
+    let darker_half = match input.half_steps {
+        // Pixels that partly show a light: the filter has no information about them, so their own value is used.
+        _ if noise.at_emitters[i] => input.color[i],
+        Some(halves) => input.color[i] - halves.steps[i].abs(),
+        None => Vec3::ZERO,
+    };
+    let level = filtered.color[i].max(darker_half);
+    (level * level + 0.01).recip()
+}

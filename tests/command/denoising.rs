@@ -1,0 +1,81 @@
+//! Which denoiser, and the error of the denoised image as a reason to stop.
+
+use assert_cmd::Command;
+use std::path::Path;
+use std::process::Output;
+
+fn run(folder: &Path, line: &str, library: Option<&str>) -> Output {
+    let mut command = Command::cargo_bin("firstlight").unwrap();
+    command.current_dir(folder).args(line.split(' ')).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    library.map(|path| command.env("FIRSTLIGHT_OIDN", path));
+    command.output().unwrap()
+}
+
+/// The JSON of a command that succeeds.
+fn told(folder: &Path, line: &str) -> serde_json::Value {
+    let output = run(folder, line, None);
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_render_stops_at_the_error_of_the_denoised_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "render cornell --size 64x64 --denoise --json";
+    let of_denoised = told(path, &format!("{scene} -o a.exr --error 10% --error-of denoised --film a-film.exr"));
+    let number = |told: &serde_json::Value, key: &str| told[key].as_f64().unwrap();
+    assert!(number(&of_denoised, "estimated_error_denoised") <= 0.1, "{of_denoised}");
+    assert!(number(&of_denoised, "estimated_error") > 0.1, "{of_denoised}");
+    let [low, high] = [0, 1].map(|i| of_denoised["estimated_error_denoised_95"][i].as_f64().unwrap());
+    assert!(low < number(&of_denoised, "estimated_error_denoised"), "{of_denoised}");
+    assert!(high > number(&of_denoised, "estimated_error_denoised"), "{of_denoised}");
+    let of_raw = told(path, &format!("{scene} -o b.exr --error 10%"));
+    assert!(number(&of_raw, "estimated_error") <= 0.1 && number(&of_raw, "spp") > number(&of_denoised, "spp"));
+    // The same stop for other threads; a film that is there already gets no more samples.
+    let again = told(path, &format!("{scene} -o c.exr --error 10% --error-of denoised --threads 1"));
+    assert_eq!(again["spp"], of_denoised["spp"]);
+    let resumed = told(path, &format!("{scene} -o d.exr --error 10% --error-of denoised --resume --film a-film.exr"));
+    assert_eq!(resumed["spp"], of_denoised["spp"]);
+    let same = |a: &str, b: &str| std::fs::read(path.join(a)).unwrap() == std::fs::read(path.join(b)).unwrap();
+    assert!(same("a.exr", "c.exr") && same("a.exr", "d.exr"));
+}
+
+#[test]
+fn a_denoiser_that_is_missing_is_told_before_anything_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let line = "render cornell -o a.png --size 16x16 --spp 1 --denoise --denoiser oidn";
+    let output = run(path, line, Some("no/such/library"));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && said.contains("FIRSTLIGHT_OIDN: no/such/library cannot be loaded"), "{said}");
+    assert!(!path.join("a.png").exists());
+    for line in ["render cornell -o a.png --denoiser oidn", "render cornell -o a.png --error 1% --error-of denoised"] {
+        let output = run(path, line, None);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains("add --denoise"), "{line}: {said}");
+    }
+}
+
+/// Only where Open Image Denoise is installed, or named by the variable.
+#[test]
+fn open_image_denoise_takes_the_place_of_the_own_filter() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "render cornell --size 48x48 --spp 4 --denoise";
+    let output = run(path, &format!("{scene} -o oidn.exr --denoiser oidn --json"), None);
+    if !output.status.success() {
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains("Open Image Denoise is not installed") && said.contains("FIRSTLIGHT_OIDN"), "{said}");
+        return;
+    }
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(told["estimated_error_denoised"].as_f64() < told["estimated_error"].as_f64(), "{told}");
+    let denoised_by = |name: &str| firstlight::scene::ImageMetadata::read(&path.join(name)).unwrap().denoised;
+    assert_eq!(denoised_by("oidn.exr"), Some("oidn".to_owned()));
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb32f().into_raw();
+    assert!(run(path, &format!("{scene} -o own.exr"), None).status.success());
+    let mean = |pixels: &[f32]| pixels.iter().sum::<f32>() / pixels.len() as f32;
+    let (own, oidn) = (pixels("own.exr"), pixels("oidn.exr"));
+    assert!(own != oidn && (mean(&own) / mean(&oidn) - 1.0).abs() < 0.05, "{} and {}", mean(&own), mean(&oidn));
+}
