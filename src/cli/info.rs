@@ -9,6 +9,7 @@ use clap::Args;
 use firstlight::frame::{PictureLayer, f_number, f_stop};
 use firstlight::printable;
 use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
+use firstlight::scene::animation::Shutter;
 use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
@@ -279,6 +280,14 @@ fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl Fn
     let n_frames = animation.n_frames();
     let frames = counted(n_frames as usize, "frame");
     row("animation", format!("{length} s, {frames} at {fps} per second, shown at {} s", number(part.at)));
+    let exposure = match animation.shutter {
+        Shutter::Share(0.0) | Shutter::Seconds(0.0) => "closed: no motion blur".to_owned(),
+        Shutter::Share(share) => {
+            format!("open for {} of a frame, {} ms: motion blur", number(share), number(1e3 * share / animation.fps))
+        }
+        Shutter::Seconds(seconds) => format!("open for {} ms: motion blur", number(1e3 * seconds)),
+    };
+    row("shutter", exposure);
     for (what, track) in part.tracks.iter().map(|track| (moved(track), track)) {
         let keys = counted(track.keys().len(), "key");
         let span = match track.keys() {

@@ -10,8 +10,8 @@
 use super::rig::Rig;
 use super::selection::Selection;
 use crate::scene::{
-    DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Moment, Ordinal, Placement, PointLight, Projection,
-    SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View, WithLight,
+    Animation, CameraInput, DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Moment, Ordinal, Placement,
+    PointLight, Projection, SceneEnvironment, SceneInputs, Shape, SpotLight, SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{
@@ -41,11 +41,44 @@ struct State {
     environment: Option<SceneEnvironment>,
     camera: Option<(Entity, Rig)>,
     moment: Option<Moment>,
+    animation: Keys,
 }
 
 impl State {
     fn content(&self) -> Content {
-        Content { entities: self.entities.clone(), environment: self.environment.clone() }
+        let Self { entities, environment, animation, .. } = self.clone();
+        Content { entities, environment, animation }
+    }
+}
+
+/// The animation. It may be large, so a new one is made only for another value, and is compared by address.
+#[derive(Clone, Debug, Default)]
+struct Keys(Option<Arc<Animation>>);
+
+impl PartialEq for Keys {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
+}
+
+impl Keys {
+    /// That of a world; `known` if it has not changed.
+    fn of(world: &World, known: &Self) -> Self {
+        match (world.get_resource::<Animation>(), &known.0) {
+            (Some(now), Some(old)) if *now == **old => known.clone(),
+            (now, _) => Self(now.cloned().map(Arc::new)),
+        }
+    }
+
+    /// Whether a scene file would have the same keys; the camera for properties without tracks is part of the view.
+    fn is_same_content(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a.has_same_keys(b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
     }
 }
 
@@ -58,6 +91,8 @@ struct UndoStep {
     label: String,
     /// Consecutive steps with the same key are merged.
     merge: Option<String>,
+    /// The state at which the time of the animation had been set.
+    at_moment: State,
 }
 
 /// The part of a state that a scene file holds, except view and display settings.
@@ -65,12 +100,15 @@ struct UndoStep {
 pub(super) struct Content {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
+    animation: Keys,
 }
 
 /// The steps that can be undone and redone, and whether the scene has unsaved changes.
 #[derive(Resource, Default)]
 pub struct History {
     now: Option<State>,
+    /// The state when the time of the animation was set, or its last keys.
+    at_moment: State,
     /// The state that was opened or saved last.
     clean: Option<Content>,
     unsaved: bool,
@@ -142,7 +180,34 @@ impl History {
         let Some(now) = &self.now else { return };
         let clean = self.clean.get_or_insert_with(|| now.content());
         let same = Arc::ptr_eq(&now.entities, &clean.entities) || now.entities == clean.entities;
-        self.unsaved = !same || now.environment != clean.environment;
+        let same_keys = now.animation.is_same_content(&clean.animation);
+        self.unsaved = !same || now.environment != clean.environment || !same_keys;
+    }
+
+    /// The inputs of an image as they were when the time of the animation was set, or its last keys; what was added since
+    /// is as in `now`.
+    pub(super) fn inputs_at_moment(&self, mut now: SceneInputs) -> SceneInputs {
+        let state = |entity: Entity| self.at_moment.entities.get(&entity);
+        for object in &mut now.objects {
+            object.placement = state(object.entity).and_then(|state| state.placement).unwrap_or(object.placement);
+        }
+        for light in &mut now.lights {
+            if let Some(state) = state(light.entity) {
+                light.placement = state.placement.unwrap_or(light.placement);
+                light.light = state.light.unwrap_or(light.light);
+            }
+        }
+        for material in &mut now.materials {
+            if let Some(SurfaceMaterial(old)) = state(material.entity).and_then(|state| state.material.as_ref()) {
+                material.material = old.clone();
+            }
+        }
+        if let (Some((entity, Rig { view, projection, lens })), Some(camera)) = (self.at_moment.camera, &mut now.camera)
+            && entity == camera.entity
+        {
+            *camera = CameraInput { entity, view, projection, lens };
+        }
+        now
     }
 
     /// Number of changes so far.
@@ -168,7 +233,8 @@ impl History {
         let step = history.undo.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
-        history.redo.push(UndoStep { before: now.clone(), ..step.clone() });
+        let at_moment = std::mem::replace(&mut history.at_moment, step.at_moment.clone());
+        history.redo.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);
@@ -183,7 +249,8 @@ impl History {
         let step = history.redo.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
-        history.undo.push(UndoStep { before: now.clone(), ..step.clone() });
+        let at_moment = std::mem::replace(&mut history.at_moment, step.at_moment.clone());
+        history.undo.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);
@@ -193,6 +260,7 @@ impl History {
 
     fn record(&mut self, new: State) {
         let Some(old) = self.now.take() else {
+            self.at_moment = new.clone();
             self.now = Some(new);
             return self.compare();
         };
@@ -208,10 +276,14 @@ impl History {
             None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(|last| last.merge == merge),
         };
         if !goes_on {
-            self.undo.push(UndoStep { before: old, selected: self.selected.clone(), label, merge });
+            let (selected, at_moment) = (self.selected.clone(), self.at_moment.clone());
+            self.undo.push(UndoStep { before: old.clone(), selected, label, merge, at_moment });
             if self.undo.len() > Self::MAX_STEPS {
                 self.undo.remove(0);
             }
+        }
+        if old.moment != new.moment || old.animation != new.animation {
+            self.at_moment = new.clone();
         }
         self.redo.clear();
         self.now = Some(new);
@@ -246,8 +318,8 @@ pub fn notice(
     mut directional_lights: RemovedComponents<DirectionalLight>,
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
-    moment: Option<Res<Moment>>,
-    mut had_environment: Local<bool>,
+    (moment, animation): (Option<Res<Moment>>, Option<Res<Animation>>),
+    (mut had_environment, mut had_animation): (Local<bool>, Local<bool>),
     mut history: ResMut<History>,
 ) {
     let lights = point_lights.read().count() + spot_lights.read().count() + directional_lights.read().count();
@@ -255,7 +327,9 @@ pub fn notice(
     let environment_changed = environment.as_ref().is_some_and(|environment| environment.is_changed())
         || std::mem::replace(&mut *had_environment, environment.is_some()) != environment.is_some();
     let moment_changed = moment.is_some_and(|moment| moment.is_changed());
-    if removed > 0 || environment_changed || moment_changed || !parts.is_empty() {
+    let animation_changed = animation.as_ref().is_some_and(|animation| animation.is_changed())
+        || std::mem::replace(&mut *had_animation, animation.is_some()) != animation.is_some();
+    if removed > 0 || environment_changed || moment_changed || animation_changed || !parts.is_empty() {
         history.touched = true;
     }
     if !camera.is_empty() {
@@ -280,7 +354,8 @@ pub fn remember(world: &mut World) {
         .min_by_key(|(entity, ordinal, ..)| (ordinal.map_or(u32::MAX, |ordinal| ordinal.0), *entity))
         .map(|(entity, _, view, projection, lens)| (entity, Rig { view: *view, projection: *projection, lens: *lens }));
     let environment = world.get_resource::<SceneEnvironment>().cloned();
-    let state = State { entities, environment, camera, moment: world.get_resource::<Moment>().copied() };
+    let animation = if touched { Keys::of(world, &old.animation) } else { old.animation };
+    let state = State { entities, environment, camera, moment: world.get_resource::<Moment>().copied(), animation };
     world.resource_mut::<History>().record(state);
     remember_selection(world);
 }
@@ -350,6 +425,12 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     if let Some(moment) = wanted.moment.filter(|_| wanted.moment != now.moment) {
         world.insert_resource(moment);
     }
+    if wanted.animation != now.animation {
+        match &wanted.animation.0 {
+            Some(animation) => world.insert_resource(Animation::clone(animation)),
+            None => drop(world.remove_resource::<Animation>()),
+        }
+    }
     if let Some((entity, rig)) = wanted.camera.filter(|_| wanted.camera != now.camera) {
         put(world, entity, &Some(rig.view));
         put(world, entity, &Some(rig.projection));
@@ -391,6 +472,11 @@ fn put<T: Component<Mutability = bevy_ecs::component::Mutable> + Clone + Partial
 fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     if old.moment != new.moment {
         return ("time of the animation".to_owned(), Some("time of the animation".to_owned()));
+    }
+    if old.animation != new.animation {
+        let tracks = |state: &State| state.animation.0.as_ref().map(|it| it.tracks.clone()).unwrap_or_default();
+        let label = if tracks(old) == tracks(new) { "settings of the animation" } else { "keys of the animation" };
+        return (label.to_owned(), None);
     }
     if !Arc::ptr_eq(&old.entities, &new.entities) && old.entities != new.entities {
         return what_changed_in_entities(&old.entities, &new.entities);

@@ -130,12 +130,15 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
         return;
     }
     let WantedMoment { at, advance } = std::mem::take(&mut *world.resource_mut::<WantedMoment>());
-    if let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves()) {
-        let length = animation.length();
-        let shown = world.resource::<Moment>().0;
+    let animation = world.get_resource::<Animation>();
+    let is_model = current.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
+    // A scene has time before it has an animation, so that keys can be set.
+    if !is_model || animation.is_some_and(Animation::moves) {
+        let length = animation.map_or(0.0, Animation::length);
+        let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
         match at {
             Some(None) => {}
-            None if advance == 0.0 => return,
+            None if advance == 0.0 || length == 0.0 => return,
             _ => {
                 let at = at.flatten().unwrap_or(shown);
                 let wanted = at + advance;
@@ -153,7 +156,7 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
         return;
     }
     let mut problem = None;
-    if current.facts.as_ref().is_none_or(|facts| facts.animation_length.is_none()) {
+    if !is_model {
         problem = Some("has no animations");
     } else if has_unsaved_changes(world, current) {
         problem = Some("has unsaved changes, which another moment would lose: save it as a scene, or undo them");
@@ -171,7 +174,7 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
 
 /// Shows another time of an animation whose scene is in the world. That is no change of the scene, though it can be undone.
 fn set_moment(world: &mut World, seconds: f64) {
-    if world.resource::<Moment>().0 == seconds {
+    if world.get_resource::<Moment>().copied().unwrap_or_default().0 == seconds {
         return;
     }
     // Edits of this frame count.

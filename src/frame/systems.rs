@@ -145,9 +145,10 @@ pub fn rebuild(
     if let Some(cause) = shown.adopted.take() {
         changes.add_scene(cause);
     }
+    let has_new_keys = time.0.as_ref().is_some_and(|animation| animation.is_changed());
     let (animation, seconds) = (time.0.as_deref(), time.1.map_or(0.0, |moment| moment.0));
     let exposure = animation.and_then(|animation| animation.open_shutter(seconds));
-    let other_exposure = shown.exposure != exposure;
+    let other_exposure = shown.exposure != exposure || has_new_keys && exposure.is_some();
     // Touched values are often equal to the previous ones; only differences count.
     let environment_changed = queries.environment() != shown.inputs.environment;
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {

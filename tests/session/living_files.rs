@@ -346,7 +346,7 @@ fn a_camera_that_moves_is_rendered_to_numbered_pictures() {
 }
 
 /// A triangle that goes one metre to the right in two seconds, before a camera.
-fn moving_triangle() -> String {
+pub(super) fn moving_triangle() -> String {
     let numbers: [f32; 17] = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 2., 0., 0., 0., 1., 0., 0.];
     let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
     let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, bytes);

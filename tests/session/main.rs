@@ -1,6 +1,7 @@
 //! A session without a window: commands in, pictures and changes out.
 
 mod edit;
+mod keys;
 mod lists;
 mod living_files;
 mod reset;

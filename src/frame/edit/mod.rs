@@ -11,9 +11,11 @@
 //! | `sky` | colours, strength and rotation of the environment |
 //! | `texture` | textures in place of colours |
 //! | `place` | moving, rotating and scaling the selection |
+//! | `keys` | keys and settings of the animation |
 //! | `add`, `spot` | new objects and their positions, copies, removal |
 
 mod add;
+mod keys;
 mod place;
 mod property;
 mod set;
@@ -33,6 +35,7 @@ use super::resources::{Clock, PictureSize, RenderState};
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
 use crate::render::MaterialKind;
+use crate::scene::animation::Interpolation;
 use crate::scene::{MaterialSlots, MeshShading, TextureSource, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
@@ -106,7 +109,7 @@ pub enum Edit {
     },
     /// Set one number or one colour of an entity.
     Set {
-        /// The entity; ignored for properties of the environment.
+        /// The entity; ignored for properties of the environment and of the animation.
         id: Id,
         /// The property.
         property: Property,
@@ -152,6 +155,19 @@ pub enum Edit {
         id: Id,
         /// The name.
         name: String,
+    },
+    /// Set keys of the animation at the current time.
+    SetKeys {
+        /// Of the camera only; otherwise of what has been changed since the time was set, else of the selection, or else
+        /// of the camera.
+        camera: bool,
+    },
+    /// Delete the keys at the current time: of the selection, or of everything if nothing is selected.
+    DeleteKeys,
+    /// Set the interpolation of the tracks of the selection, or of all tracks if nothing is selected.
+    Interpolate {
+        /// Between two keys.
+        how: Interpolation,
     },
     /// Make an object's mesh again from its source, in the background.
     Remesh {
@@ -262,6 +278,9 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
                 false => drop(world.entity_mut(entity).insert(Name::new(name.to_owned()))),
             }
         }
+        Edit::SetKeys { camera } => keys::set(world, camera)?,
+        Edit::DeleteKeys => keys::delete(world)?,
+        Edit::Interpolate { how } => keys::interpolate(world, how)?,
         Edit::Remesh { id, shading, ratio } => super::remesh::start(world, thing(world, id)?, shading, ratio)?,
     }
     Ok(())

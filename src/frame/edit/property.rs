@@ -98,6 +98,12 @@ pub enum Property {
     SkyStrength,
     /// Rotation of an environment image, degrees about +Y.
     SkyRotation,
+    /// Exposure time of the animation as a fraction of the duration of a frame, 0..1; 0 for no motion blur.
+    Shutter,
+    /// Duration of the animation in seconds; 0: up to the last key.
+    Duration,
+    /// Frames per second of the animation.
+    FramesPerSecond,
 }
 
 impl Property {
@@ -142,5 +148,10 @@ impl Property {
     pub(super) fn is_of_sky(self) -> bool {
         use Property::{Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
         matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation)
+    }
+
+    /// Whether it belongs to the animation, which is no entity.
+    pub(super) fn is_of_animation(self) -> bool {
+        matches!(self, Self::Shutter | Self::Duration | Self::FramesPerSecond)
     }
 }

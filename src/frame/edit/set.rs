@@ -1,7 +1,8 @@
-//! Sets properties of materials, lights and shapes; those of the environment are in [`super::sky`].
+//! Sets properties of materials, lights and shapes; those of the environment are in [`super::sky`], those of the animation in
+//! [`super::keys`].
 
 use super::property::Property;
-use super::sky;
+use super::{keys, sky};
 use crate::render::{Fresnel, MaterialKind, Param};
 use crate::scene::{
     ColorParam, DirectionalLight, LightKind, Linear, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
@@ -9,7 +10,7 @@ use crate::scene::{
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
-/// Sets one property; the environment needs no entity.
+/// Sets one property; the environment and the animation need no entity.
 pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value: DVec3) -> Result<(), String> {
     // Many properties are stored in single precision.
     if !value.as_vec3().is_finite() {
@@ -17,6 +18,9 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
     }
     if property.is_of_sky() {
         return sky::set(world, property, value);
+    }
+    if property.is_of_animation() {
+        return keys::set_property(world, property, value.x);
     }
     let entity = entity.filter(|&entity| world.get_entity(entity).is_ok());
     let entity = entity.ok_or("the object no longer exists")?;

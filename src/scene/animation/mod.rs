@@ -4,10 +4,13 @@
 //! time is a pure function of both: [`Animation::inputs_at`] computes it without changing the world, and
 //! [`show_moment`] changes only those components of the world that differ.
 //!
-//! [`Curve`] implements the interpolation, [`Channel`] lists the properties that can be animated.
+//! [`Curve`] implements the interpolation, [`Channel`] lists the properties that can be animated, and [`set_keys`] turns
+//! the state of a world into keys.
 
 mod described;
+mod get;
 mod key;
+mod keying;
 mod model;
 mod moment;
 mod property;
@@ -16,6 +19,7 @@ mod written;
 
 pub(super) use described::Moved;
 pub use key::{Curve, Interpolation, Key, KeyValue};
+pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys};
 pub(super) use model::ModelMotion;
 pub use moment::{Moment, show_moment};
 pub(super) use moment::{place, rest_camera};
@@ -94,6 +98,14 @@ impl Channel {
 }
 
 impl Channel {
+    /// The object, light or material; `None` for the camera.
+    pub fn entity(self) -> Option<Entity> {
+        match self {
+            Self::Camera(_) => None,
+            Self::Object(entity, _) | Self::Light(entity, _) | Self::Material(entity, _) => Some(entity),
+        }
+    }
+
     /// Name of the property in scene files.
     pub fn property(self) -> &'static str {
         match self {

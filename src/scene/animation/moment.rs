@@ -9,7 +9,7 @@ use crate::scene::inputs::{CameraInput, SceneInputs};
 use crate::scene::light::LightKind;
 use crate::scene::placement::Placement;
 use crate::scene::view::{Lens, Projection, View};
-use bevy_ecs::prelude::{Entity, Resource, World};
+use bevy_ecs::prelude::{Entity, Mut, Resource, World};
 use std::collections::HashMap;
 
 /// Current time of a world, seconds.
@@ -53,7 +53,7 @@ impl Animation {
         inputs
     }
 
-    fn moves_camera(&self) -> bool {
+    pub(super) fn moves_camera(&self) -> bool {
         self.model.as_ref().is_some_and(ModelMotion::moves_camera)
             || self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
     }
@@ -85,7 +85,16 @@ pub fn show_moment(world: &mut World, seconds: f64) {
 
 /// Sets the time without first storing changes of the camera, as needed for a new scene.
 pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
-    let Some(animation) = world.remove_resource::<Animation>() else { return };
+    if !world.contains_resource::<Animation>() {
+        return world.insert_resource(Moment(seconds));
+    }
+    // The animation itself does not change.
+    world.resource_scope(|world, animation: Mut<Animation>| place_as(world, &animation, seconds));
+    world.insert_resource(Moment(seconds));
+}
+
+/// Sets everything that has a track.
+fn place_as(world: &mut World, animation: &Animation, seconds: f64) {
     if let Some(model) = &animation.model {
         model.set_world(world, seconds);
     }
@@ -122,8 +131,6 @@ pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
         put(world, entity, projection);
         put(world, entity, lens);
     }
-    world.insert_resource(Moment(seconds));
-    world.insert_resource(animation);
 }
 
 /// Stores changes of the camera since the time was set, for its properties without tracks.

@@ -234,6 +234,14 @@ pub static BINDINGS: &[KeyGroup] = &[
                 triggers: &[named(NamedKey::Delete, Action::Send(Command::Edit(Edit::Delete)))],
                 effect: "delete the selection",
             },
+            Binding {
+                triggers: &[edit("k", Some(false), Edit::SetKeys { camera: false })],
+                effect: "set keys at the shown time: of what was changed, else of the selection, else of the camera",
+            },
+            Binding {
+                triggers: &[edit("k", Some(true), Edit::SetKeys { camera: true })],
+                effect: "set a key of the camera at the shown time",
+            },
             Binding { triggers: &[edit("z", Some(false), Edit::Undo)], effect: "undo" },
             Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "redo" },
         ],
@@ -356,7 +364,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Animation")],
-                effect: "time of the animation: play, pause, choose; where the scene has one",
+                effect: "time: play, pause, choose; set, find and delete keys; shutter, duration, frames per second",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],

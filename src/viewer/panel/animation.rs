@@ -1,15 +1,17 @@
-//! The time line: which moment of an animation is shown, and whether it plays.
+//! The time line: which moment of an animation is shown, whether it plays, its keys and its shutter.
 
-use super::widgets::{row_with_hint, rows, slider};
+use super::widgets::{number, row_with_hint, rows, slider};
 use super::{Around, Asked};
-use crate::frame::{Command, CurrentScene, Session};
+use crate::frame::{Command, CurrentScene, Edit, Property, Selection, Session};
+use crate::scene::animation::{Interpolation, Shutter, Track};
 use crate::scene::{Animation, Moment};
 use egui::Ui;
+use glam::DVec3;
 
-/// The animation that is in the world.
-fn animation_of(session: &Session) -> Option<&Animation> {
-    session.world().get_resource::<Animation>().filter(|animation| animation.moves())
-}
+/// Seconds that can be chosen where there are no keys yet.
+const FIRST_SECONDS: f64 = 5.0;
+/// Keys this near to each other are one, seconds.
+const SAME_TIME: f64 = 1e-6;
 
 /// Seconds of the animations of the open glTF model, which is in the world only at a moment, not in its stored pose.
 fn length_of_model(session: &Session) -> Option<f64> {
@@ -17,47 +19,151 @@ fn length_of_model(session: &Session) -> Option<f64> {
 }
 
 /// Whether there is anything to play.
-pub fn exists(session: &Session) -> bool {
-    animation_of(session).is_some() || length_of_model(session).is_some()
+pub fn can_play(session: &Session) -> bool {
+    session.world().get_resource::<Animation>().is_some_and(Animation::moves) || length_of_model(session).is_some()
 }
 
-/// The time line of the animation of the scene or model, if it has one.
+/// The time line of the animation of the scene or model; a scene without one has a time line to set keys on.
 pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
-    let (animation, of_model) = (animation_of(session), length_of_model(session));
-    let Some(length) = animation.map(Animation::length).or(of_model) else { return };
-    // `None` is the stored pose of a model.
-    let at = animation.map(|_| session.world().resource::<Moment>().0);
-    ui.horizontal(|ui| {
-        let (label, hint) =
-            if around.playing { ("Pause", "stop the animation") } else { ("Play", "play the animation") };
-        if ui.button(label).on_hover_text(hint).clicked() {
-            asked.toggle_play = true;
-            if at.is_none() && !around.playing {
-                asked.send(Command::SetMoment { seconds: Some(0.0) });
+    let (animation, of_model) = (session.world().get_resource::<Animation>(), length_of_model(session));
+    let moves = animation.is_some_and(Animation::moves);
+    let is_stored_pose = of_model.is_some() && !moves;
+    let length = if moves { animation.map_or(0.0, Animation::length) } else { of_model.unwrap_or(0.0) };
+    let shown = session.world().get_resource::<Moment>().map_or(0.0, |moment| moment.0);
+    let at = if is_stored_pose { 0.0 } else { shown };
+    let fps = animation.map_or(24.0, |animation| animation.fps);
+    let to_frame = |seconds: f64| (seconds * fps).round() / fps;
+    if length > 0.0 {
+        ui.horizontal(|ui| {
+            let (label, hint) =
+                if around.playing { ("Pause", "stop the animation") } else { ("Play", "play the animation") };
+            if ui.button(label).on_hover_text(hint).clicked() {
+                asked.toggle_play = true;
+                if around.playing {
+                    asked.send(Command::SetMoment { seconds: Some(to_frame(at)) });
+                } else if is_stored_pose {
+                    asked.send(Command::SetMoment { seconds: Some(0.0) });
+                }
             }
-        }
-        if let Some((animation, at)) = animation.zip(at) {
-            let frame = format!("frame {:.1} of {}", at * animation.fps, animation.n_frames());
-            ui.weak(frame).on_hover_text("as numbered by render --frames");
-        }
-    });
+            if let Some(animation) = animation.filter(|animation| animation.moves()) {
+                let frame = format!("frame {:.1} of {}", at * fps, animation.n_frames());
+                ui.weak(frame).on_hover_text("as numbered by render --frames");
+            }
+        });
+    }
     rows(ui, "moment", |ui| {
-        row_with_hint(ui, "time", "seconds of the animation", |ui| {
-            if let Some(seconds) = slider(ui, at.unwrap_or(0.0), 0.0..=length.max(1e-3), false) {
+        let hint = "seconds of the animation; stops at whole frames, or type any time";
+        row_with_hint(ui, "time", hint, |ui| {
+            let end = if length > 0.0 { length } else { FIRST_SECONDS };
+            if let Some(seconds) = slider(ui, at, 0.0..=end.max(at), false) {
+                let is_dragged = ui.input(|input| input.pointer.any_down() || input.pointer.any_released());
+                let seconds = if is_dragged { to_frame(seconds) } else { seconds };
                 asked.send(Command::SetMoment { seconds: Some(seconds) });
             }
         });
         if of_model.is_some() {
             row_with_hint(ui, "pose", "of the animations at that time, or as the file stores it", |ui| {
                 ui.horizontal(|ui| {
-                    for (label, seconds) in [("stored", None), ("animated", Some(at.unwrap_or(0.0)))] {
-                        let is_chosen = at.is_none() == seconds.is_none();
+                    for (label, seconds) in [("stored", None), ("animated", Some(at))] {
+                        let is_chosen = is_stored_pose == seconds.is_none();
                         if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
                             asked.send(Command::SetMoment { seconds });
                         }
                     }
                 })
             });
+        } else {
+            keys(ui, session, animation, at, asked);
+        }
+        if !is_stored_pose {
+            settings(ui, animation, length, asked);
+        }
+    });
+}
+
+/// Setting, deleting and finding keys.
+fn keys(ui: &mut Ui, session: &Session, animation: Option<&Animation>, at: f64, asked: &mut Asked) {
+    let hint = "at this time: what was changed, else the selection, else the camera";
+    row_with_hint(ui, "keys", hint, |ui| {
+        ui.horizontal(|ui| {
+            if ui.button("Set key").on_hover_text(format!("{hint} (Ctrl+K)")).clicked() {
+                asked.edit(Edit::SetKeys { camera: false });
+            }
+            if ui.button("Set view").on_hover_text("key of the camera at this time (Ctrl+Shift+K)").clicked() {
+                asked.edit(Edit::SetKeys { camera: true });
+            }
+        })
+    });
+    let Some(animation) = animation.filter(|animation| !animation.tracks.is_empty()) else { return };
+    let times = animation.key_times();
+    let before = times.iter().rev().find(|time| **time < at - SAME_TIME);
+    let after = times.iter().find(|time| **time > at + SAME_TIME);
+    let is_at_key = times.iter().any(|time| (time - at).abs() <= SAME_TIME);
+    row_with_hint(ui, "", "", |ui| {
+        ui.horizontal(|ui| {
+            for (label, hint, time) in [("<", "previous key", before), (">", "next key", after)] {
+                let button = egui::Button::new(label);
+                if ui.add_enabled(time.is_some(), button).on_hover_text(hint).clicked() {
+                    asked.send(Command::SetMoment { seconds: time.copied() });
+                }
+            }
+            let hint = "the keys at this time: of the selection, or all if nothing is selected";
+            if ui.add_enabled(is_at_key, egui::Button::new("Delete")).on_hover_text(hint).clicked() {
+                asked.edit(Edit::DeleteKeys);
+            }
+        })
+    });
+    let hint = "between two keys: of the selection, or of everything if nothing is selected";
+    let selected = &session.world().resource::<Selection>().0;
+    let is_meant =
+        |track: &&Track| selected.is_empty() || track.channel.entity().is_some_and(|entity| selected.contains(&entity));
+    let meant: Vec<Interpolation> =
+        animation.tracks.iter().filter(is_meant).map(|track| track.curve.interpolation).collect();
+    if meant.is_empty() {
+        return;
+    }
+    row_with_hint(ui, "between", hint, |ui| {
+        ui.horizontal(|ui| {
+            for how in [Interpolation::Linear, Interpolation::Smooth, Interpolation::Held] {
+                let is_chosen = meant.iter().all(|other| *other == how);
+                if ui.selectable_label(is_chosen, how.name()).clicked() && !is_chosen {
+                    asked.edit(Edit::Interpolate { how });
+                }
+            }
+        })
+    });
+}
+
+/// Shutter, duration and rate.
+fn settings(ui: &mut Ui, animation: Option<&Animation>, length: f64, asked: &mut Asked) {
+    let fps = animation.map_or(24.0, |animation| animation.fps);
+    let share = match animation.map(|animation| animation.shutter).unwrap_or_default() {
+        Shutter::Share(share) => share,
+        Shutter::Seconds(seconds) => (seconds * fps).min(1.0),
+    };
+    let mut set = |property: Property, value: f64| {
+        asked.edit(Edit::Set { id: 0, property, value: DVec3::splat(value) });
+    };
+    let hint = "share of the time of a frame during which the shutter is open: motion blur; 0.5 is 180 degrees";
+    row_with_hint(ui, "shutter", hint, |ui| {
+        if let Some(share) = slider(ui, share, 0.0..=1.0, false) {
+            set(Property::Shutter, share);
+        }
+    });
+    row_with_hint(ui, "duration", "seconds; 0: up to the last key", |ui| {
+        let duration = animation.and_then(|animation| animation.duration);
+        ui.horizontal(|ui| {
+            if let Some(seconds) = number(ui, duration.unwrap_or(0.0), 0.05, 0.0..=1e6, " s") {
+                set(Property::Duration, seconds);
+            }
+            if duration.is_none() && length > 0.0 {
+                ui.weak(format!("to the last key, {length:.2} s"));
+            }
+        })
+    });
+    row_with_hint(ui, "frames", "per second", |ui| {
+        if let Some(fps) = number(ui, fps, 0.1, 1e-3..=1e4, " / s") {
+            set(Property::FramesPerSecond, fps);
         }
     });
 }

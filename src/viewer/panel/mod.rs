@@ -178,9 +178,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             ui.set_width((ui.available_width() - 8.0).max(0.0));
             let [render, animation, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
-            if animation::exists(session) {
-                section(ui, animation, true, |ui| animation::time_line(ui, session, around, asked));
-            }
+            section(ui, animation, animation::can_play(session), |ui| animation::time_line(ui, session, around, asked));
             section(ui, camera, false, |ui| camera::camera(ui, session, around, asked));
             section(ui, views, false, |ui| camera::views(ui, session, around, asked));
             section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));

@@ -1,0 +1,182 @@
+//! Keys of the animation, and its settings: shutter, duration, frames per second.
+//!
+//! An animation that a scene file could not hold is not taken: every change is checked as a file is.
+
+use super::property::Property;
+use crate::frame::history::History;
+use crate::frame::resources::{Clock, CurrentScene};
+use crate::frame::selection::Selection;
+use crate::frame::status::{MessageKind, Status};
+use crate::scene::animation::{
+    Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, set_keys,
+};
+use crate::scene::file::CameraPart;
+use crate::scene::{Animation, Description, LoadedScene, Moment, SceneInputs};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, World};
+use std::sync::Arc;
+
+/// Sets keys at the current time.
+///
+/// - `camera`: of the camera only; otherwise of what has been changed, of the selection, or else of the camera.
+pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
+    let (before, written) = before(world);
+    let selected = world.resource::<Selection>().0.clone();
+    let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
+    let channels = checked(world, |world| set_keys(world, &before, written.as_ref(), of))?;
+    let seconds = world.resource::<Moment>().0;
+    let single = match is_single(world, &channels) {
+        true => ": set another one at another time",
+        false => "",
+    };
+    let text = format!("keys at {} s: {}{single}", number(seconds), named(world, &channels));
+    say(world, text);
+    Ok(())
+}
+
+/// Deletes the keys at the current time: of the selection, or of everything if nothing is selected.
+pub fn delete(world: &mut World) -> Result<(), String> {
+    let selected = world.resource::<Selection>().0.clone();
+    let n = checked(world, |world| Ok(delete_keys(world, &selected)))?;
+    let seconds = number(world.resource::<Moment>().0);
+    let of = if selected.is_empty() { "" } else { " of the selection" };
+    match n {
+        0 => Err(format!("there are no keys{of} at {seconds} s")),
+        1 => Ok(say(world, format!("key{of} at {seconds} s deleted"))),
+        n => Ok(say(world, format!("{n} keys{of} at {seconds} s deleted"))),
+    }
+}
+
+/// Sets the interpolation of the tracks of the selection, or of all tracks if nothing is selected.
+pub fn interpolate(world: &mut World, how: Interpolation) -> Result<(), String> {
+    let selected = world.resource::<Selection>().0.clone();
+    let Some(mut animation) = world.get_resource::<Animation>().cloned() else { return Err(no_tracks()) };
+    let mut n = 0;
+    for track in &mut animation.tracks {
+        if selected.is_empty() || track.channel.entity().is_some_and(|entity| selected.contains(&entity)) {
+            track.curve.interpolation = how;
+            n += 1;
+        }
+    }
+    if n == 0 {
+        return Err(no_tracks());
+    }
+    checked(world, |world| {
+        world.insert_resource(animation);
+        Ok(())
+    })
+}
+
+/// Sets the shutter, the duration or the frames per second; they are limited to what a scene file may have.
+pub fn set_property(world: &mut World, property: Property, value: f64) -> Result<(), String> {
+    let (before, written) = before(world);
+    if is_of_model(world) && world.get_resource::<Animation>().is_none() {
+        return Err("the stored pose of the model has no time: show its animation first".to_owned());
+    }
+    let mut animation = animation_or_new(world, &before, written.as_ref());
+    match property {
+        Property::Shutter => animation.shutter = Shutter::Share(value.clamp(0.0, 1.0)),
+        Property::Duration => animation.duration = (value > 0.0).then_some(value.min(1e6)),
+        Property::FramesPerSecond => animation.fps = value.clamp(1e-3, 1e4),
+        _ => return Err(format!("an animation has no {property:?}")),
+    }
+    if world.get_resource::<Animation>() == Some(&animation) {
+        return Ok(());
+    }
+    world.insert_resource(animation);
+    Ok(())
+}
+
+fn no_tracks() -> String {
+    "nothing here has keys: set one first".to_owned()
+}
+
+/// The scene when its time was set, and the camera of its file.
+fn before(world: &mut World) -> (SceneInputs, Option<CameraPart>) {
+    History::content(world);
+    let now = SceneInputs::of(world);
+    let before = world.resource::<History>().inputs_at_moment(now);
+    (before, current(world).map(|current| current.file.camera.clone()))
+}
+
+fn current(world: &World) -> Option<Arc<LoadedScene>> {
+    world.get_resource::<CurrentScene>().map(|current| current.0.clone())
+}
+
+/// Whether the open scene is a model with animations of its own.
+fn is_of_model(world: &World) -> bool {
+    current(world).is_some_and(|it| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some()))
+}
+
+/// Changes the animation, and takes the change back if a scene file could not hold the result.
+fn checked<T>(world: &mut World, change: impl FnOnce(&mut World) -> Result<T, String>) -> Result<T, String> {
+    let old = world.get_resource::<Animation>().cloned();
+    let has_tracks = |world: &World| world.get_resource::<Animation>().is_some_and(|it| !it.tracks.is_empty());
+    let done = change(world).and_then(|done| {
+        if is_of_model(world) && has_tracks(world) {
+            let advice = "save the scene (Ctrl+Shift+S) and open that to set keys";
+            return Err(format!("the model has animations of its own: {advice}"));
+        }
+        let description = Description::of(world, current(world).as_deref());
+        match description.file.check() {
+            Err(error) => {
+                let problem = error.problems.first().map(|problem| problem.message.clone());
+                Err(format!("not possible: {}", problem.unwrap_or_else(|| error.to_string())))
+            }
+            Ok(()) => Ok(done),
+        }
+    });
+    match done {
+        Ok(done) => {
+            follow_tracks(world);
+            Ok(done)
+        }
+        Err(problem) => {
+            match old {
+                Some(old) => world.insert_resource(old),
+                None => drop(world.remove_resource::<Animation>()),
+            }
+            Err(problem)
+        }
+    }
+}
+
+/// Whether each of these has one key, so that nothing moves yet.
+fn is_single(world: &World, channels: &[Channel]) -> bool {
+    let animation = world.resource::<Animation>();
+    let mut tracks = animation.tracks.iter().filter(|track| channels.contains(&track.channel));
+    tracks.all(|track| track.curve.keys.len() == 1)
+}
+
+/// Such as `translate, rotate of ball; alpha of gold`, without the last ones of many.
+fn named(world: &World, channels: &[Channel]) -> String {
+    const MOST: usize = 3;
+    let mut groups: Vec<(Option<Entity>, Vec<&'static str>)> = Vec::new();
+    for channel in channels {
+        match groups.last_mut() {
+            Some((entity, properties)) if *entity == channel.entity() => properties.push(channel.property()),
+            _ => groups.push((channel.entity(), vec![channel.property()])),
+        }
+    }
+    let name = |entity: Option<Entity>| match entity {
+        None => "the camera".to_owned(),
+        Some(entity) => world.get::<Name>(entity).map_or("something".to_owned(), |name| format!("`{name}`")),
+    };
+    let group =
+        |(entity, properties): &(Option<Entity>, Vec<&str>)| format!("{} of {}", properties.join(", "), name(*entity));
+    let mut text = groups.iter().take(MOST).map(group).collect::<Vec<_>>().join("; ");
+    if groups.len() > MOST {
+        text += &format!(" and {} more", groups.len() - MOST);
+    }
+    text
+}
+
+/// Seconds with at most three decimal places.
+fn number(seconds: f64) -> String {
+    ((seconds * 1e3).round() / 1e3).to_string()
+}
+
+fn say(world: &mut World, text: String) {
+    let now = world.resource::<Clock>().0;
+    world.resource_mut::<Status>().say(now, MessageKind::Note, text);
+}
