@@ -4,19 +4,22 @@ use super::console::remark;
 use super::failure::Failure;
 use super::number::{parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
+use firstlight::cluster::unpack::{UnpackError, Unpacked, is_archive, unpack};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::model::ModelFormat;
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSource, UpAxis, load};
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// The scene to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), or image rendered by firstlight (.png,
-    /// .exr).
+    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), image rendered by firstlight (.png,
+    /// .exr), or archive of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
@@ -26,8 +29,8 @@ pub struct SceneArgs {
 /// Several scenes to open with the same options.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), or images rendered by firstlight
-    /// (.png, .exr).
+    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), images rendered by firstlight (.png,
+    /// .exr), or archives of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]
@@ -160,7 +163,8 @@ impl SceneArgs {
             check_film_source(&source)?;
         }
         self.tell_ignored(&source);
-        let environment = self.how.env.as_deref();
+        let environment = self.environment()?;
+        let environment = environment.as_deref();
         let choice = self.how.choice();
         let (progress, choice) = (Some(progress), Some(&choice));
         let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
@@ -170,6 +174,15 @@ impl SceneArgs {
             remark(format_args!("warning: {warning}"));
         }
         Ok(scene)
+    }
+
+    /// The image that lights the scene instead of its own environment: of the option, or of the archive.
+    pub fn environment(&self) -> Result<Option<PathBuf>, Failure> {
+        let path = Path::new(&self.scene);
+        Ok(match &self.how.env {
+            None if is_archive(path) && path.is_file() => unpacked(path)?.environment,
+            given => given.clone(),
+        })
     }
 
     /// Warns of options that have no effect on this source.
@@ -186,8 +199,13 @@ impl SceneArgs {
         remark(format_args!("warning: {}: --up has no effect on {what}", source.title()));
     }
 
-    /// The source that the argument names.
+    /// The source that the argument names. An archive is unpacked, once in a process.
     pub fn source(&self) -> Result<SceneSource, Failure> {
+        let path = Path::new(&self.scene);
+        if is_archive(path) && path.is_file() {
+            let scene = unpacked(path)?.scene;
+            return SceneSource::parse(&scene).map_err(Failure::from);
+        }
         SceneSource::parse(&self.scene).map_err(|error| {
             // A word without extension that is no file is a typing error (usage); otherwise the file is missing or
             // invalid.
@@ -195,6 +213,25 @@ impl SceneArgs {
             if is_name { Failure::Usage(error.to_string()) } else { Failure::Failed(error.to_string()) }
         })
     }
+}
+
+/// Unpacks an archive into the cache folder of the platform, or into one for temporary files.
+fn unpacked(archive: &Path) -> Result<Unpacked, Failure> {
+    static KNOWN: Mutex<BTreeMap<PathBuf, Unpacked>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(unpacked) = known.get(archive) {
+        return Ok(unpacked.clone());
+    }
+    let folders = directories::ProjectDirs::from("", "", "firstlight");
+    let cache = folders.map_or_else(|| std::env::temp_dir().join("firstlight"), |it| it.cache_dir().to_path_buf());
+    let failed = |error: UnpackError| match error {
+        UnpackError::Write(error) => error.into(),
+        UnpackError::Read(error) if error.may_pass() => Failure::Passing(format!("{}: {error}", archive.display())),
+        error => Failure::Failed(format!("{}: {error}", archive.display())),
+    };
+    let unpacked = unpack(archive, &cache.join("packed")).map_err(failed)?;
+    known.insert(archive.to_path_buf(), unpacked.clone());
+    Ok(unpacked)
 }
 
 /// What outputs may replace.

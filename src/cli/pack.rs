@@ -39,6 +39,9 @@ pub fn run(args: &PackArgs) -> Result<(), Failure> {
     let (output, n) = (args.output.display(), package.names().count());
     let replaced = replaced(files.replaced());
     let environment = package.environment.as_ref().map(|name| format!(" --env {name}")).unwrap_or_default();
-    inform(format_args!("{output}: {n} files{replaced}; unpack it and open {}{environment}", package.scene));
+    inform(format_args!(
+        "{output}: {n} files{replaced}; open it, or unpack it and open {}{environment}",
+        package.scene
+    ));
     Ok(())
 }

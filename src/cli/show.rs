@@ -101,7 +101,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
         seed: args.seed.unwrap_or(0),
         up: args.scene.up(),
         choice: args.scene.how.choice(),
-        environment: args.scene.how.env.clone(),
+        environment: args.scene.environment()?,
         folder,
         record: args.record.clone(),
         print_figures: args.figures,

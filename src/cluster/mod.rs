@@ -12,3 +12,4 @@ pub mod engine;
 pub mod job;
 pub mod pack;
 pub mod part;
+pub mod unpack;

@@ -21,6 +21,9 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// The list of checksums in a package, as `sha256sum --check` reads it.
 pub const CHECKSUMS: &str = "SHA256SUMS";
+/// First words of the comment of an archive, before the name of the scene, and before that of the environment image.
+pub(super) const SCENE: &str = "scene: ";
+pub(super) const ENVIRONMENT: &str = "environment: ";
 
 /// What is in a package.
 #[derive(Clone, Debug)]
@@ -147,6 +150,9 @@ impl Package {
         }
         zip.start_file(CHECKSUMS, options).map_err(failed)?;
         zip.write_all(sums.as_bytes()).map_err(|error| unwritable(&path, error))?;
+        // What `unpack` opens, and what other programs show.
+        let environment = self.environment.iter().map(|name| format!("\n{ENVIRONMENT}{name}"));
+        zip.set_comment(format!("{SCENE}{}{}", self.scene, environment.collect::<String>())).map_err(failed)?;
         zip.finish().map_err(failed)?;
         Ok(out.finish()?)
     }
@@ -196,11 +202,16 @@ impl Content {
                 }
             }
         }
-        Ok(sum.finalize().iter().fold(String::new(), |mut text, byte| {
-            let _ = write!(text, "{byte:02x}");
-            text
-        }))
+        Ok(hexadecimal(sum))
     }
+}
+
+/// A checksum as text.
+pub(super) fn hexadecimal(sum: Sha256) -> String {
+    sum.finalize().iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 /// Where a file lies, from the root of the system, without `.` and `..`; links in it are not followed, so that what is

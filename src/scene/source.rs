@@ -53,6 +53,10 @@ impl SceneSource {
                 let message = "is an environment image: add it to a scene or a model with --env FILE.hdr";
                 Err(SceneError::in_file(path, message))
             }
+            Some("zip") if path.exists() => {
+                let message = "is an archive: open it with `firstlight FILE.zip`, or unpack it and open what is in it";
+                Err(SceneError::in_file(path, message))
+            }
             _ if path.exists() => {
                 let message = format!(
                     "unsupported file format: expected a scene (.ron), a model ({models}) or an image rendered by \

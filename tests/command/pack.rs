@@ -107,3 +107,97 @@ fn models_images_and_built_in_scenes_are_packed_as_they_are() {
     assert!(!path.join("wrong.zip").exists());
     fails(path, "pack models/m.obj -o wrong.tar", 2);
 }
+
+/// An archive with other contents; `None` removes a file.
+fn forged(original: &Path, forgery: &Path, name: &str, content: Option<&[u8]>) {
+    use std::io::{Read, Write};
+    let mut archive = zip::ZipArchive::new(std::fs::File::open(original).unwrap()).unwrap();
+    let mut out = zip::ZipWriter::new(std::fs::File::create(forgery).unwrap());
+    let options = zip::write::SimpleFileOptions::default();
+    for i in 0..archive.len() {
+        let mut file = archive.by_index(i).unwrap();
+        let own = file.name().unwrap().into_owned();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        if own != name {
+            out.start_file(own, options).unwrap();
+            out.write_all(&bytes).unwrap();
+        }
+    }
+    if let Some(content) = content {
+        out.start_file(name, options).unwrap();
+        out.write_all(content).unwrap();
+    }
+    out.finish().unwrap();
+}
+
+#[test]
+fn an_archive_opens_directly_and_only_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_scene(path);
+    let cache = path.join("cache");
+    let run = |line: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        let output = command.args(line.split(' ')).current_dir(path).env("XDG_CACHE_HOME", &cache).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().to_rgb8();
+    does(path, "render scenes/s.ron -o here.png --spp 2");
+    does(path, "pack scenes/s.ron -o s.zip");
+    for gone in ["scenes", "models", "far"] {
+        std::fs::remove_dir_all(path.join(gone)).unwrap();
+    }
+    let (code, said) = run("render s.zip -o there.png --spp 2");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(pixels("here.png") == pixels("there.png"));
+    // It is unpacked once; its image opens as its scene; a copy that somebody has changed is left alone.
+    let folders = || std::fs::read_dir(cache.join("firstlight/packed")).unwrap().map(|it| it.unwrap().path());
+    let first = folders().next().unwrap();
+    let scene = first.join("scenes/s.ron");
+    assert_eq!(run("render there.png -o again.png").0, Some(0));
+    assert!(pixels("again.png") == pixels("there.png"));
+    let edited = std::fs::read_to_string(&scene).unwrap() + "// Edited.\n";
+    std::fs::write(&scene, &edited).unwrap();
+    assert_eq!(run("render s.zip -o third.png --spp 2").0, Some(0));
+    assert!(pixels("third.png") == pixels("here.png") && std::fs::read_to_string(&scene).unwrap() == edited);
+    assert_eq!(run("render s.zip -o fourth.png --spp 2").0, Some(0));
+    assert_eq!(folders().count(), 2);
+
+    let original = path.join("s.zip");
+    let forgeries: [(&str, Option<&[u8]>, &str); 6] = [
+        ("scenes/s.ron", Some(b"()"), "damaged"),
+        ("far/far.png", None, "damaged"),
+        ("SHA256SUMS", None, "no valid list"),
+        ("more.txt", Some(b"!"), "not in SHA256SUMS"),
+        ("../out.txt", Some(b"!"), "does not stay"),
+        ("/tmp/out.txt", Some(b"!"), "does not stay"),
+    ];
+    for (name, content, wanted) in forgeries {
+        forged(&original, &path.join("forged.zip"), name, content);
+        let (code, said) = run("render forged.zip -o no.png --spp 1");
+        assert!(code == Some(1) && said.contains(wanted), "{name}: {code:?} {said}");
+    }
+    assert!(!cache.join("firstlight/out.txt").exists() && !cache.join("firstlight/packed/out.txt").exists());
+    std::fs::write(path.join("cut.zip"), &std::fs::read(&original).unwrap()[..200]).unwrap();
+    let (code, said) = run("info cut.zip");
+    assert!(code == Some(1) && said.contains("not a readable archive"), "{code:?} {said}");
+    assert_eq!(folders().count(), 2, "nothing is left of what was refused");
+}
+
+#[test]
+fn the_environment_image_of_an_archive_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_scene(path);
+    let hdr = [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec(), [128, 120, 110, 129].repeat(8)].concat();
+    std::fs::write(path.join("far/light.hdr"), hdr).unwrap();
+    let model = "models/m.obj --env far/light.hdr";
+    does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
+    does(path, &format!("pack {model} -o m.zip"));
+    let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+    let line = "render m.zip -o there.png --size 24x16 --spp 2";
+    command.args(line.split(' ')).current_dir(path).env("XDG_CACHE_HOME", path).assert().success();
+    let [here, there] = ["here.png", "there.png"].map(|name| image::open(path.join(name)).unwrap().to_rgb8());
+    assert!(here == there);
+}

@@ -1,0 +1,229 @@
+//! Opens the archive of a packed scene: unpacks it into a cache folder, once.
+//!
+//! Every file must be in the list of checksums and have its sum, and no name may lead out of the folder. The folder is
+//! named after the archive's own checksum; one in which a file has changed since is left alone, and another one is made.
+
+use super::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
+use crate::printable;
+use crate::scene::model::ModelFormat;
+use crate::scene::whole_file::{Replace, WholeFile};
+use crate::scene::{FileKind, InputFile, ReadError, WriteError, text_to_path};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::path::{Component, Path, PathBuf};
+use zip::ZipArchive;
+
+/// Number of folders that are tried for one archive.
+const MOST_FOLDERS: u32 = 1000;
+/// Bytes of the list of checksums.
+const MOST_SUMS: u64 = 64 << 20;
+/// Compression ratio above which an archive is refused; Deflate reaches 1032.
+const MOST_RATIO: u64 = 1100;
+
+/// A scene from an archive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unpacked {
+    /// What is to be opened.
+    pub scene: PathBuf,
+    /// The image that lights the scene instead of its own environment.
+    pub environment: Option<PathBuf>,
+}
+
+/// Why an archive is not opened. The text follows the path of the archive.
+#[derive(Debug, thiserror::Error)]
+pub enum UnpackError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// It is no archive, or damaged.
+    #[error("is not a readable archive: {0}")]
+    Archive(#[from] zip::result::ZipError),
+    /// A name leads out of the folder, or is none that all systems know.
+    #[error("`{}` in the archive does not stay in its folder: it was not made by `firstlight pack`", printable::name(.0))]
+    Name(String),
+    /// The list of checksums is missing, or not what it should be.
+    #[error("has no valid list of checksums ({CHECKSUMS}): make it with `firstlight pack`")]
+    NoSums,
+    /// A file is damaged, or in one of archive and list only.
+    #[error("`{}` in the archive is damaged or not in {CHECKSUMS}: copy the archive again", printable::name(.0))]
+    Damaged(String),
+    /// A file is too large to be true.
+    #[error("`{}` in the archive is implausibly large: it was not made by `firstlight pack`", printable::name(.0))]
+    TooLarge(String),
+    /// It does not say which scene is to be opened.
+    #[error("does not say which scene to open: unpack it, and open one of its files")]
+    NoScene,
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// Whether a path is named like an archive.
+pub fn is_archive(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"))
+}
+
+/// Unpacks an archive into a folder below `cache`, unless it is there already.
+///
+/// # Errors
+/// If it cannot be read, is damaged or was not made by `firstlight pack`, or if files cannot be written.
+pub fn unpack(archive: &Path, cache: &Path) -> Result<Unpacked, UnpackError> {
+    let open = || InputFile::open_within(archive, FileKind::Film, u64::MAX);
+    let sum = sum_of(&mut open()?)?;
+    let mut zip = ZipArchive::new(open()?)?;
+    let sums = sums_of(&mut zip)?;
+    let scene = scene_in(zip.comment(), &sums)?;
+    for number in 1..MOST_FOLDERS {
+        let name = &sum[..32];
+        let folder = cache.join(if number == 1 { name.to_owned() } else { format!("{name}-{number}") });
+        let is_there = folder.exists();
+        if is_there && !holds(&folder, &sums) {
+            continue;
+        }
+        if !is_there {
+            extract(&mut zip, &sums, cache, &folder)?;
+        }
+        let place = |name: &String| folder.join(text_to_path(name));
+        return Ok(Unpacked { scene: place(&scene.0), environment: scene.1.as_ref().map(place) });
+    }
+    Err(UnpackError::NoScene)
+}
+
+/// Writes all files into a folder beside the wanted one, which then gets its name.
+fn extract(
+    zip: &mut ZipArchive<InputFile>,
+    sums: &BTreeMap<String, String>,
+    cache: &Path,
+    folder: &Path,
+) -> Result<(), UnpackError> {
+    let no_folder = |folder: &Path| {
+        let folder = folder.to_path_buf();
+        move |source| WriteError::NoFolder { folder, source }
+    };
+    std::fs::create_dir_all(cache).map_err(no_folder(cache))?;
+    let part = tempfile::Builder::new().prefix(".part-").tempdir_in(cache).map_err(no_folder(cache))?;
+    for i in 0..zip.len() {
+        let mut file = zip.by_index(i)?;
+        let name = name_of(&file)?;
+        if name == CHECKSUMS {
+            continue;
+        }
+        let expected = sums.get(&name).ok_or_else(|| UnpackError::Damaged(name.clone()))?;
+        let most = file.compressed_size().saturating_mul(MOST_RATIO).saturating_add(1 << 16);
+        if file.size() > most {
+            return Err(UnpackError::TooLarge(name));
+        }
+        let path = part.path().join(text_to_path(&name));
+        let parent = path.parent().unwrap_or(part.path());
+        std::fs::create_dir_all(parent).map_err(no_folder(parent))?;
+        let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;
+        // No more than what the archive says is written.
+        let size = file.size();
+        let mut sum = Sha256::new();
+        let mut limited = (&mut file).take(size);
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            // A wrong CRC is an error of the last read.
+            match limited.read(&mut buffer).map_err(|_| UnpackError::Damaged(name.clone()))? {
+                0 => break,
+                n => {
+                    sum.update(&buffer[..n]);
+                    out.write_all(&buffer[..n]).map_err(|error| crate::scene::whole_file::unwritable(&path, error))?;
+                }
+            }
+        }
+        if hexadecimal(sum) != *expected {
+            return Err(UnpackError::Damaged(name));
+        }
+        out.finish()?;
+    }
+    if let Some(missing) = sums.keys().find(|name| !part.path().join(text_to_path(name)).is_file()) {
+        return Err(UnpackError::Damaged(missing.clone()));
+    }
+    let part = part.keep();
+    if let Err(source) = std::fs::rename(&part, folder) {
+        let _ = std::fs::remove_dir_all(&part);
+        // Another process was faster.
+        if !holds(folder, sums) {
+            return Err(WriteError::NoFolder { folder: folder.to_path_buf(), source }.into());
+        }
+    }
+    Ok(())
+}
+
+/// Whether a folder has exactly these contents in these files.
+fn holds(folder: &Path, sums: &BTreeMap<String, String>) -> bool {
+    sums.iter().all(|(name, sum)| {
+        let file = InputFile::open_within(&folder.join(text_to_path(name)), FileKind::Film, u64::MAX);
+        file.and_then(|mut file| sum_of(&mut file)).is_ok_and(|found| found == *sum)
+    })
+}
+
+fn sum_of(file: &mut InputFile) -> Result<String, ReadError> {
+    let mut sum = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok(hexadecimal(sum)),
+            n => sum.update(&buffer[..n]),
+        }
+    }
+}
+
+/// The name of a regular file that stays in its folder.
+fn name_of<R: Read>(file: &zip::read::ZipFile<R>) -> Result<String, UnpackError> {
+    let name = file.name()?.into_owned();
+    let is_plain = |part: Component| matches!(part, Component::Normal(_));
+    let is_safe =
+        !name.is_empty() && !name.contains(['\\', ':', '\0']) && text_to_path(&name).components().all(is_plain);
+    if is_safe && !file.is_symlink() && !file.is_dir() { Ok(name) } else { Err(UnpackError::Name(name)) }
+}
+
+/// The checksums by name.
+fn sums_of(zip: &mut ZipArchive<InputFile>) -> Result<BTreeMap<String, String>, UnpackError> {
+    let mut text = String::new();
+    let file = zip.by_name(CHECKSUMS).map_err(|_| UnpackError::NoSums)?;
+    file.take(MOST_SUMS).read_to_string(&mut text).map_err(|_| UnpackError::NoSums)?;
+    let parse = |line: &str| {
+        let (sum, name) = line.split_once("  ")?;
+        (sum.len() == 64).then(|| (name.to_owned(), sum.to_owned()))
+    };
+    text.lines().map(parse).collect::<Option<_>>().ok_or(UnpackError::NoSums)
+}
+
+/// The scene, and the environment image: as the comment says, or else the only scene file or model.
+fn scene_in(comment: &[u8], sums: &BTreeMap<String, String>) -> Result<(String, Option<String>), UnpackError> {
+    let comment = String::from_utf8_lossy(comment);
+    let named = |what: &str| comment.lines().find_map(|line| line.strip_prefix(what)).map(str::to_owned);
+    let is_there = |name: &String| sums.contains_key(name);
+    if let Some(scene) = named(SCENE).filter(is_there) {
+        return Ok((scene, named(ENVIRONMENT).filter(is_there)));
+    }
+    let only = |wanted: &dyn Fn(&Path) -> bool| {
+        let mut names = sums.keys().filter(|name| wanted(Path::new(name)));
+        names.next().filter(|_| names.next().is_none()).cloned()
+    };
+    let is_scene = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron"));
+    let has_scene = sums.keys().any(|name| is_scene(Path::new(name)));
+    let found = if has_scene { only(&is_scene) } else { only(&|path| ModelFormat::of(path).is_some()) };
+    found.map(|scene| (scene, None)).ok_or(UnpackError::NoScene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_says_what_to_open_or_has_one_scene_or_model() {
+        let sums = |names: &[&str]| names.iter().map(|name| ((*name).to_owned(), String::new())).collect();
+        let open = |comment: &str, names: &[&str]| scene_in(comment.as_bytes(), &sums(names)).ok();
+        let only = |name: &str| Some((name.to_owned(), None));
+        assert_eq!(open("scene: a/b.obj", &["a/b.obj", "s.ron"]), only("a/b.obj"));
+        let lit = open("scene: s.ron\nenvironment: e.hdr", &["e.hdr", "s.ron"]);
+        assert_eq!(lit, Some(("s.ron".to_owned(), Some("e.hdr".to_owned()))));
+        assert_eq!(open("scene: ../x.ron", &["m.glb", "s.ron"]), only("s.ron"));
+        assert_eq!(open("", &["m.glb", "m.png"]), only("m.glb"));
+        assert_eq!(open("", &["a.ron", "b.ron", "m.glb"]), None);
+    }
+}
