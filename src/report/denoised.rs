@@ -34,7 +34,7 @@ impl DenoisedStep {
 }
 
 /// The names of the denoisers, in this order; the first needs nothing to be installed.
-const NAMES: [&str; 3] = ["denoised", "Open Image Denoise, combined with raw", "Open Image Denoise alone"];
+const NAMES: [&str; 3] = ["denoised", "Open Image Denoise combined with raw", "Open Image Denoise alone"];
 
 /// Denoises each step and compares it with `reference`, which must have the same size.
 ///
