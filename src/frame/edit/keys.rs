@@ -40,11 +40,13 @@ pub fn delete(world: &mut World) -> Result<(), String> {
     let n = checked(world, |world| Ok(delete_keys(world, &selected)))?;
     let seconds = number(world.resource::<Moment>().0);
     let of = if selected.is_empty() { "" } else { " of the selection" };
-    match n {
-        0 => Err(format!("there are no keys{of} at {seconds} s")),
-        1 => Ok(say(world, format!("key{of} at {seconds} s deleted"))),
-        n => Ok(say(world, format!("{n} keys{of} at {seconds} s deleted"))),
-    }
+    let text = match n {
+        0 => return Err(format!("there are no keys{of} at {seconds} s")),
+        1 => format!("key{of} at {seconds} s deleted"),
+        n => format!("{n} keys{of} at {seconds} s deleted"),
+    };
+    say(world, text);
+    Ok(())
 }
 
 /// Sets the interpolation of the tracks of the selection, or of all tracks if nothing is selected.
