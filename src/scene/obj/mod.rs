@@ -61,8 +61,12 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     if !matches!(options.normals, ModelNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
     }
-    let corners = MeshCorners::of(&parsed);
+    let mut corners = MeshCorners::of(&parsed);
     let (triangles, slots, dropped) = corners.triangles(&parsed);
+    let polygons = parsed.arities.iter().filter(|&&corners| corners > 3).count();
+    // Computing normals takes most memory: what is no longer needed goes before.
+    parsed.leave_names();
+    corners.vertices = Vec::new();
     if dropped > 0 {
         warnings.push(format!("{}: {dropped} triangles use a vertex twice and were removed", path.display()));
     }
@@ -71,6 +75,7 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     }
     let mesh_error = |source| ObjError::Mesh { path: path.into(), source };
     let mut mesh = Mesh::from_f64(&corners.positions, triangles).map_err(mesh_error)?;
+    corners.positions = Vec::new();
     if !mesh.triangles.iter().any(|triangle| has_area(&mesh, *triangle)) {
         return Err(ObjError::NoArea { path: path.into(), triangles: mesh.triangles.len() });
     }
@@ -85,7 +90,6 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     };
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
-    let polygons = parsed.arities.iter().filter(|&&corners| corners > 3).count();
     let (materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
     let (warnings, material_warnings) = (warnings.into_list(), of_materials.into_list());
     Ok(ImportedModel { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })

@@ -199,6 +199,12 @@ fn joined(pieces: Vec<Piece>) -> ParsedObj {
 const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 impl ParsedObj {
+    /// Frees everything but the names of materials and libraries.
+    pub fn leave_names(&mut self) {
+        let (materials, libraries) = (std::mem::take(&mut self.materials), std::mem::take(&mut self.libraries));
+        *self = Self { materials, libraries, ..Self::default() };
+    }
+
     fn counts(&self) -> [usize; 3] {
         [self.positions.len(), self.uvs.len(), self.normals.len()]
     }
