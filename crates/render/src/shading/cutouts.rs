@@ -27,19 +27,17 @@ impl Prepared {
     }
 
     /// Whether rays are occluded; see [`firstlight_kdtree::SceneTree::any_hits`].
+    ///
+    /// Among cutouts the closest hit tells where a ray continues, so that each ray is traced once and not a second time
+    /// if it hits something; a ray without a hit costs the same either way.
     pub(crate) fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
-        self.geometry.tree.any_hits(rays, class, occluded);
         if !self.tables.features.cutouts {
-            return;
+            return self.geometry.tree.any_hits(rays, class, occluded);
         }
-        let in_doubt: Vec<usize> = (0..rays.len()).filter(|&i| occluded[i]).collect();
-        let mut asked = RayBatch::default();
-        in_doubt.iter().for_each(|&i| asked.push(&rays.get(i)));
         let mut hits = HitBatch::default();
-        self.closest_hits(&asked, class, &mut hits);
-        for (k, i) in in_doubt.into_iter().enumerate() {
-            occluded[i] = hits.get(k).is_some();
-        }
+        self.closest_hits(rays, class, &mut hits);
+        occluded.clear();
+        occluded.extend((0..rays.len()).map(|i| hits.get(i).is_some()));
     }
 
     /// Like [`Self::closest_hits`], for one ray.
