@@ -47,7 +47,7 @@ fn a_prism_deflects_each_channel_by_its_own_angle() {
         let x = direction.x / -direction.y * 3.0;
         let light = quad(Vec3::new(x as f32 - 0.01, -1.0, -4.0), Vec3::X * 0.02, Vec3::Y * 2.0);
         let shapes = vec![(faces[0].clone(), 0), (faces[1].clone(), 0), (light, 1)];
-        let scene = scene(shapes, vec![glass(), emissive(2.0)], Environment::Black, eye.clone());
+        let scene = scene(shapes, vec![glass(), emissive(2.0)], Environment::Black, eye);
         let settings = RenderSettings { max_depth: 3, ..RenderSettings::default() };
         let found = mean(&render(&scene, &settings, 16, 16, 512).0).to_array();
         let expected = 2.0 * (1.0 - fresnel(n, 1.0)) * (1.0 - fresnel(n, cos_i));
