@@ -60,7 +60,7 @@ struct CommandLine {
     /// Instruction set of the renderer [default: the widest available]; the images are identical.
     #[arg(long, value_name = "SET", value_enum, global = true)]
     simd: Option<SimdArg>,
-    /// Print only results, warnings and errors.
+    /// Print only what was asked for, such as JSON or tables, and warnings and errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Log details to standard error; RUST_LOG selects them exactly.

@@ -256,7 +256,8 @@ impl RenderCommand {
     fn in_folder(&self, folder: &Path, scene: &SceneArgs) -> Result<PathBuf, Failure> {
         if !folder.is_dir() {
             let (name, n) = (folder.display(), self.scenes.scenes.len());
-            return Err(Failure::Usage(format!("{name}: not a folder that exists: {n} scenes need -o FOLDER")));
+            let message = format!("{name}: no such folder: for {n} scenes, -o is the folder of their images");
+            return Err(Failure::Usage(message));
         }
         let mut name = file_stem(&scene.scene);
         name.push(".");

@@ -23,7 +23,7 @@ impl Denoising {
         match self {
             Self::Raw => "raw",
             Self::Denoised => "denoised",
-            Self::Split => "raw | denoised",
+            Self::Split => "split",
         }
     }
 

@@ -152,10 +152,11 @@ fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
     if view.cross(up).length() >= LEAST_SINE {
         return Ok(());
     }
-    Err(BadValue::unfit(
-        "up",
-        format!("`up` is parallel to the view direction (within {LEAST_SINE:e} rad): tilt one of them"),
-    ))
+    // What is across most views that go up or down, and up in all others.
+    let other = if view.y.abs() > 0.5 { "(0, 0, -1)" } else { "(0, 1, 0)" };
+    let message =
+        format!("`up` is parallel to the view direction (within {LEAST_SINE:e} rad): set it, such as `up: {other}`");
+    Err(BadValue::unfit("up", message))
 }
 
 impl CameraPart {

@@ -37,9 +37,17 @@ pub fn figures(status: &Status) -> String {
         write!(line, " (denoised {})", percent(denoised)).expect("a string takes all");
     }
     // Raw is what the figures are of; everything else is named.
-    if status.denoising != Denoising::Raw {
-        write!(line, "   {}", status.denoising.label()).expect("a string takes all");
-    }
+    let shown = match (status.denoising, status.denoised_error) {
+        (Denoising::Raw, None) => "",
+        (Denoising::Raw, Some(_)) => "   raw, the better one",
+        // Only at full resolution, and only once it is done, is an image denoised with a known error.
+        (Denoising::Denoised, None) if status.divider > 1 => "   smoothed",
+        (Denoising::Denoised, None) => "   smoothed, denoising…",
+        (Denoising::Denoised, Some(_)) => "   denoised",
+        (Denoising::Split, None) => "   raw | smoothed",
+        (Denoising::Split, Some(_)) => "   raw | denoised",
+    };
+    line += shown;
     if !status.restart_cause.is_empty() {
         write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
     }
@@ -165,6 +173,12 @@ mod tests {
         );
         status.denoising = Denoising::Split;
         assert!(figures(&status).contains("   raw | denoised   "));
+        status.denoised_error = None;
+        assert!(figures(&status).contains("   raw | smoothed   "));
+        status.denoising = Denoising::Denoised;
+        assert!(figures(&status).contains("   smoothed, denoising…   "));
+        (status.denoising, status.denoised_error) = (Denoising::Raw, Some(0.03));
+        assert!(figures(&status).contains("(denoised 3.0 %)   raw, the better one   "));
         status.done = true;
         assert!(figures(&status).starts_with("finished   37 spp"));
         status.paused = true;

@@ -220,6 +220,41 @@ fn values_out_of_range_are_named_with_what_is_expected() {
     }
 }
 
+/// Brackets, commas, comments and names of fields: what is told is what is wrong, where it is wrong.
+#[test]
+fn what_is_wrong_around_values_is_told_where_it_is() {
+    let view = "camera: (eye: (0, 1, 4), look_at: (0, 0, 0))";
+    let clay = "materials: { \"clay\": diffuse(albedo: 0.5) }";
+    let scene = |rest: &str| format!("(\n    {view},\n    {rest}\n)");
+    for (text, expected) in [
+        (scene(&format!("{clay},\n    objects: [sphere(radius: 1,, material: \"clay\")],")), "4:32: unexpected comma"),
+        (
+            scene(&format!("{clay},\n    objects: [sphere(radius: 1, material: \"clay\"],")),
+            "4:49: a bracket or a comma is missing before `],`",
+        ),
+        (
+            scene("materials: { \"clay\": diffuse(0.5) },"),
+            "3:34: `diffuse` has fields with names, such as `albedo: 0.5`, found `0.5` without one",
+        ),
+        (format!("# comment\n({view})"), "1:1: a comment begins with `//`, not with `#`"),
+        (format!("{view},\n{clay},\n"), "1:1: a scene is in round brackets: put `(` before `camera`"),
+        (
+            scene("materials: { \"clay\": principled(base_color: 0.5, two_sided: 1) },"),
+            "`two_sided`: expected true or false",
+        ),
+        (scene(&format!("{clay},\n    objects: [cube(size: 1)],")), "4:15: unknown object `cube`: it is a mesh"),
+        (
+            scene(&format!("{clay},\n    objects: [point(intensity: 1)],")),
+            "unknown object `point`: it belongs in `lights`",
+        ),
+        (scene("materials: { \"clay\": diffuse(albedo: \"#ff8800\") },"), "numbers and colours have no quotes"),
+    ] {
+        assert_says(&message(&text), &["scene.ron:", expected]);
+    }
+    let down = message("(camera: (eye: (0, 5, 0), look_at: (0, 0, 0)))");
+    assert_says(&down, &["set it, such as `up: (0, 0, -1)`"]);
+}
+
 #[test]
 fn all_mistakes_of_a_file_are_told_at_once() {
     let found =

@@ -419,6 +419,10 @@ impl Check<'_> {
 
     fn texture_name(&mut self, path: &str, name: &str) {
         if !self.textures.contains(name) {
+            if name.starts_with('#') || name.trim().parse::<f64>().is_ok() {
+                let message = "is not defined; numbers and colours have no quotes, such as `0.2` or `(1, 0.25, 0)`";
+                return self.wrong(path, format!("texture `{name}` {message}"));
+            }
             self.misnamed(path, format!("texture `{name}` is not defined"), name, self.file.textures.names());
         }
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Converts a parser error to a message with line and column.
 pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
-    if let Some((offset, message)) = wrong_form(error, text) {
+    if let Some((offset, message)) = wrong_brackets(error, text).or_else(|| wrong_form(error, text)) {
         return SceneError::at(file, line_and_column(text, offset), message);
     }
     let at = (error.span.start.line.max(1), error.span.start.col.max(1));
@@ -17,10 +17,11 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
         Error::NoSuchStructField { expected, found, outer } => {
             format!("unknown field `{found}`{}{}", of(outer), suggestion(found, expected.iter().copied()))
         }
-        Error::NoSuchEnumVariant { expected, found, .. } => {
+        Error::NoSuchEnumVariant { expected, found, outer } => {
             // Capitalised names are those of older versions: accepted, but not suggested.
             let words = expected.iter().copied().filter(|word| word.starts_with(char::is_lowercase));
-            format!("unknown kind `{found}`{}", suggestion(found, words))
+            let what = outer.as_ref().map_or("kind".to_owned(), |name| plain(name));
+            format!("unknown {what} `{found}`{}", elsewhere(&what, found).unwrap_or_else(|| suggestion(found, words)))
         }
         Error::MissingStructField { field, outer } => format!("field `{field}`{} is missing", of(outer)),
         Error::DuplicateStructField { field, outer } => {
@@ -37,6 +38,63 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
         _ => at,
     };
     SceneError::at(file, at, message)
+}
+
+/// Position and message of what is wrong around values: brackets, commas, comments, names of fields that are missing;
+/// `None` for other errors.
+fn wrong_brackets(error: &SpannedError, text: &str) -> Option<(usize, String)> {
+    let offset = byte_offset(text, error.span.start.line, error.span.start.col);
+    let rest = text[offset..].trim_start();
+    let at = text.len() - rest.len();
+    let word: String = rest.chars().take_while(|c| c.is_alphanumeric() || "_.-".contains(*c)).collect();
+    match &error.code {
+        Error::ExpectedAttribute | Error::ExpectedAttributeEnd if !text.trim_start().starts_with("#![") => {
+            let start = text.find('#')?;
+            return Some((start, "a comment begins with `//`, not with `#`".to_owned()));
+        }
+        Error::ExpectedDifferentStructName { .. } | Error::ExpectedStructLike | Error::ExpectedNamedStructLike(_)
+            if field_at(text, offset).is_none() && rest[word.len()..].trim_start().starts_with(':') =>
+        {
+            let message =
+                format!("a scene is in round brackets: put `(` before `{word}`, and `)` at the end of the file");
+            return Some((at, message));
+        }
+        Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier | Error::InvalidIdentifier(_) => {}
+        _ => return None,
+    }
+    if rest.starts_with(',') {
+        return Some((at, "unexpected comma: remove it, or write what is missing before it".to_owned()));
+    }
+    let Error::SuggestRawIdentifier(found) = &error.code else { return unnamed(text, at) };
+    let from = text[..offset].rfind('\n').map_or(0, |line| line + 1);
+    unnamed(text, from + text[from..].find(found.as_str())?)
+}
+
+/// Position and message of a value in brackets that has no name, such as `diffuse(0.5)`.
+fn unnamed(text: &str, at: usize) -> Option<(usize, String)> {
+    let before = text[..at].trim_end().strip_suffix('(')?.trim_end();
+    let kind = &before[before.rfind(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(0, |end| end + 1)..];
+    let value: String = text[at..].chars().take_while(|c| !",)\n".contains(*c)).collect();
+    if kind.is_empty() || value.contains(':') {
+        return None;
+    }
+    let example = match kind {
+        "diffuse" => " such as `albedo: 0.5`,",
+        "mirror" | "metal" => " such as `reflectance: 0.9`,",
+        "emission" => " such as `radiance: 10`,",
+        "glass" | "rough_glass" => " such as `ior: 1.5`,",
+        _ => "",
+    };
+    Some((at, format!("`{kind}` has fields with names,{example} found `{value}` without one")))
+}
+
+/// Where a kind belongs that is unknown at its place, for messages.
+fn elsewhere(what: &str, found: &str) -> Option<String> {
+    match (what, found) {
+        ("object", "point" | "spot" | "directional") => Some(": it belongs in `lights`".to_owned()),
+        ("object", "cube" | "box") => Some(": it is a mesh, `mesh(source: builtin(\"cube\"))`".to_owned()),
+        _ => None,
+    }
 }
 
 /// Position of a value of the wrong form, and a message with the expected form; `None` for other errors.
@@ -93,6 +151,17 @@ fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
     let field = field_at(text, offset)?;
     // Inside `constant(…)` and for unknown fields, the message names the expected type.
     let expectation = field.expectation().filter(|_| !field.is_within_kind(offset));
+    // A value of the right form is followed by what does not belong there.
+    let has_form = |(what, _): &(&str, _)| {
+        (what.ends_with("in quotes") && field.value.starts_with('"'))
+            || (what.ends_with("in square brackets") && field.value.starts_with('['))
+    };
+    if expectation.as_ref().is_some_and(has_form) {
+        let rest = text[offset..].trim_start();
+        let found: String = rest.chars().take_while(|c| *c != '\n').take(20).collect();
+        let message = format!("a bracket or a comma is missing before `{}`", found.trim_end());
+        return (!found.is_empty()).then(|| (text.len() - rest.len(), message));
+    }
     let Some((what, example)) = expectation else {
         let Error::InvalidValueForType { expected, .. } = &error.code else { return None };
         return Some((field.start, format!("`{}`: expected {expected}, found `{}`", field.name, field.quoted())));
@@ -124,7 +193,14 @@ fn word_before(text: &str, (line, column): (usize, usize), word: &str) -> (usize
 /// Converts type names to plain names: `CameraPart` to camera.
 fn plain(name: &str) -> String {
     let name = if name == "SceneFile" { "scene" } else { name.trim_end_matches("Part") };
-    name.to_lowercase()
+    let mut words = String::new();
+    for (i, c) in name.char_indices() {
+        if i > 0 && c.is_uppercase() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
 }
 
 /// Replaces quoted type names in a message of the parser by plain names.

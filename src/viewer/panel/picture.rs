@@ -148,7 +148,7 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             })
         });
         let looking = session.world().resource::<ViewMode>().0;
-        row_with_hint(ui, "noise", "raw and denoised image: F2", |ui| {
+        row_with_hint(ui, "noise", "raw, denoised, or split: raw on the left; F2 goes through them", |ui| {
             ui.horizontal(|ui| {
                 for denoising in Denoising::ALL {
                     if ui.selectable_label(looking.denoising == denoising, denoising.label()).clicked() {

@@ -57,7 +57,8 @@ pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
 
 /// A number that can be dragged or typed. Typing takes effect at the end, dragging at once.
 pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
-    let mut new = value;
+    // Clamped by the field, a number outside of the range would be an edit that nobody made.
+    let mut new = value.clamp(*range.start(), *range.end());
     let drag = egui::DragValue::new(&mut new)
         .speed(speed)
         .range(range)
@@ -91,11 +92,13 @@ pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
 
 /// A number on a slider.
 pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, logarithmic: bool) -> Option<f64> {
-    let mut new = value;
+    const DECIMALS: usize = 4;
+    // A slider rounds and clamps what it is given, which is no edit of the user.
+    let mut new = egui::emath::round_to_decimals(value.clamp(*range.start(), *range.end()), DECIMALS);
     let slider = egui::Slider::new(&mut new, range)
         .logarithmic(logarithmic)
         .update_while_editing(false)
-        .max_decimals(4)
+        .max_decimals(DECIMALS)
         .smart_aim(true);
     ui.add(slider).changed().then_some(new)
 }
@@ -131,4 +134,29 @@ pub fn strength_drag(ui: &mut Ui, value: f64, prefix: &str, suffix: &str) -> Opt
 /// from 0.
 pub fn proportional(value: f64) -> f64 {
     0.005 * value.abs().max(1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is shown is rounded and clamped, and nobody has edited it.
+    #[test]
+    fn showing_a_number_is_no_edit() {
+        let context = egui::Context::default();
+        for value in [f64::from(0.07_f32).sqrt(), 1.0 / 3.0, 1e-9, -4.0, 5.0, f64::from(0.1_f32)] {
+            let mut edits = Vec::new();
+            // A field is laid out in the first frame, and may change its number in any of them.
+            for _ in 0..3 {
+                let _ = context.run(egui::RawInput::default(), |context| {
+                    egui::CentralPanel::default().show(context, |ui| {
+                        edits.push(slider(ui, value, 0.0..=1.0, false));
+                        edits.push(number(ui, value, 0.01, 0.0..=1.0, ""));
+                        edits.push(vector(ui, DVec3::splat(value), 0.1).map(|vector| vector.x));
+                    });
+                });
+            }
+            assert!(edits.iter().all(Option::is_none), "{value}: {edits:?}");
+        }
+    }
 }
