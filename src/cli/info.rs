@@ -13,8 +13,8 @@ use firstlight::scene::animation::Shutter;
 use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Animation, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Rendering,
-    SceneInputs, SceneSource, Shape,
+    self, Animation, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Projection,
+    Rendering, SceneInputs, SceneSource, Shape,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -109,8 +109,8 @@ impl Told<'_> {
         }
         row("lights", lights);
         row("environment", environment(&shading.environment));
-        let lens = self.lens();
-        row("camera", if lens.enabled { self.aperture() } else { "pinhole".to_owned() });
+        let lens = if self.lens().enabled { self.aperture() } else { "pinhole".to_owned() };
+        row("camera", format!("{lens}, {}", self.projection()));
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
         if !self.layers.is_empty() {
             row("layers", self.layers.join(", "));
@@ -230,6 +230,14 @@ impl Told<'_> {
     fn aperture(&self) -> String {
         let stop = self.inputs.camera.map_or(0.0, |camera| f_stop(camera.lens.radius, &camera.projection));
         format!("{}, lens radius {} m", f_number(stop), two_digits(self.lens().radius))
+    }
+
+    fn projection(&self) -> String {
+        let projection = self.inputs.camera.map_or_else(Projection::default, |camera| camera.projection);
+        match projection.orthographic_height {
+            Some(height) => format!("orthographic, {} m high", two_digits(height)),
+            None => format!("{}° high", two_digits(projection.vfov_deg)),
+        }
     }
 
     fn filter(&self) -> String {

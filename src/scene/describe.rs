@@ -17,6 +17,7 @@ use super::file::{
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::meshes::LoadedMesh;
+use super::names::Names;
 use super::own_materials::{ByTextureName, without_lost_textures};
 use super::placement::Placement;
 use super::relative::path_to_text;
@@ -120,7 +121,7 @@ struct Writer<'a> {
     textures: Vec<(Arc<SurfaceTexture>, String)>,
     /// Their names by address.
     texture_names: HashMap<usize, String>,
-    taken_by_textures: Taken,
+    taken_by_textures: Names,
     loose_meshes: Vec<(usize, Arc<Mesh>)>,
     n_objects: usize,
     losses: Vec<String>,
@@ -200,12 +201,12 @@ impl<'a> Writer<'a> {
                 needed.extend([*a, *b]);
             }
         }
-        let mut taken = Taken::default();
+        let mut taken = Names::default();
         for (_, entity, name, material) in all {
             if own.contains(&entity) && !needed.contains(&entity) && !moved.has_material(entity) {
                 continue;
             }
-            let name = taken.free_name(if name.is_empty() { "material" } else { &name });
+            let name = taken.free(if name.is_empty() { "material" } else { &name });
             self.names.insert(entity, name.clone());
             self.named.push((entity, name, material));
         }
@@ -217,7 +218,7 @@ impl<'a> Writer<'a> {
             return name.clone();
         }
         let names = &self.names;
-        let new = || Taken { names: names.values().cloned().collect(), ..Taken::default() }.free_name("grey");
+        let new = || Names::taken(names.values().cloned()).free("grey");
         self.grey.get_or_insert_with(new).clone()
     }
 
@@ -237,9 +238,9 @@ impl<'a> Writer<'a> {
         }
         // Unused names of the file stay taken, since they are written too.
         if self.loaded_textures.get(&*texture.name).is_some_and(|part| **part != texture.part) {
-            self.taken_by_textures.names.insert(texture.name.clone());
+            self.taken_by_textures.take(&texture.name);
         }
-        let name = self.taken_by_textures.free_name(if texture.name.is_empty() { "texture" } else { &texture.name });
+        let name = self.taken_by_textures.free(if texture.name.is_empty() { "texture" } else { &texture.name });
         self.textures.push((texture.clone(), name.clone()));
         self.texture_names.insert(address(texture), name.clone());
         name
@@ -393,31 +394,6 @@ impl MapParams<InWorld, InFile> for Writer<'_> {
 
     fn material(&mut self, material: &Entity) -> String {
         self.material_name(Some(*material))
-    }
-}
-
-/// Names in use.
-#[derive(Default)]
-struct Taken {
-    names: HashSet<String>,
-    /// The next number to try for a name; smaller ones are taken.
-    next: HashMap<String, u64>,
-}
-
-impl Taken {
-    /// `wanted`, with the first number that makes it unique if it is taken.
-    fn free_name(&mut self, wanted: &str) -> String {
-        if self.names.insert(wanted.to_owned()) {
-            return wanted.to_owned();
-        }
-        let next = self.next.entry(wanted.to_owned()).or_insert(2);
-        loop {
-            let name = format!("{wanted} {next}");
-            *next += 1;
-            if self.names.insert(name.clone()) {
-                return name;
-            }
-        }
     }
 }
 

@@ -35,6 +35,7 @@ mod loaded;
 mod meshes;
 mod metadata_draft;
 pub mod model;
+mod names;
 pub mod obj;
 mod open_shutter;
 mod orientation;

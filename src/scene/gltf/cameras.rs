@@ -34,7 +34,7 @@ pub struct GltfCamera {
 impl Document {
     pub(super) fn cameras(&self, tree: &Tree) -> Result<Vec<GltfCamera>, Located> {
         let mut cameras: Vec<GltfCamera> = Vec::new();
-        let mut names = super::names::Names::default();
+        let mut names = crate::scene::names::Names::default();
         for &node in &tree.scene {
             let json = self.node(node)?;
             let Some(index) = json.camera else { continue };

@@ -24,7 +24,6 @@ mod lights;
 mod material;
 mod mesh;
 mod meshopt;
-mod names;
 mod nodes;
 mod primitives;
 mod skin;

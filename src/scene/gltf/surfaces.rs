@@ -6,10 +6,10 @@
 use super::document::Document;
 use super::error::Located;
 use super::material::{Alpha, GltfMaterial, TextureUse};
-use super::names::Names;
 use super::uri::{Uri, resolve};
 use crate::render::{Channel, Encoding, Material};
 use crate::scene::file::MaterialPart;
+use crate::scene::names::Names;
 use crate::scene::relative::path_to_text;
 use crate::scene::sources::TextureSource;
 use crate::scene::value::{ColorValue, Rgb, ScalarValue};

@@ -228,6 +228,16 @@ impl App {
         }
     }
 
+    /// Names what has been selected: of a floor there is no outline, and its handles may lie behind other things.
+    pub(super) fn tell_selection(&mut self, now: Instant) {
+        let selected = self.session.world().resource::<Selection>().active();
+        if std::mem::replace(&mut self.selected, selected) != selected
+            && let Some(label) = selected.and_then(|entity| self.panel.label_of(&self.session, entity))
+        {
+            self.toasts.add(Tone::News, format!("selected: {label}"), now);
+        }
+    }
+
     fn toggle_brush(&mut self, now: Instant) {
         if self.brush.toggle() {
             self.toasts.add(Tone::News, "region: drag a rectangle to render", now);

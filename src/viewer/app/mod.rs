@@ -39,6 +39,7 @@ use crate::frame::{
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::scene::{ModelChoice, SceneSource, UpAxis};
+use bevy_ecs::prelude::Entity;
 use leaving::Leaving;
 use memory::Memory;
 use serde_json::json;
@@ -231,6 +232,8 @@ struct App {
     shown_figures: String,
     /// An inspection that is to be shown but not ready yet, and since when.
     inspected_since: Option<(Inspection, Instant)>,
+    /// The active entity of the selection, as far as it has been told.
+    selected: Option<Entity>,
     last_tick: Option<Instant>,
     /// When a movement was last passed to the session.
     steered_at: Instant,
@@ -289,6 +292,7 @@ impl App {
             memory,
             leaving,
             stop_requested,
+            selected: None,
             reaction: Reaction::default(),
             overlays: true,
             presenter: None,
@@ -414,6 +418,7 @@ impl App {
         for saved in self.saver.finished() {
             self.report_saved(saved);
         }
+        self.tell_selection(now);
         self.take_files(now);
         self.follow_edits(now, event_loop);
         if self.keep_size_at.is_some_and(|at| now >= at) {

@@ -69,6 +69,12 @@ impl PanelState {
         let (_, inventory) = self.inventory.insert(known.unwrap_or_else(|| (revision, Rc::new(session.inventory()))));
         inventory.clone()
     }
+
+    /// What the list of objects calls an object or a light; `None` if it is not there.
+    pub fn label_of(&mut self, session: &Session, entity: Entity) -> Option<String> {
+        let inventory = self.inventory(session);
+        inventory.objects.iter().find(|entry| entry.entity == entity).map(|entry| entry.label.clone())
+    }
 }
 
 impl Default for PanelState {
