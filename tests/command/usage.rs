@@ -93,7 +93,7 @@ fn several_scenes_in_one_call() {
     }
     let before = std::fs::read_dir(path.join("out")).unwrap().count();
     for (line, why) in [
-        ("render cornell ball -o one.png", "not a folder"),
+        ("render cornell ball -o one.png", "no such folder"),
         ("render cornell ball -o out --film out/a.exr", "--film works with one scene only"),
         ("render cornell cornell -o out", "same file"),
         ("render cornell bal -o out", "did you mean `ball`?"),

@@ -232,7 +232,7 @@ fn mistakes_have_a_place_and_a_name() {
         (
             r#"object(name: "ball", property: scal, keys: [(0, 1)]),"#,
             at(44),
-            "unknown kind `scal` (did you mean `scale`?)",
+            "property `scal` (did you mean `scale`?)",
         ),
         (r#"object(name: "ball", property: scale, kes: [(0, 1)]),"#, at(51), "unknown field `kes`"),
         (r#"object(name: "ball", property: scale, keys: []),"#, at(51), "there are no keys"),
