@@ -74,6 +74,8 @@ pub struct Status {
     pub denoising: Denoising,
     /// Relative error of the denoised image, if that is displayed.
     pub denoised_error: Option<f64>,
+    /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
+    pub awaits_denoised: bool,
     /// Cause of the last restart.
     pub restart_cause: String,
     /// Number of restarts.

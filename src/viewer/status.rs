@@ -41,13 +41,15 @@ pub fn figures(status: &Status) -> String {
         (Denoising::Raw, None) => "",
         (Denoising::Raw, Some(_)) => "   raw, the better one",
         // Only at full resolution, and only once it is done, is an image denoised with a known error.
-        (Denoising::Denoised, None) if status.divider > 1 => "   smoothed",
-        (Denoising::Denoised, None) => "   smoothed, denoising…",
+        (Denoising::Denoised, None) => "   smoothed",
         (Denoising::Denoised, Some(_)) => "   denoised",
         (Denoising::Split, None) => "   raw | smoothed",
         (Denoising::Split, Some(_)) => "   raw | denoised",
     };
     line += shown;
+    if status.awaits_denoised {
+        line += if shown.is_empty() { "   denoising…" } else { ", denoising…" };
+    }
     if !status.restart_cause.is_empty() {
         write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
     }
@@ -175,8 +177,11 @@ mod tests {
         assert!(figures(&status).contains("   raw | denoised   "));
         status.denoised_error = None;
         assert!(figures(&status).contains("   raw | smoothed   "));
-        status.denoising = Denoising::Denoised;
+        (status.denoising, status.awaits_denoised) = (Denoising::Denoised, true);
         assert!(figures(&status).contains("   smoothed, denoising…   "));
+        status.denoising = Denoising::Raw;
+        assert!(figures(&status).contains("%   denoising…   "));
+        status.awaits_denoised = false;
         (status.denoising, status.denoised_error) = (Denoising::Raw, Some(0.03));
         assert!(figures(&status).contains("(denoised 3.0 %)   raw, the better one   "));
         status.done = true;

@@ -229,11 +229,7 @@ fn mistakes_have_a_place_and_a_name() {
     let at = |column: usize| format!("a.ron:{line}:{column}: ");
     let cases = [
         (r#"object(name: "bal", property: scale, keys: [(0, 1)]),"#, at(20), "no object `bal` (did you mean `ball`?)"),
-        (
-            r#"object(name: "ball", property: scal, keys: [(0, 1)]),"#,
-            at(44),
-            "property `scal` (did you mean `scale`?)",
-        ),
+        (r#"object(name: "ball", property: scal, keys: [(0, 1)]),"#, at(44), "property `scal` (did you mean `scale`?)"),
         (r#"object(name: "ball", property: scale, kes: [(0, 1)]),"#, at(51), "unknown field `kes`"),
         (r#"object(name: "ball", property: scale, keys: []),"#, at(51), "there are no keys"),
         (r#"object(name: "ball", property: scale, keys: [(0, 1), (0, 2)]),"#, at(67), "keys go forwards in time"),

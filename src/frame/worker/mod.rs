@@ -104,6 +104,8 @@ pub struct Stats {
     pub denoising: Denoising,
     /// Relative error of the denoised image, if that is displayed and known.
     pub denoised_error: Option<f64>,
+    /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
+    pub awaits_denoised: bool,
     /// Rays of the latest steps, and the time that they took in seconds.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,

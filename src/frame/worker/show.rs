@@ -90,8 +90,10 @@ impl Loop<'_> {
         (picture.inspection, picture.denoising, picture.legend) = (self.look.inspection, denoising, legend);
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
         picture.rgba = rgba;
-        (self.stats.denoising, self.stats.denoised_error) = (denoising, denoised_error);
         let divider = *divider;
+        let awaits_denoised = divider == 1 && self.wanted_denoising() != Denoising::Raw && denoised_error.is_none();
+        (self.stats.denoising, self.stats.denoised_error) = (denoising, denoised_error);
+        self.stats.awaits_denoised = awaits_denoised;
         if let Some(took) = smoothed.filter(|_| denoising != Denoising::Raw) {
             self.note_smoothing(divider, key, took);
         }
@@ -100,6 +102,7 @@ impl Loop<'_> {
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
             (outbox.stats.denoising, outbox.stats.denoised_error) = (denoising, denoised_error);
+            outbox.stats.awaits_denoised = awaits_denoised;
         }
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;
