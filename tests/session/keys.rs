@@ -1,12 +1,13 @@
 //! Keys that are set in a session: they are what was shown, can be undone, and are in the file that is saved.
 
+use crate::driver::Drive;
 use firstlight::frame::{Command, Edit, MessageKind, Property, Session, SessionOptions, Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::animation::{Interpolation, KeyValue, Shutter};
 use firstlight::scene::{Animation, Extraction, LoadOptions, Moment, Rendering, SceneInputs, SceneSource, load};
 use glam::DVec3;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 const STILL: &str = r#"(
     camera: (eye: (0, 1, 6), look_at: (0, 0.5, 0)),
@@ -24,6 +25,12 @@ struct Driver {
 
 const SPP: Target = Target { spp: Some(4), seconds: None, error: None };
 
+impl Drive for Driver {
+    fn session(&mut self) -> (&mut Session, Instant) {
+        (&mut self.session, self.start)
+    }
+}
+
 impl Driver {
     fn open(folder: &Path, name: &str, text: &str) -> Self {
         let path = folder.join(name);
@@ -37,26 +44,6 @@ impl Driver {
         driver.settle();
         driver.id = driver.inputs().objects[0].entity.to_bits();
         driver
-    }
-
-    fn frame(&mut self) {
-        self.session.update(self.start.elapsed());
-    }
-
-    #[track_caller]
-    fn run_until(&mut self, done: impl Fn(&Session) -> bool) {
-        let start = Instant::now();
-        self.frame();
-        while !done(&self.session) {
-            std::thread::sleep(Duration::from_millis(3));
-            assert!(start.elapsed() < Duration::from_secs(120), "nothing came: {:?}", self.session.status());
-            self.frame();
-        }
-    }
-
-    #[track_caller]
-    fn settle(&mut self) {
-        self.run_until(|session| session.status().done && session.is_idle());
     }
 
     /// Each in a frame of its own.

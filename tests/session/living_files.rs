@@ -1,5 +1,6 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
+use crate::driver::Drive;
 use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
 use firstlight::scene::{
     ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
@@ -37,6 +38,12 @@ struct Driver {
     start: Instant,
 }
 
+impl Drive for Driver {
+    fn session(&mut self) -> (&mut Session, Instant) {
+        (&mut self.session, self.start)
+    }
+}
+
 impl Driver {
     fn open(source: SceneSource, threads: usize, spp: u32) -> Self {
         let target = Target { spp: Some(spp), ..Target::default() };
@@ -44,26 +51,6 @@ impl Driver {
         let mut session = Session::new(options).unwrap();
         session.open(source);
         Self { session, start: Instant::now() }
-    }
-
-    fn frame(&mut self) {
-        self.session.update(self.start.elapsed());
-    }
-
-    #[track_caller]
-    fn run_until(&mut self, done: impl Fn(&Session) -> bool) {
-        let start = Instant::now();
-        self.frame();
-        while !done(&self.session) {
-            std::thread::sleep(Duration::from_millis(3));
-            assert!(start.elapsed() < Duration::from_secs(120), "nothing came: {:?}", self.session.status());
-            self.frame();
-        }
-    }
-
-    #[track_caller]
-    fn settle(&mut self) {
-        self.run_until(|session| session.status().done && session.is_idle());
     }
 
     fn said(&self, kind: MessageKind) -> Vec<String> {

@@ -1,5 +1,6 @@
 //! A session without a window: commands in, pictures and changes out.
 
+mod driver;
 mod edit;
 mod keys;
 mod lists;

@@ -9,6 +9,7 @@ use crate::scene::file::{AnimationPart, CameraPart};
 use crate::scene::inputs::{CameraInput, SceneInputs};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// Keys this near to each other are one, seconds: frames are at least 1e-4 s apart.
 const SAME_TIME: f64 = 1e-6;
@@ -165,8 +166,9 @@ fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> 
             new.push(NewKey { channel, before, value });
         }
     };
+    let objects: HashMap<_, _> = expected.objects.iter().map(|old| (old.entity, old)).collect();
     for object in &now.objects {
-        let Some(old) = expected.objects.iter().find(|old| old.entity == object.entity) else { continue };
+        let Some(old) = objects.get(&object.entity) else { continue };
         if old.placement == object.placement {
             continue;
         }
@@ -175,15 +177,17 @@ fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> 
             compare(channel, property.get(&old.placement), property.get(&object.placement));
         }
     }
+    let lights: HashMap<_, _> = expected.lights.iter().map(|old| (old.entity, old)).collect();
     for light in &now.lights {
-        let Some(old) = expected.lights.iter().find(|old| old.entity == light.entity) else { continue };
+        let Some(old) = lights.get(&light.entity) else { continue };
         for &property in LightProperty::ALL {
             let channel = Channel::Light(light.entity, property);
             compare(channel, property.get(&old.light, &old.placement), property.get(&light.light, &light.placement));
         }
     }
+    let materials: HashMap<_, _> = expected.materials.iter().map(|old| (old.entity, old)).collect();
     for material in &now.materials {
-        let Some(old) = expected.materials.iter().find(|old| old.entity == material.entity) else { continue };
+        let Some(old) = materials.get(&material.entity) else { continue };
         if old.material == material.material {
             continue;
         }

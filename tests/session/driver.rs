@@ -1,0 +1,31 @@
+//! Runs the frames of a session, as a window does.
+
+use firstlight::frame::Session;
+use std::time::{Duration, Instant};
+
+/// What has a session, and when that began.
+pub trait Drive {
+    fn session(&mut self) -> (&mut Session, Instant);
+
+    fn frame(&mut self) {
+        let (session, start) = self.session();
+        session.update(start.elapsed());
+    }
+
+    #[track_caller]
+    fn run_until(&mut self, done: impl Fn(&Session) -> bool) {
+        let start = Instant::now();
+        self.frame();
+        while !done(self.session().0) {
+            std::thread::sleep(Duration::from_millis(3));
+            let waits = start.elapsed() < Duration::from_secs(120);
+            assert!(waits, "nothing came: {:?}", self.session().0.status());
+            self.frame();
+        }
+    }
+
+    #[track_caller]
+    fn settle(&mut self) {
+        self.run_until(|session| session.status().done && session.is_idle());
+    }
+}
