@@ -99,8 +99,10 @@ extern "C" fn count_bytes(_: *mut c_void, bytes: isize, _: bool) -> bool {
 }
 
 impl Embree {
-    pub fn open(path: &str) -> Result<Self, String> {
+    /// Opens the library; `isa` is empty, or the part `,isa=...` of the device configuration.
+    pub fn open(path: &str, isa: &str) -> Result<Self, String> {
         let c_path = CString::new(path).map_err(|error| error.to_string())?;
+        let configuration = CString::new(format!("threads=1{isa}")).map_err(|error| error.to_string())?;
         // SAFETY: signatures as in rtcore.h of Embree 4; the library stays open until the program ends.
         unsafe {
             let library = dlopen(c_path.as_ptr(), 2);
@@ -120,7 +122,7 @@ impl Embree {
             let new_device: unsafe extern "C" fn(*const c_char) -> Handle = function!("rtcNewDevice");
             let monitor: unsafe extern "C" fn(Handle, extern "C" fn(*mut c_void, isize, bool) -> bool, *mut c_void) =
                 function!("rtcSetDeviceMemoryMonitorFunction");
-            let device = new_device(c"threads=1".as_ptr());
+            let device = new_device(configuration.as_ptr());
             monitor(device, count_bytes, null_mut());
             Ok(Self {
                 device,

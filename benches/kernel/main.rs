@@ -1,11 +1,13 @@
 //! How fast the ray kernel is, and how fast others are on the same rays.
 //!
 //! ```text
-//! cargo bench -p firstlight-benches --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--quick] [--small] [--crowd]
+//! cargo bench -p firstlight-benches --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--isa avx2] [--quick]
+//!     [--small] [--crowd]
 //! ```
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
 //! - `FIRSTLIGHT_EMBREE`: a libembree4 shared object to compare with (see `scripts/compare_embree.sh`).
+//! - `--isa avx2`: uses AVX2 where there is AVX-512, and Embree does too.
 //! - `FIRSTLIGHT_EMBREE_ROBUST`: if set, Embree builds its scenes with the robust flag.
 //!
 //! Times are CPU time of one thread (but for building on all threads: that is time on the wall), engines take turns in every round, and the figure is the median over the rounds
@@ -22,7 +24,7 @@ mod rays;
 mod small;
 
 use clock::{cpu_seconds, median};
-use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, SceneTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitBatch, InstructionSet, MeshTree, RayBatch, SceneTree, Shape};
 use glam::Affine3A;
 use rays::RaySet;
 use std::sync::Arc;
@@ -45,6 +47,8 @@ fn main() {
     let mut options =
         Options { filter: String::new(), class: String::new(), size: 384, rounds: 7, preset: BuildPreset::Best };
     let (mut only_small, mut only_crowd) = (false, false);
+    // A part of Embree's device configuration.
+    let mut isa = "";
     // Builds too run on this thread alone, whose clock is read.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
     let mut args = std::env::args().skip(1);
@@ -61,6 +65,11 @@ fn main() {
                 options.size = u32::max(size / 8 * 8, 8);
             }
             "--rounds" => options.rounds = args.next().and_then(|n| n.parse().ok()).expect("--rounds wants a number"),
+            "--isa" => {
+                assert_eq!(args.next().as_deref(), Some("avx2"), "--isa wants avx2");
+                assert!(InstructionSet::Avx2.set_default(), "this processor has no AVX2");
+                isa = ",isa=avx2";
+            }
             filter => options.filter = filter.to_string(),
         }
     }
@@ -75,7 +84,7 @@ fn main() {
         return;
     }
     #[cfg(unix)]
-    let embree = std::env::var("FIRSTLIGHT_EMBREE").ok().map(|path| embree::Embree::open(&path).unwrap());
+    let embree = std::env::var("FIRSTLIGHT_EMBREE").ok().map(|path| embree::Embree::open(&path, isa).unwrap());
     #[cfg(unix)]
     if embree.is_some() {
         println!("figures in ns a ray (x: how many times faster than Embree, one ray at a time)");

@@ -47,9 +47,10 @@ impl<B: LeafBlock> BlockTree<B> {
         Self { nodes, nodes8, blocks, compact, extent }
     }
 
-    /// Whether the tree exceeds the caches, so that prefetching pays.
+    /// Whether prefetching pays: nodes and blocks often come from main memory. What the second- or third-level cache
+    /// holds arrives in time without it, and the prefetched lines evict others from the first level.
     pub fn is_large(&self) -> bool {
-        self.block_bytes() > 1 << 20
+        self.block_bytes() > 8 << 20
     }
 
     pub fn bytes(&self) -> usize {

@@ -124,7 +124,7 @@ impl<R: LeafRay> LeafBlock for NoBlock<R> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ShearedRay {
     /// The two axes across the ray and the axis along it.
-    pub axes: [usize; 3],
+    pub axes: [u32; 3],
     /// The origin along these axes.
     pub origin: [f32; 3],
     pub sx: f32,
@@ -138,7 +138,13 @@ impl LeafRay for ShearedRay {
     #[inline(always)]
     fn new(ray: &Ray, shear: &Shear) -> Self {
         let axes = [shear.kx, shear.ky, shear.kz];
-        Self { axes, origin: axes.map(|k| ray.origin[k]), sx: shear.sx, sy: shear.sy, sz: shear.sz }
+        Self {
+            axes: axes.map(|k| k as u32),
+            origin: axes.map(|k| ray.origin[k]),
+            sx: shear.sx,
+            sy: shear.sy,
+            sz: shear.sz,
+        }
     }
 }
 
@@ -146,7 +152,7 @@ impl ShearedRay {
     /// Transforms sixteen points into the sheared frame.
     #[inline(always)]
     pub fn shear<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
-        let [kx, ky, kz] = self.axes;
+        let [kx, ky, kz] = self.axes.map(|k| k as usize);
         let origin = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let point = [s.load(&points[kx]), s.load(&points[ky]), s.load(&points[kz])];
         shear(s, point, origin, s.splat(self.sx), s.splat(self.sy))

@@ -389,7 +389,7 @@ impl<S: KernelSimd> MeshPacket<S> {
             let lane = mask.trailing_zeros() as usize % LANES;
             mask &= mask - 1;
             let ray = ShearedRay {
-                axes: group.axes,
+                axes: group.axes.map(|k| k as u32),
                 origin: [origin[0][lane], origin[1][lane], origin[2][lane]],
                 sx: sx[lane],
                 sy: sy[lane],

@@ -18,13 +18,25 @@ pub(super) struct Node8 {
     pub axes: u32,
     /// [`EMPTY`], the index of a node, or with [`LEAF`] set the first block of a leaf.
     pub children: [u32; 8],
-    /// For each octant of directions (bit `a` set: the direction is negative along axis `a`): in the low 24 bits the
-    /// children from far to near, three bits each; above them one byte per level from the root, whose bits mark the
-    /// children on the far side of their plane.
-    pub octants: [u64; 8],
 }
-// Two cache lines.
-const _: () = assert!(size_of::<Node8>() == 128);
+// One cache line.
+const _: () = assert!(size_of::<Node8>() == 64);
+
+/// A bit for each plane of a node.
+pub(super) const PLANES: u32 = 0x7F;
+
+/// The order of the children for each set of planes whose axis the ray descends: in the low 24 bits the children from
+/// far to near, three bits each; above them one byte per level from the root, whose bits mark the children on the far
+/// side of their plane.
+pub(super) static CHILD_ORDERS: [u64; 128] = {
+    let mut orders = [0; 128];
+    let mut down = 0;
+    while down < 128 {
+        orders[down] = child_order(down as u64);
+        down += 1;
+    }
+    orders
+};
 
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
@@ -45,39 +57,35 @@ impl Stack {
     pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
 }
 
-/// A ray in the layout that [`super::simd::KernelSimd::descend`] reads: `ray::TreeRay` padded so that a three-bit axis
-/// can index it, stored twice.
+/// A ray in the layout that [`super::simd::KernelSimd::descend`] reads: `ray::TreeRay` in rows of four.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
+#[repr(C, align(16))]
 pub(super) struct DescentRay {
-    pub origin: [[f32; 8]; 2],
-    /// Shortened reciprocals of the direction, and negated lengthened ones: multiplied by a distance they give the
-    /// earliest crossing and the negative of the latest.
-    pub inv: [[f32; 8]; 2],
+    pub origin: [f32; 3],
     pub padding: f32,
-    pub octant: usize,
-    /// The octant in whose order children are visited.
-    pub order: usize,
+    /// Shortened reciprocals of the direction: multiplied by a distance they give the earliest crossing.
+    pub inv_lo: [f32; 3],
+    /// [`PLANES`] if the far child is visited first, otherwise 0.
+    pub reversed: u32,
+    /// Negated lengthened reciprocals: multiplied by a distance they give the negative of the latest crossing.
+    pub minus_inv_hi: [f32; 3],
+    /// Distance beyond which nothing matters: that of the nearest hit.
+    pub end: f32,
 }
 
 impl DescentRay {
+    pub const IDLE: Self =
+        Self { origin: [0.0; 3], padding: 0.0, inv_lo: [0.0; 3], reversed: 0, minus_inv_hi: [0.0; 3], end: 0.0 };
+
     #[inline(always)]
-    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], padding: f32) -> Self {
-        let [x, y, z] = origin;
-        let origin = [[x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]; 2];
-        let down = |axis: usize| usize::from(inv_lo[axis].is_sign_negative()) << axis;
-        let inv = [
-            [inv_lo[0], inv_lo[1], inv_lo[2], 0.0, 0.0, 0.0, 0.0, 0.0],
-            [-inv_hi[0], -inv_hi[1], -inv_hi[2], 0.0, 0.0, 0.0, 0.0, 0.0],
-        ];
-        let octant = down(0) | down(1) | down(2);
-        Self { origin, inv, padding, octant, order: octant }
+    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], padding: f32, end: f32) -> Self {
+        Self { origin, padding, inv_lo, reversed: 0, minus_inv_hi: inv_hi.map(|inv| -inv), end }
     }
 
     /// Returns the ray with the far child visited first.
     #[inline(always)]
     pub fn far_first(self) -> Self {
-        Self { order: self.octant ^ 7, ..self }
+        Self { reversed: PLANES, ..self }
     }
 }
 
@@ -102,7 +110,7 @@ pub(super) fn collapse(tree: &KdNodes) -> Vec<Node8> {
 }
 
 fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
-    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
+    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8] };
     // The subtree at each position of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
     let mut plane = 0;
@@ -135,28 +143,29 @@ fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> 
             Node::Inner { .. } => make_child(index),
         };
     }
-    node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
     node
 }
 
-/// Returns the order of the children and their far sides for one octant.
+/// Returns the entry of [`CHILD_ORDERS`] for the planes that the ray descends.
 ///
 /// The rank of a child from the near end has one bit per level, 1 on the far side.
-fn octant_word(axes: u32, octant: usize) -> u64 {
-    let mut word = 0;
-    for child in 0..8u64 {
-        let (mut rank, mut plane) = (0, 0);
-        for depth in 0..3 {
+const fn child_order(down: u64) -> u64 {
+    let mut order = 0;
+    let mut child = 0;
+    while child < 8 {
+        let (mut rank, mut plane, mut depth) = (0, 0, 0);
+        while depth < 3 {
             let side = child >> (2 - depth) & 1;
-            let down = (octant >> (axes >> (3 * plane) & 7) & 1) as u64;
-            let far = side ^ down;
-            word |= far << (24 + 8 * depth + child);
+            let far = side ^ (down >> plane & 1);
+            order |= far << (24 + 8 * depth + child);
             rank = rank << 1 | far;
             plane = 2 * plane + 1 + side;
+            depth += 1;
         }
-        word |= child << (3 * (7 - rank));
+        order |= child << (3 * (7 - rank));
+        child += 1;
     }
-    word
+    order
 }
 
 /// Scalar reference of [`super::simd::KernelSimd::descend`].
@@ -172,21 +181,23 @@ pub(super) fn descend_plain(
     stack: &mut Stack,
     mut height: usize,
 ) -> usize {
-    let mut order = node.octants[ray.order];
+    let axis = |plane: usize| (node.axes >> (3 * plane) & 7) as usize;
+    let down: u32 = (0..7).map(|plane| u32::from(ray.inv_lo[axis(plane)].is_sign_negative()) << plane).sum();
+    let mut order = CHILD_ORDERS[(down ^ ray.reversed) as usize];
     for _ in 0..8 {
         let lane = (order & 7) as usize;
         order >>= 3;
         let (mut t0, mut t1) = (t0, t1);
         let mut plane = 0;
         for depth in 0..3 {
-            let axis = (node.axes >> (3 * plane) & 7) as usize;
-            let distance = node.splits[plane] - ray.origin[0][axis];
+            let axis = axis(plane);
+            let distance = node.splits[plane] - ray.origin[axis];
             let side = lane >> (2 - depth) & 1;
             // NaN, for a ray in the plane, bounds neither side.
-            if (side == 1) == (ray.octant >> axis & 1 == 1) {
-                t1 = f32::min(t1, ray.padding - distance * ray.inv[1][axis]);
+            if (side == 1) == (down >> plane & 1 == 1) {
+                t1 = f32::min(t1, ray.padding - distance * ray.minus_inv_hi[axis]);
             } else {
-                t0 = f32::max(t0, distance * ray.inv[0][axis] - ray.padding);
+                t0 = f32::max(t0, distance * ray.inv_lo[axis] - ray.padding);
             }
             plane = 2 * plane + 1 + side;
         }
@@ -225,8 +236,7 @@ mod tests {
         let cases: Vec<_> = (0..20_000)
             .map(|_| {
                 let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
-                let mut node =
-                    Node8 { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
+                let mut node = Node8 { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
                 (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
@@ -234,8 +244,7 @@ mod tests {
                     node.splits[2] = f32::INFINITY;
                 }
                 node.children = std::array::from_fn(|c| if next() % 5 == 0 { EMPTY } else { c as u32 * 7 });
-                node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
-                let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6);
+                let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6, f32::INFINITY);
                 let ray = if next() % 2 == 0 { ray } else { ray.far_first() };
                 (node, ray, 0.0, if next() % 2 == 0 { f32::INFINITY } else { 1.5 })
             })

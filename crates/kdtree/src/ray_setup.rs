@@ -156,7 +156,8 @@ impl RaySetup {
         let [lx, ly, lz] = &self.inv_lo;
         let [hx, hy, hz] = &self.inv_hi;
         let origin = [x[lane], y[lane], z[lane]];
-        DescentRay::new(origin, [lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]], self.padding[lane])
+        let (inv_lo, inv_hi) = ([lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]]);
+        DescentRay::new(origin, inv_lo, inv_hi, self.padding[lane], self.t[lane])
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! The x86 implementations of [`KernelSimd`].
 
 use super::KernelSimd;
-use crate::node8::{DescentRay, EMPTY, Node8, STACK, Stack};
+use crate::node8::{CHILD_ORDERS, DescentRay, EMPTY, Node8, PLANES, STACK, Stack};
 use firstlight_simd::{Avx2, Avx512, Mask};
 use std::arch::x86_64::*;
 
@@ -15,32 +15,36 @@ impl KernelSimd for Avx512 {
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
             let shifts = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(shifts), shifts);
             // The lower half holds entry times, the upper half negated exit times: then both are updated by a maximum.
-            let upper_half = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
             // Lane 7 holds the axes: no child refers to this plane.
             let splits = _mm256_load_ps(std::ptr::from_ref(node).cast());
             let splits = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(splits), splits);
             let axes = _mm512_srlv_epi32(_mm512_set1_epi32(node.axes as i32), shifts);
-            // Only the low three bits of each lane are its axis.
-            let axes = _mm512_ternarylogic_epi32::<0xF8>(upper_half, axes, _mm512_set1_epi32(7));
-            let origin = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.origin.as_ptr().cast()));
-            let inv = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.inv.as_ptr().cast()));
+            // The permutation within rows uses the low two bits of each lane, which are its axis.
+            let origin = _mm512_broadcast_f32x4(_mm_load_ps(ray.origin.as_ptr()));
+            let origin = _mm512_permutevar_ps(origin, axes);
+            let second_row = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4);
+            let axes = _mm512_ternarylogic_epi32::<0xF8>(second_row, axes, _mm512_set1_epi32(3));
+            let rows = _mm512_castps256_ps512(_mm256_loadu_ps(std::ptr::from_ref(&ray.inv_lo).cast()));
+            let inv = _mm512_permutexvar_ps(axes, rows);
+            let down = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(inv))) & PLANES;
             let times = _mm512_mul_ps(_mm512_sub_ps(splits, origin), inv);
             let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.padding));
             let root = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
             let middle = _mm512_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2, 9, 9, 9, 9, 10, 10, 10, 10);
             let bottom = _mm512_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6, 11, 11, 12, 12, 13, 13, 14, 14);
             // The far side gets a new entry, the near side a new exit.
-            let octant = node.octants[ray.octant & 7];
+            let far = CHILD_ORDERS[(down & PLANES) as usize];
             let bounds = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(t0), _mm512_set1_ps(-t1));
             // NaN as the first argument yields the second.
-            let mask = both_halves(octant >> 24);
+            let mask = both_halves(far >> 24);
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(root, times), bounds);
-            let mask = both_halves(octant >> 32);
+            let mask = both_halves(far >> 32);
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(middle, times), bounds);
-            let mask = both_halves(octant >> 40);
+            let mask = both_halves(far >> 40);
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(bottom, times), bounds);
-            let order = node.octants[ray.order & 7];
+            let order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
             let order = _mm512_srlv_epi32(_mm512_set1_epi32(order as i32), shifts);
+            let upper_half = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
             let order_twice = _mm512_ternarylogic_epi32::<0xF8>(upper_half, order, _mm512_set1_epi32(7));
             let bounds = _mm512_permutexvar_ps(order_twice, bounds);
             let first = _mm512_castps512_ps256(bounds);
@@ -83,21 +87,21 @@ impl KernelSimd for Avx2 {
             // Lane 7 holds the axes: no child refers to this plane.
             let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
             let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
-            let inv_lo = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[0].as_ptr()), axes);
-            let minus_inv_hi = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[1].as_ptr()), axes);
-            let origin = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.origin[0].as_ptr()), axes);
+            // The permutation within rows uses the low two bits of each lane, which are its axis.
+            let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.origin.as_ptr().cast()), axes);
+            let inv_lo = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.inv_lo.as_ptr().cast()), axes);
+            let minus_inv_hi = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.minus_inv_hi.as_ptr().cast()), axes);
             let padding = _mm256_set1_ps(ray.padding);
             let distance = _mm256_sub_ps(splits, origin);
             let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);
             let hi = _mm256_sub_ps(padding, _mm256_mul_ps(distance, minus_inv_hi));
             let (never, always) = (_mm256_set1_ps(f32::NEG_INFINITY), _mm256_set1_ps(f32::INFINITY));
             // Where the direction is negative, the upper side comes first.
-            let down = _mm256_castps_si256(inv_lo);
-            let down = _mm256_castsi256_ps(_mm256_srai_epi32::<31>(down));
-            let lower_t0 = _mm256_blendv_ps(never, lo, down);
-            let upper_t0 = _mm256_blendv_ps(lo, never, down);
-            let lower_t1 = _mm256_blendv_ps(hi, always, down);
-            let upper_t1 = _mm256_blendv_ps(always, hi, down);
+            let lower_t0 = _mm256_blendv_ps(never, lo, inv_lo);
+            let upper_t0 = _mm256_blendv_ps(lo, never, inv_lo);
+            let lower_t1 = _mm256_blendv_ps(hi, always, inv_lo);
+            let upper_t1 = _mm256_blendv_ps(always, hi, inv_lo);
+            let down = _mm256_movemask_ps(inv_lo) as u32;
             // For each child its plane at each level, and which children are on the upper side.
             let root = _mm256_setzero_si256();
             let middle = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
@@ -111,7 +115,8 @@ impl KernelSimd for Avx2 {
             last = _mm256_min_ps(sides::<0b1111_0000>(lower_t1, root, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1100_1100>(lower_t1, middle, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1010_1010>(lower_t1, bottom, upper_t1), last);
-            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.octants[ray.order & 7] as i32), shifts);
+            let order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
+            let order = _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), shifts);
             let first = _mm256_permutevar8x32_ps(first, order);
             let last = _mm256_permutevar8x32_ps(last, order);
             let children = _mm256_permutevar8x32_epi32(_mm256_load_si256(node.children.as_ptr().cast()), order);
