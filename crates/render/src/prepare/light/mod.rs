@@ -13,6 +13,7 @@ mod sample_simd;
 mod selection;
 pub(crate) mod shape;
 mod tree;
+mod tree_build;
 mod tree_simd;
 
 use crate::core::delta_light::DeltaLight;

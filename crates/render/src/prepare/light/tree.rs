@@ -3,21 +3,11 @@
 //! Every node has a bounding sphere of its lights, a cone of their normals, and their power. From the root down, one of
 //! two children is selected in proportion to a bound on its contribution: power over distance squared, times the
 //! largest cosines at both ends (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree
-//! Splitting", without the splitting). The tree is built by their cost, surface area times orientation. Descending to a
+//! Splitting", without the splitting). `tree_build` builds it. Descending to a
 //! given light gives the exact probability of its selection.
 
-use crate::prepare::light::delta::{EVERYTHING, FAR};
-use crate::prepare::light::emitter::Light;
-use crate::prepare::light::shape::LightShape;
-use firstlight_kdtree::geometry::Aabb;
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
-use std::f32::consts::{FRAC_PI_2, PI};
-
-/// Depth from which on nodes are split by count, so that the path to a light fits into 64 bits.
-const MAX_UNEVEN_DEPTH: u32 = 32;
-
-const BINS: usize = 12;
 
 #[derive(Debug, Default)]
 pub(crate) struct LightTree {
@@ -48,63 +38,7 @@ pub(crate) struct LightNode {
 
 pub(crate) const LEAF: u32 = 1 << 31;
 
-/// A light in the builder.
-#[derive(Clone, Copy)]
-struct LightItem {
-    bounds: Aabb,
-    cone: Cone,
-    power: f32,
-    least_cos: f32,
-    id: u32,
-    /// Whether it is a directional light.
-    is_far: bool,
-}
-
-/// Directions within `spread` radians of a unit axis.
-#[derive(Clone, Copy)]
-struct Cone {
-    axis: Vec3,
-    spread: f32,
-}
-
 impl LightTree {
-    /// Requires at least two lights.
-    pub fn build(lights: &[Light]) -> Self {
-        let mut items: Vec<LightItem> = (0..).zip(lights).map(|(id, light)| LightItem::new(id, light)).collect();
-        let has_spots = items.iter().any(|item| item.least_cos >= 0.0);
-        let (nodes, ways) = (Vec::with_capacity(2 * lights.len()), vec![0; lights.len()]);
-        let mut tree = Self { nodes, ways, has_spots };
-        tree.nodes.push(LightNode::new(&items));
-        tree.split(0, &mut items, 0, 0);
-        tree
-    }
-
-    fn split(&mut self, at: usize, items: &mut [LightItem], depth: u32, way: u64) {
-        if let [only] = items {
-            self.nodes[at].link = LEAF | only.id;
-            self.ways[only.id as usize] = way;
-            return;
-        }
-        let some_are_far = items.iter().any(|item| item.is_far) && !items.iter().all(|item| item.is_far);
-        let middle = match (depth < MAX_UNEVEN_DEPTH && !some_are_far).then(|| best_split(items)).flatten() {
-            Some((axis, limit)) => partition(items, |item| item.middle()[axis] < limit),
-            // They would make the bounding box infinite.
-            None if some_are_far => partition(items, |item| item.is_far),
-            None => {
-                let all = Aabb::from_points(items.iter().map(LightItem::middle));
-                let axis = (all.max - all.min).max_position();
-                items.sort_unstable_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]).then(a.id.cmp(&b.id)));
-                items.len() / 2
-            }
-        };
-        let (below, above) = items.split_at_mut(middle);
-        let first = self.nodes.len();
-        self.nodes[at].link = first as u32;
-        self.nodes.extend([LightNode::new(below), LightNode::new(above)]);
-        self.split(first, below, depth + 1, way);
-        self.split(first + 1, above, depth + 1, way | 1 << depth);
-    }
-
     /// Selects a light; returns it and the probability of the choice; `None` if none can reach the point.
     pub fn sample(&self, position: Vec3, normal: Vec3, mut u: f32) -> Option<(u32, f32)> {
         let (mut node, mut pmf) = (self.nodes[0], 1.0);
@@ -150,25 +84,6 @@ impl LightTree {
         let (offset, least_cos) = ((center - position).into(), self.has_spots.then_some(least_cos));
         let bound = NodeBound { offset, radius, axis: axis.into(), widening, power, least_cos };
         bound.irradiance((normal != Vec3::ZERO).then(|| normal.into()))
-    }
-}
-
-impl LightNode {
-    fn new(items: &[LightItem]) -> Self {
-        let bounds = items.iter().fold(Aabb::EMPTY, |all, item| all.union(item.bounds));
-        let cone = items[1..].iter().fold(items[0].cone, |all, item| all.union(item.cone));
-        let center = 0.5 * (bounds.min + bounds.max);
-        Self {
-            center,
-            // Both with a margin, so that rounding excludes nothing.
-            radius: 0.5 * (bounds.max - bounds.min).length() * (1.0 + 8.0 * f32::EPSILON)
-                + 4.0 * f32::EPSILON * center.length(),
-            axis: cone.axis,
-            widening: 2.0 * (0.5 * cone.spread).sin() + 1e-5,
-            power: items.iter().map(|item| item.power).sum(),
-            least_cos: items.iter().map(|item| item.least_cos).fold(1.0, f32::min),
-            link: 0,
-        }
     }
 }
 
@@ -230,151 +145,13 @@ pub(crate) fn step_down<R: Real>([first, second]: [R; 2], u: R) -> (R::Mask, R, 
     (take, part, rest)
 }
 
-impl LightItem {
-    fn new(id: u32, light: &Light) -> Self {
-        let everywhere = Cone { axis: Vec3::Z, spread: PI };
-        let (bounds, cone, facing) = match light.shape {
-            LightShape::Sphere { center, radius } => {
-                (Aabb { min: center - radius, max: center + radius }, everywhere, 0.25)
-            }
-            LightShape::Quad { corner, edge_u, edge_v, normal, .. } => {
-                let corners = [corner, corner + edge_u, corner + edge_v, corner + edge_u + edge_v];
-                (Aabb::from_points(corners), Cone { axis: normal, spread: 0.0 }, 1.0)
-            }
-            LightShape::Triangle { vertices, normal, .. } => {
-                (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
-            }
-            LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
-            // Its rays deviate from the axis by at most 90°, and those near it are the brightest: like those of a flat
-            // light.
-            LightShape::Point { position, cone: Some(spot) } => {
-                (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
-            }
-            LightShape::Directional { .. } => {
-                let (center, size) = (light.shape.center(), Vec3::splat(EVERYTHING));
-                (Aabb { min: center - size, max: center + size }, everywhere, 0.0)
-            }
-        };
-        // A light with mean radiance 0 may still emit somewhere: its power is positive.
-        let is_far = matches!(light.shape, LightShape::Directional { .. });
-        let least_cos = match light.shape {
-            LightShape::Point { cone: Some(spot), .. } => 1.0 - spot.outer,
-            _ => -1.0,
-        };
-        let power = if is_far { FAR * FAR } else { light.shape.area() * facing };
-        let power = (light.mean_radiance * power).max(f32::MIN_POSITIVE);
-        Self { bounds, cone, power, least_cos, id, is_far }
-    }
-
-    fn middle(&self) -> Vec3 {
-        0.5 * (self.bounds.min + self.bounds.max)
-    }
-}
-
-impl Cone {
-    fn union(self, other: Self) -> Self {
-        let (wide, narrow) = if self.spread >= other.spread { (self, other) } else { (other, self) };
-        if wide.spread >= PI {
-            return wide;
-        }
-        let between = wide.axis.angle_between(narrow.axis);
-        if between + narrow.spread <= wide.spread {
-            return wide;
-        }
-        let spread = 0.5 * (wide.spread + between + narrow.spread);
-        let across = wide.axis.cross(narrow.axis);
-        if spread >= PI || across.length_squared() < 1e-12 {
-            return Self { axis: wide.axis, spread: PI };
-        }
-        let turn = glam::Quat::from_axis_angle(across.normalize(), spread - wide.spread);
-        // Rotation rounds.
-        Self { axis: (turn * wide.axis).normalize(), spread: spread + 1e-5 }
-    }
-
-    /// Solid angle of the lights' emission, weighted by cosine beyond the cone (Conty and Kulla, section 4.4).
-    fn measure(self) -> f32 {
-        let (o, w) = (self.spread, (self.spread + FRAC_PI_2).min(PI));
-        2.0 * PI * (1.0 - o.cos()) + FRAC_PI_2 * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos())
-    }
-}
-
-/// One side of a split; its cost is power times area times orientation.
-#[derive(Clone, Copy)]
-struct Half {
-    bounds: Aabb,
-    cone: Option<Cone>,
-    power: f32,
-}
-
-impl Half {
-    const EMPTY: Self = Self { bounds: Aabb::EMPTY, cone: None, power: 0.0 };
-
-    fn with(self, other: Self) -> Self {
-        let cone = match (self.cone, other.cone) {
-            (Some(a), Some(b)) => Some(a.union(b)),
-            (a, b) => a.or(b),
-        };
-        Self { bounds: self.bounds.union(other.bounds), cone, power: self.power + other.power }
-    }
-
-    fn cost(self) -> f32 {
-        let Some(cone) = self.cone else { return 0.0 };
-        let size = self.bounds.max - self.bounds.min;
-        let area = size.x * size.y + size.y * size.z + size.z * size.x;
-        self.power * area * cone.measure()
-    }
-}
-
-/// Returns axis and limit of the centres; `None` if all centres are equal, or no split has a lower cost.
-fn best_split(items: &[LightItem]) -> Option<(usize, f32)> {
-    let middles = Aabb::from_points(items.iter().map(LightItem::middle));
-    let size = middles.max - middles.min;
-    let mut best: Option<(f32, usize, f32)> = None;
-    for axis in 0..3 {
-        if !(size[axis] > 0.0) {
-            continue;
-        }
-        let mut bins = [Half::EMPTY; BINS];
-        for item in items {
-            let place = (item.middle()[axis] - middles.min[axis]) / size[axis] * BINS as f32;
-            let bin = &mut bins[(place as usize).min(BINS - 1)];
-            *bin = bin.with(Half { bounds: item.bounds, cone: Some(item.cone), power: item.power });
-        }
-        // Long boxes are preferably split across.
-        let slimness = size.max_element() / size[axis];
-        let mut above = [Half::EMPTY; BINS];
-        for i in (0..BINS - 1).rev() {
-            above[i] = above[i + 1].with(bins[i + 1]);
-        }
-        let mut below = Half::EMPTY;
-        for i in 0..BINS - 1 {
-            below = below.with(bins[i]);
-            if below.cone.is_none() || above[i].cone.is_none() {
-                continue;
-            }
-            let cost = slimness * (below.cost() + above[i].cost());
-            if best.is_none_or(|(least, ..)| cost < least) {
-                best = Some((cost, axis, middles.min[axis] + size[axis] * ((i + 1) as f32 / BINS as f32)));
-            }
-        }
-    }
-    let (_, axis, limit) = best?;
-    // Rounding may put all of them on one side.
-    let n_below = items.iter().filter(|item| item.middle()[axis] < limit).count();
-    (0 < n_below && n_below < items.len()).then_some((axis, limit))
-}
-
-/// Moves the items for which `is_below` holds to the front, in order; returns their number.
-fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> usize {
-    items.sort_by_key(|item| !is_below(item));
-    items.partition_point(is_below)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::core::material_queries::Emission;
     use crate::core::techniques::Techniques;
+    use crate::prepare::light::emitter::Light;
+    use crate::prepare::light::shape::LightShape;
     use crate::prepare::light::tree_simd::LightTreeArrays;
     use crate::sampling::Sampler;
     use crate::test_statistics::ChiSquared;
