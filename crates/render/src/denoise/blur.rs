@@ -5,6 +5,8 @@ use rayon::prelude::*;
 
 /// Radius in pixels of the two box filters that average variance and difference of raw and filtered image.
 pub(super) const RADIUS: usize = 2;
+/// Number of pixels that these two average: one over the sum of the squares of their weights.
+pub(super) const N_AVERAGED: f32 = 54.0;
 
 /// Applies a box filter of `2 * radius + 1` pixels per side twice, which is nearly a Gaussian. At the border the box is
 /// cut.

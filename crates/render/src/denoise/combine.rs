@@ -1,22 +1,20 @@
 //! Combination of the raw and the filtered image per pixel.
 //!
-//! Raw and filtered values are mixed by James–Stein shrinkage (1961): the filtered share is the expected variance
-//! divided by the squared difference between both. Where the filter is unbiased, the two differ by noise alone and the
-//! filter dominates; where it is biased, they differ by more than the noise, which vanishes with more samples. So the
-//! result converges to the same limit as the raw image, and is nowhere worse than it if the variance is known to a
-//! factor of two.
+//! Raw and filtered values are mixed by James–Stein shrinkage (1961): the filtered share is the variance divided by the
+//! sum of variance and squared bias. Where the filter is unbiased, the two images differ by noise alone and the filter
+//! dominates; where it is biased, their squared difference exceeds the variance, which vanishes with more samples. So
+//! the result converges to the same limit as the raw image.
+//!
+//! Squared difference and variance are local means over few pixels with one or three degrees of freedom each, and as
+//! uncertain as that: what exceeds the variance counts as bias as far as it is significant.
 
 use super::Denoised;
 use super::blur::{RADIUS, smooth_apart};
 use super::input::DenoiseInput;
-use super::noise::{Filtered, Noise};
+use super::noise::{Filtered, Noise, squared_bias};
 use super::risk::error_of;
 use glam::Vec3;
 use rayon::prelude::*;
-
-/// Share of the squared difference that is replaced by its expectation for an unbiased filter: the local mean of
-/// squared differences is noisy itself, and where it is large at random, grains of noise would remain.
-const TRUST: f32 = 0.4;
 
 pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered) -> Denoised {
     let n = input.n_pixels();
@@ -33,11 +31,14 @@ pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered) 
     });
     let share: Vec<f32> = (0..n)
         .map(|i| {
-            let gain = variance[i] - own[i];
-            (gain / ((1.0 - TRUST) * difference[i] + TRUST * gain).max(1e-12)).clamp(0.0, 1.0)
+            let gain = (variance[i] - own[i]).max(0.0);
+            let bias = squared_bias(difference[i], variance[i], own[i]);
+            (gain / (gain + bias).max(1e-12)).clamp(0.0, 1.0)
         })
         .collect();
-    let color = (0..n).map(|i| input.color[i].lerp(filtered.color[i], share[i])).collect();
+    // Where the filter is trusted, what is left of the raw value has no fireflies.
+    let combined = |i: usize| (input.color[i] - share[i] * noise.excess[i]).lerp(filtered.color[i], share[i]);
+    let color = (0..n).map(combined).collect();
     let (error, error_95) = error_of(input, noise, filtered, &share);
     Denoised { color, share, error, error_95 }
 }

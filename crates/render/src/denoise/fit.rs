@@ -1,12 +1,17 @@
 //! The best linear function of the features in one window, and its error.
 
 use super::moments::{Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product};
+use super::noise::significant_part;
 use glam::Vec3;
 use rayon::prelude::*;
 
 /// Lower limit of the squared misfit of light over albedo: a fit without noise and misfit in its window is still
 /// uncertain for pixels with other features.
 const LEAST_MISFIT: f32 = 1e-4;
+
+/// Share of the squared distance from the mean features by which misfit grows: it is not noise, and much of it comes from
+/// places with features like those of the pixel.
+const MISFIT_BY_DISTANCE: f32 = 0.1;
 
 /// Light as a linear function of the features, by ridge regression in a window.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +54,8 @@ impl Fit {
     /// Returns the expected squared error of a prediction, which grows with the distance of the features from the
     /// window's mean.
     pub fn expected_error(&self, prediction: &Prediction) -> f32 {
-        (self.misfit + LEAST_MISFIT) * prediction.distance + self.noise * prediction.leverage()
+        let of_misfit = 1.0 + MISFIT_BY_DISTANCE * (prediction.distance - 1.0);
+        (self.misfit + LEAST_MISFIT) * of_misfit + self.noise * prediction.leverage()
     }
 
     /// - `features`: with the position relative to the centre of the window's central block.
@@ -77,11 +83,16 @@ pub(super) struct Fits {
 
 impl Fits {
     /// Fits all windows; `stop` is called once per row of windows; `None` if it returned true.
-    pub fn of(blocks: &Blocks, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+    ///
+    /// - `significance`: standard deviations by which residuals must exceed the noise to be taken for misfit.
+    pub fn of(blocks: &Blocks, significance: f32, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let ridge = ridge(blocks.level);
         let rows: Option<Vec<Vec<Fit>>> = (0..blocks.height)
             .into_par_iter()
-            .map(|y| (!stop()).then(|| (0..blocks.width).map(|x| solve(&blocks.window(x, y), &ridge)).collect()))
+            .map(|y| {
+                (!stop())
+                    .then(|| (0..blocks.width).map(|x| solve(&blocks.window(x, y), &ridge, significance)).collect())
+            })
             .collect();
         let fits = rows?.into_iter().flatten().collect();
         Some(Self { level: blocks.level, width: blocks.width, height: blocks.height, fits })
@@ -114,16 +125,17 @@ impl Fits {
     }
 }
 
-/// Returns the ridge term per feature, added to its variance: much smaller differences are ignored.
+/// Returns the ridge term per feature, added to its variance: much smaller differences are ignored. Above the rounding
+/// errors of the sums.
 fn ridge(level: u32) -> [f32; N_FEATURES] {
     let side = (1u32 << level) as f32;
-    let place = 0.02 * side * side;
-    [3e-3, 3e-3, 3e-3, 1e-6, place, place, 1e-3]
+    let place = 6e-4 * side * side;
+    [3e-5, 3e-5, 3e-5, 3e-7, place, place, 1e-5]
 }
 
 // Indices as in the formulas, which use rows and columns at once.
 #[allow(clippy::needless_range_loop)]
-fn solve(sums: &Sums, ridge: &[f32; N_FEATURES]) -> Fit {
+fn solve(sums: &Sums, ridge: &[f32; N_FEATURES], significance: f32) -> Fit {
     let inverse_weight = 1.0 / sums[WEIGHT].max(1e-20);
     let inverse_count = 1.0 / sums[COUNT].max(1.0);
     let mean: [f32; N_FEATURES] = std::array::from_fn(|i| sums[FEATURE + i] * inverse_weight);
@@ -183,12 +195,14 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES]) -> Fit {
     // Share of the noise that is left in the residuals.
     let left = (1.0 - freedom * inverse_count).max(0.1);
     let noise = sums[VARIANCE] * inverse_weight;
+    // Both are means over the degrees of freedom that are left.
+    let deviation = (residual + noise * left) / (sums[COUNT] - freedom).max(2.0).sqrt();
     Fit {
         mean,
         precision,
         light,
         slope,
-        misfit: (residual - noise * left).max(0.0),
+        misfit: significant_part((residual - noise * left).max(0.0), significance * deviation),
         noise,
         unbias: 1.0 / left,
         inverse_count,

@@ -1,5 +1,6 @@
 //! The noise of the raw image, and how much of it a filter passes on.
 
+use super::blur::N_AVERAGED;
 use super::input::DenoiseInput;
 use crate::sampling::hash_u32;
 use glam::Vec3;
@@ -11,6 +12,8 @@ pub(super) struct Noise {
     pub variance: Vec<Vec3>,
     /// Whether a pixel or a neighbour shows an emitter.
     pub at_emitters: Vec<bool>,
+    /// What fireflies have more of than usual samples, radiance of each pixel; see [`super::limit`].
+    pub excess: Vec<Vec3>,
 }
 
 /// A filtered image.
@@ -19,10 +22,36 @@ pub(super) struct Filtered {
     pub color: Vec<Vec3>,
     /// Covariance of raw and filtered value, per channel: the part of the noise that is common to both; noisy.
     pub covariance: Vec<Vec3>,
+    /// What the filter's own model cannot explain of its input, squared, per channel: a sign of bias.
+    pub misfit: Vec<Vec3>,
+}
+
+/// Standard deviations by which the squared difference must exceed its expectation to be taken for bias. With less, grains
+/// of noise would remain wherever it is large at random.
+const SIGNIFICANCE: f32 = 3.0;
+
+/// Returns what is likely to be the squared bias of the filter.
+///
+/// - `difference`: of raw and filtered value, squared, local mean; `variance`: of the raw value; `own`: covariance of both.
+pub(super) fn squared_bias(difference: f32, variance: f32, own: f32) -> f32 {
+    let excess = (difference - variance + own).max(0.0);
+    // Without bias it is a mean of products of the errors of both halves.
+    let deviation = (difference + variance) / N_AVERAGED.sqrt();
+    significant_part(excess, SIGNIFICANCE * deviation)
+}
+
+/// Returns the part of an excess that is hardly random: nearly all of it far above its standard deviation, next to nothing
+/// far below.
+pub(super) fn significant_part(excess: f32, deviation: f32) -> f32 {
+    let square = excess * excess;
+    square * excess / (square + deviation * deviation).max(1e-30)
 }
 
 /// Size of the probe's change of the image, relative to its noise: small enough for a filter to be nearly linear in it.
 const PROBE: f32 = 0.25;
+
+/// Misfit of a filter about which nothing is known, relative to the variance of its result.
+const MISFIT_PER_VARIANCE: f32 = 1.2;
 
 impl Noise {
     /// Applies a filter about which nothing is known; `None` if it fails or is stopped.
@@ -46,7 +75,10 @@ impl Noise {
         let color = filter(input.color)?;
         let changed: Vec<Vec3> = (0..n).into_par_iter().map(|i| input.color[i] + PROBE * noise(i)).collect();
         let of_changed = filter(&changed)?;
-        let covariance = (0..n).into_par_iter().map(|i| (of_changed[i] - color[i]) * noise(i) / PROBE).collect();
-        Some(Filtered { color, covariance })
+        let covariance: Vec<Vec3> =
+            (0..n).into_par_iter().map(|i| (of_changed[i] - color[i]) * noise(i) / PROBE).collect();
+        // Good filters let bias and variance grow alike.
+        let misfit = covariance.iter().map(|covariance| MISFIT_PER_VARIANCE * *covariance).collect();
+        Some(Filtered { color, covariance, misfit })
     }
 }

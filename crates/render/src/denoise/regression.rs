@@ -12,6 +12,7 @@
 use super::blur::blur;
 use super::fit::Fits;
 use super::input::DenoiseInput;
+use super::limit::limit;
 use super::moments::{Blocks, N_FEATURES, Samples};
 use super::noise::{Filtered, Noise};
 use glam::Vec3;
@@ -23,6 +24,8 @@ pub(super) struct Candidate {
     pub color: Vec<Vec3>,
     /// Weight of each pixel's own value in its filtered value, 0..1.
     pub own: Vec<f32>,
+    /// Mean squared misfit of the windows, of light over albedo, sum over channels.
+    pub misfit: Vec<f32>,
 }
 
 /// Both candidates, and the noise of the raw image.
@@ -34,8 +37,9 @@ pub(super) struct Regression {
 
 /// Number of window sizes: 3 · 2ᵏ pixels for k in 1..=5.
 const N_LEVELS: u32 = 5;
-/// Number of small window sizes.
-const N_SMALL: u32 = 2;
+/// Standard deviations by which residuals must exceed the noise to be taken for misfit, if the noise is known apart from
+/// them.
+const SIGNIFICANCE: f32 = 3.0;
 /// Lower limit of the albedo as a divisor, so that light that dark surfaces reflect independently of it is not
 /// amplified.
 const LEAST_ALBEDO: f32 = 0.04;
@@ -45,22 +49,25 @@ const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 /// Returns `None` if `stop`, which is called once per row, returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Regression> {
     let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
+    // Without halves the noise is that of the residuals.
+    let (significance, n_small) = if input.half_steps.is_some() { (SIGNIFICANCE, 1) } else { (0.0, 2) };
     let mut levels = Vec::new();
     loop {
-        levels.push(Fits::of(&blocks, stop)?);
+        levels.push(Fits::of(&blocks, significance, stop)?);
         if blocks.level == N_LEVELS || blocks.width.max(blocks.height) == 1 {
             break;
         }
         blocks = blocks.coarser();
     }
-    let rows: Option<Vec<Vec<[(Vec3, f32); 2]>>> = (0..input.height)
+    let rows: Option<Vec<Vec<[Predicted; 2]>>> = (0..input.height)
         .into_par_iter()
-        .map(|y| (!stop()).then(|| (0..input.width).map(|x| predict(&samples, &levels, x, y)).collect()))
+        .map(|y| (!stop()).then(|| (0..input.width).map(|x| predict(&samples, &levels, n_small, x, y)).collect()))
         .collect();
-    let predicted: Vec<[(Vec3, f32); 2]> = rows?.into_iter().flatten().collect();
+    let predicted: Vec<[Predicted; 2]> = rows?.into_iter().flatten().collect();
     let candidate = |k: usize| Candidate {
-        color: predicted.iter().zip(&albedo).map(|(of, albedo)| (of[k].0 * *albedo).max(Vec3::ZERO)).collect(),
-        own: predicted.iter().map(|of| of[k].1.min(1.0)).collect(),
+        color: predicted.iter().zip(&albedo).map(|(of, albedo)| (of[k].light * *albedo).max(Vec3::ZERO)).collect(),
+        own: predicted.iter().map(|of| of[k].own.min(1.0)).collect(),
+        misfit: predicted.iter().map(|of| of[k].misfit).collect(),
     };
     Some(Regression { candidates: [candidate(0), candidate(1)], noise })
 }
@@ -85,18 +92,19 @@ impl Start {
         let at_emitters = near(input, |pixel| guides.emitters[pixel]);
         let albedo: Vec<Vec3> = guides.albedo.iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
         let mut samples = samples(input, &albedo, &at_emitters);
+        let excess = limit(input, &albedo, &at_emitters, &mut samples);
         let mut blocks = Blocks::finest(&samples);
         let n = input.n_pixels();
         let variance = match input.half_steps {
             Some(halves) => (0..n).map(|i| halves.variance(i)).collect(),
             None => {
                 // The only estimate of the noise is the residual of small windows.
-                samples.variance = residuals(&samples, &Fits::of(&blocks, stop)?, stop)?;
+                samples.variance = residuals(&samples, &Fits::of(&blocks, 0.0, stop)?, stop)?;
                 blocks = Blocks::finest(&samples);
                 (0..n).map(|i| samples.variance[i] / 3.0 * albedo[i] * albedo[i]).collect()
             }
         };
-        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters } })
+        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess } })
     }
 }
 
@@ -165,13 +173,29 @@ fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -
     Some(rows?.into_iter().flatten().collect())
 }
 
-/// Returns light over albedo of a pixel and the weight of its own value in it: from all windows, and from small ones.
+/// The weighted mean over windows at one pixel.
+#[derive(Clone, Copy)]
+struct Predicted {
+    /// Light over albedo.
+    light: Vec3,
+    /// Weight of the pixel's own value in it.
+    own: f32,
+    misfit: f32,
+}
+
+/// Returns the mean over all windows that contain a pixel, and over the small ones.
+///
+/// - `n_small`: number of window sizes that count as small.
 #[inline(always)]
-fn predict(samples: &Samples, levels: &[Fits], x: usize, y: usize) -> [(Vec3, f32); 2] {
+fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize) -> [Predicted; 2] {
     let pixel = y * samples.width + x;
     let features: &[f32; N_FEATURES] = &samples.features[pixel];
-    let (mut light, mut own, mut total) = (Vec3::ZERO, 0.0, 0.0);
-    let mut small = (Vec3::ZERO, 0.0);
+    let (mut light, mut own, mut misfit, mut total) = (Vec3::ZERO, 0.0, 0.0, 0.0);
+    let mean = |light: Vec3, own: f32, misfit: f32, total: f32| {
+        let total = total.max(1e-30);
+        Predicted { light: light / total, own: own / total, misfit: misfit / total }
+    };
+    let mut small = mean(light, own, misfit, total);
     for fits in levels {
         fits.around(x, y, features, |fit, features, nearness| {
             let prediction = fit.predict(features);
@@ -179,13 +203,14 @@ fn predict(samples: &Samples, levels: &[Fits], x: usize, y: usize) -> [(Vec3, f3
             let weight = nearness / (error * error);
             light += weight * prediction.light;
             own += weight * prediction.leverage() * samples.weight[pixel] / fit.mean_weight.max(1e-20);
+            misfit += weight * fit.misfit;
             total += weight;
         });
-        if fits.level <= N_SMALL {
-            small = (light / total.max(1e-30), own / total.max(1e-30));
+        if fits.level <= n_small {
+            small = mean(light, own, misfit, total);
         }
     }
-    [(light / total.max(1e-30), own / total.max(1e-30)), small]
+    [mean(light, own, misfit, total), small]
 }
 
 /// Blends both candidates per pixel, with weights that favour the smaller estimated risk (SURE, Stein 1981: the risk of
@@ -212,8 +237,13 @@ pub(super) fn pick(input: &DenoiseInput, found: &Regression) -> Filtered {
     };
     let share = smooth((0..n).into_par_iter().map(share).collect());
     let own = |i: usize| small.own[i] + (all.own[i] - small.own[i]) * share[i];
+    let misfit = |i: usize| {
+        let albedo = input.guides.albedo[i];
+        (small.misfit[i] + (all.misfit[i] - small.misfit[i]) * share[i]) / 3.0 * albedo * albedo
+    };
     Filtered {
         color: (0..n).map(|i| small.color[i].lerp(all.color[i], share[i])).collect(),
         covariance: (0..n).map(|i| own(i) * found.noise.variance[i]).collect(),
+        misfit: (0..n).map(misfit).collect(),
     }
 }

@@ -5,26 +5,31 @@
 //! known to some tenths only, and wherever the combination has chosen by the same difference, it is too small. So
 //! variance and bias are estimated apart:
 //!
-//! - The variance of the filtered value is its covariance with the raw value, as for all projections.
-//! - Its squared bias is what differs from the raw value by more than noise can, and at least half of its variance:
-//!   windows are weighted by expected squared error, and where that is least, the squared bias of a first-order fit is
-//!   half of the variance, even if too small to be seen.
-//! - The variance of the raw value is averaged over a wide neighbourhood: the narrow one has decided the shares, which
-//!   are raw where its variance is too small at random.
+//! - The variance of the filtered value follows from its covariance with the raw value. For a projection they are equal;
+//!   a mean of projections over several windows has less.
+//! - Its squared bias is what differs from the raw value by more than noise can, and a part of the misfit of the windows
+//!   and of the variance, even if too small to be seen: windows are weighted by expected squared error, and where that
+//!   is least, bias and variance are of the same size.
+//! - The variance of the raw value is averaged over a wide neighbourhood, and larger where it is mixed with the filtered
+//!   one: the narrow neighbourhood has decided the shares, which are raw where its variance is too small at random.
 
 use super::blur::{RADIUS, smooth_apart};
 use super::input::DenoiseInput;
-use super::noise::{Filtered, Noise};
+use super::noise::{Filtered, Noise, squared_bias};
 use glam::Vec3;
 use rayon::prelude::*;
 
 /// Radius in pixels of the two box filters that average the variance of the raw image.
 const WIDE_RADIUS: usize = 6;
-/// Uncertainty of the squared difference of raw and filtered image without bias, relative to the variance: less than
-/// that is no sign of bias.
-const DIFFERENCE_UNCERTAINTY: f32 = 0.2;
-/// Squared bias that is too small to be seen, relative to the variance of the filtered value.
-const LEAST_BIAS: f32 = 0.5;
+/// Variance of the filtered value over its covariance with the raw one.
+const OWN_VARIANCE: f32 = 0.85;
+/// Squared bias that is too small to be seen, relative to the covariance and to the misfit.
+const LEAST_BIAS: f32 = 0.1;
+const MISFIT_BIAS: f32 = 0.35;
+/// How much the variance of the raw value is too small where the filtered share is large, relative to both.
+const AT_RANDOM: f32 = 1.5;
+/// Level of pixels that show an emitter in part: their own value less this multiple of the step.
+const EMITTER_STEPS: f32 = 0.7;
 
 /// Standard deviations of parts of the estimate, relative to their mean: of the squared bias, of the error of a tile, and
 /// of the variance of the raw image.
@@ -47,6 +52,7 @@ pub(super) fn error_of(input: &DenoiseInput, noise: &Noise, filtered: &Filtered,
     let variance = smooth(RADIUS, &|i| noise.variance[i]);
     let wide_variance = smooth(WIDE_RADIUS, &|i| noise.variance[i]);
     let own = smooth(RADIUS, &|i| filtered.covariance[i]);
+    let misfit = smooth(RADIUS, &|i| filtered.misfit[i]);
     let difference = smooth(RADIUS, &|i| {
         let off = input.color[i] - filtered.color[i];
         off * off
@@ -57,11 +63,10 @@ pub(super) fn error_of(input: &DenoiseInput, noise: &Noise, filtered: &Filtered,
     for i in 0..n {
         let (s, rest) = (share[i], 1.0 - share[i]);
         let own = own[i].max(0.0);
-        let beyond = (difference[i] - variance[i] + own).max(0.0);
-        let doubt = DIFFERENCE_UNCERTAINTY * variance[i];
-        let seen = beyond * beyond / (beyond * beyond + doubt * doubt).max(1e-30);
-        let bias = s * s * (seen * beyond + LEAST_BIAS * own);
-        let risk = rest * rest * wide_variance[i] + (2.0 * rest + s) * s * own + bias;
+        let unseen = LEAST_BIAS * own + MISFIT_BIAS * misfit[i].max(0.0);
+        let bias = s * s * (squared_bias(difference[i], variance[i], own) + unseen);
+        let of_raw = rest * rest * (1.0 + AT_RANDOM * s) * wide_variance[i];
+        let risk = of_raw + (2.0 * rest + OWN_VARIANCE * s) * s * own + bias;
         of_tiles[i / input.width / TILE * tiles_x + i % input.width / TILE] += f64::from(risk);
         of_bias += f64::from(bias);
     }
@@ -79,9 +84,10 @@ pub(super) fn error_of(input: &DenoiseInput, noise: &Noise, filtered: &Filtered,
 /// lights, their noise would dominate the error of the whole image.
 fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, i: usize) -> Vec3 {
     let darker_half = match input.half_steps {
-        // Pixels that partly show a light: the filter has no information about them, so their own value is used.
-        _ if noise.at_emitters[i] => input.color[i],
+        // The filter has no information about pixels that show a light in part.
+        Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.steps[i].abs(),
         Some(halves) => input.color[i] - halves.steps[i].abs(),
+        None if noise.at_emitters[i] => input.color[i],
         None => Vec3::ZERO,
     };
     let level = filtered.color[i].max(darker_half);
