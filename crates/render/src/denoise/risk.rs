@@ -24,12 +24,12 @@ const WIDE_RADIUS: usize = 6;
 /// Variance of the filtered value over its covariance with the raw one.
 const OWN_VARIANCE: f32 = 0.85;
 /// Squared bias that is too small to be seen, relative to the covariance and to the misfit.
-const LEAST_BIAS: f32 = 0.1;
+const LEAST_BIAS: f32 = 0.15;
 const MISFIT_BIAS: f32 = 0.35;
 /// How much the variance of the raw value is too small where the filtered share is large, relative to both.
 const AT_RANDOM: f32 = 1.5;
 /// Level of pixels that show an emitter in part: their own value less this multiple of the step.
-const EMITTER_STEPS: f32 = 0.7;
+const EMITTER_STEPS: f32 = 0.5;
 
 /// Standard deviations of parts of the estimate, relative to their mean: of the squared bias, of the error of a tile, and
 /// of the variance of the raw image.
