@@ -5,7 +5,9 @@
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
+use super::denoising::DenoiserArg;
 use super::failure::Failure;
+use super::film_denoiser::FilmDenoiser;
 use super::layers::LayerArgs;
 use super::number::percent;
 use super::part::numbered;
@@ -47,6 +49,12 @@ pub struct MergeArgs {
     /// Merging the results gives the film that merging all at once gives. {part} in the output is replaced by the number.
     #[arg(long, value_name = "I/N")]
     part: Option<String>,
+    /// Save the image denoised, like `render --denoise`; opens the scene of the films.
+    #[arg(long, requires = "image", conflicts_with = "layers")]
+    denoise: bool,
+    /// The filter of --denoise [default: own].
+    #[arg(long, value_enum, value_name = "FILTER", requires = "denoise")]
+    denoiser: Option<DenoiserArg>,
     #[command(flatten)]
     layers: LayerArgs,
     #[command(flatten)]
@@ -108,8 +116,13 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         };
         set = group;
     }
-    let progress = Progress::new();
     let first = set.films[0].clone();
+    // A scene that cannot be opened is reported before films are added.
+    let denoiser = match args.denoise {
+        true => Some(FilmDenoiser::open(&first, &read_film_summary(&first)?.shot, args.denoiser, &mut files)?),
+        false => None,
+    };
+    let progress = Progress::new();
     let told = |done, n| progress.at(done as f64 / n as f64, format!("{done} of {n} films"));
     let FilmFile { film, shot, features, .. } = set.add_up(&told)?;
     drop(progress);
@@ -120,12 +133,14 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         check_replaced_film(&film, &note_of_film, output)?;
     }
     write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
+    let denoised = denoiser.as_ref().map(|denoiser| denoiser.denoise(&film, &shot)).transpose()?;
     if let Some(path) = &args.image {
-        let (size, note) = ((film.width(), film.height()), note(path));
+        let shown = ImageMetadata { denoised: denoiser.as_ref().map(FilmDenoiser::name), ..shot.clone() };
+        let (size, note) = ((film.width(), film.height()), note_of(&film, shown, &first, path));
         let display = shot.display.into();
         if args.layers.is_empty() {
-            Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
-                .write(path, files.replace())?;
+            let denoised = denoised.as_ref().map(|denoised| &denoised.color[..]);
+            Print { film: &film, display: &display, size, note: Some(&note), denoised }.write(path, files.replace())?;
         } else {
             let layers = args.layers.of(&film);
             let features = features.as_ref();
@@ -136,7 +151,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let error = film.error_estimate().map(|error| error.relative);
     let (least, mean, most) = film.sample_counts();
     if args.json {
-        return print(serde_json::json!({
+        let mut told = serde_json::json!({
             "output": output.to_string_lossy(),
             "films": set.films.len(),
             "spp": film.spp(),
@@ -145,9 +160,15 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
             "first_sample": film.first_sample(),
             "missing": missing.iter().map(|range| [range.start, range.end]).collect::<Vec<_>>(),
             "estimated_error": error,
-        }));
+        });
+        if let Some(denoised) = denoised {
+            told["estimated_error_denoised"] = denoised.error.into();
+            told["estimated_error_denoised_95"] = denoised.error_95.to_vec().into();
+        }
+        return print(told);
     }
-    let error = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
+    let of_denoised = denoised.map_or_else(String::new, |denoised| format!(" (denoised: {})", percent(denoised.error)));
+    let error = error.map_or_else(String::new, |error| format!(", estimated error {}{of_denoised}", percent(error)));
     let replaced = replaced(files.replaced());
     inform(format_args!("{}: {} samples per pixel{error}{replaced}", output.display(), film.spp()));
     Ok(())

@@ -10,6 +10,7 @@ mod console;
 mod denoising;
 mod explain;
 mod failure;
+mod film_denoiser;
 mod frames;
 mod info;
 mod info_objects;

@@ -42,6 +42,48 @@ fn a_render_stops_at_the_error_of_the_denoised_image() {
 }
 
 #[test]
+fn merged_films_denoise_to_the_bytes_of_the_one_that_was_rendered_in_one_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "render cornell --size 48x40 --json";
+    let whole = told(path, &format!("{scene} -o whole.exr --spp 8 --uniform --denoise"));
+    told(path, &format!("{scene} -o a.png --samples 0..4 --film a.exr"));
+    told(path, &format!("{scene} -o b.png --samples 4..8 --film b.exr"));
+    let merged = told(path, "merge b.exr a.exr -o all.exr --image merged.exr --denoise --json");
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    assert!(bytes("whole.exr") == bytes("merged.exr"), "{whole} and {merged}");
+    for key in ["estimated_error", "estimated_error_denoised", "estimated_error_denoised_95"] {
+        assert_eq!(whole[key], merged[key], "{key}");
+    }
+    told(path, &format!("{scene} -o whole.png --spp 8 --uniform --denoise"));
+    let output = run(path, "merge a.exr b.exr -o again.exr --image merged.png --denoise", None);
+    assert!(output.status.success() && String::from_utf8_lossy(&output.stderr).contains("(denoised: "), "{output:?}");
+    assert!(bytes("whole.png") == bytes("merged.png"));
+    let output = run(path, "merge a.exr b.exr -o more.exr --denoise", None);
+    assert_eq!(output.status.code(), Some(2), "there is no image to denoise");
+}
+
+/// A scene that has changed, or is gone, since its films were rendered has no guides for them.
+#[test]
+fn films_of_another_version_of_a_scene_are_not_denoised() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let text = firstlight::scene::builtin_text("ball").unwrap();
+    std::fs::write(path.join("scene.ron"), text).unwrap();
+    for (name, samples) in [("a", "0..2"), ("b", "2..4")] {
+        told(
+            path,
+            &format!("render scene.ron --size 32x24 -o {name}.png --samples {samples} --film {name}.exr --json"),
+        );
+    }
+    std::fs::write(path.join("scene.ron"), text.replace("intensity: 800", "intensity: 700")).unwrap();
+    let output = run(path, "merge a.exr b.exr -o all.exr --image all.png --denoise", None);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && said.contains("a different scene"), "{said}");
+    assert!(!path.join("all.png").exists());
+}
+
+#[test]
 fn a_denoiser_that_is_missing_is_told_before_anything_is_rendered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
