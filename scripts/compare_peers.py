@@ -5,12 +5,15 @@
     cargo build --release --no-default-features --features cli --target-dir target/headless
     scripts/compare_peers.py --program target/headless/release/firstlight cornell.json veach_mis.json
 
-Scenes are in the neutral JSON form of scripts/neutral_to_scene.py; beside each lies a converged picture with the same
-name and the ending .exr. Both renderers take samples by the pixel with a box filter, without denoising or clamping.
-Mitsuba runs its path integrator with the multijitter sampler, each number of samples as a render of its own, the
-second of two counting, so that compilation is left out; firstlight's times are those of `firstlight report`, tree and
-loading left out. Seconds are CPU seconds / threads, so that other work on the machine counts little; wall time is
-printed beside them. `--cycles PYTHON` adds Blender's Cycles (see render_in_cycles.py). Exit status 1 when something went wrong.
+Scenes are in the neutral JSON form of scripts/neutral_to_scene.py (scripts/mesh_scenes.py writes some); beside each lies a
+converged picture with the same name and the ending .exr. Both renderers take samples by the pixel with a box filter,
+without denoising or clamping. Mitsuba runs its path integrator with the multijitter sampler in LLVM mode, or in scalar
+mode where that is faster, each number of samples as a render of its own after one that does not count because it
+compiles. firstlight's times are those of `firstlight report`, with adaptive sampling and the choice of techniques, tree
+and loading left out. Seconds are CPU seconds / threads, so that other work on the machine counts little; wall time is
+printed beside them. Both take `--repeat` turns with seeds of their own: time and relMSE of a step are medians, and the
+range of the ratios of single turns is printed. `--cycles PYTHON` adds Blender's Cycles (see render_in_cycles.py). Exit
+status 1 when something went wrong.
 """
 
 import argparse
@@ -43,8 +46,10 @@ def rel_mse(picture, reference):
 class MitsubaScene:
     """A neutral scene as Mitsuba's dictionary."""
 
-    def __init__(self, mi, scene, folder):
-        self.mi, self.scene, self.folder = mi, scene, folder
+    def __init__(self, mi, scene, folder, merges=False):
+        self.mi, self.scene, self.folder, self.merges = mi, scene, folder, merges
+        # BSDFs by material: thousands of objects share one.
+        self.made = {}
 
     def dictionary(self, sampler):
         camera = self.scene["camera"]
@@ -75,7 +80,13 @@ class MitsubaScene:
             out["environment"] = {"type": "constant", "radiance": self.rgb(self.scene["environment"])}
         for i, value in enumerate(self.scene["objects"]):
             for k, shape in enumerate(self.shapes(value)):
-                out[f"object_{i}_{k}"] = self.dressed(shape, value["material"])
+                name = f"object_{i}_{k}"
+                out[name] = self.dressed(shape, value["material"])
+                if value["type"] == "instances" and not self.merges:
+                    out[name] = group = self.mi.load_dict({"type": "shapegroup", "inside": out[name]})
+                    for n, matrix in enumerate(value["matrices"]):
+                        to_world = self.mi.ScalarTransform4f(matrix_of(matrix))
+                        out[f"{name}_{n}"] = {"type": "instance", "to_world": to_world, "group": group}
         return out
 
     @staticmethod
@@ -117,18 +128,24 @@ class MitsubaScene:
             return {"type": "blendbsdf", "weight": value["weight"], "a": a, "b": b}, clear_a or clear_b
         raise ValueError(f"material {name}: a part of kind {kind} is not supported here")
 
-    def dressed(self, shape, material):
+    def parts(self, material):
+        """BSDF and emitter of the shapes of a material."""
         value = self.scene["materials"][material]
+        if material not in self.made:
+            is_emissive = value["type"] == "emissive"
+            bsdf, is_clear = ({"type": "diffuse", "reflectance": self.rgb(0.0)}, True) if is_emissive else self.bsdf(material)
+            self.made[material] = self.mi.load_dict(bsdf if is_clear else {"type": "twosided", "inside": bsdf})
+        parts = {"bsdf": self.made[material]}
         if value["type"] == "emissive":
-            black = {"type": "diffuse", "reflectance": self.rgb(0.0)}
-            parts = {"bsdf": black, "emitter": {"type": "area", "radiance": self.paint(value["radiance"])}}
-        else:
-            bsdf, is_clear = self.bsdf(material)
-            parts = {"bsdf": bsdf if is_clear else {"type": "twosided", "inside": bsdf}}
+            parts["emitter"] = {"type": "area", "radiance": self.paint(value["radiance"])}
+        return parts
+
+    def dressed(self, shape, material):
+        parts = self.parts(material)
         if "mesh" not in shape:
             return {**shape, **parts}
         properties = self.mi.Properties()
-        properties["mesh_bsdf"] = self.mi.load_dict(parts["bsdf"])
+        properties["mesh_bsdf"] = parts["bsdf"]
         if "emitter" in parts:
             properties["mesh_emitter"] = self.mi.load_dict(parts["emitter"])
         positions, faces, normals = shape["mesh"]
@@ -159,7 +176,10 @@ class MitsubaScene:
             matrix[:3, 2] = normal / np.linalg.norm(normal)
             matrix[:3, 3] = corner + 0.5 * u + 0.5 * v
             yield {"type": "rectangle", "to_world": self.mi.ScalarTransform4f(matrix)}
-        elif kind == "mesh":
+        elif kind == "instances" and self.merges:
+            matrices = [matrix_of(matrix) for matrix in value["matrices"]]
+            yield {"mesh": merged(self.mesh(value), matrices)}
+        elif kind in ("mesh", "instances"):
             yield {"mesh": self.mesh(value)}
         else:
             raise ValueError(f"objects of kind {kind} are not supported here")
@@ -179,17 +199,42 @@ class MitsubaScene:
         return positions.astype(np.float32), faces.astype(np.uint32), normals
 
 
+def merged(mesh, matrices):
+    """One mesh of many copies."""
+    positions, faces, normals = mesh
+    n = np.arange(len(matrices), dtype=np.uint32)[:, None, None] * np.uint32(len(positions))
+    moved = np.concatenate([positions @ matrix[:3, :3].T + matrix[:3, 3] for matrix in matrices])
+    if normals is not None:
+        normals = np.concatenate([normals @ np.linalg.inv(matrix[:3, :3]) for matrix in matrices])
+        normals = (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)).astype(np.float32)
+    return moved.astype(np.float32), (faces[None] + n).reshape(-1, 3), normals
+
+
+def best_variant(scene, merges=False):
+    """LLVM mode compiles for each shape at each render, which takes longer than rendering where there are thousands."""
+    sizes = {"spheres": lambda of: len(of["centers"]) // 3, "instances": lambda of: 1 if merges else len(of["matrices"])}
+    n_shapes = sum(sizes.get(value["type"], lambda of: 1)(value) for value in scene["objects"])
+    return "scalar_rgb" if n_shapes > 1000 else "llvm_ad_rgb"
+
+
 def placed_mesh(value, folder):
     """Positions in the world, and triangles."""
     positions, faces = read_obj(os.path.join(folder, value["obj"]))
     if value.get("matrix") is not None:
-        matrix = np.array(value["matrix"], dtype=float).reshape(-1, 4)[:3]
-        return positions @ matrix[:, :3].T + matrix[:, 3], faces
+        matrix = matrix_of(value["matrix"])
+        return positions @ matrix[:3, :3].T + matrix[:3, 3], faces
     angle = math.radians(value.get("rotate_y") or 0.0)
     turn = np.array([[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]])
     scale = value.get("scale")
     positions = positions * (1.0 if scale is None else np.array(scale, dtype=float)) @ turn.T
     return positions + np.array(value.get("translate") or [0, 0, 0], dtype=float), faces
+
+
+def matrix_of(rows):
+    """4 × 4, of 3 or 4 rows of 4, nested or flat."""
+    matrix = np.eye(4)
+    matrix[:3] = np.array(rows, dtype=float).reshape(-1, 4)[:3]
+    return matrix
 
 
 def read_obj(path):
@@ -209,24 +254,34 @@ def read_obj(path):
     return np.array(positions), np.array(faces)
 
 
-def mitsuba_curve(args, scene, folder, reference):
-    import drjit as dr
-    import mitsuba as mi
+class MitsubaRenderer:
+    """A scene in Mitsuba, that has been rendered once so that nothing is left to compile."""
 
-    mi.set_variant(args.variant)
-    mi.set_log_level(mi.LogLevel.Error)
-    if args.variant.startswith("llvm"):
+    def __init__(self, args, scene, folder):
+        import drjit as dr
+        import mitsuba as mi
+
+        self.args, self.mi = args, mi
+        mi.set_log_level(mi.LogLevel.Error)
         dr.set_thread_count(args.threads)
-    loaded = mi.load_dict(MitsubaScene(mi, scene, folder).dictionary(args.sampler))
-    curve, spp = [], 1
-    while spp <= args.spp:
-        for attempt in range(2):
+        self.loaded = mi.load_dict(MitsubaScene(mi, scene, folder, args.merge_instances).dictionary(args.sampler))
+        for spp in self.steps():
+            self.render(spp, 16)
+
+    def steps(self):
+        return [4**k for k in range(32) if 4**k <= self.args.spp]
+
+    def render(self, spp, seed):
+        return np.array(self.mi.render(self.loaded, spp=spp, seed=seed))
+
+    def curve(self, reference, turn):
+        curve = []
+        for spp in self.steps():
             wall, cpu = time.perf_counter(), time.process_time()
-            picture = np.array(mi.render(loaded, spp=spp, seed=17 + attempt))
+            picture = self.render(spp, 17 + turn)
             wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-        curve.append((spp, cpu / args.threads, wall, rel_mse(picture, reference)))
-        spp *= 4
-    return curve
+            curve.append((spp, cpu / self.args.threads, wall, rel_mse(picture, reference)))
+        return curve
 
 
 def cycles_curve(args, source, reference):
@@ -247,7 +302,7 @@ def cycles_curve(args, source, reference):
         return curve
 
 
-def firstlight_curve(args, scene, source, reference_path):
+def firstlight_curve(args, scene, source, reference_path, turn):
     converter = load_converter()
     with tempfile.TemporaryDirectory() as folder:
         target = os.path.join(folder, "scene.ron")
@@ -255,13 +310,14 @@ def firstlight_curve(args, scene, source, reference_path):
             file.write(converter.Converter(scene, source, target).convert())
         subprocess.run(
             [args.program, "report", target, "--reference", reference_path, "--no-ablation", "--out", folder,
-             "--threads", str(args.threads), "--spp", str(args.spp * args.further)],
+             "--threads", str(args.threads), "--spp", str(args.spp * args.further), "--seed", str(1 + turn)],
             check=True, stdout=subprocess.DEVNULL,
         )
         with open(os.path.join(folder, "steps.csv"), encoding="utf-8", newline="") as file:
             return [
                 (int(row["spp"]), float(row["cpu_s"] or "nan") / args.threads, float(row["wall_s"]), float(row["relmse"]))
                 for row in csv.DictReader(file)
+                if not row["without"] and not row["denoiser"]
             ]
 
 
@@ -278,31 +334,43 @@ def seconds_to(curve, column, target):
     return t * e / target, ">"
 
 
+def median(curves):
+    """Step by step: (samples, CPU seconds per thread, wall seconds, relMSE)."""
+    return [(steps[0][0], *(float(np.median([step[k] for step in steps])) for k in (1, 2, 3))) for steps in zip(*curves)]
+
+
 def compare(args, source):
     with open(source, encoding="utf-8") as file:
         scene = json.load(file)
     import mitsuba as mi
 
-    mi.set_variant(args.variant)
+    mi.set_variant(args.variant or best_variant(scene, args.merge_instances))
     folder = os.path.dirname(os.path.abspath(source))
     reference_path = os.path.splitext(os.path.abspath(source))[0] + ".exr"
     reference = np.array(mi.Bitmap(reference_path).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-    ours = firstlight_curve(args, scene, source, reference_path)
-    peers = [("mitsuba", mitsuba_curve(args, scene, folder, reference))]
+    renderer = MitsubaRenderer(args, scene, folder)
+    turns = {"mitsuba": [], "firstlight": []}
+    for turn in range(args.repeat):
+        turns["mitsuba"].append(renderer.curve(reference, turn))
+        turns["firstlight"].append(firstlight_curve(args, scene, source, reference_path, turn))
     if args.cycles:
-        peers.append(("cycles", cycles_curve(args, source, reference)))
+        turns["cycles"] = [cycles_curve(args, source, reference)] * args.repeat
     name = os.path.splitext(os.path.basename(source))[0]
-    for label, curve in (*peers, ("firstlight", ours)):
+    curves = {label: median(curves) for label, curves in turns.items()}
+    for label, curve in curves.items():
         for spp, cpu, wall, error in curve:
             print(f"# {name:16} {label:10} {spp:6} spp  {cpu:9.4f} cpu/t s  {wall:9.4f} wall s  relMSE {error:.4g}")
     rows = []
-    for label, curve in peers:
-        for spp, cpu, wall, error in curve:
-            own_cpu, mark = seconds_to(ours, 1, error)
-            own_wall, _ = seconds_to(ours, 2, error)
+    for label, curve in curves.items():
+        if label == "firstlight":
+            continue
+        for k, (spp, cpu, wall, error) in enumerate(curve):
+            own_cpu, mark = seconds_to(curves["firstlight"], 1, error)
+            own_wall, _ = seconds_to(curves["firstlight"], 2, error)
+            single = [seconds_to(own, 1, its[k][3])[0] / its[k][1] for own, its in zip(turns["firstlight"], turns[label])]
             rows.append(
                 f"| {name} | {label} | {error:.3g} | {spp} | {cpu:.3f} | {mark}{own_cpu:.3f} | {own_cpu / cpu:.2f} "
-                f"| {wall:.3f} | {own_wall:.3f} | {own_wall / wall:.2f} |"
+                f"| {min(single):.2f}-{max(single):.2f} | {wall:.3f} | {own_wall:.3f} | {own_wall / wall:.2f} |"
             )
     return rows
 
@@ -314,7 +382,9 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--spp", type=int, default=256, help="most samples per pixel of the peer")
     parser.add_argument("--further", type=int, default=4, help="how many times as many samples firstlight takes")
-    parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--repeat", type=int, default=1, help="turns; medians of them are compared")
+    parser.add_argument("--variant", help="of Mitsuba (default: llvm_ad_rgb; scalar_rgb for more than 1,000 shapes)")
+    parser.add_argument("--merge-instances", action="store_true", help="as one mesh in Mitsuba")
     parser.add_argument("--sampler", default="multijitter")
     parser.add_argument("--cycles", metavar="PYTHON", help="an interpreter that has the package bpy: measures Cycles as well")
     args = parser.parse_args()
@@ -325,8 +395,8 @@ def main():
         except (OSError, ValueError, KeyError, RuntimeError, subprocess.CalledProcessError) as error:
             print(f"error: {source}: {error}", file=sys.stderr)
             failed = True
-    print("| scene | peer | relMSE | its spp | its cpu s / threads | firstlight | ratio | its wall s | firstlight | ratio |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| scene | peer | relMSE | its spp | its cpu s / threads | firstlight | ratio | single turns | its wall s | firstlight | ratio |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     print("\n".join(rows))
     return 1 if failed else 0
 

@@ -131,6 +131,7 @@ OBJECTS = {
     "spheres": (("centers", "radii", "material"), ()),
     "quad": (("corner", "edge_u", "edge_v", "material"), ()),
     "mesh": (("obj", "material"), ("scale", "rotate_y", "translate", "matrix", "smooth")),
+    "instances": (("obj", "matrices", "material"), ("smooth",)),
 }
 
 
@@ -360,6 +361,8 @@ class Converter:
         is_textured = any(isinstance(part.get("albedo"), dict) for part in self.parts(value["material"]))
         if kind != "quad" and is_textured:
             raise Refused(f"{where}.material: a {kind} has no surface coordinates for the texture of {material}")
+        if kind == "instances":
+            return "\n".join(f"        mesh({said}, material: {material})," for said in self.instances(where, value))
         said = getattr(self, kind)(where, value)
         return f"        {kind}({said}, material: {material}),"
 
@@ -387,9 +390,21 @@ class Converter:
             raise Refused(f"{where}.edge_v: edges must be at right angles, but stand at {angle:.2f} degrees")
         return ", ".join(said)
 
-    def mesh(self, where, part):
+    def mesh_source(self, where, part):
         shading = "smooth" if truth(where + ".smooth", part.get("smooth", False)) else "flat"
-        said = f"source: obj({self.path(where + '.obj', part['obj'], check_obj)}), shading: {shading}"
+        return f"source: obj({self.path(where + '.obj', part['obj'], check_obj)}), shading: {shading}"
+
+    def instances(self, where, part):
+        """One mesh for each matrix: meshes of the same source share their tree."""
+        matrices = part["matrices"]
+        if not isinstance(matrices, list) or not matrices:
+            raise Refused(f"{where}.matrices: expected a list of matrices, found {brief(matrices)}")
+        source = self.mesh_source(where, part)
+        places = (self.matrix(f"{where}.matrices[{i}]", matrix) for i, matrix in enumerate(matrices))
+        return [f"{source}, transform: (matrix: {place})" for place in places]
+
+    def mesh(self, where, part):
+        said = self.mesh_source(where, part)
         given = {name: part[name] for name in ("scale", "rotate_y", "translate", "matrix") if part.get(name) is not None}
         if "matrix" in given:
             if len(given) > 1:

@@ -40,6 +40,11 @@ fn everything() -> Value {
                 "type": "mesh", "obj": "tri.obj", "smooth": false, "material": "metal",
                 "matrix": [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, -1], [0, 0, 0, 1]],
             },
+            {
+                "type": "instances", "obj": "tri.obj", "smooth": false, "material": "red", "matrices": [
+                    [1, 0, 0, -1, 0, 1, 0, 1.5, 0, 0, 1, 0], [[0.5, 0, 0, 1], [0, 0.5, 0, 1], [0, 0, 0.5, 0]],
+                ],
+            },
         ],
     })
 }
@@ -162,6 +167,8 @@ fn a_converted_scene_is_the_scene_that_was_meant() {
         ("/objects/5/smooth", json!(false)),
         ("/objects/5/rotate_y", json!(-30)),
         ("/objects/6/matrix/0/3", json!(0.6)),
+        ("/objects/7/matrices/1/0/3", json!(1.1)),
+        ("/objects/7/smooth", json!(true)),
     ] {
         let mut scene = everything();
         *scene.pointer_mut(place).unwrap() = value;
@@ -201,6 +208,8 @@ const BY_HAND: &str = r#"(
             transform: (translate: (-1, 0, 0), rotate: (0, 30, 0), scale: (0.5, 0.5, 0.5)),
         ),
         mesh(source: obj("tri.obj"), shading: flat, material: "gold", transform: (translate: (0.5, 0, -1))),
+        mesh(source: obj("tri.obj"), shading: flat, material: "red", transform: (translate: (-1, 1.5, 0))),
+        mesh(source: obj("tri.obj"), shading: flat, material: "red", transform: (translate: (1, 1, 0), scale: 0.5)),
     ],
 )"#;
 
@@ -417,6 +426,11 @@ fn what_cannot_be_said_is_refused_by_its_name() {
         ("/objects/5/smooth", json!(null), "objects[5].smooth"),
         ("/objects/5/rotate_y", json!([]), "objects[5].rotate_y"),
         ("/objects/5/rotate_y", json!([0, 30, 0]), "objects[5].rotate_y"),
+        ("/objects/7/matrices", json!([]), "objects[7].matrices"),
+        ("/objects/7/matrices", json!(null), "objects[7].matrices"),
+        ("/objects/7/matrices/0", json!([1, 0, 0]), "objects[7].matrices[0]"),
+        ("/objects/7/obj", json!("none.obj"), "none.obj"),
+        ("/objects/7/scale", json!(2), "scale"),
         ("/objects/5/scale", json!(0), "objects[5].scale"),
         ("/objects/5/scale", json!([1, 0, 1]), "objects[5].scale"),
         ("/objects/5/scale", json!("2"), "objects[5].scale"),
