@@ -6,11 +6,11 @@ use crate::integrators::caustics::trace::LightWave;
 use crate::prepare::guide::Guide;
 use rayon::prelude::*;
 
-/// Number of pilot light paths.
-const PILOT_PATHS: u32 = 1 << 15;
+/// Number of pilot light paths: more find hardly better directions, and a small image waits for them.
+const PILOT_PATHS: u32 = 1 << 13;
 
 /// Pilot light paths per batch of a worker.
-const PILOT_BATCH: u32 = 2048;
+const PILOT_BATCH: u32 = 1024;
 
 /// Builds the guiding cache if it is used; returns false if `stop` returned true before it was complete.
 ///

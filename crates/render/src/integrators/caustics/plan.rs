@@ -30,6 +30,7 @@ use crate::sampling::Sampler;
 use crate::shading::lights::power_weight;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
+use std::cell::OnceCell;
 
 /// Seed of all pilot paths, unlikely to be that of an image.
 const PILOT_SEED: u32 = 0x7069_6c6f;
@@ -129,6 +130,8 @@ struct Pilot {
     light_cost: f64,
     /// Whether some light can be found by light paths only.
     needs_light_paths: bool,
+    /// See [`Self::levels`].
+    levels: OnceCell<Vec<DVec3>>,
 }
 
 /// Candidates for the light path stride; 0 for no light paths.
@@ -188,6 +191,7 @@ impl Pilot {
             n_light_paths,
             light_cost: (LIGHT_PATH_START + work / n_light_paths) * n_pixels,
             needs_light_paths: scene.tables.lights.has_delta(),
+            levels: OnceCell::new(),
         })
     }
 
@@ -238,7 +242,7 @@ impl Pilot {
         let levels = self.levels();
         let is_better = |part: &usize| {
             let of = |pilot: &CameraPilot| {
-                let spots = pilot.spots.iter().zip(&levels).skip(*part).step_by(n);
+                let spots = pilot.spots.iter().zip(levels).skip(*part).step_by(n);
                 pilot.cost * spots.map(|(spot, level)| relative(spot.variance, *level)).sum::<f64>()
             };
             of(&self.guided) < of(&self.plain)
@@ -252,7 +256,11 @@ impl Pilot {
     }
 
     /// Level of each spot, to which variances are relative: the mean over the spot and its neighbours.
-    fn levels(&self) -> Vec<DVec3> {
+    fn levels(&self) -> &[DVec3] {
+        self.levels.get_or_init(|| self.find_levels())
+    }
+
+    fn find_levels(&self) -> Vec<DVec3> {
         let mut found = vec![DVec3::ZERO; self.guided.spots.len()];
         let per_splat = self.per_splat(self.grid);
         for splat in &self.splats {
@@ -286,7 +294,7 @@ impl Pilot {
 
     fn mean_over_spots(&self, spots: &[Spot], value: impl Fn(&Spot) -> DVec3) -> f64 {
         let levels = self.levels();
-        spots.iter().zip(levels).map(|(spot, level)| relative(value(spot), level)).sum::<f64>() / spots.len() as f64
+        spots.iter().zip(levels).map(|(spot, level)| relative(value(spot), *level)).sum::<f64>() / spots.len() as f64
     }
 
     /// Variance of the caustics found by camera and light paths, for one sample of the image with a light path per
@@ -326,7 +334,7 @@ impl Pilot {
         let per_moment = 1.0 / (self.n_light_paths * n_pixels * n_pixels);
         let per_square = self.per_splat(self.grid).powi(2) / levels.len() as f64;
         let squares: f64 =
-            sums.into_iter().zip(levels).map(|((sum, own), level)| relative(sum * sum - own, level)).sum();
+            sums.into_iter().zip(levels).map(|((sum, own), level)| relative(sum * sum - own, *level)).sum();
         Found { camera: (found.camera * per_moment - squares * per_square).max(0.0), light: found.light * per_moment }
     }
 }
