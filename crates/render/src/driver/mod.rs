@@ -1,5 +1,6 @@
 //! Passes over a film: rendering, feature buffers, denoising, explanation of a pixel, inspections.
 
+mod block_costs;
 pub(crate) mod caustic_choice;
 pub(crate) mod denoised;
 pub(crate) mod explain;

@@ -1,6 +1,7 @@
 //! One pass over the film: takes missing samples of its tiles, in parallel on the current rayon pool.
 
 use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
+use crate::driver::block_costs::block_costs;
 use crate::driver::caustic_choice::plan_of_film;
 use crate::driver::moving::advance_moving;
 use crate::driver::report::PassReport;
@@ -79,6 +80,13 @@ pub fn advance_region<'a>(
     let mut total = PassReport::nothing();
     while total.completed && film.spp_in(region) < target_spp {
         if let Some(metric) = metric {
+            if film.round_is_due() && film.block_costs.is_none() {
+                film.block_costs = block_costs(&pass, stop);
+                if film.block_costs.is_none() {
+                    total.completed = false;
+                    break;
+                }
+            }
             film.begin_round_if_due(metric);
         }
         // Rounds end at powers of two, and the error of light tracing is recorded there.

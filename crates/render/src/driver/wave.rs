@@ -151,9 +151,9 @@ pub(super) struct Pass<'a> {
     pub settings: &'a RenderSettings,
     pub caustics: Option<CausticPass<'a>>,
     pub plan: CausticPlan,
-    camera_media: Vec<u32>,
+    pub camera_media: Vec<u32>,
     filter: Arc<FilterSampler>,
-    size: UVec2,
+    pub size: UVec2,
     /// Upper bound of the radiance of a sample, see [`crate::prepare::bound`].
     pub bound: Option<f32>,
     /// Depth from which on all paths are subject to Russian roulette.
@@ -202,7 +202,7 @@ impl<'a> Pass<'a> {
         pass
     }
 
-    fn lens(&self) -> CameraRays<'_> {
+    pub fn lens(&self) -> CameraRays<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
         CameraRays { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
     }

@@ -1,14 +1,16 @@
 //! Sample allocation: which blocks of pixels get the next samples.
 //!
 //! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per
-//! pixel on average, and doubles the budget. At its beginning, the film alone determines which blocks double their
-//! samples, once or twice, and in which order; the decision is stored in the film. So a film is a function of scene,
-//! seed and settings, independent of threads and portions, and resuming a stopped film gives the same result.
+//! pixel on average, and doubles the budget. At its beginning, the film and the costs of its blocks determine which
+//! blocks double their samples, once or twice, and in which order; the decision is stored in the film. So a film is a
+//! function of scene, seed and settings, independent of threads and portions, and resuming a stopped film gives the same
+//! result.
 //!
 //! Between passes the sample count of every block is a power of two, so that each pixel's sequence stays stratified,
-//! and doublings measure the error. The optimal allocation has n ∝ √variance; powers of two lose 2 %. Doublings are
-//! ordered by the reduction of the error per sample: doubling from n to 2n lowers variance / n by variance / (2n), for
-//! n samples, so by variance / (2 n²) per sample.
+//! and doublings measure the error. The optimal allocation has n ∝ √(variance / cost); powers of two lose 2 %. Doublings
+//! are ordered by the reduction of the error per cost: doubling from n to 2n lowers variance / n by variance / (2n), for
+//! n samples, so by variance / (2 n²) per sample. Where pixels are noisy paths are often long, so without the cost an
+//! allocation can lose more time than it saves.
 //!
 //! The decision uses the samples that are allocated by it, which is a bias (a block that happens to look dark gets
 //! fewer samples to correct that). It is kept small: the variance of a block is averaged over nine blocks and up to
@@ -29,7 +31,7 @@ pub(crate) const FIRST_ROUND: u32 = 8;
 const LEAST_SHARE: u32 = 4;
 const MOST_SHARE: u32 = 16;
 
-/// Relative reduction of the squared error that a first uneven round must achieve: an even film is faster to display
+/// Relative reduction of the squared error times cost that a first uneven round must achieve: an even film is faster to display
 /// and to predict, and a smaller gain may be noise.
 const LEAST_GAIN: f64 = 0.05;
 
@@ -40,6 +42,8 @@ struct Candidate {
     spp: u32,
     /// Variance of one sample relative to the squared level, mean over pixels and channels; `None` if unknown.
     variance: Option<f64>,
+    /// Cost of one sample per pixel.
+    cost: f64,
 }
 
 /// The blocks of a film, row by row.
@@ -51,25 +55,29 @@ struct Grid {
 /// A possible doubling of a block's samples.
 struct Doubling {
     block: usize,
-    /// Reduction of the squared error per sample; infinite for a mandatory doubling.
+    /// Reduction of the squared error per cost; infinite for a mandatory doubling.
     gain: f64,
-    /// Samples that it takes, over all pixels of the block.
-    cost: u64,
+    /// Number of its samples, over all pixels of the block.
+    n_samples: u64,
 }
 
 /// Decides a round of a film with these tiles, whose blocks form a grid of `size` blocks, and stores it in the blocks.
 ///
 /// - `from`: mean samples per pixel that have been spent.
 /// - `irregular`: see [`Round::irregular`].
+/// - `costs`: cost of a sample per block, row by row; without, all cost the same.
 pub(crate) fn begin_round(
     tiles: &mut [FilmTile],
     size: UVec2,
-    from: u32,
-    irregular: bool,
+    (from, irregular): (u32, bool),
     metric: ErrorMetric,
+    costs: Option<&[f64]>,
 ) -> Round {
     let to = doubled(from);
     let mut grid = Grid::of(tiles, size, metric);
+    for (block, cost) in grid.blocks.iter_mut().zip(costs.unwrap_or_default()) {
+        block.cost = *cost;
+    }
     grid.smooth();
     let n_pixels: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels)).sum();
     let doublings = grid.best_doublings(to);
@@ -82,11 +90,11 @@ pub(crate) fn begin_round(
     let mut spent = 0;
     for doubling in doublings {
         // Rounded to the nearest doubling.
-        let at = spent + doubling.cost / 2;
+        let at = spent + doubling.n_samples / 2;
         if at > budget && doubling.gain.is_finite() {
             break;
         }
-        spent += doubling.cost;
+        spent += doubling.n_samples;
         let share = (at as f64 / budget as f64 * f64::from(to - from)).ceil() as u32;
         let place = due[doubling.block].iter_mut().find(|due| **due == NEVER).expect("no more than that many");
         *place = (from + share.max(1)).min(to);
@@ -120,7 +128,7 @@ fn place_of(tile: &FilmTile, block: &Block, width: usize) -> usize {
 
 impl Grid {
     fn of(tiles: &[FilmTile], size: UVec2, metric: ErrorMetric) -> Self {
-        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None };
+        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None, cost: 1.0 };
         let mut grid = Self { width: size.x as usize, blocks: vec![nothing; (size.x * size.y) as usize] };
         let known: Vec<Vec<(usize, Candidate)>> = tiles
             .par_iter()
@@ -132,7 +140,8 @@ impl Grid {
                         ErrorMetric::Display { exposure_stops } => display_weight(tile, block, exposure_stops),
                     };
                     let variance = variance_of(&block.steps, 3 * n_pixels).map(|variance| variance * weight);
-                    (place_of(tile, &tile.blocks[i], size.x as usize), Candidate { n_pixels, spp: block.spp, variance })
+                    let candidate = Candidate { n_pixels, spp: block.spp, variance, cost: 1.0 };
+                    (place_of(tile, &tile.blocks[i], size.x as usize), candidate)
                 };
                 tile.blocks.iter().enumerate().map(of).collect()
             })
@@ -143,8 +152,8 @@ impl Grid {
         grid
     }
 
-    /// Replaces the variance of each block by a weighted mean over itself and its neighbours, or by that of the whole
-    /// image where none of them is known.
+    /// Replaces variance and cost of each block by a weighted mean over itself and its neighbours. Where no variance is
+    /// known, that of the whole image is taken.
     fn smooth(&mut self) {
         const WEIGHTS: [[f64; 3]; 3] = [[1.0, 2.0, 1.0], [2.0, 8.0, 2.0], [1.0, 2.0, 1.0]];
         let (width, height) = (self.width, self.blocks.len() / self.width);
@@ -153,22 +162,25 @@ impl Grid {
         };
         let (sum, n) = self.blocks.iter().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         let everywhere = if n > 0.0 { sum / n } else { 1.0 };
-        let smoothed: Vec<f64> = (0..self.blocks.len())
+        let smoothed: Vec<(f64, f64)> = (0..self.blocks.len())
             .into_par_iter()
             .map(|i| {
                 let (x, y) = (i % width, i / width);
                 let (mut sum, mut n) = (0.0, 0.0);
+                let (mut cost, mut weights) = (0.0, 0.0);
                 for (dy, row) in WEIGHTS.iter().enumerate().filter(|(dy, _)| (1..=height).contains(&(y + dy))) {
                     for (dx, weight) in row.iter().enumerate().filter(|(dx, _)| (1..=width).contains(&(x + dx))) {
-                        let (of_sum, of_n) = of(&self.blocks[(y + dy - 1) * width + x + dx - 1]);
+                        let block = &self.blocks[(y + dy - 1) * width + x + dx - 1];
+                        let (of_sum, of_n) = of(block);
                         (sum, n) = (sum + weight * of_sum, n + weight * of_n);
+                        (cost, weights) = (cost + weight * block.cost, weights + weight);
                     }
                 }
-                if n > 0.0 { sum / n } else { everywhere }
+                (if n > 0.0 { sum / n } else { everywhere }, cost / weights)
             })
             .collect();
-        for (block, variance) in self.blocks.iter_mut().zip(smoothed) {
-            block.variance = Some(variance);
+        for (block, (variance, cost)) in self.blocks.iter_mut().zip(smoothed) {
+            (block.variance, block.cost) = (Some(variance), cost);
         }
     }
 
@@ -182,11 +194,11 @@ impl Grid {
                 if u64::from(next) > u64::from(to) * u64::from(MOST_SHARE) {
                     break;
                 }
-                let cost = u64::from(next - spp) * u64::from(block.n_pixels);
+                let n_samples = u64::from(next - spp) * u64::from(block.n_pixels);
                 let must_be = spp < to / LEAST_SHARE;
-                let fall = block.variance.unwrap_or_default() / (f64::from(spp.max(1)) * f64::from(next));
+                let fall = block.variance.unwrap_or_default() / (f64::from(spp.max(1)) * f64::from(next) * block.cost);
                 let gain = if must_be { f64::INFINITY } else { fall };
-                doublings.push(Doubling { block: place, gain, cost });
+                doublings.push(Doubling { block: place, gain, n_samples });
                 spp = next;
             }
         }
@@ -201,16 +213,19 @@ impl Grid {
         if self.blocks.iter().any(|block| block.spp != from) {
             return false;
         }
-        let error = |spp_of: &dyn Fn(usize, &Candidate) -> u32| {
+        // Squared error times cost.
+        let product = |spp_of: &dyn Fn(usize, &Candidate) -> u32| {
             let of = |(i, block): (usize, &Candidate)| {
-                f64::from(block.n_pixels) * block.variance.unwrap_or_default() / f64::from(spp_of(i, block))
+                let (n_pixels, spp) = (f64::from(block.n_pixels), f64::from(spp_of(i, block)));
+                (n_pixels * block.variance.unwrap_or_default() / spp, n_pixels * spp * block.cost)
             };
-            self.blocks.iter().enumerate().map(of).sum::<f64>()
+            let sums = self.blocks.iter().enumerate().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+            sums.0 * sums.1
         };
         let after = |i: usize, block: &Candidate| {
             due[i].iter().filter(|&&due| due != NEVER).fold(block.spp, |spp, _| doubled(spp))
         };
-        error(&after) >= (1.0 - LEAST_GAIN) * error(&|_, _| to)
+        product(&after) >= (1.0 - LEAST_GAIN) * product(&|_, _| to)
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Film {
     pub(crate) caustic_plan: Option<CausticPlan>,
     /// See [`Self::set_preview`].
     pub(crate) is_preview: bool,
+    /// Cost of a sample per block, for the sample allocation; `None` until it is measured, which gives the same again.
+    pub(crate) block_costs: Option<Vec<f64>>,
 }
 
 impl Film {
@@ -140,6 +142,7 @@ impl Film {
             idle_light: Vec::new(),
             caustic_plan: None,
             is_preview: false,
+            block_costs: None,
         })
     }
 
@@ -243,6 +246,7 @@ impl Film {
     /// other use.
     pub fn clear_unless(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
         self.caustic_plan = None;
+        self.block_costs = None;
         if let Some(layer) = self.light.take() {
             self.idle_light = layer.sums;
         }
@@ -431,20 +435,26 @@ impl Film {
         self.tiles.par_iter_mut().for_each(|tile| tile.record_light(layer, width));
     }
 
-    /// Decides the next round of an adaptive film, if the previous one is over.
+    /// Whether the next round of an adaptive film must be decided, because the previous one is over.
+    pub(crate) fn round_is_due(&self) -> bool {
+        // Tiles of other sizes cut blocks, which then have no neighbours.
+        self.tile_size.is_multiple_of(BLOCK_SIZE)
+            && self.spp() >= self.round.as_ref().map_or(FIRST_ROUND, |round| round.to)
+    }
+
+    /// Decides the next round of an adaptive film, if it is due. Unknown [`Self::block_costs`] are taken as equal.
     pub(crate) fn begin_round_if_due(&mut self, metric: ErrorMetric) {
-        let spp = self.spp();
+        if !self.round_is_due() {
+            return;
+        }
         let (least, mean, most) = self.sample_counts();
         let (from, irregular) = match &self.round {
-            // Tiles of other sizes cut blocks, which then have no neighbours.
-            _ if !self.tile_size.is_multiple_of(BLOCK_SIZE) => return,
-            Some(round) if spp < round.to => return,
-            Some(round) => (spp, round.irregular),
-            None if spp < FIRST_ROUND => return,
-            None => (spp.max(mean.round() as u32), least < most),
+            Some(round) => (self.spp(), round.irregular),
+            None => (self.spp().max(mean.round() as u32), least < most),
         };
         let size = UVec2::new(self.width, self.height).map(|side| side.div_ceil(BLOCK_SIZE));
-        self.round = Some(begin_round(&mut self.tiles, size, from, irregular, metric));
+        let costs = self.block_costs.as_deref();
+        self.round = Some(begin_round(&mut self.tiles, size, (from, irregular), metric, costs));
     }
 
     /// Records that all samples due up to a budget have been taken.

@@ -123,7 +123,7 @@ impl PathWave {
                 record.see_hits(&self.paths, &self.hits);
             }
             if let Some(work) = &mut self.work {
-                work.add_rays(&self.hits, self.paths.len(), class);
+                work.add_rays(&self.hits, &self.paths.slot[..self.paths.len()], class);
                 if depth > 1 && caustics.is_some_and(|pass| pass.guide().is_some()) {
                     work.add_told(scene, &self.paths, &self.hits);
                 }
@@ -138,7 +138,7 @@ impl PathWave {
             }
             counts.shadow += self.shadows.rays.len() as u64;
             if let Some(work) = &mut self.work {
-                work.add_shadow_rays(self.shadows.rays.len());
+                work.add_shadow_rays(&self.shadows.slot[..self.shadows.rays.len()]);
             }
             counts.bounce += self.next.len() as u64;
             std::mem::swap(&mut self.paths, &mut self.next);

@@ -21,6 +21,8 @@ pub(crate) struct Work {
     /// Cost of a ray that hits it, per object.
     of_object: Vec<f64>,
     pub total: f64,
+    /// The part of `total` from the paths of each slot; empty if it is not wanted.
+    pub of_slot: Vec<f64>,
 }
 
 impl Work {
@@ -30,13 +32,26 @@ impl Work {
             Shape::Spheres { tree, .. } => tree.len(),
             _ => 1,
         });
-        Self { of_object: parts.map(|n| 1.0 + LEVEL * (n.max(1) as f64).log2()).collect(), total: 0.0 }
+        Self {
+            of_object: parts.map(|n| 1.0 + LEVEL * (n.max(1) as f64).log2()).collect(),
+            total: 0.0,
+            of_slot: Vec::new(),
+        }
+    }
+
+    /// Returns an empty sum that is also kept for each of `n` slots.
+    pub fn per_slot(scene: &Prepared, n: usize) -> Self {
+        Self { of_slot: vec![0.0; n], ..Self::new(scene) }
     }
 
     /// Adds rays and their hits.
-    pub fn add_rays(&mut self, hits: &HitBatch, n: usize, class: RayClass) {
-        let sum: f64 = hits.object[..n].iter().map(|&object| self.of_object.get(object as usize).unwrap_or(&1.0)).sum();
-        self.total += if class == RayClass::Coherent { COHERENT * sum } else { sum };
+    ///
+    /// - `slots`: the slot of each ray.
+    pub fn add_rays(&mut self, hits: &HitBatch, slots: &[u32], class: RayClass) {
+        let factor = if class == RayClass::Coherent { COHERENT } else { 1.0 };
+        for (&object, &slot) in hits.object.iter().zip(slots) {
+            self.add(factor * self.of_object.get(object as usize).unwrap_or(&1.0), slot);
+        }
     }
 
     /// Adds vertices with guided sampling.
@@ -48,10 +63,28 @@ impl Work {
             };
             paths.track_of(*i).is_lost() && hits.get(*i).is_some_and(scatters)
         };
-        self.total += HINTS * (0..paths.len()).filter(asks).count() as f64;
+        for i in (0..paths.len()).filter(asks) {
+            self.add(HINTS, paths.slot[i]);
+        }
     }
 
-    pub fn add_shadow_rays(&mut self, n: usize) {
+    /// - `slots`: the slot of each shadow ray.
+    pub fn add_shadow_rays(&mut self, slots: &[u32]) {
+        for &slot in slots {
+            self.add(SHADOW_RAY, slot);
+        }
+    }
+
+    /// Adds connections of light paths to the lens.
+    pub fn add_connections(&mut self, n: usize) {
         self.total += SHADOW_RAY * n as f64;
+    }
+
+    #[inline]
+    fn add(&mut self, cost: f64, slot: u32) {
+        self.total += cost;
+        if let Some(of_slot) = self.of_slot.get_mut(slot as usize) {
+            *of_slot += cost;
+        }
     }
 }

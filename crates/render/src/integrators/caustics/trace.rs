@@ -147,12 +147,12 @@ impl LightWave {
             pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             if let Some(work) = &mut self.work {
-                work.add_rays(&self.hits, self.paths.len(), RayClass::Incoherent);
+                work.add_rays(&self.hits, &self.paths.slot[..self.paths.len()], RayClass::Incoherent);
             }
             self.scatter(pass, n_vertices);
             let arrivals = &mut self.arrivals;
             if let Some(work) = &mut self.work {
-                work.add_shadow_rays(arrivals.rays.len());
+                work.add_connections(arrivals.rays.len());
             }
             pass.scene.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
             counts.shadow += arrivals.rays.len() as u64;
