@@ -5,7 +5,7 @@
 //! same list of commands always gives the same image.
 
 use super::rig::Rig;
-use super::{Bookmarks, Denoising, Edit, Target};
+use super::{Bookmarks, DenoiseFilter, Denoising, Edit, Target};
 use crate::render::{Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
 use bevy_ecs::message::Message;
@@ -184,6 +184,8 @@ pub enum Command {
     SetInspection(Inspection),
     /// Displays the image raw, denoised, or half and half.
     SetDenoising(Denoising),
+    /// Sets the filter of denoised images.
+    SetDenoiseFilter(DenoiseFilter),
     /// The next of denoised, raw and split; no inspection is displayed then.
     NextDenoising,
     /// Tint the pixels in focus, and draw the focal plane.

@@ -136,6 +136,10 @@ impl CommandParams<'_, '_> {
                 let look = super::ViewOptions { denoising, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
+            Command::SetDenoiseFilter(filter) => {
+                let look = super::ViewOptions { filter, ..self.looking.0 };
+                self.looking.set_if_neq(ViewMode(look));
+            }
             Command::NextDenoising => {
                 let denoising = self.looking.0.denoising.next();
                 let look = super::ViewOptions { inspection: Inspection::Picture, denoising, ..self.looking.0 };

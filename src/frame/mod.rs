@@ -55,7 +55,7 @@ mod worker;
 
 pub use camera_path::{along, turntable};
 pub use command::Command;
-pub use denoising::Denoising;
+pub use denoising::{DenoiseFilter, Denoising};
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use feature_layers::{FeatureLayers, FeatureNames};

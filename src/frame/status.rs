@@ -1,6 +1,6 @@
 //! Output of a session: the image and the status.
 
-use super::denoising::Denoising;
+use super::denoising::{DenoiseFilter, Denoising};
 use super::rig::Rig;
 use crate::printable;
 use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, Legend, RayCounts, Region};
@@ -72,7 +72,9 @@ pub struct Status {
     pub caustics: Option<CausticChoice>,
     /// How the image is denoised.
     pub denoising: Denoising,
-    /// Relative error of the denoised image, if that is displayed.
+    /// The filter of the denoised image, and its relative error, if that is displayed.
+    pub denoised_by: DenoiseFilter,
+    /// See [`Self::denoised_by`].
     pub denoised_error: Option<f64>,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,

@@ -1,11 +1,11 @@
 //! Saves images on separate threads, so that the window stays responsive.
 
 use crate::frame::{
-    FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
+    DenoiseFilter, FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
     render_offline_until,
 };
 use crate::render::{
-    Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, denoise_film, gather_guides, worker_threads,
+    DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, worker_threads,
 };
 use crate::scene::file::check_film_size;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
@@ -42,6 +42,8 @@ pub struct Shown {
     pub prepared: Prepared,
     pub names: FeatureNames,
     pub settings: RenderSettings,
+    /// Of the layer with the denoised image.
+    pub filter: DenoiseFilter,
     pub threads: usize,
     /// Pixels of the requested image.
     pub size: (u32, u32),
@@ -52,18 +54,21 @@ pub struct DenoiseWith {
     /// The scene that the film shows.
     pub prepared: Prepared,
     pub settings: RenderSettings,
+    pub filter: DenoiseFilter,
     pub threads: usize,
 }
 
 impl DenoiseWith {
-    /// `None` if the window was closed meanwhile, or the system has no threads: then the image is saved raw.
-    fn denoise(&self, film: &Film, ending: &AtomicBool) -> Option<Vec<Vec3>> {
+    /// Returns the colours and the filter that was used. `None` if the window was closed meanwhile, or the system has no
+    /// threads: then the image is saved raw.
+    fn denoise(&self, film: &Film, ending: &AtomicBool) -> Option<(Vec<Vec3>, DenoiseFilter)> {
         let stop = || ending.load(Ordering::Relaxed);
         let pool = worker_threads().num_threads(self.threads).build().ok()?;
         let size = UVec2::new(film.width(), film.height());
         pool.install(|| {
             let guides = gather_guides(&self.prepared, &self.settings, size, FEATURE_SAMPLES, &stop)?;
-            denoise_film(film, &guides, &stop).map(|denoised| denoised.color)
+            let (by, denoised) = self.filter.denoise(&DenoiseSource::of(film), &guides, &stop)?;
+            Some((denoised.color, by))
         })
     }
 }
@@ -101,7 +106,8 @@ impl Saver {
         self.spawn(move || {
             let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             let denoised = denoise.and_then(|with| with.denoise(&film, &ending));
-            print(&folder, &stem, (&film, denoised.as_deref()), draft, &display, size, format)
+            let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
+            print(&folder, &stem, (&film, denoised), draft, &display, size, format)
         });
     }
 
@@ -145,7 +151,7 @@ impl Saver {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
             let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
-            let Shown { prepared, names, settings, threads, size } = shown;
+            let Shown { prepared, names, settings, filter, threads, size } = shown;
             let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
             let pool = worker_threads().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
@@ -154,8 +160,8 @@ impl Saver {
             let gather = || FeatureLayers::gather(&prepared, names, &settings, of_film, FEATURE_SAMPLES, &stop);
             let features = pool.install(gather).ok_or_else(|| failed(&"the window was closed"))?;
             let knows_error = film.error_estimate().is_some();
-            let with = DenoiseWith { prepared: prepared.clone(), settings, threads };
-            let denoised = with.denoise(&film, &ending).ok_or_else(|| failed(&"the window was closed"))?;
+            let with = DenoiseWith { prepared: prepared.clone(), settings, filter, threads };
+            let (denoised, _) = with.denoise(&film, &ending).ok_or_else(|| failed(&"the window was closed"))?;
             let is_known = |layer: &PictureLayer| knows_error || *layer != PictureLayer::Error;
             let layers: Vec<PictureLayer> = PictureLayer::ALL.into_iter().filter(is_known).collect();
             let (coarse, note) = metadata_of(&folder, &stem, &film, draft, &display, size);
@@ -206,18 +212,19 @@ impl Saver {
 fn print(
     folder: &Path,
     stem: &str,
-    (film, denoised): (&Film, Option<&[Vec3]>),
+    (film, denoised): (&Film, Option<(&[Vec3], DenoiseFilter)>),
     draft: Option<MetadataDraft>,
     display: &Display,
     size: (u32, u32),
     format: PictureFormat,
 ) -> Saved {
     let (coarse, mut note) = metadata_of(folder, stem, film, draft, display, size);
-    if denoised.is_some()
+    if let Some((_, filter)) = denoised
         && let Some(raw) = note.as_deref().and_then(|note| ImageMetadata::from_note(note).ok())
     {
-        note = Some(ImageMetadata { denoised: Some("own".to_owned()), ..raw }.to_note());
+        note = Some(ImageMetadata { denoised: Some(filter.name().to_owned()), ..raw }.to_note());
     }
+    let denoised = denoised.map(|(colors, _)| colors);
     let print = Print { film, display, size, note: note.as_deref(), denoised };
     Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
@@ -320,7 +327,7 @@ mod tests {
             let (prepared, names) = (extraction.prepared.clone(), FeatureNames::of(&extraction, &inputs));
             let mut film = Film::new(9, 7);
             advance(&prepared, &settings, &mut film, spp, &|| false);
-            let shown = Shown { prepared, names, settings, threads: 1, size: (9, 7) };
+            let shown = Shown { prepared, names, settings, filter: DenoiseFilter::Own, threads: 1, size: (9, 7) };
             saver.save_layers(ready(film), shown, None, Display::default(), "cornell");
             saver.threads.drain(..).for_each(|thread| thread.join().unwrap());
             let [Ok(Kept { path, coarse: false })] = &saver.finished()[..] else { panic!("it cannot be saved") };

@@ -1,6 +1,6 @@
 //! Text of the status line: quality of the image, and settings.
 
-use crate::frame::{Denoising, Status, f_number, f_stop};
+use crate::frame::{DenoiseFilter, Denoising, Status, f_number, f_stop};
 use crate::render::{Integrator, ToneCurve};
 use std::fmt::Write as _;
 
@@ -47,6 +47,9 @@ pub fn figures(status: &Status) -> String {
         (Denoising::Split, Some(_)) => "   raw | denoised",
     };
     line += shown;
+    if matches!(shown, "   denoised" | "   raw | denoised") && status.denoised_by != DenoiseFilter::Own {
+        write!(line, " by {}", status.denoised_by.label()).expect("a string takes all");
+    }
     if status.awaits_denoised {
         line += if shown.is_empty() { "   denoising…" } else { ", denoising…" };
     }
@@ -173,6 +176,9 @@ mod tests {
             "{}",
             figures(&status)
         );
+        status.denoised_by = DenoiseFilter::Oidn;
+        assert!(figures(&status).contains("   denoised by Open Image Denoise   "), "{}", figures(&status));
+        status.denoised_by = DenoiseFilter::Own;
         status.denoising = Denoising::Split;
         assert!(figures(&status).contains("   raw | denoised   "));
         status.denoised_error = None;

@@ -3,8 +3,8 @@
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
-    Bookmarks, Command, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection,
-    Session, SessionOptions, Target, wanted_mesh,
+    Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
+    Selection, Session, SessionOptions, Target, wanted_mesh,
 };
 use firstlight::render::{Inspection, Integrator, MaterialKind};
 use firstlight::scene::{
@@ -392,6 +392,28 @@ fn the_denoised_image_keeps_all_samples_and_has_an_error() {
     driver.session.send(Command::SetDenoising(Denoising::Denoised));
     driver.session.send(Command::Turn { yaw_deg: 5.0, pitch_deg: 0.0 });
     driver.until(|session| session.status().restarts > restarts && session.status().denoised_error.is_some());
+}
+
+/// Where the other filter is not installed, firstlight's own is used, and named.
+#[test]
+fn another_filter_denoises_the_same_samples() {
+    let mut driver = Driver::open("gallery");
+    let (raw, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
+    driver.session.send(Command::SetDenoising(Denoising::Denoised));
+    driver.until(|session| session.status().denoised_error.is_some() && session.is_idle());
+    let own = driver.session.picture().rgba.clone();
+    assert_eq!(driver.session.status().denoised_by, DenoiseFilter::Own);
+    let is_installed = DenoiseFilter::Oidn.check().is_ok();
+    let number = driver.session.picture().number;
+    driver.session.send(Command::SetDenoiseFilter(DenoiseFilter::Oidn));
+    driver.until(|session| {
+        session.picture().number > number && session.status().denoised_error.is_some() && session.is_idle()
+    });
+    let (other, by) = (driver.session.picture().rgba.clone(), driver.session.status().denoised_by);
+    assert_eq!((other != own, by == DenoiseFilter::Oidn), (is_installed, is_installed));
+    driver.session.send(Command::SetDenoising(Denoising::Raw));
+    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
+    assert_eq!((&driver.session.picture().rgba, driver.session.status().restarts), (&raw, restarts));
 }
 
 #[test]

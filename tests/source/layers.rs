@@ -47,7 +47,7 @@ const LAYERS: [(&str, &[&str]); 26] = [
     (PRINTABLE, &[]),
     (CONSOLE, &[PRINTABLE]),
     (SCENE, &[PRINTABLE, CONSOLE]),
-    (FRAME, &[PRINTABLE, CONSOLE, SCENE]),
+    (FRAME, &[OIDN, PRINTABLE, CONSOLE, SCENE]),
     ("src/cluster", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/report", &[OIDN, PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/stability", &[PRINTABLE, CONSOLE, SCENE, FRAME]),

@@ -25,7 +25,7 @@ impl Loop<'_> {
     /// Takes over a denoised image of the current view.
     pub(super) fn take_settled(&mut self) {
         let Some(settled) = self.denoiser.take() else { return };
-        if self.settled_key().is_some_and(|key| key == settled.key) {
+        if self.settled_key().is_some_and(|key| key == settled.key) && settled.filter == self.look.filter {
             self.views.settle_again = Some(Instant::now() + SAMPLES_FIRST * settled.took);
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             self.views.settled = Some(settled);
@@ -39,6 +39,11 @@ impl Loop<'_> {
         (*divider == 1).then_some(ViewKey { generation: job.generation, inspection: Inspection::Picture, size })
     }
 
+    /// The denoised image of a view, by the filter that is wanted.
+    fn settled(&self, key: ViewKey) -> Option<&Settled> {
+        self.views.settled.as_ref().filter(|settled| settled.key == key && settled.filter == self.look.filter)
+    }
+
     /// Has the film denoised if it is time.
     ///
     /// - `is_last`: no samples will follow, so that it is time whenever there are new ones.
@@ -48,7 +53,7 @@ impl Loop<'_> {
         }
         let (Some(job), Some((1, film)), Some(key)) = (&self.job, &self.film, self.settled_key()) else { return };
         let spp = film.spp_in(self.active_region().as_ref());
-        let before = self.views.settled.as_ref().filter(|settled| settled.key == key).map_or(0, |settled| settled.spp);
+        let before = self.settled(key).map_or(0, |settled| settled.spp);
         let is_soon = before > 0 && self.views.settle_again.is_some_and(|at| Instant::now() < at);
         let is_due = spp > before && (is_last || (!is_soon && 4 * u64::from(spp) >= 5 * u64::from(before)));
         if film.spp() == 0 || !is_due || self.denoiser.is_busy() {
@@ -57,6 +62,7 @@ impl Loop<'_> {
         let pool = lock(&self.shared.pool).clone();
         self.denoiser.request(Request {
             key,
+            filter: self.look.filter,
             source: pool.install(|| DenoiseSource::of(film)),
             prepared: job.prepared.clone(),
             settings: job.settings,
@@ -84,7 +90,7 @@ impl Loop<'_> {
         };
         // A coarse image is displayed whatever comes next, or nothing would be displayed during a long movement.
         let stop = || divider == 1 && self.shared.interrupt.load(Ordering::Relaxed);
-        let settled = self.views.settled.as_ref().filter(|settled| divider == 1 && settled.key == key);
+        let settled = self.settled(key).filter(|_| divider == 1);
         if let Some(settled) = settled.filter(|settled| wanted == Denoising::Denoised && self.is_overtaken(settled)) {
             develop(film, &self.display, width, height, rgba);
             return Some((Denoising::Raw, Some(settled.denoised.error)));
@@ -121,7 +127,7 @@ impl Loop<'_> {
         if divider > 1 || self.wanted_denoising() == Denoising::Raw {
             return false;
         }
-        let settled = self.views.settled.as_ref().filter(|settled| settled.key == key);
+        let settled = self.settled(key);
         let too_soon =
             self.views.smooth_again.is_some_and(|(of, until): (ViewKey, Instant)| of == key && Instant::now() < until);
         match settled {

@@ -5,9 +5,8 @@
 
 use super::views::{Settled, ViewKey};
 use super::{DENOISE, DENOISE_NICENESS, lock, make_pool};
-use crate::render::{
-    DenoiseSource, FEATURE_SAMPLES, Prepared, RenderSettings, SurfaceGuides, denoise_source, gather_guides,
-};
+use crate::frame::denoising::DenoiseFilter;
+use crate::render::{DenoiseSource, FEATURE_SAMPLES, Prepared, RenderSettings, SurfaceGuides, gather_guides};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -17,6 +16,7 @@ use std::time::Instant;
 /// What is to be denoised.
 pub struct Request {
     pub key: ViewKey,
+    pub filter: DenoiseFilter,
     pub source: DenoiseSource,
     pub prepared: Prepared,
     pub settings: RenderSettings,
@@ -109,7 +109,7 @@ fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
     let mut known: Option<(ViewKey, SurfaceGuides)> = None;
     let mut last_pool: Option<Arc<rayon::ThreadPool>> = None;
     while let Some(request) = next(shared) {
-        let Request { key, source, prepared, settings, spp, threads } = request;
+        let Request { key, filter, source, prepared, settings, spp, threads } = request;
         let last = last_pool.take().filter(|pool| pool.current_num_threads() == threads);
         let Some(pool) = last.or_else(|| make_pool(threads, DENOISE, yielding.then_some(DENOISE_NICENESS)).ok()) else {
             continue;
@@ -120,15 +120,15 @@ fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
             let gather = || gather_guides(&prepared, &settings, key.size, FEATURE_SAMPLES, &stop);
             let guides = of_view.or_else(gather)?;
             let start = Instant::now();
-            let denoised = denoise_source(&source, &guides, &stop)?;
-            Some((guides, denoised, start.elapsed()))
+            let (by, denoised) = filter.denoise(&source, &guides, &stop)?;
+            Some((guides, by, denoised, start.elapsed()))
         };
         // A panic has been reported by its thread; the raw image stays.
         let made = catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok().flatten();
         last_pool = Some(pool);
-        if let Some((guides, denoised, took)) = made {
+        if let Some((guides, by, denoised, took)) = made {
             known = Some((key, guides));
-            lock(&shared.slot).result = Some(Settled { key, spp, denoised, took });
+            lock(&shared.slot).result = Some(Settled { key, filter, by, spp, denoised, took });
             tell();
         }
     }

@@ -14,7 +14,7 @@ mod show;
 mod thread;
 mod views;
 
-use super::denoising::Denoising;
+use super::denoising::{DenoiseFilter, Denoising};
 use super::{LatencyHistogram, Picture, Target};
 use crate::render::{
     BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
@@ -59,6 +59,8 @@ pub struct ViewOptions {
     pub inspection: Inspection,
     /// Of the image itself, where no inspection is displayed.
     pub denoising: Denoising,
+    /// Denoises at full resolution.
+    pub filter: DenoiseFilter,
     /// Tints the pixels in focus and draws the focal plane.
     pub sharp_zone: bool,
 }
@@ -102,7 +104,8 @@ pub struct Stats {
     pub caustics: Option<CausticChoice>,
     /// How the displayed image is denoised.
     pub denoising: Denoising,
-    /// Relative error of the denoised image, if that is displayed and known.
+    /// The filter of the denoised image, and its relative error, if that is displayed and known.
+    pub denoised_by: DenoiseFilter,
     pub denoised_error: Option<f64>,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,

@@ -92,7 +92,9 @@ impl Loop<'_> {
         picture.rgba = rgba;
         let divider = *divider;
         let awaits_denoised = divider == 1 && self.wanted_denoising() != Denoising::Raw && denoised_error.is_none();
-        (self.stats.denoising, self.stats.denoised_error) = (denoising, denoised_error);
+        let denoised_by = self.views.settled.as_ref().map_or(self.look.filter, |settled| settled.by);
+        (self.stats.denoising, self.stats.denoised_by) = (denoising, denoised_by);
+        self.stats.denoised_error = denoised_error;
         self.stats.awaits_denoised = awaits_denoised;
         if let Some(took) = smoothed.filter(|_| denoising != Denoising::Raw) {
             self.note_smoothing(divider, key, took);
@@ -101,7 +103,8 @@ impl Loop<'_> {
             let mut outbox = lock(&self.shared.outbox);
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
-            (outbox.stats.denoising, outbox.stats.denoised_error) = (denoising, denoised_error);
+            (outbox.stats.denoising, outbox.stats.denoised_by) = (denoising, denoised_by);
+            outbox.stats.denoised_error = denoised_error;
             outbox.stats.awaits_denoised = awaits_denoised;
         }
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);

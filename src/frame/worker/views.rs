@@ -1,5 +1,6 @@
 //! Cached results computed from the film or the scene.
 
+use crate::frame::denoising::DenoiseFilter;
 use crate::render::{Denoised, Inspected, Inspection};
 use glam::UVec2;
 use std::time::{Duration, Instant};
@@ -30,6 +31,10 @@ pub struct ViewKey {
 /// A denoised image.
 pub struct Settled {
     pub key: ViewKey,
+    /// The filter that was asked for.
+    pub filter: DenoiseFilter,
+    /// The filter that was used: firstlight's own where the other one failed.
+    pub by: DenoiseFilter,
     pub spp: u32,
     pub denoised: Denoised,
     /// Without the feature buffers, which are gathered once per view.

@@ -51,6 +51,12 @@ impl App {
         if let Some(linear) = asked.screenshot {
             self.screenshot(linear);
         }
+        if let Some(filter) = asked.filter {
+            match filter.check() {
+                Ok(()) => self.session.send(Command::SetDenoiseFilter(filter)),
+                Err(error) => self.toasts.add(Tone::Problem, error, now),
+            }
+        }
         if asked.save_layers {
             self.save_layers(now);
         }
@@ -272,6 +278,7 @@ impl App {
         let denoise = self.session.rendered().filter(|_| is_denoised).map(|(prepared, settings)| DenoiseWith {
             prepared,
             settings,
+            filter: self.session.world().resource::<ViewMode>().0.filter,
             threads: self.session.status().threads,
         });
         self.saver.save((self.session.keep_film(), denoise), draft, display, size, &scene, format);
@@ -287,7 +294,8 @@ impl App {
         let status = self.session.status();
         let (display, scene, threads) = (status.display, status.scene.clone(), status.threads);
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
-        let shown = Shown { prepared, names, settings, threads, size };
+        let filter = self.session.world().resource::<ViewMode>().0.filter;
+        let shown = Shown { prepared, names, settings, filter, threads, size };
         self.saver.save_layers(self.session.keep_film(), shown, draft, display, &scene);
     }
 

@@ -33,7 +33,7 @@ mod widgets;
 use super::change::PictureChange;
 use super::dialog::DialogPurpose;
 use super::reaction::Reaction;
-use crate::frame::{Command, Edit, Navigation, Session, gizmo};
+use crate::frame::{Command, DenoiseFilter, Edit, Navigation, Session, gizmo};
 use crate::scene::Inventory;
 use bevy_ecs::prelude::Entity;
 use egui::{Context, RichText, Ui};
@@ -127,6 +127,8 @@ pub struct Asked {
     pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
     pub save_layers: bool,
+    /// The filter of denoised images, which may not be installed.
+    pub filter: Option<DenoiseFilter>,
     pub toggle_brush: bool,
     /// A file dialog to show, with its purpose.
     pub dialog: Option<DialogPurpose>,

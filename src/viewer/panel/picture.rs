@@ -2,7 +2,7 @@
 
 use super::widgets::{number, row, row_with_hint, rows, slider, whole};
 use super::{Around, Asked};
-use crate::frame::{Command, Denoising, Session, StopAt, Target, ViewMode};
+use crate::frame::{Command, DenoiseFilter, Denoising, Session, StopAt, Target, ViewMode};
 use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::Rendering;
 use crate::viewer::status::tone_curve;
@@ -157,6 +157,20 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 }
             })
         });
+        row_with_hint(
+            ui,
+            "denoiser",
+            "of images at full resolution; OIDN is Open Image Denoise, where it is installed",
+            |ui| {
+                ui.horizontal(|ui| {
+                    for filter in DenoiseFilter::ALL {
+                        if ui.selectable_label(looking.filter == filter, filter.short_label()).clicked() {
+                            asked.filter = Some(filter);
+                        }
+                    }
+                })
+            },
+        );
         row(ui, "show", |ui| {
             let shown = looking.inspection;
             egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {
