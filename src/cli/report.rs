@@ -13,7 +13,7 @@ use firstlight::render::{
 };
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
-    csv, denoised_curves, foreign_share, measure_curve, page, summary_text,
+    csv, denoised_curves, denoised_text, foreign_share, measure_curve, page, summary_text, timed,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
@@ -103,6 +103,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes())?;
     write_whole(&table, csv(&outcomes).as_bytes())?;
     print(lines(summary_text(&outcomes).trim_end()))?;
+    print(lines(denoised_text(&outcomes).trim_end()))?;
     print(vec![html.display().to_string(), table.display().to_string()])?;
     for mismatch in outcomes.iter().filter_map(SceneOutcome::mismatch) {
         remark(format_args!("warning: {mismatch}"));
@@ -300,9 +301,10 @@ impl ReportScene {
                 .collect()
         };
         let prepared = self.prepared();
-        let guides = gather_guides(&prepared, &self.settings, self.size.into(), FEATURE_SAMPLES, &|| false)
-            .expect("nothing stops it");
-        let denoised = denoised_curves(&steps, &guides, oidn, &reference.picture, &display).unwrap_or_else(|error| {
+        let gather = || gather_guides(&prepared, &self.settings, self.size.into(), FEATURE_SAMPLES, &|| false);
+        let (guides, took) = timed(|| gather().expect("nothing stops it"));
+        let denoised = denoised_curves(&steps, (&guides, took), oidn, &reference.picture, &display);
+        let denoised = denoised.unwrap_or_else(|error| {
             remark(format_args!("warning: {error}"));
             Vec::new()
         });

@@ -1,9 +1,11 @@
 //! The steps of a convergence curve, denoised: by firstlight, and by Open Image Denoise where it is installed.
 
-use super::{CurveStep, Distance, LinearPicture};
+use super::curve::{Seconds, seconds_to};
+use super::{CurveStep, Distance, LinearPicture, cpu_seconds};
 use crate::oidn::{Oidn, OidnError};
 use crate::render::{Denoised, Display, SurfaceGuides, denoise_source};
 use glam::Vec3;
+use std::time::Instant;
 
 /// One denoiser at all steps of a curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +18,9 @@ pub struct DenoisedCurve {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenoisedStep {
     pub spp: u32,
+    /// Until the image is there: samples, feature buffers, and denoising once. CPU seconds per thread, as
+    /// [`Spent::seconds`](super::Spent::seconds).
+    pub seconds: f64,
     pub distance: Distance,
     /// The error that it tells of itself with its 95 % interval; `None` for a filter alone, which tells none.
     pub estimate: Option<(f64, [f64; 2])>,
@@ -33,35 +38,61 @@ impl DenoisedStep {
     }
 }
 
+impl DenoisedCurve {
+    /// Seconds until the relative error is down to `error`; `None` if it is not, in the measured steps.
+    pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
+        let points: Vec<(f64, f64)> =
+            self.steps.iter().map(|step| (step.seconds, step.distance.relative_mse)).collect();
+        let first = points.first().copied()?;
+        // The first step is the earliest image there can be.
+        let at_once = || (first.1 <= error * error).then_some(Seconds::Interpolated(first.0));
+        seconds_to(&points, None, error * error).or_else(at_once)
+    }
+}
+
+/// CPU seconds per thread of the current pool that `work` takes; wall seconds where the system tells no CPU time.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let (cpu, start) = (cpu_seconds(), Instant::now());
+    let done = work();
+    let wall = start.elapsed().as_secs_f64();
+    let of_cpu = cpu_seconds().zip(cpu).map(|(now, before)| (now - before) / rayon::current_num_threads() as f64);
+    (done, of_cpu.unwrap_or(wall))
+}
+
 /// The names of the denoisers, in this order; the first needs nothing to be installed.
 const NAMES: [&str; 3] = ["denoised", "Open Image Denoise combined with raw", "Open Image Denoise alone"];
 
 /// Denoises each step and compares it with `reference`, which must have the same size.
 ///
-/// - `guides`: of the scene; `oidn`: the library, if it is installed.
+/// - `guides`: of the scene, and the seconds that it took to gather them; `oidn`: the library, if it is installed.
 ///
 /// # Errors
 /// If the library reports one.
 pub fn denoised_curves(
     steps: &[CurveStep],
-    guides: &SurfaceGuides,
+    (guides, guides_took): (&SurfaceGuides, f64),
     oidn: Option<&Oidn>,
     reference: &LinearPicture,
     display: &Display,
 ) -> Result<Vec<DenoisedCurve>, OidnError> {
     let mut curves: Vec<DenoisedCurve> = NAMES.map(|name| DenoisedCurve { name, steps: Vec::new() }).into();
     for step in steps {
-        let measured = |pixels: Vec<Vec3>, estimate| {
+        let measured = |pixels: Vec<Vec3>, took: f64, estimate| {
             let (width, height) = (step.picture.width, step.picture.height);
             let picture = LinearPicture { width, height, pixels };
-            DenoisedStep { spp: step.spp, distance: Distance::between(&picture, reference, display), estimate }
+            let seconds = step.spent.seconds() + guides_took + took;
+            DenoisedStep { spp: step.spp, seconds, distance: Distance::between(&picture, reference, display), estimate }
         };
-        let combined = |found: Denoised| measured(found.color, Some((found.error, found.error_95)));
+        let combined =
+            |(found, took): (Denoised, f64)| measured(found.color, took, Some((found.error, found.error_95)));
         let never = || false;
-        curves[0].steps.extend(denoise_source(&step.source, guides, &never).map(combined));
+        let (own, took) = timed(|| denoise_source(&step.source, guides, &never));
+        curves[0].steps.extend(own.map(|found| combined((found, took))));
         if let Some(oidn) = oidn {
-            curves[1].steps.extend(oidn.denoise(&step.source, guides, &never)?.map(combined));
-            curves[2].steps.push(measured(oidn.filter_source(&step.source, guides)?, None));
+            let (found, took) = timed(|| oidn.denoise(&step.source, guides, &never));
+            curves[1].steps.extend(found?.map(|found| combined((found, took))));
+            let (filtered, took) = timed(|| oidn.filter_source(&step.source, guides));
+            curves[2].steps.push(measured(filtered?, took, None));
         }
     }
     curves.retain(|curve| !curve.steps.is_empty());

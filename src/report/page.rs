@@ -46,6 +46,27 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
     html
 }
 
+/// Errors that denoised images are compared by.
+const DENOISED_TARGETS: [f64; 2] = [0.05, 0.02];
+
+/// Seconds to the same error raw and denoised, as plain text; empty if nothing was denoised.
+pub fn denoised_text(outcomes: &[SceneOutcome]) -> String {
+    let mut text = String::new();
+    for outcome in outcomes {
+        let Some(own) = outcome.denoised.first() else { continue };
+        let _ = write!(text, "{}:", printable::name(&outcome.title));
+        for target in DENOISED_TARGETS {
+            let (raw, denoised) = (outcome.curve.seconds_to(target), own.seconds_to(target));
+            let _ = write!(text, "  {}% in {} s raw, {} s denoised", 100.0 * target, seconds(raw), seconds(denoised));
+            if let Some((raw, denoised)) = raw.zip(denoised) {
+                let _ = write!(text, " ({:.2})", denoised.value() / raw.value());
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// The key figures of each scene as plain text.
 pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     let width =
@@ -265,7 +286,8 @@ fn steps_table(curve: &ConvergenceCurve) -> String {
     )
 }
 
-/// relMSE of the raw image and of each denoiser, with estimated over true error.
+/// relMSE of the raw image and of each denoiser, with estimated over true error; seconds until it is small, in which the
+/// feature buffers and one denoising count.
 fn denoised_table(outcome: &SceneOutcome) -> String {
     let curves = &outcome.denoised;
     let mut rows = String::new();
@@ -279,6 +301,16 @@ fn denoised_table(outcome: &SceneOutcome) -> String {
         });
         let cells: String = cells.collect();
         let _ = writeln!(rows, "<tr><td>{}</td><td>{}</td>{cells}</tr>", raw.spp, number(raw.distance.relative_mse));
+    }
+    for target in DENOISED_TARGETS {
+        let cells = curves.iter().map(|curve| format!("<td>{}</td><td></td>", seconds(curve.seconds_to(target))));
+        let _ = writeln!(
+            rows,
+            "<tr><td>s to {}</td><td>{}</td>{}</tr>",
+            percent(target),
+            seconds(outcome.curve.seconds_to(target)),
+            cells.collect::<String>()
+        );
     }
     let names = curves.iter().map(|curve| format!("<th>{}</th><th>estimated / true</th>", escape(curve.name)));
     format!(
