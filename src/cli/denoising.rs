@@ -2,6 +2,7 @@
 
 use super::failure::Failure;
 use clap::{Args, ValueEnum};
+use firstlight::frame::DenoiseFilter;
 use firstlight::oidn::Oidn;
 use firstlight::render::{DenoiseSource, Denoised, Film, SurfaceGuides, denoise_source};
 
@@ -52,7 +53,8 @@ impl DenoiseArgs {
 
     /// Name of the denoiser in image metadata.
     pub fn name(&self) -> String {
-        if self.denoiser == Some(DenoiserArg::Oidn) { "oidn" } else { "own" }.to_owned()
+        let filter = if self.denoiser == Some(DenoiserArg::Oidn) { DenoiseFilter::Oidn } else { DenoiseFilter::Own };
+        filter.name().to_owned()
     }
 }
 

@@ -72,9 +72,9 @@ pub struct Status {
     pub caustics: Option<CausticChoice>,
     /// How the image is denoised.
     pub denoising: Denoising,
-    /// The filter of the denoised image, and its relative error, if that is displayed.
+    /// The filter of the denoised image, if that is displayed.
     pub denoised_by: DenoiseFilter,
-    /// See [`Self::denoised_by`].
+    /// Relative error of the denoised image, if that is displayed.
     pub denoised_error: Option<f64>,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,

@@ -41,8 +41,12 @@ impl DenoisedStep {
 impl DenoisedCurve {
     /// Seconds until the relative error is down to `error`; `None` if it is not, in the measured steps.
     pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
-        let points: Vec<(f64, f64)> =
+        let mut points: Vec<(f64, f64)> =
             self.steps.iter().map(|step| (step.seconds, step.distance.relative_mse)).collect();
+        // A single sample per pixel takes longer to denoise: an image of more samples may be there sooner.
+        for i in (1..points.len()).rev() {
+            points[i - 1].0 = points[i - 1].0.min(points[i].0);
+        }
         let first = points.first().copied()?;
         // The first step is the earliest image there can be.
         let at_once = || (first.1 <= error * error).then_some(Seconds::Interpolated(first.0));
@@ -97,4 +101,26 @@ pub fn denoised_curves(
     }
     curves.retain(|curve| !curve.steps.is_empty());
     Ok(curves)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_count_from_the_first_image_that_is_good_enough() {
+        let step = |spp, seconds, error: f64| {
+            let distance = Distance { relative_mse: error * error, rmse: 0.0, flip: 0.0 };
+            DenoisedStep { spp, seconds, distance, estimate: None }
+        };
+        let curve = DenoisedCurve {
+            name: "denoised",
+            // The first step is slow to denoise.
+            steps: vec![step(1, 0.3, 0.04), step(2, 0.2, 0.03), step(4, 0.4, 0.015)],
+        };
+        assert_eq!(curve.seconds_to(0.05), Some(Seconds::Interpolated(0.2)));
+        let Some(Seconds::Interpolated(seconds)) = curve.seconds_to(0.02) else { panic!("between two steps") };
+        assert!((0.2..0.4).contains(&seconds), "{seconds}");
+        assert_eq!(curve.seconds_to(0.01), None, "beyond the measured steps");
+    }
 }

@@ -47,7 +47,8 @@ pub fn figures(status: &Status) -> String {
         (Denoising::Split, Some(_)) => "   raw | denoised",
     };
     line += shown;
-    if matches!(shown, "   denoised" | "   raw | denoised") && status.denoised_by != DenoiseFilter::Own {
+    let is_denoised = status.denoising != Denoising::Raw && status.denoised_error.is_some();
+    if is_denoised && status.denoised_by != DenoiseFilter::Own {
         write!(line, " by {}", status.denoised_by.label()).expect("a string takes all");
     }
     if status.awaits_denoised {

@@ -72,6 +72,8 @@ pub(super) struct DescentRay {
     /// Distance beyond which nothing matters: that of the nearest hit.
     pub end: f32,
 }
+// Three rows of four.
+const _: () = assert!(size_of::<DescentRay>() == 48);
 
 impl DescentRay {
     pub const IDLE: Self =

@@ -14,18 +14,19 @@ impl KernelSimd for Avx512 {
             assert!(height <= STACK - 8);
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
             let shifts = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(shifts), shifts);
-            // The lower half holds entry times, the upper half negated exit times: then both are updated by a maximum.
+            let rows = std::ptr::from_ref(ray).cast::<f32>();
             // Lane 7 holds the axes: no child refers to this plane.
             let splits = _mm256_load_ps(std::ptr::from_ref(node).cast());
             let splits = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(splits), splits);
             let axes = _mm512_srlv_epi32(_mm512_set1_epi32(node.axes as i32), shifts);
             // The permutation within rows uses the low two bits of each lane, which are its axis.
-            let origin = _mm512_broadcast_f32x4(_mm_load_ps(ray.origin.as_ptr()));
+            let origin = _mm512_broadcast_f32x4(_mm_load_ps(rows));
             let origin = _mm512_permutevar_ps(origin, axes);
+            // The lower half holds entry times, the upper half negated exit times: then both are updated by a maximum.
             let second_row = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4);
             let axes = _mm512_ternarylogic_epi32::<0xF8>(second_row, axes, _mm512_set1_epi32(3));
-            let rows = _mm512_castps256_ps512(_mm256_loadu_ps(std::ptr::from_ref(&ray.inv_lo).cast()));
-            let inv = _mm512_permutexvar_ps(axes, rows);
+            let inv = _mm512_castps256_ps512(_mm256_loadu_ps(rows.add(4)));
+            let inv = _mm512_permutexvar_ps(axes, inv);
             let down = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(inv))) & PLANES;
             let times = _mm512_mul_ps(_mm512_sub_ps(splits, origin), inv);
             let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.padding));
@@ -88,9 +89,10 @@ impl KernelSimd for Avx2 {
             let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
             let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
             // The permutation within rows uses the low two bits of each lane, which are its axis.
-            let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.origin.as_ptr().cast()), axes);
-            let inv_lo = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.inv_lo.as_ptr().cast()), axes);
-            let minus_inv_hi = _mm256_permutevar_ps(_mm256_broadcast_ps(&*ray.minus_inv_hi.as_ptr().cast()), axes);
+            let rows = std::ptr::from_ref(ray).cast::<__m128>();
+            let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows), axes);
+            let inv_lo = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(1)), axes);
+            let minus_inv_hi = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(2)), axes);
             let padding = _mm256_set1_ps(ray.padding);
             let distance = _mm256_sub_ps(splits, origin);
             let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);

@@ -104,8 +104,9 @@ pub struct Stats {
     pub caustics: Option<CausticChoice>,
     /// How the displayed image is denoised.
     pub denoising: Denoising,
-    /// The filter of the denoised image, and its relative error, if that is displayed and known.
+    /// The filter of the denoised image, if that is displayed.
     pub denoised_by: DenoiseFilter,
+    /// Relative error of the denoised image, if that is displayed and known.
     pub denoised_error: Option<f64>,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,

@@ -43,7 +43,7 @@ pub(super) fn block_costs(pass: &Pass, stop: &(dyn Fn() -> bool + Sync)) -> Opti
         let start = |paths: &mut PathBatch| {
             for (slot, i) in (0..).zip(blocks.clone().flat_map(|block| (0..PATHS).map(move |i| (block, i)))) {
                 let (ray, sampler, weight) = lens.ray(pixel_of(i, n_blocks.x, pass.size), i.1);
-                paths.push(&{ ray }, &CameraPath { ray, sampler, slot, weight }.into());
+                paths.push(&ray, &CameraPath { ray, sampler, slot, weight }.into());
             }
         };
         wave.begin_in(pass.snapshot, &pass.camera_media);
