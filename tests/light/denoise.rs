@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use firstlight::render::{
-    Denoised, Environment, Film, MovingFilter, Prepared, RenderSettings, advance, denoise_film, gather_guides,
-    smooth_film,
+    Denoised, Environment, Film, GuideGatherer, MovingFilter, Prepared, RenderSettings, advance, denoise_film,
+    gather_features, gather_guides, smooth_film,
 };
 use glam::{UVec2, Vec3};
 
@@ -62,6 +62,33 @@ fn no_number_of_samples_makes_it_worse_than_raw() {
         let told = found.error / error.sqrt();
         println!("{spp}: {} told {told}", error / raw);
         assert!(spp < 16 || (0.65..1.5).contains(&told), "{spp} samples: told {} for {}", found.error, error.sqrt());
+    }
+}
+
+/// Guides can be had at once and be made better later.
+#[test]
+fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
+    let scene = room();
+    for simd in [RenderSettings::default().simd, None] {
+        let settings = RenderSettings { simd, ..RenderSettings::default() };
+        let size = UVec2::new(150, 61);
+        let gather = |samples| gather_guides(&scene, &settings, size, samples, &|| false).expect("nothing stops it");
+        let mut steps = GuideGatherer::new(size);
+        for samples in [1, 4, 4, 7, 16] {
+            steps = steps.gather(&scene, &settings, samples, &|| false).expect("nothing stops it");
+            assert_eq!(steps.samples(), samples);
+            assert_eq!(steps.guides(), gather(samples), "{samples} samples, {simd:?}");
+        }
+        // The seed of the guides differs from that of the image.
+        let other = RenderSettings { seed: settings.seed ^ 0x9e37_79b9, ..settings };
+        let features = gather_features(&scene, &other, size, 16, &|| false).expect("nothing stops it");
+        let guides = steps.guides();
+        assert_eq!(guides.albedo, features.albedo);
+        assert_eq!(guides.normal, features.normal);
+        assert_eq!(guides.depth, features.depth);
+        let n_emitters = guides.emitters.iter().filter(|emits| **emits).count();
+        assert!(n_emitters > 0 && n_emitters < guides.emitters.len() / 4, "{n_emitters}");
+        assert!(steps.gather(&scene, &settings, 32, &|| true).is_none(), "it is told to stop");
     }
 }
 

@@ -1,20 +1,25 @@
 //! When the film is denoised, and which denoised image is displayed.
 //!
 //! Images of a moving camera are smoothed at once, by the render thread. At full resolution the settled filter runs
-//! beside the samples ([`super::denoiser`]) on a copy of the film, first at once and then each time that the film has a
-//! quarter more samples; until its first result, images are smoothed.
+//! beside the samples ([`super::denoiser`]) on a copy of the film, as soon as it has guides and then each time that the
+//! film has a quarter more samples; until its first result, images are smoothed.
 
-use super::denoiser::Request;
+use super::denoiser::{Request, ToDenoise};
 use super::thread::Loop;
 use super::views::{Settled, ViewKey};
 use super::{Denoising, lock};
-use crate::render::{DenoiseSource, Film, Inspection, MovingFilter, develop, develop_colors, smooth_film};
+use crate::render::{
+    DenoiseSource, FEATURE_SAMPLES, Film, Inspection, MovingFilter, develop, develop_colors, smooth_film,
+};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples.
 const SAMPLES_FIRST: u32 = 4;
+
+/// Samples per pixel of the guides of the first denoised image of a view; all later ones have [`FEATURE_SAMPLES`].
+const FIRST_GUIDE_SAMPLES: u32 = 8;
 
 impl Loop<'_> {
     /// The noise that the image is to be displayed with; raw where something else is displayed.
@@ -26,6 +31,13 @@ impl Loop<'_> {
     pub(super) fn take_settled(&mut self) {
         let Some(settled) = self.denoiser.take() else { return };
         if self.settled_key().is_some_and(|key| key == settled.key) && settled.filter == self.look.filter {
+            tracing::debug!(
+                "denoised {} samples per pixel with guides of {}, in {:.2} s, {:.2} s after the restart",
+                settled.spp,
+                settled.guide_samples,
+                settled.took.as_secs_f64(),
+                self.restarted_at.elapsed().as_secs_f64()
+            );
             self.views.settle_again = Some(Instant::now() + SAMPLES_FIRST * settled.took);
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             self.views.settled = Some(settled);
@@ -44,29 +56,40 @@ impl Loop<'_> {
         self.views.settled.as_ref().filter(|settled| settled.key == key && settled.filter == self.look.filter)
     }
 
-    /// Has the film denoised if it is time.
+    /// Has the film denoised if it is time, or guides gathered if the view has none.
     ///
     /// - `is_last`: no samples will follow, so that it is time whenever there are new ones.
-    pub(super) fn request_denoised(&mut self, is_last: bool) {
-        if self.wanted_denoising() == Denoising::Raw {
+    pub(super) fn request_denoised(&self, is_last: bool) {
+        if self.wanted_denoising() == Denoising::Raw || self.denoiser.is_busy() {
             return;
         }
         let (Some(job), Some((1, film)), Some(key)) = (&self.job, &self.film, self.settled_key()) else { return };
-        let spp = film.spp_in(self.active_region().as_ref());
-        let before = self.settled(key).map_or(0, |settled| settled.spp);
-        let is_soon = before > 0 && self.views.settle_again.is_some_and(|at| Instant::now() < at);
-        let is_due = spp > before && (is_last || (!is_soon && 4 * u64::from(spp) >= 5 * u64::from(before)));
-        if film.spp() == 0 || !is_due || self.denoiser.is_busy() {
-            return;
-        }
+        let (before, guides_before) = self.settled(key).map_or((0, 0), |settled| (settled.spp, settled.guide_samples));
+        let is_first = before == 0;
+        let guide_samples = if is_first && !is_last { FIRST_GUIDE_SAMPLES } else { FEATURE_SAMPLES };
         let pool = lock(&self.shared.pool).clone();
+        let image = if self.denoiser.guide_samples(key) < FIRST_GUIDE_SAMPLES && !is_last {
+            // The film gets more samples meanwhile, from which the first image is made then.
+            None
+        } else {
+            let spp = film.spp_in(self.active_region().as_ref());
+            let is_soon = !is_first && self.views.settle_again.is_some_and(|at| Instant::now() < at);
+            let is_due = match is_last {
+                true => spp > before || guides_before < FEATURE_SAMPLES,
+                false => spp > before && !is_soon && 4 * u64::from(spp) >= 5 * u64::from(before),
+            };
+            if film.spp() == 0 || !is_due {
+                return;
+            }
+            Some(ToDenoise { filter: self.look.filter, source: pool.install(|| DenoiseSource::of(film)), spp })
+        };
         self.denoiser.request(Request {
             key,
-            filter: self.look.filter,
-            source: pool.install(|| DenoiseSource::of(film)),
             prepared: job.prepared.clone(),
             settings: job.settings,
-            spp,
+            guide_samples,
+            image,
+            is_first,
             threads: pool.current_num_threads(),
         });
     }

@@ -1,34 +1,73 @@
-//! The thread that denoises: beside the render thread, with less of the processor, on a copy of what the film shows.
+//! The thread that denoises: beside the render thread, on a copy of what the film shows.
 //!
-//! The render thread hands over a copy, adds more samples, and takes the result when it is there. Another view makes
-//! the thread drop what it is at within some rows. Start reading at [`Denoiser::start`].
+//! It gathers the guides of a view while the film gets its first samples. Then the render thread hands over a copy, adds
+//! more samples, and takes the result when it is there. The first image of a view is what the user waits for, and gets
+//! as much of the processor as samples do; later ones get less. Another view makes the thread drop what it is at within
+//! some rows. Start reading at [`Denoiser::start`].
 
 use super::views::{Settled, ViewKey};
-use super::{DENOISE, DENOISE_NICENESS, lock, make_pool};
+use super::{DENOISE, DENOISE_NICENESS, NICENESS, lock, make_pool};
 use crate::frame::denoising::DenoiseFilter;
-use crate::render::{DenoiseSource, FEATURE_SAMPLES, Prepared, RenderSettings, SurfaceGuides, gather_guides};
+use crate::render::{DenoiseSource, FEATURE_SAMPLES, GuideGatherer, Prepared, RenderSettings, SurfaceGuides};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-/// What is to be denoised.
+/// A view whose guides are to be gathered, and an image of it that is to be denoised.
 pub struct Request {
     pub key: ViewKey,
-    pub filter: DenoiseFilter,
-    pub source: DenoiseSource,
     pub prepared: Prepared,
     pub settings: RenderSettings,
+    /// Samples per pixel that the guides have at least.
+    pub guide_samples: u32,
+    /// Without one, guides are all that is wanted so far.
+    pub image: Option<ToDenoise>,
+    /// Nothing denoised is there yet.
+    pub is_first: bool,
+    pub threads: usize,
+}
+
+/// What is to be denoised.
+pub struct ToDenoise {
+    pub filter: DenoiseFilter,
+    pub source: DenoiseSource,
     /// Samples per pixel of the source.
     pub spp: u32,
-    pub threads: usize,
+}
+
+/// Guides of a view, as good as they are so far.
+struct KnownGuides {
+    key: ViewKey,
+    guides: SurfaceGuides,
+    samples: u32,
+    /// For more samples; none once there are all.
+    gatherer: Option<GuideGatherer>,
+}
+
+impl KnownGuides {
+    /// Gathers what is missing in `known`; `None` if `stop` returned true.
+    fn of(known: Option<Self>, request: &Request, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        let Request { key, prepared, settings, guide_samples, .. } = request;
+        let gatherer = match known {
+            Some(known) if known.samples >= *guide_samples => return Some(known),
+            known => known.and_then(|known| known.gatherer).unwrap_or_else(|| GuideGatherer::new(key.size)),
+        };
+        let gatherer = gatherer.gather(prepared, settings, *guide_samples, stop)?;
+        let (guides, samples) = (gatherer.guides(), gatherer.samples());
+        Some(Self { key: *key, guides, samples, gatherer: Some(gatherer).filter(|_| samples < FEATURE_SAMPLES) })
+    }
 }
 
 #[derive(Default)]
 struct Slot {
     request: Option<Request>,
     result: Option<Settled>,
+    /// The view that has guides, and their samples per pixel.
+    guides: Option<(ViewKey, u32)>,
+    /// A request has been done since the last look.
+    has_news: bool,
     /// A request is there or being worked on.
     is_busy: bool,
     quit: bool,
@@ -51,7 +90,7 @@ pub struct Denoiser {
 
 impl Denoiser {
     /// - `yielding`: gives way to other threads.
-    /// - `tell`: called when a result is there.
+    /// - `tell`: called when a request is done.
     ///
     /// Without a thread, if the system has none, nothing is denoised.
     pub fn start(yielding: bool, tell: impl Fn() + Send + 'static) -> Self {
@@ -84,12 +123,20 @@ impl Denoiser {
         self.shared.arrived.notify_all();
     }
 
-    pub fn has_result(&self) -> bool {
-        lock(&self.shared.slot).result.is_some()
+    /// Samples per pixel of the guides of a view; 0 without any.
+    pub fn guide_samples(&self, key: ViewKey) -> u32 {
+        lock(&self.shared.slot).guides.filter(|(of, _)| *of == key).map_or(0, |(_, samples)| samples)
+    }
+
+    /// Whether a request has been done since the last [`Denoiser::take`].
+    pub fn has_news(&self) -> bool {
+        lock(&self.shared.slot).has_news
     }
 
     pub fn take(&self) -> Option<Settled> {
-        lock(&self.shared.slot).result.take()
+        let mut slot = lock(&self.shared.slot);
+        slot.has_news = false;
+        slot.result.take()
     }
 }
 
@@ -106,31 +153,54 @@ impl Drop for Denoiser {
 }
 
 fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
-    let mut known: Option<(ViewKey, SurfaceGuides)> = None;
-    let mut last_pool: Option<Arc<rayon::ThreadPool>> = None;
-    while let Some(request) = next(shared) {
-        let Request { key, filter, source, prepared, settings, spp, threads } = request;
-        let last = last_pool.take().filter(|pool| pool.current_num_threads() == threads);
-        let Some(pool) = last.or_else(|| make_pool(threads, DENOISE, yielding.then_some(DENOISE_NICENESS)).ok()) else {
-            continue;
-        };
+    let mut known: Option<KnownGuides> = None;
+    let mut pools = Pools { yielding, ..Pools::default() };
+    while let Some(mut request) = next(shared) {
+        let (key, image) = (request.key, request.image.take());
+        let Some(pool) = pools.of(&request) else { continue };
         let stop = || shared.quit.load(Ordering::Relaxed) || shared.wanted.load(Ordering::Relaxed) != key.generation;
-        let of_view = known.take().filter(|(of, _)| *of == key).map(|(_, guides)| guides);
+        let of_view = known.take().filter(|known| known.key == key);
         let work = || {
-            let gather = || gather_guides(&prepared, &settings, key.size, FEATURE_SAMPLES, &stop);
-            let guides = of_view.or_else(gather)?;
+            let known = KnownGuides::of(of_view, &request, &stop)?;
+            let Some(ToDenoise { filter, source, spp }) = image else { return Some((known, None)) };
             let start = Instant::now();
-            let (by, denoised) = filter.denoise(&source, &guides, &stop)?;
-            Some((guides, by, denoised, start.elapsed()))
+            let (by, denoised) = filter.denoise(&source, &known.guides, &stop)?;
+            let (guide_samples, took) = (known.samples, start.elapsed());
+            Some((known, Some(Settled { key, filter, by, spp, guide_samples, denoised, took })))
         };
         // A panic has been reported by its thread; the raw image stays.
         let made = catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok().flatten();
-        last_pool = Some(pool);
-        if let Some((guides, by, denoised, took)) = made {
-            known = Some((key, guides));
-            lock(&shared.slot).result = Some(Settled { key, filter, by, spp, denoised, took });
+        if let Some((guides, settled)) = made {
+            let mut slot = lock(&shared.slot);
+            slot.guides = Some((key, guides.samples));
+            slot.result = settled;
+            slot.has_news = true;
+            // What comes next needs this thread.
+            slot.is_busy = slot.request.is_some();
+            drop(slot);
+            known = Some(guides);
             tell();
         }
+    }
+}
+
+/// The threads that denoise: of the first image of a view, and of later ones.
+#[derive(Default)]
+struct Pools {
+    yielding: bool,
+    first: Option<Arc<rayon::ThreadPool>>,
+    later: Option<Arc<rayon::ThreadPool>>,
+}
+
+impl Pools {
+    /// The pool of a request; `None` if there can be none.
+    fn of(&mut self, request: &Request) -> Option<Arc<rayon::ThreadPool>> {
+        let (pool, niceness) =
+            if request.is_first { (&mut self.first, NICENESS) } else { (&mut self.later, DENOISE_NICENESS) };
+        if pool.as_ref().is_none_or(|pool| pool.current_num_threads() != request.threads) {
+            *pool = make_pool(request.threads, DENOISE, self.yielding.then_some(niceness)).ok();
+        }
+        pool.clone()
     }
 }
 

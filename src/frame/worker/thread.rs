@@ -24,7 +24,7 @@ pub struct Loop<'a> {
     pub(super) shared: &'a Shared,
     clock: Instant,
     /// Time of the last restart.
-    restarted_at: Instant,
+    pub(super) restarted_at: Instant,
     pub(super) scheduler: Scheduler,
     pub(super) display: Display,
     pub(super) look: ViewOptions,
@@ -271,6 +271,8 @@ impl<'a> Loop<'a> {
             self.stats.n_above = 0;
             self.stats.bad.clear();
             self.is_uneven = false;
+            // Guides are gathered beside the first samples.
+            self.request_denoised(false);
         }
         let region = self.active_region();
         self.is_uneven |= region.is_some();
@@ -406,7 +408,7 @@ impl<'a> Loop<'a> {
             self.wake();
         }
         let mut inbox = lock(&self.shared.inbox);
-        while !self.shared.interrupt.load(Ordering::Acquire) && !self.denoiser.has_result() {
+        while !self.shared.interrupt.load(Ordering::Acquire) && !self.denoiser.has_news() {
             self.shared.sleeping.store(true, Ordering::Release);
             inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
         }

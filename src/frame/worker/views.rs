@@ -36,6 +36,8 @@ pub struct Settled {
     /// The filter that was used: firstlight's own where the other one failed.
     pub by: DenoiseFilter,
     pub spp: u32,
+    /// Samples per pixel of its guides.
+    pub guide_samples: u32,
     pub denoised: Denoised,
     /// Without the feature buffers, which are gathered once per view.
     pub took: Duration,

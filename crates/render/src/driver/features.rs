@@ -41,7 +41,7 @@ pub fn gather_features(
     samples: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
-    gather(snapshot, settings, size, samples, Ids::None, stop)
+    gather(snapshot, settings, size, samples, false, stop)
 }
 
 /// Like [`gather_features`], with the ids of objects and materials.
@@ -55,33 +55,11 @@ pub fn gather_features_and_ids(
     samples: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
-    gather(snapshot, settings, size, samples, Ids::AtCamera, stop)
-}
-
-/// Like [`gather_features_and_ids`], where materials are those of the surfaces to which all other features belong, seen
-/// in mirrors and through glass.
-pub(crate) fn gather_features_and_materials_beyond(
-    snapshot: &Prepared,
-    settings: &RenderSettings,
-    size: UVec2,
-    samples: u32,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Option<FeatureBuffers> {
-    gather(snapshot, settings, size, samples, Ids::Beyond, stop)
-}
-
-/// Which ids are gathered.
-#[derive(Clone, Copy, PartialEq)]
-enum Ids {
-    None,
-    /// Object and material that the camera ray hits.
-    AtCamera,
-    /// That object, and the material of the first non-specular surface.
-    Beyond,
+    gather(snapshot, settings, size, samples, true, stop)
 }
 
 /// Rows per band, and columns per part of it: blocks of 4 × 4 rays are traced together.
-const BAND: u32 = 8;
+pub(super) const BAND: u32 = 8;
 const PART: u32 = 128;
 
 /// Paths in flight at once.
@@ -92,47 +70,41 @@ fn gather(
     settings: &RenderSettings,
     size: UVec2,
     samples: u32,
-    ids: Ids,
+    with_ids: bool,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<FeatureBuffers> {
-    assert!(size.min_element() > 0 && samples > 0, "{samples} samples of {size} pixels");
-    settings.check().unwrap_or_else(|error| panic!("{error}"));
-    snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
+    assert!(samples > 0, "{samples} samples of {size} pixels");
     let filter = FilterSampler::new(settings.filter);
-    let lens = CameraRays {
-        camera: &snapshot.camera,
-        size,
-        filter: &filter,
-        seed: settings.seed,
-        even_samples: settings.techniques.even_samples,
-    };
+    let look = Look::new(snapshot, settings, &filter, size);
     let media = snapshot.camera_media();
-    let mut buffers = FeatureBuffers::new(size.x, size.y, samples, ids != Ids::None);
-    let look = Look { snapshot, settings, lens, samples };
+    let mut buffers = FeatureBuffers::new(size.x, size.y, samples, with_ids);
     let done = bands_of(&mut buffers).into_par_iter().map_init(
-        || {
-            let mut worker = Worker::default();
-            worker.wave.begin_in(snapshot, &media);
-            worker.wave.materials_beyond = ids == Ids::Beyond;
-            worker
-        },
+        || Worker { tracer: PartTracer::begin(snapshot, &media, false), ..Worker::default() },
         |worker, mut band| {
-            let rows = band.first_row..size.y.min(band.first_row + BAND);
-            (0..size.x).step_by(PART as usize).all(|left| {
-                let columns = left..size.x.min(left + PART);
-                worker.look_at(&look, &mut band, rows.clone(), columns, stop)
-            })
+            Part::of_band(band.first_row, size).all(|part| worker.look_at(&look, samples, &mut band, &part, stop))
         },
     );
     done.all(|done| done).then_some(buffers)
 }
 
 /// Input of all parts.
-struct Look<'a> {
+pub(super) struct Look<'a> {
     snapshot: &'a Prepared,
     settings: &'a RenderSettings,
     lens: CameraRays<'a>,
-    samples: u32,
+}
+
+impl<'a> Look<'a> {
+    /// # Panics
+    /// If `size` is 0, or settings or camera are not possible.
+    pub fn new(snapshot: &'a Prepared, settings: &'a RenderSettings, filter: &'a FilterSampler, size: UVec2) -> Self {
+        assert!(size.min_element() > 0, "{size} pixels");
+        settings.check().unwrap_or_else(|error| panic!("{error}"));
+        snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
+        let (camera, even_samples) = (&snapshot.camera, settings.techniques.even_samples);
+        let lens = CameraRays { camera, size, filter, seed: settings.seed, even_samples };
+        Self { snapshot, settings, lens }
+    }
 }
 
 /// The rows of one band in all buffers.
@@ -180,7 +152,7 @@ fn bands_of(buffers: &mut FeatureBuffers) -> Vec<Band<'_>> {
 /// Scratch memory of one worker.
 #[derive(Default)]
 struct Worker {
-    wave: FeatureWave,
+    tracer: PartTracer,
     sums: Vec<Sums>,
     ids: Vec<[IdCounts; 2]>,
 }
@@ -190,26 +162,122 @@ impl Worker {
     fn look_at(
         &mut self,
         look: &Look,
+        samples: u32,
         band: &mut Band,
-        rows: Range<u32>,
-        columns: Range<u32>,
+        part: &Part,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> bool {
-        let Look { snapshot, settings, lens, samples } = look;
-        let origin = UVec2::new(columns.start, rows.start);
-        let pixels = pixels_in_blocks(origin, UVec2::new(columns.len() as u32, rows.len() as u32));
-        let n_pixels = pixels.local.len();
-        let at = |local: usize| {
-            let (x, y) = (local % columns.len(), local / columns.len());
-            y * lens.size.x as usize + columns.start as usize + x
-        };
+        let n_pixels = part.n_pixels();
+        let at = |local: usize| part.in_band(local, look.lens.size.x);
         self.sums.clear();
         self.sums.resize(n_pixels, Sums::default());
         self.ids.clear();
         self.ids.resize(if band.ids.is_some() { n_pixels } else { 0 }, Default::default());
-        let step = (WAVE_SIZE / n_pixels).clamp(1, *samples as usize) as u32;
-        for first in (0..*samples).step_by(step as usize) {
-            let numbers = first..(*samples).min(first.saturating_add(step));
+        let Self { tracer, sums, ids } = self;
+        let done = tracer.trace(look, part, 0..samples, stop, |one| {
+            if samples == 1 {
+                for (local, seen) in one.iter().enumerate() {
+                    band.set_one(at(local), seen);
+                }
+            } else {
+                sums.iter_mut().zip(one).for_each(|(sums, seen)| sums.add(seen));
+            }
+            for (counts, seen) in ids.iter_mut().zip(one).filter(|(_, seen)| seen.object != Seen::NONE) {
+                counts[0].add(seen.object);
+                counts[1].add(seen.material);
+            }
+        });
+        if !done {
+            return false;
+        }
+        if samples > 1 {
+            for (local, sums) in sums.iter().enumerate() {
+                band.set_mean(at(local), sums, samples);
+            }
+        }
+        if let Some([objects, materials]) = &mut band.ids {
+            for (local, [object, material]) in ids.iter().enumerate() {
+                (objects[at(local)], materials[at(local)]) = (object.ranked(), material.ranked());
+            }
+        }
+        true
+    }
+}
+
+/// A part of a band.
+pub(super) struct Part {
+    rows: Range<u32>,
+    columns: Range<u32>,
+}
+
+impl Part {
+    /// The parts of the band that begins in this row, from the left.
+    pub fn of_band(first_row: u32, size: UVec2) -> impl Iterator<Item = Self> {
+        let rows = first_row..size.y.min(first_row + BAND);
+        (0..size.x).step_by(PART as usize).map(move |left| {
+            let columns = left..size.x.min(left + PART);
+            Self { rows: rows.clone(), columns }
+        })
+    }
+
+    pub fn n_pixels(&self) -> usize {
+        self.rows.len() * self.columns.len()
+    }
+
+    pub fn n_columns(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The indices of each row of the part in lists of the band.
+    ///
+    /// - `width`: of the image, pixels.
+    pub fn rows_in_band(&self, width: u32) -> impl Iterator<Item = Range<usize>> {
+        let (first, n) = (self.columns.start as usize, self.columns.len());
+        (0..self.rows.len()).map(move |y| y * width as usize + first).map(move |at| at..at + n)
+    }
+
+    /// Index in lists of the band of a pixel of the part, both row by row.
+    ///
+    /// - `width`: of the image, pixels.
+    pub fn in_band(&self, local: usize, width: u32) -> usize {
+        let (x, y) = (local % self.columns.len(), local / self.columns.len());
+        y * width as usize + self.columns.start as usize + x
+    }
+}
+
+/// Traces the camera paths of parts of bands.
+#[derive(Default)]
+pub(super) struct PartTracer {
+    wave: FeatureWave,
+}
+
+impl PartTracer {
+    /// - `media`: in which camera paths start.
+    /// - `materials_beyond`: see [`FeatureWave::materials_beyond`].
+    pub fn begin(snapshot: &Prepared, media: &[u32], materials_beyond: bool) -> Self {
+        let mut tracer = Self::default();
+        tracer.wave.begin_in(snapshot, media);
+        tracer.wave.materials_beyond = materials_beyond;
+        tracer
+    }
+
+    /// Calls `each` with what each pixel of the part, row by row, sees in each of the samples, in ascending order; false
+    /// if `stop` returned true.
+    pub fn trace(
+        &mut self,
+        look: &Look,
+        part: &Part,
+        samples: Range<u32>,
+        stop: &(dyn Fn() -> bool + Sync),
+        mut each: impl FnMut(&[Seen]),
+    ) -> bool {
+        let Look { snapshot, settings, lens } = look;
+        let origin = UVec2::new(part.columns.start, part.rows.start);
+        let pixels = pixels_in_blocks(origin, UVec2::new(part.columns.len() as u32, part.rows.len() as u32));
+        let n_pixels = part.n_pixels();
+        let step = (WAVE_SIZE / n_pixels).clamp(1, samples.len().max(1)) as u32;
+        for first in samples.clone().step_by(step as usize) {
+            let numbers = first..samples.end.min(first.saturating_add(step));
             let slot = |sample: u32| (sample - numbers.start) * n_pixels as u32;
             let start = |paths: &mut PathBatch| {
                 for sample in numbers.clone() {
@@ -230,31 +298,7 @@ impl Worker {
             let Some(seen) = self.wave.trace(snapshot, settings, numbers.len() * n_pixels, start, stop) else {
                 return false;
             };
-            if *samples == 1 {
-                for (local, seen) in seen.iter().enumerate() {
-                    band.set_one(at(local), seen);
-                }
-            } else {
-                for one in seen.chunks_exact(n_pixels) {
-                    self.sums.iter_mut().zip(one).for_each(|(sums, seen)| sums.add(seen));
-                }
-            }
-            for one in seen.chunks_exact(n_pixels) {
-                for (counts, seen) in self.ids.iter_mut().zip(one).filter(|(_, seen)| seen.object != Seen::NONE) {
-                    counts[0].add(seen.object);
-                    counts[1].add(seen.material);
-                }
-            }
-        }
-        if *samples > 1 {
-            for (local, sums) in self.sums.iter().enumerate() {
-                band.set_mean(at(local), sums, *samples);
-            }
-        }
-        if let Some([objects, materials]) = &mut band.ids {
-            for (local, [object, material]) in self.ids.iter().enumerate() {
-                (objects[at(local)], materials[at(local)]) = (object.ranked(), material.ranked());
-            }
+            seen.chunks_exact(n_pixels).for_each(&mut each);
         }
         true
     }

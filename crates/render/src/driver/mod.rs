@@ -5,6 +5,7 @@ pub(crate) mod caustic_choice;
 pub(crate) mod denoised;
 pub(crate) mod explain;
 pub(crate) mod features;
+pub(crate) mod guides;
 pub(crate) mod inspect;
 pub(crate) mod moving;
 pub(crate) mod renderer;
