@@ -377,6 +377,21 @@ fn scenes_of_all_shapes_agree() {
     }
 }
 
+#[test]
+fn piles_of_instances_agree() {
+    // More in one place than a leaf block holds, some of them twice, with needles whose bounds are loose.
+    for (seed, n, spread) in [(1, 100, 0.0), (2, 60, 0.02), (3, 300, 0.3)] {
+        let mut random = Random(seed);
+        let (sheet, soup) = (sheet(6), triangle_soup(seed, 30));
+        let trees = [sheet.tree(BuildPreset::Best), soup.tree(BuildPreset::Best)];
+        let mut placed = placements(&mut random, n, spread, false);
+        placed.extend_from_within(..n / 3);
+        let shapes = placed.iter().enumerate().map(|(i, place)| mesh(&trees[i % 2], *place)).collect();
+        let scene = SceneTree::build(shapes);
+        assert_agrees(&scene, &awkward_rays(seed, &sheet, 1500), &format!("pile {seed}"));
+    }
+}
+
 /// A room with boxes in it, turned and upright, whose walls meet at shared corners; some quads twice, some needles, one
 /// without area. All corners are returned too, for rays to aim at.
 fn room(seed: u64, n: usize, scale: f32, offset: Vec3) -> (SceneTree, Soup) {

@@ -160,11 +160,16 @@ impl RaySetup {
         DescentRay::new(origin, inv_lo, inv_hi, self.padding[lane], self.t[lane])
     }
 
+    /// Returns origin and direction in the tree's own space.
+    #[inline(always)]
+    pub fn ray(&self, lane: usize) -> (Vec3, Vec3) {
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.dir);
+        (Vec3::new(ox[lane], oy[lane], oz[lane]), Vec3::new(dx[lane], dy[lane], dz[lane]))
+    }
+
     #[inline(always)]
     pub fn leaf<R: LeafRay>(&self, lane: usize) -> R {
-        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.dir);
-        let origin = Vec3::new(ox[lane], oy[lane], oz[lane]);
-        let dir = Vec3::new(dx[lane], dy[lane], dz[lane]);
+        let (origin, dir) = self.ray(lane);
         let kz = self.kz[lane] as usize % 3;
         let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
         let shear = Shear { kz, kx, ky, sx: self.sx[lane], sy: self.sy[lane], sz: self.sz[lane] };

@@ -41,8 +41,9 @@ impl SceneTree {
         let instances = map_shapes(&shapes, Instance::new);
         let boxes = map_shapes(&shapes, object_bounds);
         let bounds = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
-        let top = TopLevel::new(&shapes, &boxes);
-        Self { objects: PlacedShapes { shapes, instances }, bounds, top }
+        let objects = PlacedShapes { shapes, instances };
+        let top = TopLevel::new(&objects, &boxes);
+        Self { objects, bounds, top }
     }
 
     /// The shapes passed to [`Self::build`]; a hit's `object` is an index into them.

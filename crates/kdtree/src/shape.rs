@@ -3,6 +3,7 @@
 use super::mesh_tree::MeshTree;
 use super::ray::RELATIVE_PADDING;
 use super::sphere_tree::{SphereTree, sphere_bounds};
+use super::support::Support;
 use crate::geometry::{Aabb, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
 use std::sync::Arc;
@@ -54,6 +55,16 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// Map from the object's own space to that of the snapshot.
+    pub(super) fn placement(&self) -> Affine3A {
+        match self {
+            Self::Mesh { world_from_object, .. } | Self::Spheres { world_from_object, .. } => *world_from_object,
+            _ => Affine3A::IDENTITY,
+        }
+    }
+}
+
 /// A hint about the rays of a batch: it selects the traversal, never the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayClass {
@@ -99,30 +110,35 @@ pub(super) fn transform_point(map: &Affine3A, p: Vec3) -> Vec3 {
 /// Returns the bounds of an object in the world, padded for the rounding of rays transformed into its own space. Empty
 /// for planes and for objects without surface.
 pub(super) fn object_bounds(shape: &Shape) -> Aabb {
-    let placed = |bounds: Aabb, map: &Affine3A| {
-        if bounds.is_empty() {
-            return bounds;
-        }
-        let corners = (0..8).map(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-            transform_point(map, Vec3::new(pick(0), pick(1), pick(2)))
-        });
-        let around = Aabb::from_points(corners);
-        // The inverse map may amplify errors by the condition number of the matrix.
-        let back = inverse(map);
-        let condition = max_row_sum(map) * max_row_sum(&back);
-        let largest = around.min.abs().max(around.max.abs()).max_element() + map.translation.abs().max_element();
-        let padding = RELATIVE_PADDING * condition * largest;
-        Aabb { min: around.min - padding, max: around.max + padding }
-    };
     match shape {
         Shape::Plane { .. } => Aabb::EMPTY,
         Shape::Sphere { center, radius } => sphere_bounds(*center, *radius),
         Shape::Quad { corner, edge_u, edge_v } => Aabb::from_points(quad_corners(*corner, *edge_u, *edge_v)),
         Shape::Triangle { vertices } => Aabb::from_points(*vertices),
-        Shape::Mesh { tree, world_from_object } => placed(tree.bounds(), world_from_object),
-        Shape::Spheres { tree, world_from_object } => placed(tree.bounds(), world_from_object),
+        Shape::Mesh { tree, world_from_object } => placed_bounds(tree.bounds(), world_from_object, None),
+        Shape::Spheres { tree, world_from_object } => placed_bounds(tree.bounds(), world_from_object, None),
     }
+}
+
+/// Returns the bounds of a placed object in the world, padded for the rounding of rays transformed into its own space.
+///
+/// - `own`: bounds in the object's own space.
+/// - `support`: makes the result tight; without it the result bounds the transformed box.
+pub(super) fn placed_bounds(own: Aabb, map: &Affine3A, support: Option<&Support>) -> Aabb {
+    if own.is_empty() {
+        return own;
+    }
+    let corners = (0..8).map(|i| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { own.min[axis] } else { own.max[axis] };
+        transform_point(map, Vec3::new(pick(0), pick(1), pick(2)))
+    });
+    let whole = Aabb::from_points(corners);
+    // The inverse map may amplify errors by the condition number of the matrix.
+    let condition = max_row_sum(map) * max_row_sum(&inverse(map));
+    let largest = whole.min.abs().max(whole.max.abs()).max_element() + map.translation.abs().max_element();
+    let padding = RELATIVE_PADDING * condition * largest;
+    let around = support.map_or(whole, |support| support.bounds(map).intersection(whole));
+    Aabb { min: around.min - padding, max: around.max + padding }
 }
 
 fn max_row_sum(map: &Affine3A) -> f32 {

@@ -15,7 +15,7 @@ use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
 
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
-const SLOTS: usize = 64;
+pub(super) const SLOTS: usize = 64;
 
 /// A ray in state. Visits of nodes touch the first cache line only, `descent` to `height`.
 #[derive(Clone, Copy)]
@@ -37,27 +37,32 @@ pub(super) struct Slot<R> {
 const _: () = assert!(size_of::<Slot<ShearedRay>>() == 128);
 
 /// The entry at the bottom of every stack: the ray is finished.
-const DONE: u32 = LEAF - 1;
+pub(super) const DONE: u32 = LEAF - 1;
 
 /// The slots in one state. A slot is written to every list and counted only in the list that it belongs to, which takes
 /// no branch; hence the spare element.
-struct List {
+pub(super) struct List {
     slots: [u8; SLOTS + 1],
     len: usize,
 }
 
 impl List {
-    const NEW: Self = Self { slots: [0; SLOTS + 1], len: 0 };
+    pub const NEW: Self = Self { slots: [0; SLOTS + 1], len: 0 };
 
     #[inline(always)]
-    fn push_if(&mut self, belongs: bool, slot: u8) {
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    #[inline(always)]
+    pub fn push_if(&mut self, belongs: bool, slot: u8) {
         self.slots[self.len] = slot;
         self.len += usize::from(belongs);
     }
 
     /// Empties the list and returns its content.
     #[inline(always)]
-    fn take(&mut self) -> ([u8; SLOTS + 1], usize) {
+    pub fn take(&mut self) -> ([u8; SLOTS + 1], usize) {
         (self.slots, std::mem::take(&mut self.len))
     }
 }

@@ -2,13 +2,14 @@
 //!
 //! A handful of simple objects, or of spheres in a cloud, is tested by packets of sixteen rays; larger numbers have
 //! trees that are traversed by streams. Rays that enter the bounds of an instance traverse its own tree, as a packet if
-//! the batch is coherent, otherwise in a stream. With many instances each ray selects its nearest instance first, and
-//! rays that select the same one are traced group, round after round. None of this changes the results.
+//! the batch is coherent, otherwise in a stream. Many instances have a tree over them, and one stream through both
+//! levels. None of this changes the results.
 
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
-use super::instance_tree::{Entry, InstanceTree, Recent};
+use super::instance_stream::{self, InstanceSource, InstanceState};
+use super::instance_tree::InstanceTree;
 use super::lanes::to_own_space;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects};
@@ -25,9 +26,6 @@ use std::cell::RefCell;
 
 /// Rays that pass through all objects before the next ones start.
 const CHUNK: usize = 2048;
-
-/// Chunk size with many instances, each of which few rays may enter.
-const LARGE_CHUNK: usize = 8192;
 
 /// The objects of a scene, grouped by traversal.
 #[derive(Debug, Default)]
@@ -64,12 +62,13 @@ impl TopLevel {
     /// Groups the objects.
     ///
     /// - `boxes`: bounds of all shapes.
-    pub fn new(shapes: &[Shape], boxes: &[Aabb]) -> Self {
+    pub fn new(scene: &PlacedShapes, boxes: &[Aabb]) -> Self {
+        let shapes = &scene.shapes[..];
         let (loose, simple_objects) = PrimitiveTrees::build(shapes, boxes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
         let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
         let instances = if instances.len() > MAX_INSTANCES {
-            Instances::Many(InstanceTree::build(boxes, instances))
+            Instances::Many(InstanceTree::build(scene, &instances))
         } else {
             Instances::Few(instances)
         };
@@ -106,6 +105,7 @@ enum StreamTree<'a> {
     Triangles(&'a BlockTree<TriangleBlock>),
     Quads(&'a BlockTree<QuadBlock>),
     Spheres(&'a BlockTree<SphereBlock>),
+    Instances(&'a InstanceTree),
 }
 
 /// Storage for the results of a batch.
@@ -122,7 +122,7 @@ trait Answers {
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
     /// Traces a [`stream`] with the instruction set `set`.
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState);
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamStates);
 }
 
 impl Answers for HitBatch {
@@ -148,9 +148,9 @@ impl Answers for HitBatch {
         dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamStates) {
         let answers = self;
-        dispatch!(set, closest_stream(tree: StreamTree, rays: QueuedRays, answers: &mut HitBatch, state: &mut StreamState));
+        dispatch!(set, closest_stream(tree: StreamTree, rays: QueuedRays, answers: &mut HitBatch, state: &mut StreamStates));
     }
 }
 
@@ -178,9 +178,9 @@ impl Answers for [bool] {
         dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamStates) {
         let answers = self;
-        dispatch!(set, any_stream(tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamState));
+        dispatch!(set, any_stream(tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamStates));
     }
 }
 
@@ -197,26 +197,31 @@ fn trace<A: Answers + ?Sized>(
 
 /// Buffers for tracing a batch, reused for the next.
 struct TraceScratch {
-    state: StreamState,
-    rounds: Rounds,
+    state: StreamStates,
     all: Vec<u32>,
+}
+
+/// State of streams over one level and over two.
+struct StreamStates {
+    one: StreamState,
+    two: Option<InstanceState>,
 }
 
 thread_local! {
     static SCRATCH: RefCell<TraceScratch> =
-        RefCell::new(TraceScratch { state: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
+        RefCell::new(TraceScratch { state: StreamStates { one: StreamState::new(), two: None }, all: Vec::new() });
 }
 
 fn trace_in<A: Answers + ?Sized>(
-    TraceScratch { state, rounds, all }: &mut TraceScratch,
+    TraceScratch { state, all }: &mut TraceScratch,
     set: InstructionSet,
     (top, scene): (&TopLevel, &PlacedShapes),
     (rays, class): (&RayBatch, RayClass),
     answers: &mut A,
 ) {
-    let (few, chunk) = match &top.instances {
-        Instances::Few(few) => (&few[..], CHUNK),
-        Instances::Many(_) => (&[][..], LARGE_CHUNK),
+    let few = match &top.instances {
+        Instances::Few(few) => &few[..],
+        Instances::Many(_) => &[],
     };
     let goes_in_packets = |object: &u32| match &scene.shapes[*object as usize] {
         Shape::Mesh { .. } => class == RayClass::Coherent,
@@ -226,7 +231,7 @@ fn trace_in<A: Answers + ?Sized>(
     let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
     all.clear();
     all.extend(0..rays.len() as u32);
-    for queue in all.chunks(chunk) {
+    for queue in all.chunks(CHUNK) {
         answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, queue });
         let own = |instance: Option<u32>| QueuedRays {
             rays,
@@ -248,7 +253,7 @@ fn trace_in<A: Answers + ?Sized>(
             }
         }
         if let Instances::Many(tree) = &top.instances {
-            rounds.trace(set, tree, scene, rays, answers, queue, state);
+            answers.stream(set, StreamTree::Instances(tree), own(None), state);
         }
     }
 }
@@ -348,13 +353,13 @@ fn closest_stream<S: KernelSimd>(
     tree: StreamTree,
     rays: QueuedRays,
     answers: &mut HitBatch,
-    state: &mut StreamState,
+    state: &mut StreamStates,
 ) {
     run_stream::<S, HitBatch, false>(s, tree, rays, answers, state);
 }
 
 #[inline(always)]
-fn any_stream<S: KernelSimd>(s: S, tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamState) {
+fn any_stream<S: KernelSimd>(s: S, tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamStates) {
     run_stream::<S, [bool], true>(s, tree, rays, answers, state);
 }
 
@@ -364,13 +369,17 @@ fn run_stream<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(
     tree: StreamTree,
     rays: QueuedRays,
     answers: &mut A,
-    state: &mut StreamState,
+    state: &mut StreamStates,
 ) {
     let mut source = Queue { rays, answers };
     match tree {
-        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
-        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
-        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
+        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
+        StreamTree::Instances(tree) => {
+            let state = state.two.get_or_insert_with(InstanceState::new);
+            instance_stream::run::<S, ANY>(s, tree, &mut source, state);
+        }
     }
 }
 
@@ -426,87 +435,9 @@ impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     }
 }
 
-/// Traversal of many instances: each ray visits the instances along its way, front to back. In every round it enters
-/// its next instance, together with all other rays that select the same one.
-#[derive(Default)]
-struct Rounds {
-    /// Of all rays.
-    entries: Vec<Entry>,
-    pending: Vec<Pending>,
-    /// Selected instance and ray, in this round.
-    requests: Vec<(u32, u32)>,
-    group: Vec<u32>,
-}
-
-/// A ray between instances.
-struct Pending {
-    ray: u32,
-    /// Range of its entries that are still to be visited.
-    left: std::ops::Range<usize>,
-    /// The `t` from which further entries may follow.
-    from: f32,
-    recent: Recent,
-}
-
-impl Pending {
-    /// Returns the next instance to enter; `None` if no further one can matter.
-    fn next(&mut self, tree: &InstanceTree, ray: &Ray, t: f32, entries: &mut Vec<Entry>) -> Option<u32> {
-        loop {
-            // Entries are sorted: if one is too far, all later ones are.
-            if let Some(entry) = self.left.next().map(|entry| entries[entry])
-                && entry.t <= t
-            {
-                return Some(entry.object);
-            }
-            if self.from > t || self.from == f32::INFINITY {
-                return None;
-            }
-            self.left.start = entries.len();
-            self.from = tree.entries(ray, self.from, t, &mut self.recent, entries);
-            self.left.end = entries.len();
-        }
-    }
-}
-
-impl Rounds {
-    #[expect(clippy::too_many_arguments, reason = "a loop body, cut out")]
-    fn trace<A: Answers + ?Sized>(
-        &mut self,
-        set: InstructionSet,
-        tree: &InstanceTree,
-        scene: &PlacedShapes,
-        rays: &RayBatch,
-        answers: &mut A,
-        queue: &[u32],
-        state: &mut StreamState,
-    ) {
-        self.entries.clear();
-        self.pending.clear();
-        let start = |&ray: &u32| Pending { ray, left: 0..0, from: 0.0, recent: Recent::default() };
-        self.pending.extend(queue.iter().map(start));
-        loop {
-            self.requests.clear();
-            let (entries, requests) = (&mut self.entries, &mut self.requests);
-            self.pending.retain_mut(|pending| {
-                let ray = rays.get(pending.ray as usize);
-                let so_far = answers.so_far(pending.ray as usize, ray.t_max);
-                let next = so_far.and_then(|(t, _)| pending.next(tree, &ray, t, entries));
-                requests.extend(next.map(|object| (object, pending.ray)));
-                next.is_some()
-            });
-            if self.requests.is_empty() {
-                break;
-            }
-            self.requests.sort_unstable();
-            for wish in self.requests.chunk_by(|a, b| a.0 == b.0) {
-                self.group.clear();
-                self.group.extend(wish.iter().map(|&(_, ray)| ray));
-                let object = wish[0].0;
-                let instance = Some((object, &scene.instances[object as usize]));
-                if let Some(tree) = tree_of(scene, object) {
-                    answers.stream(set, tree, QueuedRays { rays, queue: &self.group, instance }, state);
-                }
-            }
-        }
+impl<A: Answers + ?Sized> InstanceSource for Queue<'_, A> {
+    #[inline(always)]
+    fn finish_in(&mut self, ray: u32, object: u32, nearest: &Nearest) {
+        self.answers.set(ray as usize, object, nearest.prim, nearest);
     }
 }

@@ -1,0 +1,341 @@
+//! Stream traversal of many instances: like [`super::stream`], over two levels.
+//!
+//! A ray descends the tree over the instances. In a leaf the placements whose bounds it passes join its stack, nearest on
+//! top. When one is popped, the ray enters it: it is transformed and descends the tree of the instance, with a stack of
+//! its own, and returns to the upper tree when that stack is empty. All rays of a batch are in one stream, whichever
+//! instances they are in, so that also few rays in each of many instances keep the processor busy.
+//!
+//! Start reading at [`run`].
+
+use super::block_tree::BlockTree;
+use super::blocks::PreciseRay;
+use super::instance_tree::{InstanceTree, OwnTree, Placement, Recent};
+use super::leaf::{BLOCK, LeafBlock, LeafRay, ShearedRay};
+use super::node8::{DescentRay, LEAF, Node8, Stack};
+use super::ray::{Nearest, TreeRay};
+use super::ray_setup::{RaySetup, Source};
+use super::shape::{transform_point, transform_vector};
+use super::simd::KernelSimd;
+use super::stream::{DONE, List, SLOTS};
+use crate::geometry::{Ray, Shear};
+use glam::Vec3;
+
+/// Marks an entry of the upper tree's stack that is a placement, whose index is in the bits below.
+const PLACEMENT: u32 = LEAF | 1 << 30;
+
+/// Receiver of the hits of rays among instances.
+pub(super) trait InstanceSource: Source {
+    /// Called for rays that have a nearer hit than that which [`Source::next`] returned.
+    fn finish_in(&mut self, ray: u32, object: u32, nearest: &Nearest);
+}
+
+/// A ray in state. Visits of nodes touch the first cache line only, `descent` to `height`.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Slot {
+    /// In the space that the ray is in.
+    descent: DescentRay,
+    /// The entry that is visited next.
+    child: u32,
+    t0: f32,
+    t1: f32,
+    /// Number of entries on the stack of the tree that the ray is in.
+    height: u32,
+    nearest: Nearest,
+    /// For the instance that the ray is in.
+    sheared: ShearedRay,
+    precise: PreciseRay,
+    /// In the space of the upper tree.
+    upper: DescentRay,
+    origin: Vec3,
+    dir: Vec3,
+    recent: Recent,
+    /// Height of the upper tree's stack while the ray is in an instance.
+    upper_height: u32,
+    /// The object that the ray is in.
+    object: u32,
+    /// The object and primitive of the nearest hit.
+    found: [u32; 2],
+    has_hit: bool,
+    id: u32,
+    is_busy: bool,
+}
+
+impl Slot {
+    const IDLE: Self = Self {
+        descent: DescentRay::IDLE,
+        child: 0,
+        t0: 0.0,
+        t1: 0.0,
+        height: 1,
+        nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
+        sheared: ShearedRay::IDLE,
+        precise: PreciseRay::IDLE,
+        upper: DescentRay::IDLE,
+        origin: Vec3::ZERO,
+        dir: Vec3::ZERO,
+        recent: Recent::NEW,
+        upper_height: 1,
+        object: 0,
+        found: [0; 2],
+        has_hit: false,
+        id: 0,
+        is_busy: false,
+    };
+
+    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
+    #[inline(always)]
+    fn pop(&mut self, stack: &Stack) {
+        let (mut top, end) = (self.height as usize - 1, self.descent.end);
+        while stack.t0[top] > end {
+            top -= 1;
+        }
+        let t1 = stack.t1[top];
+        self.height = top as u32;
+        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
+    }
+}
+
+/// What a ray does next: the index of its list.
+const INNER: usize = 0;
+const LEAVES: usize = 1;
+const UPPER_LEAVES: usize = 2;
+const ENTER: usize = 3;
+const LEAVE: usize = 4;
+const IDLE: usize = 5;
+
+/// Slots of the rays in state and their stacks, reused for many streams.
+pub(super) struct InstanceState {
+    slots: Box<[Slot]>,
+    /// For each slot the stack in the upper tree, and that in an instance.
+    stacks: Box<[[Stack; 2]]>,
+}
+
+impl InstanceState {
+    pub fn new() -> Self {
+        let mut stacks: Box<[[Stack; 2]]> = (0..SLOTS).map(|_| [Stack::NEW, Stack::NEW]).collect();
+        for stack in stacks.iter_mut().flatten() {
+            (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
+        }
+        Self { slots: vec![Slot::IDLE; SLOTS].into(), stacks }
+    }
+}
+
+/// The rays by what they do next.
+struct Lists([List; 6]);
+
+impl Lists {
+    /// - `in_instance`: whether the slot's ray is in an instance.
+    #[inline(always)]
+    fn push(&mut self, i: u8, child: u32, in_instance: bool) {
+        let kind = usize::from(child >= DONE) + usize::from(child > DONE) + usize::from(child >= PLACEMENT);
+        const LISTS: [[usize; 4]; 2] = [[INNER, IDLE, UPPER_LEAVES, ENTER], [INNER, LEAVE, LEAVES, LEAVES]];
+        self.0[LISTS[usize::from(in_instance)][kind]].push_if(true, i);
+    }
+}
+
+/// Traces all rays of the source through the instances; with `ANY` a ray ends at its first hit.
+///
+/// - `source`: the index of a ray's nearest hit so far ([`Nearest::prim`]) is that of an object.
+#[inline(always)]
+pub(super) fn run<S: KernelSimd, const ANY: bool>(
+    s: S,
+    tree: &InstanceTree,
+    source: &mut impl InstanceSource,
+    state: &mut InstanceState,
+) {
+    let upper_nodes = &tree.nodes8[..];
+    if upper_nodes.is_empty() {
+        return;
+    }
+    let stacks: &mut [[Stack; 2]; SLOTS] = (&mut *state.stacks).try_into().expect("two for each slot");
+    let slots: &mut [Slot; SLOTS] = (&mut *state.slots).try_into().expect("as many as there are");
+    let mut nodes: [&[Node8]; SLOTS] = [upper_nodes; SLOTS];
+    let mut trees: [Option<&OwnTree>; SLOTS] = [None; SLOTS];
+    let mut lists = Lists([List::NEW; 6]);
+    for (i, slot) in (0..).zip(slots.iter_mut().take(source.left())) {
+        // A stream that ended by a panic leaves busy slots behind.
+        slot.is_busy = false;
+        lists.0[IDLE].push_if(true, i);
+    }
+    let mut setup = RaySetup::new();
+    loop {
+        let (list, len) = lists.0[IDLE].take();
+        for &i in &list[..len] {
+            let slot = &mut slots[i as usize % SLOTS];
+            if slot.is_busy && slot.has_hit {
+                source.finish_in(slot.id, slot.found[0], &Nearest { prim: slot.found[1], ..slot.nearest });
+            }
+            slot.is_busy = false;
+            let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { continue };
+            let (t0, t1) = setup.within(lane);
+            let (descent, nearest) = (setup.descent(lane), setup.nearest(lane));
+            let (origin, dir) = setup.ray(lane);
+            let (id, found) = (setup.id(lane), [nearest.prim, 0]);
+            *slot =
+                Slot { descent, t0, t1, nearest, upper: descent, origin, dir, found, id, is_busy: true, ..Slot::IDLE };
+            lists.0[INNER].push_if(true, i);
+        }
+        if lists.0.iter().all(|list| list.len() == 0) {
+            return;
+        }
+        let (list, len) = lists.0[INNER].take();
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let (slot, stack) = (&mut slots[at], &mut stacks[at][usize::from(trees[at].is_some())]);
+            let (node, height) = (&nodes[at][slot.child as usize], slot.height as usize);
+            slot.height = s.descend(node, &slot.descent, slot.t0, slot.t1, stack, height) as u32;
+        }
+        // A separate loop, so that a misprediction discards little work.
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let (slot, in_instance) = (&mut slots[at], trees[at].is_some());
+            slot.pop(&stacks[at][usize::from(in_instance)]);
+            lists.push(i, slot.child, in_instance);
+        }
+        let (list, len) = lists.0[UPPER_LEAVES].take();
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let (slot, stack) = (&mut slots[at], &mut stacks[at][0]);
+            test_boxes(s, tree, slot, stack);
+            slot.pop(stack);
+            lists.push(i, slot.child, false);
+        }
+        let (list, len) = lists.0[ENTER].take();
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let slot = &mut slots[at];
+            let placement = tree.placement(slot.child & !PLACEMENT);
+            let own_tree = tree.own_tree(placement);
+            let entered = match own_tree {
+                OwnTree::Mesh(tree) => enter::<_, ANY>(slot, &tree.tree, placement),
+                OwnTree::Spheres(tree) => enter::<_, ANY>(slot, &tree.tree, placement),
+            };
+            if let Some(own_nodes) = entered {
+                (nodes[at], trees[at]) = (own_nodes, Some(own_tree));
+                lists.0[INNER].push_if(true, i);
+            } else {
+                slot.pop(&stacks[at][0]);
+                lists.push(i, slot.child, false);
+            }
+        }
+        let (list, len) = lists.0[LEAVES].take();
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let slot = &mut slots[at];
+            match trees[at] {
+                Some(OwnTree::Mesh(tree)) => tree.tree.test_leaf(s, slot.child, &slot.sheared, &mut slot.nearest),
+                Some(OwnTree::Spheres(tree)) => tree.tree.test_leaf(s, slot.child, &slot.precise, &mut slot.nearest),
+                None => {}
+            }
+            slot.descent.end = slot.nearest.t;
+        }
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let slot = &mut slots[at];
+            slot.pop(&stacks[at][1]);
+            if ANY && slot.nearest.found {
+                slot.child = DONE;
+            }
+            lists.push(i, slot.child, true);
+        }
+        let (list, len) = lists.0[LEAVE].take();
+        for &i in &list[..len] {
+            let at = i as usize % SLOTS;
+            let slot = &mut slots[at];
+            (nodes[at], trees[at]) = (upper_nodes, None);
+            if slot.nearest.found {
+                (slot.found, slot.has_hit) = ([slot.object, slot.nearest.prim], true);
+                slot.nearest.found = false;
+            }
+            slot.descent = DescentRay { end: slot.nearest.t, ..slot.upper };
+            slot.height = slot.upper_height;
+            slot.pop(&stacks[at][0]);
+            if ANY && slot.has_hit {
+                slot.child = DONE;
+            }
+            lists.push(i, slot.child, false);
+        }
+    }
+}
+
+/// Pushes the objects of a leaf's block that the ray passes within the leaf's cell, nearest on top, and below them the
+/// leaf's next block.
+#[inline(always)]
+fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut Slot, stack: &mut Stack) {
+    let block = tree.block(slot.child);
+    let (mut met, t) = block.entries(s, &slot.descent, slot.t0, slot.t1);
+    let mut height = slot.height as usize;
+    if block.placements.is_followed() {
+        (stack.child[height], stack.t0[height], stack.t1[height]) = (slot.child + 1, slot.t0, slot.t1);
+        height += 1;
+    }
+    let first = height;
+    while met != 0 {
+        let lane = met.trailing_zeros() as usize % BLOCK;
+        met &= met - 1;
+        let placement = block.placements.get(lane);
+        if !slot.recent.is_new(placement) {
+            continue;
+        }
+        s.prefetch(std::ptr::from_ref(tree.placement(placement)).cast());
+        let mut at = height;
+        while at > first && stack.t0[at - 1] < t[lane] {
+            (stack.child[at], stack.t0[at]) = (stack.child[at - 1], stack.t0[at - 1]);
+            at -= 1;
+        }
+        (stack.child[at], stack.t0[at]) = (PLACEMENT | placement, t[lane]);
+        height += 1;
+    }
+    slot.height = height as u32;
+}
+
+/// Moves the ray into an object. Returns the nodes of the object's tree; `None` if the ray misses its bounds.
+#[inline(always)]
+fn enter<'a, B: LeafBlock, const ANY: bool>(
+    slot: &mut Slot,
+    tree: &'a BlockTree<B>,
+    placement: &Placement,
+) -> Option<&'a [Node8]>
+where
+    B::Ray: OwnRay,
+{
+    let map = placement.object_from_world();
+    let (origin, dir) = (transform_point(&map, slot.origin), transform_vector(&map, slot.dir));
+    let ray = Ray { origin, dir, t_max: slot.nearest.t };
+    let shear = Shear::new(ray.dir);
+    let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, tree.extent);
+    let (t0, t1) = tree_ray.clip(&tree.nodes.bounds, slot.nearest.t);
+    if !(t0 <= t1) || tree.nodes8.is_empty() {
+        return None;
+    }
+    let TreeRay { origin, inv_lo, inv_hi, padding, .. } = tree_ray;
+    let descent = DescentRay::new(origin, inv_lo, inv_hi, padding, slot.nearest.t);
+    slot.descent = if ANY { descent.far_first() } else { descent };
+    B::Ray::new(&ray, &shear).put(slot);
+    slot.upper_height = slot.height;
+    (slot.child, slot.t0, slot.t1, slot.height) = (0, t0, t1, 1);
+    slot.object = placement.object;
+    // At equal distance the lower object wins, whatever its primitive.
+    slot.nearest.prim = if placement.object < slot.found[0] { u32::MAX } else { 0 };
+    Some(&tree.nodes8)
+}
+
+/// A ray prepared for the leaves of an instance.
+trait OwnRay: LeafRay {
+    fn put(self, slot: &mut Slot);
+}
+
+impl OwnRay for ShearedRay {
+    #[inline(always)]
+    fn put(self, slot: &mut Slot) {
+        slot.sheared = self;
+    }
+}
+
+impl OwnRay for PreciseRay {
+    #[inline(always)]
+    fn put(self, slot: &mut Slot) {
+        slot.precise = self;
+    }
+}
