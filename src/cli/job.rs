@@ -227,6 +227,12 @@ impl RenderJob {
         replace: Replace,
     ) -> Result<(), Failure> {
         let mut note = self.note(film, path);
+        if denoised.is_some() {
+            let raw = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
+            let filter = Some(args.denoise.name());
+            let (denoised_layer, denoised) = if args.layers.is_empty() { (None, filter) } else { (filter, None) };
+            note = ImageMetadata { denoised, denoised_layer, ..raw }.to_note();
+        }
         if !args.layers.is_empty() {
             let layers = args.layers.of(film);
             let denoised = denoised.map(|denoised| &denoised.color[..]);
@@ -235,10 +241,6 @@ impl RenderJob {
                 true => print_bytes(&picture.bytes(path)?),
                 false => Ok(picture.write(path, replace)?),
             };
-        }
-        if denoised.is_some() {
-            let raw = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
-            note = ImageMetadata { denoised: Some(args.denoise.name()), ..raw }.to_note();
         }
         let denoised = denoised.map(|denoised| &denoised.color[..]);
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note), denoised };

@@ -101,10 +101,6 @@ impl LayerArgs {
 
     /// Fails if feature layers are requested but the film was rendered without them.
     pub fn check_kept(&self, features: Option<&FeatureLayers>) -> Result<(), Failure> {
-        if self.has_denoised() {
-            let message = "--layers: denoised needs the scene: render with --resume and --layers denoised";
-            return Err(Failure::Usage(message.to_owned()));
-        }
         if self.have_features() && features.is_none() {
             let message = "the films have no such layers: render one of them with --film and the same --layers";
             return Err(Failure::Failed(message.to_owned()));

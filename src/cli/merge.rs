@@ -52,8 +52,8 @@ pub struct MergeArgs {
     /// Save the image denoised, like `render --denoise`; opens the scene of the films.
     #[arg(long, requires = "image", conflicts_with = "layers")]
     denoise: bool,
-    /// The filter of --denoise [default: own].
-    #[arg(long, value_enum, value_name = "FILTER", requires = "denoise")]
+    /// The filter of --denoise and --layers denoised [default: own].
+    #[arg(long, value_enum, value_name = "FILTER")]
     denoiser: Option<DenoiserArg>,
     #[command(flatten)]
     layers: LayerArgs,
@@ -99,6 +99,11 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         return Err(Failure::Usage("--layers belong to an image: name it with --image FILE.exr".to_owned()));
     }
     args.layers.check()?;
+    let is_denoised = args.denoise || args.layers.has_denoised();
+    if args.denoiser.is_some() && !is_denoised {
+        let message = "--denoiser needs an image that is denoised: add --denoise or --layers denoised";
+        return Err(Failure::Usage(message.to_owned()));
+    }
     let mut set = FilmSet::read(args.films.clone())?;
     let missing = set.missing(args.samples.clone());
     if !missing.is_empty() {
@@ -118,7 +123,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     }
     let first = set.films[0].clone();
     // A scene that cannot be opened is reported before films are added.
-    let denoiser = match args.denoise {
+    let denoiser = match is_denoised {
         true => Some(FilmDenoiser::open(&first, &read_film_summary(&first)?.shot, args.denoiser, &mut files)?),
         false => None,
     };
@@ -135,16 +140,18 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
     let denoised = denoiser.as_ref().map(|denoiser| denoiser.denoise(&film, &shot)).transpose()?;
     if let Some(path) = &args.image {
-        let shown = ImageMetadata { denoised: denoiser.as_ref().map(FilmDenoiser::name), ..shot.clone() };
+        let filter = denoiser.as_ref().map(FilmDenoiser::name);
+        let (denoised_layer, of_pixels) = if args.layers.is_empty() { (None, filter) } else { (filter, None) };
+        let shown = ImageMetadata { denoised: of_pixels, denoised_layer, ..shot.clone() };
         let (size, note) = ((film.width(), film.height()), note_of(&film, shown, &first, path));
         let display = shot.display.into();
+        let denoised = denoised.as_ref().map(|denoised| &denoised.color[..]);
         if args.layers.is_empty() {
-            let denoised = denoised.as_ref().map(|denoised| &denoised.color[..]);
             Print { film: &film, display: &display, size, note: Some(&note), denoised }.write(path, files.replace())?;
         } else {
             let layers = args.layers.of(&film);
             let features = features.as_ref();
-            LayeredPicture { film: &film, features, denoised: None, layers: &layers, note: Some(&note) }
+            LayeredPicture { film: &film, features, denoised, layers: &layers, note: Some(&note) }
                 .write(path, files.replace())?;
         }
     }

@@ -93,6 +93,7 @@ impl MetadataDraft {
             allocation: self.allocation,
             uneven: samples.uneven,
             denoised: None,
+            denoised_layer: None,
             text: has_changed.then(|| file.to_ron()),
         };
         shot.to_note()

@@ -161,10 +161,11 @@ impl Saver {
             let features = pool.install(gather).ok_or_else(|| failed(&"the window was closed"))?;
             let knows_error = film.error_estimate().is_some();
             let with = DenoiseWith { prepared: prepared.clone(), settings, filter, threads };
-            let (denoised, _) = with.denoise(&film, &ending).ok_or_else(|| failed(&"the window was closed"))?;
+            let (denoised, by) = with.denoise(&film, &ending).ok_or_else(|| failed(&"the window was closed"))?;
             let is_known = |layer: &PictureLayer| knows_error || *layer != PictureLayer::Error;
             let layers: Vec<PictureLayer> = PictureLayer::ALL.into_iter().filter(is_known).collect();
             let (coarse, note) = metadata_of(&folder, &stem, &film, draft, &display, size);
+            let note = note.map(|note| with_filter(note, by, true));
             let picture = LayeredPicture {
                 film: &film,
                 features: Some(&features),
@@ -208,6 +209,16 @@ impl Saver {
     }
 }
 
+/// The metadata of an image with the name of its filter.
+///
+/// - `of_layer`: the pixels are raw, and a layer is denoised.
+fn with_filter(note: String, filter: DenoiseFilter, of_layer: bool) -> String {
+    let Ok(raw) = ImageMetadata::from_note(&note) else { return note };
+    let name = Some(filter.name().to_owned());
+    let (denoised_layer, denoised) = if of_layer { (name, None) } else { (None, name) };
+    ImageMetadata { denoised, denoised_layer, ..raw }.to_note()
+}
+
 /// Writes a film with its metadata, under the next free number.
 fn print(
     folder: &Path,
@@ -219,10 +230,8 @@ fn print(
     format: PictureFormat,
 ) -> Saved {
     let (coarse, mut note) = metadata_of(folder, stem, film, draft, display, size);
-    if let Some((_, filter)) = denoised
-        && let Some(raw) = note.as_deref().and_then(|note| ImageMetadata::from_note(note).ok())
-    {
-        note = Some(ImageMetadata { denoised: Some(filter.name().to_owned()), ..raw }.to_note());
+    if let Some((_, filter)) = denoised {
+        note = note.map(|note| with_filter(note, filter, false));
     }
     let denoised = denoised.map(|(colors, _)| colors);
     let print = Print { film, display, size, note: note.as_deref(), denoised };

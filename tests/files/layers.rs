@@ -58,11 +58,10 @@ fn the_denoised_layer_is_the_denoised_image() {
         assert_eq!(both[&format!("denoised.{channel}")], denoised[channel]);
         assert_ne!(both[channel], denoised[channel]);
     }
-    does(path, "render cornell --size 24x16 --samples 4..8 -o rest.exr --film rest-film.exr");
-    let refused = run(path, "merge film.exr rest-film.exr -o merged.exr --image image.exr --layers denoised");
-    assert!(!refused.status.success());
-    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(message.contains("denoised needs the scene"), "{message}");
+    let note_of = |name: &str| std::fs::read(path.join(name)).unwrap();
+    let has = |bytes: &[u8], text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    let (of_both, of_raw) = (note_of("both.exr"), note_of("raw.exr"));
+    assert!(has(&of_both, "denoised_layer") && !has(&of_raw, "denoised"));
 }
 
 /// A film that is read, or added up from parts, denoises as well as the one that was rendered, and its errors are known.
@@ -87,6 +86,12 @@ fn a_film_that_is_opened_again_denoises_to_the_same_image() {
     assert!(std::fs::read(path.join("merged.exr")).unwrap() == std::fs::read(path.join("film.exr")).unwrap());
     does(path, &format!("render merged.exr --spp 8 --resume -o again.exr {layers} --overwrite"));
     assert!(of("again.exr") == of("at-once.exr"), "merged");
+    let merge = "merge part-2.exr part-1.exr --overwrite -o merged.exr --image image.exr";
+    does(path, &format!("{merge} {layers}"));
+    assert!(of("image.exr") == of("at-once.exr"), "by merge");
+    let refused = run(path, &format!("{merge} --denoiser own"));
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && message.contains("--layers denoised"), "{message}");
 }
 
 /// Names as other programs expect them; sizes, ranges and sums as they must be.
