@@ -158,8 +158,8 @@ impl<R: Real, const N: usize> Pixel<R, N> {
         if N == N_LIGHT {
             unlike = (mean(&values) - self.own).abs() * self.by_light + unlike;
         }
-        // Nearly exp(−x), without its cost.
-        let near = self.weight.all(1.0) / (unlike * 0.125 + 1.0);
+        // Nearly exp(−x), without its cost, and 0 from 10 on.
+        let near = (unlike * -0.1 + 1.0).at_least(0.0);
         let near = near * near;
         let near = near * near;
         let weight = near * near * kernel;

@@ -54,9 +54,11 @@ pub struct MovingFilter {
     light: Planes,
     /// What a level is written to, before it takes the place of `light`.
     next: Planes,
-    /// What light was divided by; 0 of pixels that take no part.
+    /// Number of pixels.
+    n: usize,
+    /// What light was divided by; 0 of pixels that take no part. At least as many as there are pixels.
     divisors: Vec<Vec3>,
-    /// The image, first raw and in the end smoothed.
+    /// The image, first raw and in the end smoothed. At least as many as there are pixels.
     colors: Vec<Vec3>,
 }
 
@@ -86,7 +88,12 @@ impl MovingFilter {
             return None;
         }
         self.finish(input.width);
-        Some(&self.colors)
+        Some(self.latest())
+    }
+
+    /// The result of the latest image that was not stopped, if no other has been begun since.
+    pub fn latest(&self) -> &[Vec3] {
+        &self.colors[..self.n]
     }
 
     /// Reads the image: guides, and moments of light.
@@ -96,12 +103,17 @@ impl MovingFilter {
         self.guides.fit(width, height, N_GUIDES);
         self.light.fit(width, height, N_LIGHT);
         self.next.fit(width, height, N_LIGHT);
-        self.divisors.resize(width * height, Vec3::ZERO);
-        self.colors.resize(width * height, Vec3::ZERO);
+        self.n = width * height;
+        for list in [&mut self.divisors, &mut self.colors] {
+            if list.len() < self.n {
+                *list = vec![Vec3::ZERO; self.n];
+            }
+        }
         let stride = self.light.stride();
         let nothing = PixelSurface { albedo: Vec3::ZERO, normal: Vec3::ZERO, position: Vec3::ZERO, is_bright: true };
         let planes = self.guides.rows_mut().zip(self.light.rows_mut());
-        let pixels = self.colors.par_chunks_exact_mut(width).zip(self.divisors.par_chunks_exact_mut(width));
+        let pixels =
+            self.colors[..self.n].par_chunks_exact_mut(width).zip(self.divisors[..self.n].par_chunks_exact_mut(width));
         planes.zip(pixels).enumerate().for_each_init(
             || vec![nothing; width],
             |surfaces, (y, ((guides, light), (colors, divisors)))| {
@@ -133,7 +145,7 @@ impl MovingFilter {
     /// Puts light, and the variance that its moments tell, in place of the moments.
     fn fill_light(&mut self, width: usize, stop: &(dyn Fn() -> bool + Sync)) {
         let stride = self.light.stride();
-        let pixels = self.colors.par_chunks_exact(width).zip(self.divisors.par_chunks_exact(width));
+        let pixels = self.colors[..self.n].par_chunks_exact(width).zip(self.divisors[..self.n].par_chunks_exact(width));
         self.light.rows_mut().zip(pixels).for_each(|(row, (colors, divisors))| {
             if stop() {
                 return;
@@ -180,7 +192,8 @@ impl MovingFilter {
     fn finish(&mut self, width: usize) {
         let stride = self.light.stride();
         let light = &self.light;
-        let pixels = self.colors.par_chunks_exact_mut(width).zip(self.divisors.par_chunks_exact(width));
+        let pixels =
+            self.colors[..self.n].par_chunks_exact_mut(width).zip(self.divisors[..self.n].par_chunks_exact(width));
         pixels.enumerate().for_each(|(y, (colors, divisors))| {
             let row = light.row(y);
             for (at, (color, divisor)) in (MARGIN..).zip(colors.iter_mut().zip(divisors)) {

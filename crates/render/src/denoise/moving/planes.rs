@@ -14,16 +14,23 @@ pub fn stride_of(width: usize) -> usize {
 /// Rows of several planes: those of a row lie together.
 #[derive(Default)]
 pub struct Planes {
+    /// At least those of the present image: to clear memory again whenever the size changes would take longer than the
+    /// filter.
     numbers: Vec<f32>,
     stride: usize,
+    height: usize,
     n: usize,
 }
 
 impl Planes {
     /// Takes the size of an image of so many pixels, with `n` planes. The numbers are whatever they were.
     pub fn fit(&mut self, width: usize, height: usize, n: usize) {
-        (self.stride, self.n) = (stride_of(width), n);
-        self.numbers.resize(height * self.stride * n, 0.0);
+        (self.stride, self.height, self.n) = (stride_of(width), height, n);
+        let needed = height * self.stride * n;
+        if self.numbers.len() < needed {
+            // Memory that is zero already is touched by the workers first.
+            self.numbers = vec![0.0; needed];
+        }
     }
 
     /// Numbers of a plane of a row.
@@ -33,7 +40,7 @@ impl Planes {
 
     /// Pixels.
     pub fn height(&self) -> usize {
-        self.numbers.len() / (self.stride * self.n)
+        self.height
     }
 
     /// All planes of a row.
@@ -44,6 +51,7 @@ impl Planes {
 
     /// All planes of each row.
     pub fn rows_mut(&mut self) -> rayon::slice::ChunksExactMut<'_, f32> {
-        self.numbers.par_chunks_exact_mut(self.stride * self.n)
+        let length = self.stride * self.n;
+        self.numbers[..self.height * length].par_chunks_exact_mut(length)
     }
 }
