@@ -24,6 +24,10 @@ const FASTEST: f64 = 0.5;
 /// Part of the maximum that a new choice aims at: inside the hysteresis band, so that it does not change again at once.
 const AIM: f64 = 0.7;
 
+/// Seconds that smoothing a coarse image may add to the time of rendering it; what takes longer is paid by a coarser
+/// resolution.
+const SMOOTHING: f64 = 0.002;
+
 /// Time after the last restart at which motion is considered to have ended, and the image gets finer. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
 const QUIET: Duration = Duration::from_millis(120);
@@ -98,6 +102,8 @@ pub struct Scheduler {
     rate: Option<f64>,
     /// Seconds from a finished image until it is displayed, running average.
     showing: f64,
+    /// Seconds per pixel of smoothing a coarse image; 0 if they are raw.
+    smoothing: f64,
     /// Divider of coarse images; kept across restarts.
     coarse: u32,
     phase: Phase,
@@ -133,6 +139,7 @@ impl Scheduler {
             paused: false,
             rate: None,
             showing: 0.0,
+            smoothing: 0.0,
             coarse: 1,
             phase: Phase::Full,
             restarted_at: Duration::ZERO,
@@ -187,6 +194,13 @@ impl Scheduler {
     /// Reports the time from a finished image until it was displayed.
     pub fn shown_after(&mut self, wait: Duration) {
         self.showing += 0.05 * (wait.as_secs_f64() - self.showing);
+    }
+
+    /// Reports for how many seconds a coarse image of this divider was smoothed before it was displayed; 0 if it was not.
+    pub fn smoothed(&mut self, divider: u32, seconds: f64) {
+        let measured = seconds / self.pixels(divider);
+        let is_known = self.smoothing > 0.0 && measured > 0.0;
+        self.smoothing = if is_known { self.smoothing + 0.2 * (measured - self.smoothing) } else { measured };
     }
 
     /// Render time at full resolution since the last restart, seconds.
@@ -287,10 +301,10 @@ impl Scheduler {
     fn choose_coarse(&mut self) {
         let slowest = self.slowest();
         let finer = DIVIDERS.iter().rev().find(|&&divider| divider < self.coarse).copied();
-        let too_slow = self.seconds_for(self.coarse) > slowest;
-        let finer_fits = finer.is_some_and(|divider| self.seconds_for(divider) < FASTEST * slowest);
+        let too_slow = self.seconds_until_shown(self.coarse) > slowest;
+        let finer_fits = finer.is_some_and(|divider| self.seconds_until_shown(divider) < FASTEST * slowest);
         if too_slow || finer_fits {
-            let fits = |divider: &u32| self.seconds_for(*divider) <= AIM * slowest;
+            let fits = |divider: &u32| self.seconds_until_shown(*divider) <= AIM * slowest;
             self.coarse = DIVIDERS.into_iter().find(fits).unwrap_or(DIVIDERS[DIVIDERS.len() - 1]);
         }
     }
@@ -308,6 +322,11 @@ impl Scheduler {
     /// Seconds for one sample per pixel.
     fn seconds_for(&self, divider: u32) -> f64 {
         self.pixels(divider) / self.speed()
+    }
+
+    /// Seconds for one sample per pixel, and what smoothing takes beyond [`SMOOTHING`].
+    fn seconds_until_shown(&self, divider: u32) -> f64 {
+        self.seconds_for(divider) + (self.smoothing * self.pixels(divider) - SMOOTHING).max(0.0)
     }
 
     fn pixels(&self, divider: u32) -> f64 {
@@ -411,6 +430,25 @@ mod tests {
             let finer = DIVIDERS.iter().rev().find(|&&finer| finer < divider).expect("a coarse one");
             assert!(machine.scheduler.seconds_for(*finer) > AIM * slowest, "{showing}: {took} s at 1/{divider}");
         }
+    }
+
+    #[test]
+    fn smoothing_that_takes_long_makes_coarse_images_coarser() {
+        let choice = |seconds_per_pixel: f64| {
+            let mut machine = Machine::new(1280, 720, 4e7, Target::default());
+            while machine.now < 2.0 {
+                machine.step();
+            }
+            for _ in 0..10 {
+                let divider = machine.scheduler.coarse;
+                let seconds = seconds_per_pixel * machine.scheduler.pixels(divider);
+                machine.scheduler.smoothed(divider, seconds);
+                machine.restart();
+            }
+            machine.scheduler.coarse
+        };
+        // 640 × 360 pixels take 6 ms to render; the second smoothing takes 2 ms more, the third one 12 ms.
+        assert_eq!((choice(0.0), choice(8e-9), choice(50e-9)), (2, 2, 3));
     }
 
     #[test]

@@ -78,7 +78,9 @@ impl Loop<'_> {
                 true => spp > before || guides_before < FEATURE_SAMPLES,
                 false => spp > before && !is_soon && 4 * u64::from(spp) >= 5 * u64::from(before),
             };
-            if film.spp() == 0 || !is_due {
+            // A copy of the film would delay the answer to what has arrived.
+            let is_awaited = !is_last && self.shared.interrupt.load(Ordering::Relaxed);
+            if film.spp() == 0 || !is_due || is_awaited {
                 return;
             }
             Some(ToDenoise { filter: self.look.filter, source: pool.install(|| DenoiseSource::of(film)), spp })
@@ -94,8 +96,7 @@ impl Loop<'_> {
         });
     }
 
-    /// Develops the image as it is wanted and can be had now, and returns how that is, with the error of the denoised
-    /// image; `None` if another view or job has arrived meanwhile.
+    /// Develops the image as it is wanted and can be had now; `None` if another view or job has arrived meanwhile.
     ///
     /// - `filter`: smooths what is not denoised.
     pub(super) fn develop_wanted(
@@ -105,38 +106,47 @@ impl Loop<'_> {
         key: ViewKey,
         (width, height): (u32, u32),
         rgba: &mut Vec<u8>,
-    ) -> Option<(Denoising, Option<f64>)> {
+    ) -> Option<Developed> {
         let wanted = self.wanted_denoising();
+        let develop_raw = |rgba: &mut Vec<u8>| develop(film, &self.display, width, height, rgba);
         let Some(job) = self.job.as_ref().filter(|_| wanted != Denoising::Raw) else {
-            develop(film, &self.display, width, height, rgba);
-            return Some((Denoising::Raw, None));
+            develop_raw(rgba);
+            return Some(Developed::raw(None));
         };
-        // A coarse image is displayed whatever comes next, or nothing would be displayed during a long movement.
-        let stop = || divider == 1 && self.shared.interrupt.load(Ordering::Relaxed);
+        // The first image of a view is displayed whatever comes next, or nothing would be displayed during a long
+        // movement.
+        let stop = || self.pictured == job.generation && self.shared.interrupt.load(Ordering::Relaxed);
         let settled = self.settled(key).filter(|_| divider == 1);
         if let Some(settled) = settled.filter(|settled| wanted == Denoising::Denoised && self.is_overtaken(settled)) {
-            develop(film, &self.display, width, height, rgba);
-            return Some((Denoising::Raw, Some(settled.denoised.error)));
+            develop_raw(rgba);
+            return Some(Developed::raw(Some(settled.denoised.error)));
         }
-        let smoothed = match settled {
-            Some(_) => None,
-            None => smooth_film(filter, &job.prepared, &job.settings, film, &stop),
+        let start = Instant::now();
+        let (smoothed, smoothing) = match settled {
+            Some(_) => (None, None),
+            // Only the display has changed.
+            None if self.is_smoothed(key) => (Some(filter.latest()), None),
+            None => {
+                let smoothed = smooth_film(filter, &job.prepared, &job.settings, film, &stop);
+                let took = smoothed.is_some().then(|| start.elapsed());
+                (smoothed, took)
+            }
         };
         let colors = settled.map(|settled| settled.denoised.color.as_slice()).or(smoothed);
         let Some(colors) = colors else {
             if stop() {
                 return None;
             }
-            develop(film, &self.display, width, height, rgba);
-            return Some((Denoising::Raw, None));
+            develop_raw(rgba);
+            return Some(Developed::raw(None));
         };
         develop_colors(colors, key.size.into(), &self.display, (width, height), rgba);
         if wanted == Denoising::Split {
             let mut raw = Vec::new();
-            develop(film, &self.display, width, height, &mut raw);
+            develop_raw(&mut raw);
             split(rgba, &raw, width as usize);
         }
-        Some((wanted, settled.map(|settled| settled.denoised.error)))
+        Some(Developed { denoising: wanted, error: settled.map(|settled| settled.denoised.error), smoothing })
     }
 
     /// Whether the samples since an image was denoised have made the raw image the better one, as far as both errors
@@ -151,12 +161,15 @@ impl Loop<'_> {
             return false;
         }
         let settled = self.settled(key);
-        let too_soon =
-            self.views.smooth_again.is_some_and(|(of, until): (ViewKey, Instant)| of == key && Instant::now() < until);
         match settled {
             Some(settled) => self.wanted_denoising() == Denoising::Denoised && !self.is_overtaken(settled),
-            None => too_soon,
+            None => self.is_smoothed(key),
         }
+    }
+
+    /// Whether a smoothed image of this view at full resolution is there, and too new to be made again.
+    fn is_smoothed(&self, key: ViewKey) -> bool {
+        self.views.smooth_again.is_some_and(|(of, until)| of == key && Instant::now() < until)
     }
 
     /// Notes how long an image of the film at full resolution took, if it was smoothed: samples come first.
@@ -164,6 +177,22 @@ impl Loop<'_> {
         if divider == 1 && self.wanted_denoising() != Denoising::Raw {
             self.views.smooth_again = Some((key, Instant::now() + SAMPLES_FIRST * took));
         }
+    }
+}
+
+/// How an image was developed.
+pub struct Developed {
+    pub denoising: Denoising,
+    /// Error of the denoised image, if there is one.
+    pub error: Option<f64>,
+    /// How long it was smoothed.
+    pub smoothing: Option<Duration>,
+}
+
+impl Developed {
+    /// - `error`: of the denoised image that is there too.
+    pub fn raw(error: Option<f64>) -> Self {
+        Self { denoising: Denoising::Raw, error, smoothing: None }
     }
 }
 

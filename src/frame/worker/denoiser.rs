@@ -78,7 +78,7 @@ struct Shared {
     slot: Mutex<Slot>,
     arrived: Condvar,
     /// Results of other generations are of no use.
-    wanted: AtomicU64,
+    wanted: Arc<AtomicU64>,
     quit: AtomicBool,
 }
 
@@ -90,20 +90,20 @@ pub struct Denoiser {
 
 impl Denoiser {
     /// - `yielding`: gives way to other threads.
+    /// - `wanted`: the generation that is wanted; what is done for another one is dropped at once.
     /// - `tell`: called when a request is done.
     ///
     /// Without a thread, if the system has none, nothing is denoised.
-    pub fn start(yielding: bool, tell: impl Fn() + Send + 'static) -> Self {
-        let shared = Arc::new(Shared::default());
+    pub fn start(yielding: bool, wanted: Arc<AtomicU64>, tell: impl Fn() + Send + 'static) -> Self {
+        let shared = Arc::new(Shared { wanted, ..Shared::default() });
         let of_thread = shared.clone();
         let thread = std::thread::Builder::new().name("firstlight denoise".to_owned());
         let thread = thread.spawn(move || run(&of_thread, yielding, &tell)).ok();
         Self { shared, thread }
     }
 
-    /// From now on this generation is wanted: what is done for another one is dropped.
+    /// Drops what has been asked for another generation, and its result.
     pub fn want(&self, generation: u64) {
-        self.shared.wanted.store(generation, Ordering::Relaxed);
         let mut slot = lock(&self.shared.slot);
         if slot.request.take_if(|request| request.key.generation != generation).is_some() {
             slot.is_busy = false;

@@ -198,6 +198,9 @@ struct Shared {
     pool: Mutex<Arc<rayon::ThreadPool>>,
     beside: Mutex<Arc<rayon::ThreadPool>>,
     cancels: Mutex<LatencyHistogram>,
+    /// The latest generation. What is denoised for another one is dropped before the render thread knows of it: the
+    /// first samples need the processor.
+    wanted: Arc<AtomicU64>,
     waker: Option<Waker>,
     yielding: bool,
 }
@@ -236,6 +239,7 @@ impl Worker {
             pool: Mutex::new(make_pool(threads, WORKERS, yielding.then_some(NICENESS))?),
             beside: Mutex::new(make_pool(threads, BESIDE, yielding.then_some(NICENESS))?),
             cancels: Mutex::default(),
+            wanted: Arc::default(),
             waker,
             yielding,
         });
@@ -244,7 +248,8 @@ impl Worker {
             .spawn({
                 let (shared, of_denoiser) = (shared.clone(), shared.clone());
                 move || {
-                    let denoiser = denoiser::Denoiser::start(yielding, move || of_denoiser.tell_of_result());
+                    let (wanted, tell) = (shared.wanted.clone(), move || of_denoiser.tell_of_result());
+                    let denoiser = denoiser::Denoiser::start(yielding, wanted, tell);
                     thread::Loop::new(&shared, denoiser, target).run();
                 }
             })
@@ -255,6 +260,9 @@ impl Worker {
     pub fn order(&self, orders: Orders) {
         if orders.is_empty() {
             return;
+        }
+        if let Some(job) = &orders.job {
+            self.shared.wanted.store(job.generation, Ordering::Relaxed);
         }
         let interrupts = orders.job.is_some() && !self.shared.sleeping.load(Ordering::Acquire);
         self.post(|inbox| {

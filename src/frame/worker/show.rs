@@ -1,5 +1,6 @@
 //! From the film to the displayed image: developed or inspected, scaled to the window size, with overlays.
 
+use super::denoised::Developed;
 use super::thread::Loop;
 use super::views::ViewKey;
 use super::{Denoising, Stats, lock};
@@ -46,21 +47,20 @@ impl Loop<'_> {
         let pool = lock(&self.shared.pool).clone();
         let (width, height) = (job.width, job.height);
         let mut rgba = std::mem::take(&mut self.spare.rgba);
-        let mut smoothed = None;
         let interrupt = &self.shared.interrupt;
         // Another view or job has arrived: this image would not be displayed.
         let stop = || interrupt.load(Ordering::Relaxed);
         let mut legend = None;
-        let (mut denoising, mut denoised_error) = (Denoising::Raw, None);
+        let mut developed = Developed::raw(None);
         if self.look.inspection == Inspection::Picture {
             let mut filter = std::mem::take(&mut self.filter);
             let develop = || self.develop_wanted(&mut filter, (*divider, film), key, (width, height), &mut rgba);
-            let developed = pool.install(develop);
+            let done = pool.install(develop);
             self.filter = filter;
-            let Some(developed) = developed else { return };
-            (denoising, denoised_error) = developed;
-            if denoised_error.is_none() {
-                smoothed = Some(start.elapsed());
+            let Some(done) = done else { return };
+            developed = done;
+            if *divider > 1 {
+                self.scheduler.smoothed(*divider, developed.smoothing.unwrap_or_default().as_secs_f64());
             }
         } else {
             let known = self.views.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
@@ -84,7 +84,9 @@ impl Loop<'_> {
             pool.install(|| tint_sharp_zone(&mut rgba, size, &depths, key.size, zone, camera.focus_distance));
             self.views.depths = Some((key, depths));
         }
+        let Developed { denoising, error: denoised_error, smoothing } = developed;
         self.n_pictures += 1;
+        self.pictured = job.generation;
         let picture = &mut self.spare;
         (picture.width, picture.height, picture.number) = (width, height, self.n_pictures);
         (picture.inspection, picture.denoising, picture.legend) = (self.look.inspection, denoising, legend);
@@ -96,7 +98,7 @@ impl Loop<'_> {
         (self.stats.denoising, self.stats.denoised_by) = (denoising, denoised_by);
         self.stats.denoised_error = denoised_error;
         self.stats.awaits_denoised = awaits_denoised;
-        if let Some(took) = smoothed.filter(|_| denoising != Denoising::Raw) {
+        if let Some(took) = smoothing {
             self.note_smoothing(divider, key, took);
         }
         {

@@ -49,6 +49,8 @@ pub struct Loop<'a> {
     pub(super) redraw: bool,
     /// Number of images handed over so far.
     pub(super) n_pictures: u64,
+    /// The job of the image handed over last.
+    pub(super) pictured: u64,
     /// Requests for a film for saving.
     to_keep: Vec<Sender<Film>>,
 }
@@ -76,6 +78,7 @@ impl<'a> Loop<'a> {
             spare: Picture::default(),
             redraw: false,
             n_pictures: 0,
+            pictured: u64::MAX,
             to_keep: Vec::new(),
         }
     }

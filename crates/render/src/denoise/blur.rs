@@ -35,20 +35,40 @@ fn box_mean(values: &[f32], width: usize, height: usize, radius: usize) -> Vec<f
     mean
 }
 
-/// Returns local means of values, separately for pixels at emitters and for all others.
-///
-/// - `radius`: of the two box filters, pixels.
-pub(super) fn smooth_apart(values: &[f32], input: &DenoiseInput, at_emitters: &[bool], radius: usize) -> Vec<f32> {
-    let (width, height) = (input.width, input.height);
-    let of = |is: bool| {
-        let inside: Vec<f32> = at_emitters.iter().map(|&at| if at == is { 1.0 } else { 0.0 }).collect();
-        let sums: Vec<f32> = values.iter().zip(&inside).map(|(value, inside)| value * inside).collect();
-        let (sums, inside) = (blur(&sums, width, height, radius), blur(&inside, width, height, radius));
-        sums.iter().zip(&inside).map(|(sum, inside)| sum / inside.max(1e-6)).collect::<Vec<f32>>()
-    };
-    if !at_emitters.contains(&true) {
-        return blur(values, width, height, radius);
+/// Local means of values, separately for pixels at emitters and for all others.
+pub(super) struct Apart<'a> {
+    width: usize,
+    height: usize,
+    radius: usize,
+    at_emitters: &'a [bool],
+    /// Local share of pixels at emitters, and of all others; none where no pixel is at an emitter.
+    shares: Option<[Vec<f32>; 2]>,
+}
+
+impl<'a> Apart<'a> {
+    /// - `radius`: of the two box filters, pixels.
+    pub fn of(input: &DenoiseInput, at_emitters: &'a [bool], radius: usize) -> Self {
+        let (width, height) = (input.width, input.height);
+        let share = |is: bool| {
+            let inside: Vec<f32> = at_emitters.par_iter().map(|&at| if at == is { 1.0 } else { 0.0 }).collect();
+            blur(&inside, width, height, radius)
+        };
+        let shares = at_emitters.contains(&true).then(|| [true, false].map(share));
+        Self { width, height, radius, at_emitters, shares }
     }
-    let (apart, at) = (of(false), of(true));
-    (0..values.len()).map(|i| if at_emitters[i] { at[i] } else { apart[i] }).collect()
+
+    pub fn smooth(&self, values: &[f32]) -> Vec<f32> {
+        let Self { width, height, radius, at_emitters, .. } = *self;
+        let Some(shares) = &self.shares else { return blur(values, width, height, radius) };
+        let of = |is: bool| {
+            let inside = values.par_iter().zip(at_emitters).map(|(&value, &at)| if at == is { value } else { 0.0 });
+            blur(&inside.collect::<Vec<f32>>(), width, height, radius)
+        };
+        let sums = [true, false].map(of);
+        let mean = |i: usize| {
+            let which = usize::from(!at_emitters[i]);
+            sums[which][i] / shares[which][i].max(1e-6)
+        };
+        (0..values.len()).into_par_iter().map(mean).collect()
+    }
 }

@@ -8,28 +8,37 @@
 //! Squared difference and variance are local means over few pixels with one or three degrees of freedom each, and as
 //! uncertain as that: what exceeds the variance counts as bias as far as it is significant.
 
-use super::Denoised;
-use super::blur::{RADIUS, smooth_apart};
+use super::blur::{Apart, RADIUS};
 use super::input::DenoiseInput;
 use super::noise::{Filtered, Noise, squared_bias};
 use super::risk::error_of;
+use super::{Denoised, go_on};
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered) -> Denoised {
+/// Returns `None` if `stop` returned true.
+pub(super) fn combine(
+    input: &DenoiseInput,
+    noise: &Noise,
+    filtered: &Filtered,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Denoised> {
     let n = input.n_pixels();
     let by_filtered = |i: usize| (filtered.color[i] * filtered.color[i] + 0.01).recip();
+    let apart = Apart::of(input, &noise.at_emitters, RADIUS);
     let smooth = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+        go_on(stop)?;
         let values: Vec<f32> = (0..n).into_par_iter().map(|i| by_filtered(i).dot(of(i))).collect();
-        smooth_apart(&values, input, &noise.at_emitters, RADIUS)
+        Some(apart.smooth(&values))
     };
-    let variance = smooth(&|i| noise.variance[i]);
-    let own = smooth(&|i| filtered.covariance[i]);
+    let variance = smooth(&|i| noise.variance[i])?;
+    let own = smooth(&|i| filtered.covariance[i])?;
     let difference = smooth(&|i| {
         let off = filtered.color[i] - input.color[i];
         off * off
-    });
+    })?;
     let share: Vec<f32> = (0..n)
+        .into_par_iter()
         .map(|i| {
             let gain = (variance[i] - own[i]).max(0.0);
             let bias = squared_bias(difference[i], variance[i], own[i]);
@@ -38,7 +47,7 @@ pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered) 
         .collect();
     // Where the filter is trusted, what is left of the raw value has no fireflies.
     let combined = |i: usize| (input.color[i] - share[i] * noise.excess[i]).lerp(filtered.color[i], share[i]);
-    let color = (0..n).map(combined).collect();
-    let (error, error_95) = error_of(input, noise, filtered, &share);
-    Denoised { color, share, error, error_95 }
+    let color = (0..n).into_par_iter().map(combined).collect();
+    let (error, error_95) = error_of(input, noise, filtered, &share, stop)?;
+    Some(Denoised { color, share, error, error_95 })
 }

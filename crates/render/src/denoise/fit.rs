@@ -1,9 +1,9 @@
 //! The best linear function of the features in one window, and its error.
 
+use super::each;
 use super::moments::{Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product};
 use super::noise::significant_part;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Lower limit of the squared misfit of light over albedo: a fit without noise and misfit in its window is still
 /// uncertain for pixels with other features.
@@ -51,6 +51,19 @@ impl Prediction {
 }
 
 impl Fit {
+    /// Of a window that is left out.
+    const NOTHING: Self = Self {
+        mean: [0.0; N_FEATURES],
+        precision: [0.0; N_FEATURES],
+        light: [0.0; 3],
+        slope: [[0.0; 3]; N_FEATURES],
+        misfit: 0.0,
+        noise: 0.0,
+        unbias: 0.0,
+        inverse_count: 0.0,
+        mean_weight: 0.0,
+    };
+
     /// Returns the expected squared error of a prediction, which grows with the distance of the features from the
     /// window's mean.
     pub fn expected_error(&self, prediction: &Prediction) -> f32 {
@@ -82,20 +95,15 @@ pub(super) struct Fits {
 }
 
 impl Fits {
-    /// Fits all windows; `stop` is called once per row of windows; `None` if it returned true.
+    /// Fits all windows; `stop` is called before each; `None` if it returned true.
     ///
     /// - `significance`: standard deviations by which residuals must exceed the noise to be taken for misfit.
     pub fn of(blocks: &Blocks, significance: f32, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let ridge = ridge(blocks.level);
-        let rows: Option<Vec<Vec<Fit>>> = (0..blocks.height)
-            .into_par_iter()
-            .map(|y| {
-                (!stop())
-                    .then(|| (0..blocks.width).map(|x| solve(&blocks.window(x, y), &ridge, significance)).collect())
-            })
-            .collect();
-        let fits = rows?.into_iter().flatten().collect();
-        Some(Self { level: blocks.level, width: blocks.width, height: blocks.height, fits })
+        let (width, height) = (blocks.width, blocks.height);
+        let fit = |i: usize| solve(&blocks.window(i % width, i / width), &ridge, significance);
+        let fits = each(width * height, Fit::NOTHING, stop, fit)?;
+        Some(Self { level: blocks.level, width, height, fits })
     }
 
     /// Calls `take` with each window that contains a pixel, the pixel's features relative to it, and the pixel's

@@ -8,7 +8,7 @@
 //! the samples where it does not. A pixel is changed by no more than half of the distance between its halves, which
 //! vanishes with more samples: so the limit of the combined image is still that of the raw one.
 
-use super::blur::smooth_apart;
+use super::blur::Apart;
 use super::input::DenoiseInput;
 use super::moments::Samples;
 use glam::Vec3;
@@ -28,7 +28,7 @@ pub(super) fn limit(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool],
     let n = input.n_pixels();
     let Some(halves) = input.half_steps else { return vec![Vec3::ZERO; n] };
     let sizes: Vec<f32> = (0..n).into_par_iter().map(|i| (halves.steps[i] / albedo[i]).abs().element_sum()).collect();
-    let typical = smooth_apart(&sizes, input, at_emitters, RADIUS);
+    let typical = Apart::of(input, at_emitters, RADIUS).smooth(&sizes);
     let lowered = |(i, (light, variance)): (usize, (&mut Vec3, &mut f32))| {
         let most = LARGEST_STEP * typical[i];
         if at_emitters[i] || sizes[i] <= most {

@@ -20,6 +20,7 @@ pub use input::{DenoiseInput, Guides};
 pub use moving::{MovingFilter, MovingInput};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// A denoised image.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +43,29 @@ pub struct Denoised {
 pub fn denoise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
     input.check();
     let found = regression::regression(input, stop)?;
+    go_on(stop)?;
     let filtered = regression::pick(input, &found);
-    Some(combine::combine(input, &found.noise, &filtered))
+    go_on(stop)?;
+    combine::combine(input, &found.noise, &filtered, stop)
+}
+
+/// What `of` returns for 0 up to `n`, in parallel; `None` if `stop`, which is called before each, returned true.
+///
+/// - `nothing`: takes the place of what is left out.
+fn each<T: Copy + Send + Sync>(
+    n: usize,
+    nothing: T,
+    stop: &(dyn Fn() -> bool + Sync),
+    of: impl Fn(usize) -> T + Sync,
+) -> Option<Vec<T>> {
+    let all: Vec<T> = (0..n).into_par_iter().map(|i| if stop() { nothing } else { of(i) }).collect();
+    go_on(stop)?;
+    Some(all)
+}
+
+/// `None` if `stop` returned true.
+fn go_on(stop: &(dyn Fn() -> bool + Sync)) -> Option<()> {
+    (!stop()).then_some(())
 }
 
 /// Like [`denoise`], with another filter in place of the regression: it gets the radiance of each pixel and returns the
@@ -59,7 +81,8 @@ pub fn denoise_with(
     input.check();
     let noise = regression::noise(input, stop)?;
     let filtered = noise.probed(input, filter)?;
-    Some(combine::combine(input, &noise, &filtered))
+    go_on(stop)?;
+    combine::combine(input, &noise, &filtered, stop)
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use super::input::DenoiseInput;
 use super::limit::limit;
 use super::moments::{Blocks, N_FEATURES, Samples};
 use super::noise::{Filtered, Noise};
+use super::{each, go_on};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -46,7 +47,7 @@ const LEAST_ALBEDO: f32 = 0.04;
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
-/// Returns `None` if `stop`, which is called once per row, returned true.
+/// Returns `None` if `stop`, which is called often, returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Regression> {
     let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
     // Without halves the noise is that of the residuals.
@@ -57,19 +58,20 @@ pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync))
         if blocks.level == N_LEVELS || blocks.width.max(blocks.height) == 1 {
             break;
         }
+        go_on(stop)?;
         blocks = blocks.coarser();
     }
-    let rows: Option<Vec<Vec<[Predicted; 2]>>> = (0..input.height)
-        .into_par_iter()
-        .map(|y| (!stop()).then(|| (0..input.width).map(|x| predict(&samples, &levels, n_small, x, y)).collect()))
-        .collect();
-    let predicted: Vec<[Predicted; 2]> = rows?.into_iter().flatten().collect();
+    let width = input.width;
+    let pixel = |i: usize| predict(&samples, &levels, n_small, i % width, i / width);
+    let predicted = each(input.n_pixels(), [Predicted::NOTHING; 2], stop, pixel)?;
     let candidate = |k: usize| Candidate {
-        color: predicted.iter().zip(&albedo).map(|(of, albedo)| (of[k].light * *albedo).max(Vec3::ZERO)).collect(),
-        own: predicted.iter().map(|of| of[k].own.min(1.0)).collect(),
-        misfit: predicted.iter().map(|of| of[k].misfit).collect(),
+        color: predicted.par_iter().zip(&albedo).map(|(of, albedo)| (of[k].light * *albedo).max(Vec3::ZERO)).collect(),
+        own: predicted.par_iter().map(|of| of[k].own.min(1.0)).collect(),
+        misfit: predicted.par_iter().map(|of| of[k].misfit).collect(),
     };
-    Some(Regression { candidates: [candidate(0), candidate(1)], noise })
+    let first = candidate(0);
+    go_on(stop)?;
+    Some(Regression { candidates: [first, candidate(1)], noise })
 }
 
 /// The noise of the raw image alone; `None` if `stop` returned true.
@@ -90,18 +92,21 @@ impl Start {
     fn of(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let guides = &input.guides;
         let at_emitters = near(input, |pixel| guides.emitters[pixel]);
-        let albedo: Vec<Vec3> = guides.albedo.iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
+        let albedo: Vec<Vec3> = guides.albedo.par_iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
+        go_on(stop)?;
         let mut samples = samples(input, &albedo, &at_emitters);
+        go_on(stop)?;
         let excess = limit(input, &albedo, &at_emitters, &mut samples);
+        go_on(stop)?;
         let mut blocks = Blocks::finest(&samples);
         let n = input.n_pixels();
         let variance = match input.half_steps {
-            Some(halves) => (0..n).map(|i| halves.variance(i)).collect(),
+            Some(halves) => (0..n).into_par_iter().map(|i| halves.variance(i)).collect(),
             None => {
                 // The only estimate of the noise is the residual of small windows.
                 samples.variance = residuals(&samples, &Fits::of(&blocks, 0.0, stop)?, stop)?;
                 blocks = Blocks::finest(&samples);
-                (0..n).map(|i| samples.variance[i] / 3.0 * albedo[i] * albedo[i]).collect()
+                (0..n).into_par_iter().map(|i| samples.variance[i] / 3.0 * albedo[i] * albedo[i]).collect()
             }
         };
         Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess } })
@@ -115,7 +120,7 @@ fn nearness(depth: &[f32]) -> Vec<f32> {
     let middle = finite.len() / 2;
     let typical = if finite.is_empty() { 1.0 } else { *finite.select_nth_unstable_by(middle, f32::total_cmp).1 };
     let of = |&depth: &f32| if depth.is_finite() && depth > 0.0 { typical / (typical + depth) - 0.5 } else { -0.5 };
-    depth.iter().map(of).collect()
+    depth.par_iter().map(of).collect()
 }
 
 fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool]) -> Samples {
@@ -166,11 +171,8 @@ fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -
         });
         sum / n
     };
-    let rows: Option<Vec<Vec<f32>>> = (0..samples.height)
-        .into_par_iter()
-        .map(|y| (!stop()).then(|| (0..samples.width).map(|x| residual(x, y)).collect()))
-        .collect();
-    Some(rows?.into_iter().flatten().collect())
+    let width = samples.width;
+    each(width * samples.height, 0.0, stop, |i| residual(i % width, i / width))
 }
 
 /// The weighted mean over windows at one pixel.
@@ -181,6 +183,11 @@ struct Predicted {
     /// Weight of the pixel's own value in it.
     own: f32,
     misfit: f32,
+}
+
+impl Predicted {
+    /// Of a pixel that is left out.
+    const NOTHING: Self = Self { light: Vec3::ZERO, own: 0.0, misfit: 0.0 };
 }
 
 /// Returns the mean over all windows that contain a pixel, and over the small ones.
@@ -242,8 +249,8 @@ pub(super) fn pick(input: &DenoiseInput, found: &Regression) -> Filtered {
         (small.misfit[i] + (all.misfit[i] - small.misfit[i]) * share[i]) / 3.0 * albedo * albedo
     };
     Filtered {
-        color: (0..n).map(|i| small.color[i].lerp(all.color[i], share[i])).collect(),
-        covariance: (0..n).map(|i| own(i) * found.noise.variance[i]).collect(),
-        misfit: (0..n).map(misfit).collect(),
+        color: (0..n).into_par_iter().map(|i| small.color[i].lerp(all.color[i], share[i])).collect(),
+        covariance: (0..n).into_par_iter().map(|i| own(i) * found.noise.variance[i]).collect(),
+        misfit: (0..n).into_par_iter().map(misfit).collect(),
     }
 }

@@ -13,7 +13,8 @@
 //! - The variance of the raw value is averaged over a wide neighbourhood, and larger where it is mixed with the filtered
 //!   one: the narrow neighbourhood has decided the shares, which are raw where its variance is too small at random.
 
-use super::blur::{RADIUS, smooth_apart};
+use super::blur::{Apart, RADIUS};
+use super::go_on;
 use super::input::DenoiseInput;
 use super::noise::{Filtered, Noise, squared_bias};
 use glam::Vec3;
@@ -39,44 +40,63 @@ const VARIANCE_UNCERTAINTY: f64 = 0.2;
 /// Side in pixels of the tiles whose errors are independent.
 const TILE: usize = 32;
 
-/// Estimated root of relMSE of the combined image, and the bounds of its interval.
+/// Estimated root of relMSE of the combined image, and the bounds of its interval; `None` if `stop` returned true.
 ///
 /// - `share`: filtered share of each pixel.
-pub(super) fn error_of(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, share: &[f32]) -> (f64, [f64; 2]) {
+pub(super) fn error_of(
+    input: &DenoiseInput,
+    noise: &Noise,
+    filtered: &Filtered,
+    share: &[f32],
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<(f64, [f64; 2])> {
     let n = input.n_pixels();
     let weight: Vec<Vec3> = (0..n).into_par_iter().map(|i| one_over_level(input, noise, filtered, i)).collect();
-    let smooth = |radius: usize, of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+    let [narrow, wide] = [RADIUS, WIDE_RADIUS].map(|radius| Apart::of(input, &noise.at_emitters, radius));
+    let smooth = |apart: &Apart, of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+        go_on(stop)?;
         let values: Vec<f32> = (0..n).into_par_iter().map(|i| weight[i].dot(of(i))).collect();
-        smooth_apart(&values, input, &noise.at_emitters, radius)
+        Some(apart.smooth(&values))
     };
-    let variance = smooth(RADIUS, &|i| noise.variance[i]);
-    let wide_variance = smooth(WIDE_RADIUS, &|i| noise.variance[i]);
-    let own = smooth(RADIUS, &|i| filtered.covariance[i]);
-    let misfit = smooth(RADIUS, &|i| filtered.misfit[i]);
-    let difference = smooth(RADIUS, &|i| {
+    let variance = smooth(&narrow, &|i| noise.variance[i])?;
+    let wide_variance = smooth(&wide, &|i| noise.variance[i])?;
+    let own = smooth(&narrow, &|i| filtered.covariance[i])?;
+    let misfit = smooth(&narrow, &|i| filtered.misfit[i])?;
+    let difference = smooth(&narrow, &|i| {
         let off = input.color[i] - filtered.color[i];
         off * off
-    });
-    let tiles_x = input.width.div_ceil(TILE);
-    let mut of_tiles = vec![0.0; tiles_x * input.height.div_ceil(TILE)];
-    let mut of_bias = 0.0;
-    for i in 0..n {
+    })?;
+    // Risk and squared bias.
+    let of_pixel = |i: usize| {
         let (s, rest) = (share[i], 1.0 - share[i]);
         let own = own[i].max(0.0);
         let unseen = LEAST_BIAS * own + MISFIT_BIAS * misfit[i].max(0.0);
         let bias = s * s * (squared_bias(difference[i], variance[i], own) + unseen);
         let of_raw = rest * rest * (1.0 + AT_RANDOM * s) * wide_variance[i];
         let risk = of_raw + (2.0 * rest + OWN_VARIANCE * s) * s * own + bias;
-        of_tiles[i / input.width / TILE * tiles_x + i % input.width / TILE] += f64::from(risk);
-        of_bias += f64::from(bias);
-    }
+        (f64::from(risk), f64::from(bias))
+    };
+    let tiles_x = input.width.div_ceil(TILE);
+    let of_band = |band: usize| {
+        let (mut of_tiles, mut of_bias) = (vec![0.0; tiles_x], 0.0);
+        for i in band * TILE * input.width..n.min((band + 1) * TILE * input.width) {
+            let (risk, bias) = of_pixel(i);
+            of_tiles[i % input.width / TILE] += risk;
+            of_bias += bias;
+        }
+        (of_tiles, of_bias)
+    };
+    // Sums of bands in their order, so that the result does not depend on the number of threads.
+    let of_bands: Vec<(Vec<f64>, f64)> = (0..input.height.div_ceil(TILE)).into_par_iter().map(of_band).collect();
+    let of_bias: f64 = of_bands.iter().map(|(_, bias)| bias).sum();
+    let of_tiles: Vec<f64> = of_bands.into_iter().flat_map(|(of_tiles, _)| of_tiles).collect();
     let sum: f64 = of_tiles.iter().sum();
     let error = (sum / (3 * n) as f64).max(0.0).sqrt();
     // On the logarithm, where a sum of positive terms is closer to symmetric.
     let of_tiles = of_tiles.iter().map(|risk| risk * risk).sum::<f64>().sqrt() * TILE_UNCERTAINTY;
     let relative = of_tiles.hypot(of_bias * BIAS_UNCERTAINTY) / sum.max(1e-30);
     let factor = (0.5 * 1.96 * relative.hypot(VARIANCE_UNCERTAINTY)).exp();
-    (error, [error / factor, error * factor])
+    Some((error, [error / factor, error * factor]))
 }
 
 /// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its

@@ -387,7 +387,11 @@ impl Film {
 
     /// Mean radiance of all pixels, row by row from the top.
     pub fn means(&self) -> Vec<Vec3> {
-        (0..self.height).flat_map(|y| self.row(y)).collect()
+        let mut means = vec![Vec3::ZERO; self.width as usize * self.height as usize];
+        means.par_chunks_exact_mut(self.width as usize).zip(0..self.height).for_each(|(row, y)| {
+            self.for_each_in_row(y, |x, radiance| row[x] = radiance);
+        });
+        means
     }
 
     /// Samples per pixel of the camera paths at a pixel, non-finite ones included.
