@@ -4,8 +4,8 @@
 use crate::common::*;
 use crate::determinism::{busy_scene, with_threads};
 use firstlight::render::{
-    Environment, ErrorMetric, Film, Material, MergeError, Prepared, RenderSettings, SampleAllocation, Techniques,
-    advance,
+    CausticPlan, Environment, ErrorMetric, Film, FilmRecord, Material, MergeError, Prepared, RenderSettings,
+    SampleAllocation, Techniques, advance,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -103,6 +103,41 @@ fn portions_interruptions_and_the_way_over_the_disk_change_nothing() {
     }
     assert!(portions.to_record() == whole.to_record());
     assert_eq!(portions.error_estimate(), whole.error_estimate());
+}
+
+/// Light paths are of the whole image: a film that is kept among those of one sample goes on with the next batch.
+#[test]
+fn a_film_kept_among_the_light_paths_of_a_sample_goes_on_with_the_rest() {
+    let scene = busy_scene();
+    let caustic_plan = Some(CausticPlan { light_path_stride: 1, guided: false });
+    let techniques = Techniques { caustic_plan, ..Techniques::ALL };
+    with_threads(1, || {
+        for settings in [adaptive(), RenderSettings { allocation: SampleAllocation::Uniform, ..adaptive() }] {
+            let settings = RenderSettings { techniques, ..settings };
+            // Several batches of light paths per sample.
+            let new = || Film::new(160, 110);
+            let mut whole = new();
+            assert!(advance(&scene, &settings, &mut whole, 3, &NEVER).completed);
+            let whole = whole.to_record();
+            let batches = |record: &FilmRecord| -> u64 {
+                let light = record.layout.light_traced.as_ref().expect("light paths");
+                light.batches.iter().map(|(first, end)| end - first).sum()
+            };
+            let per_sample = batches(&whole) / 3;
+            let mut n_among = 0;
+            for patience in (0..400).step_by(9) {
+                let asked = AtomicU32::new(0);
+                let mut film = new();
+                advance(&scene, &settings, &mut film, 3, &|| asked.fetch_add(1, Ordering::Relaxed) >= patience);
+                let kept = film.to_record();
+                n_among += usize::from(kept.layout.light_traced.is_some() && batches(&kept) % per_sample > 0);
+                let mut film = Film::from_record(&kept).unwrap();
+                assert!(advance(&scene, &settings, &mut film, 3, &NEVER).completed);
+                assert!(film.to_record() == whole, "{patience}");
+            }
+            assert!(n_among >= 3, "{n_among} stops fell among the light paths of a sample");
+        }
+    });
 }
 
 /// A light that paths find through glass by BSDF sampling alone: few of them bring all of the light of a spot. A block that
