@@ -2,7 +2,8 @@
 //!
 //! Images of a moving camera are smoothed at once, by the render thread. At full resolution the settled filter runs
 //! beside the samples ([`super::denoiser`]) on a copy of the film, as soon as it has guides and then each time that the
-//! film has a quarter more samples; until its first result, images are smoothed.
+//! film has a quarter more samples, sooner if the raw image is about to become the better one; until its first result,
+//! images are smoothed.
 
 use super::denoiser::{Request, ToDenoise};
 use super::thread::Loop;
@@ -15,7 +16,8 @@ use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples.
+/// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples,
+/// unless the raw image would become the better one within as much.
 const SAMPLES_FIRST: u32 = 4;
 
 /// Samples per pixel of the guides of the first denoised image of a view; all later ones have [`FEATURE_SAMPLES`].
@@ -73,7 +75,8 @@ impl Loop<'_> {
             None
         } else {
             let spp = film.spp_in(self.active_region().as_ref());
-            let is_soon = !is_first && self.views.settle_again.is_some_and(|at| Instant::now() < at);
+            let waits = self.views.settle_again.is_some_and(|at| Instant::now() < at);
+            let is_soon = waits && self.settled(key).is_some_and(|settled| !self.is_nearly_overtaken(settled, spp));
             let is_due = match is_last {
                 true => spp > before || guides_before < FEATURE_SAMPLES,
                 false => spp > before && !is_soon && 4 * u64::from(spp) >= 5 * u64::from(before),
@@ -155,6 +158,16 @@ impl Loop<'_> {
         self.active_region().is_none() && self.stats.error.is_some_and(|raw| raw < settled.denoised.error)
     }
 
+    /// Whether the raw image will be the better one before another image is denoised, if that does not begin now. Noise
+    /// would come back to the display until then.
+    ///
+    /// - `spp`: samples per pixel now.
+    fn is_nearly_overtaken(&self, settled: &Settled, spp: u32) -> bool {
+        let Some(raw) = self.stats.error.filter(|_| self.active_region().is_none()) else { return false };
+        let left = time_until_overtaken(raw, settled.denoised.error, self.restarted_at.elapsed());
+        2 * u64::from(spp) >= 3 * u64::from(settled.spp) && left <= SAMPLES_FIRST * settled.took
+    }
+
     /// Whether an image of the film would look like the one before or come too soon after it.
     pub(super) fn is_displayed(&self, divider: u32, key: ViewKey) -> bool {
         if divider > 1 || self.wanted_denoising() == Denoising::Raw {
@@ -196,6 +209,14 @@ impl Developed {
     }
 }
 
+/// Time until the raw image of a film has the error of a denoised one: errors fall with the square root of the time.
+///
+/// - `raw`, `denoised`: relative errors; `elapsed`: time that the samples took so far.
+fn time_until_overtaken(raw: f64, denoised: f64, elapsed: Duration) -> Duration {
+    let factor = (raw / denoised).powi(2) - 1.0;
+    Duration::try_from_secs_f64(elapsed.as_secs_f64() * factor.max(0.0)).unwrap_or(Duration::MAX)
+}
+
 /// Puts the left half of the raw image over the denoised one, with a line between the two.
 fn split(rgba: &mut [u8], raw: &[u8], width: usize) {
     let middle = width / 2;
@@ -207,7 +228,15 @@ fn split(rgba: &mut [u8], raw: &[u8], width: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::split;
+    use super::{Duration, split, time_until_overtaken};
+
+    #[test]
+    fn a_denoised_image_is_overtaken_when_the_samples_have_its_error() {
+        let left = |raw, denoised| time_until_overtaken(raw, denoised, Duration::from_secs(4));
+        assert_eq!(left(0.1, 0.05), Duration::from_secs(12));
+        assert_eq!((left(0.05, 0.05), left(0.01, 0.05)), (Duration::ZERO, Duration::ZERO));
+        assert_eq!(left(0.1, 0.0), Duration::MAX);
+    }
 
     #[test]
     fn the_left_half_is_raw_and_a_line_lies_between() {
