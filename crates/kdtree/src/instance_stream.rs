@@ -16,7 +16,7 @@ use super::ray::{Nearest, TreeRay};
 use super::ray_setup::{RaySetup, Source};
 use super::shape::{transform_point, transform_vector};
 use super::simd::KernelSimd;
-use super::stream::{DONE, List, SLOTS};
+use super::stream::{DONE, List, SLOTS, Walk};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
 
@@ -29,18 +29,12 @@ pub(super) trait InstanceSource: Source {
     fn finish_in(&mut self, ray: u32, object: u32, nearest: &Nearest);
 }
 
-/// A ray in state. Visits of nodes touch the first cache line only, `descent` to `height`.
+/// A ray in state.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Slot {
-    /// In the space that the ray is in.
-    descent: DescentRay,
-    /// The entry that is visited next.
-    child: u32,
-    t0: f32,
-    t1: f32,
-    /// Number of entries on the stack of the tree that the ray is in.
-    height: u32,
+    /// In the tree that the ray is in.
+    walk: Walk,
     nearest: Nearest,
     /// For the instance that the ray is in.
     sheared: ShearedRay,
@@ -63,11 +57,7 @@ struct Slot {
 
 impl Slot {
     const IDLE: Self = Self {
-        descent: DescentRay::IDLE,
-        child: 0,
-        t0: 0.0,
-        t1: 0.0,
-        height: 1,
+        walk: Walk::IDLE,
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
         sheared: ShearedRay::IDLE,
         precise: PreciseRay::IDLE,
@@ -82,18 +72,6 @@ impl Slot {
         id: 0,
         is_busy: false,
     };
-
-    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
-    #[inline(always)]
-    fn pop(&mut self, stack: &Stack) {
-        let (mut top, end) = (self.height as usize - 1, self.descent.end);
-        while stack.t0[top] > end {
-            top -= 1;
-        }
-        let t1 = stack.t1[top];
-        self.height = top as u32;
-        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
-    }
 }
 
 /// What a ray does next: the index of its list.
@@ -169,11 +147,11 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             slot.is_busy = false;
             let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { continue };
             let (t0, t1) = setup.within(lane);
-            let (descent, nearest) = (setup.descent(lane), setup.nearest(lane));
+            let walk = Walk { descent: setup.descent(lane), child: 0, t0, t1, height: 1 };
+            let nearest = setup.nearest(lane);
             let (origin, dir) = setup.ray(lane);
             let (id, found) = (setup.id(lane), [nearest.prim, 0]);
-            *slot =
-                Slot { descent, t0, t1, nearest, upper: descent, origin, dir, found, id, is_busy: true, ..Slot::IDLE };
+            *slot = Slot { walk, nearest, upper: walk.descent, origin, dir, found, id, is_busy: true, ..Slot::IDLE };
             lists.0[INNER].push_if(true, i);
         }
         if lists.0.iter().all(|list| list.len() == 0) {
@@ -183,29 +161,29 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
         for &i in &list[..len] {
             let at = i as usize % SLOTS;
             let (slot, stack) = (&mut slots[at], &mut stacks[at][usize::from(trees[at].is_some())]);
-            let (node, height) = (&nodes[at][slot.child as usize], slot.height as usize);
-            slot.height = s.descend(node, &slot.descent, slot.t0, slot.t1, stack, height) as u32;
+            let (node, height) = (&nodes[at][slot.walk.child as usize], slot.walk.height as usize);
+            slot.walk.height = s.descend(node, &slot.walk.descent, slot.walk.t0, slot.walk.t1, stack, height) as u32;
         }
         // A separate loop, so that a misprediction discards little work.
         for &i in &list[..len] {
             let at = i as usize % SLOTS;
             let (slot, in_instance) = (&mut slots[at], trees[at].is_some());
-            slot.pop(&stacks[at][usize::from(in_instance)]);
-            lists.push(i, slot.child, in_instance);
+            slot.walk.pop(&stacks[at][usize::from(in_instance)]);
+            lists.push(i, slot.walk.child, in_instance);
         }
         let (list, len) = lists.0[UPPER_LEAVES].take();
         for &i in &list[..len] {
             let at = i as usize % SLOTS;
             let (slot, stack) = (&mut slots[at], &mut stacks[at][0]);
             test_boxes(s, tree, slot, stack);
-            slot.pop(stack);
-            lists.push(i, slot.child, false);
+            slot.walk.pop(stack);
+            lists.push(i, slot.walk.child, false);
         }
         let (list, len) = lists.0[ENTER].take();
         for &i in &list[..len] {
             let at = i as usize % SLOTS;
             let slot = &mut slots[at];
-            let placement = tree.placement(slot.child & !PLACEMENT);
+            let placement = tree.placement(slot.walk.child & !PLACEMENT);
             let own_tree = tree.own_tree(placement);
             let entered = match own_tree {
                 OwnTree::Mesh(tree) => enter::<_, ANY>(slot, &tree.tree, placement),
@@ -215,8 +193,8 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
                 (nodes[at], trees[at]) = (own_nodes, Some(own_tree));
                 lists.0[INNER].push_if(true, i);
             } else {
-                slot.pop(&stacks[at][0]);
-                lists.push(i, slot.child, false);
+                slot.walk.pop(&stacks[at][0]);
+                lists.push(i, slot.walk.child, false);
             }
         }
         let (list, len) = lists.0[LEAVES].take();
@@ -224,20 +202,22 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             let at = i as usize % SLOTS;
             let slot = &mut slots[at];
             match trees[at] {
-                Some(OwnTree::Mesh(tree)) => tree.tree.test_leaf(s, slot.child, &slot.sheared, &mut slot.nearest),
-                Some(OwnTree::Spheres(tree)) => tree.tree.test_leaf(s, slot.child, &slot.precise, &mut slot.nearest),
+                Some(OwnTree::Mesh(tree)) => tree.tree.test_leaf(s, slot.walk.child, &slot.sheared, &mut slot.nearest),
+                Some(OwnTree::Spheres(tree)) => {
+                    tree.tree.test_leaf(s, slot.walk.child, &slot.precise, &mut slot.nearest)
+                }
                 None => {}
             }
-            slot.descent.end = slot.nearest.t;
+            slot.walk.descent.end = slot.nearest.t;
         }
         for &i in &list[..len] {
             let at = i as usize % SLOTS;
             let slot = &mut slots[at];
-            slot.pop(&stacks[at][1]);
+            slot.walk.pop(&stacks[at][1]);
             if ANY && slot.nearest.found {
-                slot.child = DONE;
+                slot.walk.child = DONE;
             }
-            lists.push(i, slot.child, true);
+            lists.push(i, slot.walk.child, true);
         }
         let (list, len) = lists.0[LEAVE].take();
         for &i in &list[..len] {
@@ -248,13 +228,13 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
                 (slot.found, slot.has_hit) = ([slot.object, slot.nearest.prim], true);
                 slot.nearest.found = false;
             }
-            slot.descent = DescentRay { end: slot.nearest.t, ..slot.upper };
-            slot.height = slot.upper_height;
-            slot.pop(&stacks[at][0]);
+            slot.walk.descent = DescentRay { end: slot.nearest.t, ..slot.upper };
+            slot.walk.height = slot.upper_height;
+            slot.walk.pop(&stacks[at][0]);
             if ANY && slot.has_hit {
-                slot.child = DONE;
+                slot.walk.child = DONE;
             }
-            lists.push(i, slot.child, false);
+            lists.push(i, slot.walk.child, false);
         }
     }
 }
@@ -263,11 +243,11 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
 /// leaf's next block.
 #[inline(always)]
 fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut Slot, stack: &mut Stack) {
-    let block = tree.block(slot.child);
-    let (mut met, t) = block.entries(s, &slot.descent, slot.t0, slot.t1);
-    let mut height = slot.height as usize;
+    let block = tree.block(slot.walk.child);
+    let (mut met, t) = block.entries(s, &slot.walk.descent, slot.walk.t0, slot.walk.t1);
+    let mut height = slot.walk.height as usize;
     if block.placements.is_followed() {
-        (stack.child[height], stack.t0[height], stack.t1[height]) = (slot.child + 1, slot.t0, slot.t1);
+        (stack.child[height], stack.t0[height], stack.t1[height]) = (slot.walk.child + 1, slot.walk.t0, slot.walk.t1);
         height += 1;
     }
     let first = height;
@@ -287,7 +267,7 @@ fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut Slot, stack: 
         (stack.child[at], stack.t0[at]) = (PLACEMENT | placement, t[lane]);
         height += 1;
     }
-    slot.height = height as u32;
+    slot.walk.height = height as u32;
 }
 
 /// Moves the ray into an object. Returns the nodes of the object's tree; `None` if the ray misses its bounds.
@@ -311,10 +291,10 @@ where
     }
     let TreeRay { origin, inv_lo, inv_hi, padding, .. } = tree_ray;
     let descent = DescentRay::new(origin, inv_lo, inv_hi, padding, slot.nearest.t);
-    slot.descent = if ANY { descent.far_first() } else { descent };
+    slot.walk.descent = if ANY { descent.far_first() } else { descent };
     B::Ray::new(&ray, &shear).put(slot);
-    slot.upper_height = slot.height;
-    (slot.child, slot.t0, slot.t1, slot.height) = (0, t0, t1, 1);
+    slot.upper_height = slot.walk.height;
+    (slot.walk.child, slot.walk.t0, slot.walk.t1, slot.walk.height) = (0, t0, t1, 1);
     slot.object = placement.object;
     // At equal distance the lower object wins, whatever its primitive.
     slot.nearest.prim = if placement.object < slot.found[0] { u32::MAX } else { 0 };

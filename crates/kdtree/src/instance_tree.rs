@@ -91,10 +91,10 @@ impl OwnTree {
     }
 }
 
-/// The objects tested last, so that an object that spans many cells is not tested in each of them.
+/// The objects, or their placements, that were tested last, so that an object that spans many cells is not tested in each of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Recent {
-    /// Object index plus 1; 0 for an empty slot.
+    /// Index plus 1; 0 for an empty slot.
     objects: [u32; 8],
 }
 
@@ -177,7 +177,8 @@ impl InstanceTree {
         let placements: Vec<Placement> = objects.iter().filter_map(place).collect();
         let supports: Vec<Support> = own_trees.par_iter().map(OwnTree::support).collect();
         let bounds_of = |placement: &Placement| {
-            let (own_tree, map) = (placement.own_tree as usize, scene.shapes[placement.object as usize].placement());
+            let (own_tree, map) =
+                (placement.own_tree as usize, scene.shapes[placement.object as usize].world_from_object());
             placed_bounds(own_trees[own_tree].bounds(), &map, Some(&supports[own_tree]))
         };
         let boxes: Vec<Aabb> = placements.par_iter().with_min_len(MIN_PARALLEL).map(bounds_of).collect();

@@ -57,7 +57,7 @@ pub enum Shape {
 
 impl Shape {
     /// Map from the object's own space to that of the snapshot.
-    pub(super) fn placement(&self) -> Affine3A {
+    pub(super) fn world_from_object(&self) -> Affine3A {
         match self {
             Self::Mesh { world_from_object, .. } | Self::Spheres { world_from_object, .. } => *world_from_object,
             _ => Affine3A::IDENTITY,

@@ -17,17 +17,41 @@ use super::simd::KernelSimd;
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
 pub(super) const SLOTS: usize = 64;
 
-/// A ray in state. Visits of nodes touch the first cache line only, `descent` to `height`.
+/// The way of a ray through a tree: all that visits of nodes touch, in one cache line.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Walk {
+    pub descent: DescentRay,
+    /// The entry that is visited next.
+    pub child: u32,
+    pub t0: f32,
+    pub t1: f32,
+    /// Number of entries on the stack.
+    pub height: u32,
+}
+const _: () = assert!(size_of::<Walk>() == 64);
+
+impl Walk {
+    pub const IDLE: Self = Self { descent: DescentRay::IDLE, child: 0, t0: 0.0, t1: 0.0, height: 1 };
+
+    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
+    #[inline(always)]
+    pub fn pop(&mut self, stack: &Stack) {
+        let (mut top, end) = (self.height as usize - 1, self.descent.end);
+        while stack.t0[top] > end {
+            top -= 1;
+        }
+        let t1 = stack.t1[top];
+        self.height = top as u32;
+        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
+    }
+}
+
+/// A ray in state.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Slot<R> {
-    descent: DescentRay,
-    /// The entry that is visited next.
-    child: u32,
-    t0: f32,
-    t1: f32,
-    /// Number of entries on the stack.
-    height: u32,
+    walk: Walk,
     leaf: R,
     nearest: Nearest,
     id: u32,
@@ -149,44 +173,44 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
         let (list, len) = inner.take();
         for &i in &list[..len] {
             let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
-            let (node, height) = (&nodes8[slot.child as usize], slot.height as usize);
-            slot.height = s.descend(node, &slot.descent, slot.t0, slot.t1, stack, height) as u32;
+            let (node, height) = (&nodes8[slot.walk.child as usize], slot.walk.height as usize);
+            slot.walk.height = s.descend(node, &slot.walk.descent, slot.walk.t0, slot.walk.t1, stack, height) as u32;
         }
         // A separate loop, so that a misprediction discards little work.
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
-            slot.pop(&stacks[i as usize % SLOTS]);
+            slot.walk.pop(&stacks[i as usize % SLOTS]);
             if prefetch {
-                tree.prefetch::<S, 1>(s, slot.child);
+                tree.prefetch::<S, 1>(s, slot.walk.child);
             }
-            inner.push_if(slot.child < DONE, i);
-            leaf.push_if(slot.child > DONE, i);
-            idle.push_if(slot.child == DONE, i);
+            inner.push_if(slot.walk.child < DONE, i);
+            leaf.push_if(slot.walk.child > DONE, i);
+            idle.push_if(slot.walk.child == DONE, i);
         }
         let (list, len) = leaf.take();
         for &i in &list[..len] {
-            let child = slots[i as usize % SLOTS].child;
+            let child = slots[i as usize % SLOTS].walk.child;
             if prefetch {
                 tree.prefetch::<S, 0>(s, child);
             }
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
-            tree.test_leaf(s, slot.child, &slot.leaf, &mut slot.nearest);
-            slot.descent.end = slot.nearest.t;
+            tree.test_leaf(s, slot.walk.child, &slot.leaf, &mut slot.nearest);
+            slot.walk.descent.end = slot.nearest.t;
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
-            slot.pop(&stacks[i as usize % SLOTS]);
+            slot.walk.pop(&stacks[i as usize % SLOTS]);
             if ANY && slot.nearest.found {
-                slot.child = DONE;
+                slot.walk.child = DONE;
             }
             if prefetch {
-                tree.prefetch::<S, 1>(s, slot.child);
+                tree.prefetch::<S, 1>(s, slot.walk.child);
             }
-            inner.push_if(slot.child < DONE, i);
-            leaf.push_if(slot.child > DONE, i);
-            idle.push_if(slot.child == DONE, i);
+            inner.push_if(slot.walk.child < DONE, i);
+            leaf.push_if(slot.walk.child > DONE, i);
+            idle.push_if(slot.walk.child == DONE, i);
         }
     }
 }
@@ -202,44 +226,25 @@ fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
 ) -> bool {
     let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
     let (t0, t1) = setup.within(lane);
+    let descent = if ANY { setup.descent(lane).far_first() } else { setup.descent(lane) };
     *slot = Slot {
-        descent: if ANY { setup.descent(lane).far_first() } else { setup.descent(lane) },
+        walk: Walk { descent, child: 0, t0, t1, height: 1 },
         leaf: setup.leaf(lane),
         nearest: setup.nearest(lane),
         id: setup.id(lane),
         is_busy: true,
-        height: 1,
-        child: 0,
-        t0,
-        t1,
     };
     true
 }
 
 impl<R: LeafRay> Slot<R> {
     const IDLE: Self = Self {
-        descent: DescentRay::IDLE,
+        walk: Walk::IDLE,
         leaf: R::IDLE,
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
         id: 0,
         is_busy: false,
-        height: 1,
-        child: 0,
-        t0: 0.0,
-        t1: 0.0,
     };
-
-    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
-    #[inline(always)]
-    fn pop(&mut self, stack: &Stack) {
-        let (mut top, end) = (self.height as usize - 1, self.descent.end);
-        while stack.t0[top] > end {
-            top -= 1;
-        }
-        let t1 = stack.t1[top];
-        self.height = top as u32;
-        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
-    }
 }
 
 #[cfg(test)]

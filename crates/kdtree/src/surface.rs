@@ -54,7 +54,7 @@ pub struct Instance {
 
 impl Instance {
     pub fn new(shape: &Shape) -> Self {
-        let world_from_object = shape.placement();
+        let world_from_object = shape.world_from_object();
         let object_from_world = inverse(&world_from_object);
         let abs = |m: Mat3A| Mat3A::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
         let row_sum = |m: Mat3A| (m.x_axis + m.y_axis + m.z_axis).max_element();

@@ -31,8 +31,8 @@ pub(crate) const FIRST_ROUND: u32 = 8;
 const LEAST_SHARE: u32 = 4;
 const MOST_SHARE: u32 = 16;
 
-/// Relative reduction of the squared error times cost that a first uneven round must achieve: an even film is faster to display
-/// and to predict, and a smaller gain may be noise.
+/// Relative reduction of the squared error times cost that a first uneven round must achieve: an even film is faster to
+/// display and to predict, and a smaller gain may be noise.
 const LEAST_GAIN: f64 = 0.05;
 
 /// State of a block at the beginning of a round.
