@@ -91,7 +91,7 @@ impl OwnTree {
     }
 }
 
-/// The objects, or their placements, that were tested last, so that an object that spans many cells is not tested in each of them.
+/// The objects, or their placements, that were tested last, so that one that spans many cells is not tested in each.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Recent {
     /// Index plus 1; 0 for an empty slot.
