@@ -73,11 +73,23 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
         let settings = RenderSettings { simd, ..RenderSettings::default() };
         let size = UVec2::new(150, 61);
         let gather = |samples| gather_guides(&scene, &settings, size, samples, &|| false).expect("nothing stops it");
-        let mut steps = GuideGatherer::new(size);
-        for samples in [1, 4, 4, 7, 16] {
-            steps = steps.gather(&scene, &settings, samples, &|| false).expect("nothing stops it");
-            assert_eq!(steps.samples(), samples);
-            assert_eq!(steps.guides(), gather(samples), "{samples} samples, {simd:?}");
+        let mut steps = GuideGatherer::default();
+        // What a view leaves behind is not seen by the next one.
+        for size in [UVec2::new(64, 40), size] {
+            steps.start(size);
+            assert!(steps.gather(&scene, &RenderSettings { seed: 3, ..settings }, 2, &|| false));
+        }
+        for is_stopped in [false, true] {
+            if is_stopped {
+                assert!(!steps.gather(&scene, &settings, 32, &|| true), "it is told to stop");
+                assert_eq!(steps.samples(), 0);
+            }
+            steps.start(size);
+            for samples in [1, 4, 4, 7, 16] {
+                assert!(steps.gather(&scene, &settings, samples, &|| false));
+                assert_eq!(steps.samples(), samples);
+                assert_eq!(*steps.guides(), gather(samples), "{samples} samples, {simd:?}");
+            }
         }
         // The seed of the guides differs from that of the image.
         let other = RenderSettings { seed: settings.seed ^ 0x9e37_79b9, ..settings };
@@ -88,7 +100,6 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
         assert_eq!(guides.depth, features.depth);
         let n_emitters = guides.emitters.iter().filter(|emits| **emits).count();
         assert!(n_emitters > 0 && n_emitters < guides.emitters.len() / 4, "{n_emitters}");
-        assert!(steps.gather(&scene, &settings, 32, &|| true).is_none(), "it is told to stop");
     }
 }
 

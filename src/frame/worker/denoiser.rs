@@ -8,7 +8,7 @@
 use super::views::{Settled, ViewKey};
 use super::{DENOISE, DENOISE_NICENESS, NICENESS, lock, make_pool};
 use crate::frame::denoising::DenoiseFilter;
-use crate::render::{DenoiseSource, FEATURE_SAMPLES, GuideGatherer, Prepared, RenderSettings, SurfaceGuides};
+use crate::render::{DenoiseSource, GuideGatherer, Prepared, RenderSettings};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -37,26 +37,22 @@ pub struct ToDenoise {
     pub spp: u32,
 }
 
-/// Guides of a view, as good as they are so far.
+/// Guides of the latest view, as good as they are so far.
+#[derive(Default)]
 struct KnownGuides {
-    key: ViewKey,
-    guides: SurfaceGuides,
-    samples: u32,
-    /// For more samples; none once there are all.
-    gatherer: Option<GuideGatherer>,
+    key: Option<ViewKey>,
+    gatherer: GuideGatherer,
 }
 
 impl KnownGuides {
-    /// Gathers what is missing in `known`; `None` if `stop` returned true.
-    fn of(known: Option<Self>, request: &Request, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+    /// Gathers what the request needs and is not there yet; `None` if `stop` returned true.
+    fn gather(&mut self, request: &Request, stop: &(dyn Fn() -> bool + Sync)) -> Option<()> {
         let Request { key, prepared, settings, guide_samples, .. } = request;
-        let gatherer = match known {
-            Some(known) if known.samples >= *guide_samples => return Some(known),
-            known => known.and_then(|known| known.gatherer).unwrap_or_else(|| GuideGatherer::new(key.size)),
-        };
-        let gatherer = gatherer.gather(prepared, settings, *guide_samples, stop)?;
-        let (guides, samples) = (gatherer.guides(), gatherer.samples());
-        Some(Self { key: *key, guides, samples, gatherer: Some(gatherer).filter(|_| samples < FEATURE_SAMPLES) })
+        if self.key != Some(*key) {
+            self.gatherer.start(key.size);
+            self.key = Some(*key);
+        }
+        self.gatherer.gather(prepared, settings, *guide_samples, stop).then_some(())
     }
 }
 
@@ -153,32 +149,33 @@ impl Drop for Denoiser {
 }
 
 fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
-    let mut known: Option<KnownGuides> = None;
+    let mut known = KnownGuides::default();
     let mut pools = Pools { yielding, ..Pools::default() };
     while let Some(mut request) = next(shared) {
         let (key, image) = (request.key, request.image.take());
         let Some(pool) = pools.of(&request) else { continue };
         let stop = || shared.quit.load(Ordering::Relaxed) || shared.wanted.load(Ordering::Relaxed) != key.generation;
-        let of_view = known.take().filter(|known| known.key == key);
         let work = || {
-            let known = KnownGuides::of(of_view, &request, &stop)?;
-            let Some(ToDenoise { filter, source, spp }) = image else { return Some((known, None)) };
+            known.gather(&request, &stop)?;
+            let Some(ToDenoise { filter, source, spp }) = image else { return Some(None) };
             let start = Instant::now();
-            let (by, denoised) = filter.denoise(&source, &known.guides, &stop)?;
-            let (guide_samples, took) = (known.samples, start.elapsed());
-            Some((known, Some(Settled { key, filter, by, spp, guide_samples, denoised, took })))
+            let (by, denoised) = filter.denoise(&source, known.gatherer.guides(), &stop)?;
+            let (guide_samples, took) = (known.gatherer.samples(), start.elapsed());
+            Some(Some(Settled { key, filter, by, spp, guide_samples, denoised, took }))
         };
-        // A panic has been reported by its thread; the raw image stays.
-        let made = catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok().flatten();
-        if let Some((guides, settled)) = made {
+        let made = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
+        if made.is_err() {
+            // A panic has been reported by its thread; the raw image stays.
+            known = KnownGuides::default();
+        }
+        if let Ok(Some(settled)) = made {
             let mut slot = lock(&shared.slot);
-            slot.guides = Some((key, guides.samples));
+            slot.guides = Some((key, known.gatherer.samples()));
             slot.result = settled;
             slot.has_news = true;
             // What comes next needs this thread.
             slot.is_busy = slot.request.is_some();
             drop(slot);
-            known = Some(guides);
             tell();
         }
     }

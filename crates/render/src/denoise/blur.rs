@@ -1,7 +1,8 @@
 //! Box filters.
 
 use super::input::DenoiseInput;
-use rayon::prelude::*;
+use super::{Stop, each, fill};
+use bytemuck::zeroed_vec;
 
 /// Radius in pixels of the two box filters that average variance and difference of raw and filtered image.
 pub(super) const RADIUS: usize = 2;
@@ -9,21 +10,22 @@ pub(super) const RADIUS: usize = 2;
 pub(super) const N_AVERAGED: f32 = 54.0;
 
 /// Applies a box filter of `2 * radius + 1` pixels per side twice, which is nearly a Gaussian. At the border the box is
-/// cut.
-pub(super) fn blur(values: &[f32], width: usize, height: usize, radius: usize) -> Vec<f32> {
-    box_mean(&box_mean(values, width, height, radius), width, height, radius)
+/// cut. `None` if `stop` returned true.
+pub(super) fn blur(values: &[f32], width: usize, height: usize, radius: usize, stop: Stop) -> Option<Vec<f32>> {
+    box_mean(&box_mean(values, width, height, radius, stop)?, width, height, radius, stop)
 }
 
-fn box_mean(values: &[f32], width: usize, height: usize, radius: usize) -> Vec<f32> {
-    let mut rows = vec![0.0; width * height];
-    rows.par_chunks_exact_mut(width).zip(values.par_chunks_exact(width)).for_each(|(to, from)| {
+fn box_mean(values: &[f32], width: usize, height: usize, radius: usize, stop: Stop) -> Option<Vec<f32>> {
+    let mut rows: Vec<f32> = zeroed_vec(width * height);
+    fill(&mut rows, width, stop, |y, to| {
+        let from = &values[y * width..][..width];
         for (x, to) in to.iter_mut().enumerate() {
             let around = &from[x.saturating_sub(radius)..(x + radius + 1).min(width)];
             *to = around.iter().sum::<f32>() / around.len() as f32;
         }
-    });
-    let mut mean = vec![0.0; width * height];
-    mean.par_chunks_exact_mut(width).enumerate().for_each(|(y, to)| {
+    })?;
+    let mut mean = zeroed_vec(width * height);
+    fill(&mut mean, width, stop, |y, to: &mut [f32]| {
         let around = y.saturating_sub(radius)..(y + radius + 1).min(height);
         let share = 1.0 / around.len() as f32;
         for row in around {
@@ -31,8 +33,8 @@ fn box_mean(values: &[f32], width: usize, height: usize, radius: usize) -> Vec<f
                 *to += from * share;
             }
         }
-    });
-    mean
+    })?;
+    Some(mean)
 }
 
 /// Local means of values, separately for pixels at emitters and for all others.
@@ -46,29 +48,32 @@ pub(super) struct Apart<'a> {
 }
 
 impl<'a> Apart<'a> {
+    /// `None` if `stop` returned true.
+    ///
     /// - `radius`: of the two box filters, pixels.
-    pub fn of(input: &DenoiseInput, at_emitters: &'a [bool], radius: usize) -> Self {
+    pub fn of(input: &DenoiseInput, at_emitters: &'a [bool], radius: usize, stop: Stop) -> Option<Self> {
         let (width, height) = (input.width, input.height);
         let share = |is: bool| {
-            let inside: Vec<f32> = at_emitters.par_iter().map(|&at| if at == is { 1.0 } else { 0.0 }).collect();
-            blur(&inside, width, height, radius)
+            let inside = each(at_emitters.len(), stop, |i| if at_emitters[i] == is { 1.0 } else { 0.0 })?;
+            blur(&inside, width, height, radius, stop)
         };
-        let shares = at_emitters.contains(&true).then(|| [true, false].map(share));
-        Self { width, height, radius, at_emitters, shares }
+        let shares = if at_emitters.contains(&true) { Some([share(true)?, share(false)?]) } else { None };
+        Some(Self { width, height, radius, at_emitters, shares })
     }
 
-    pub fn smooth(&self, values: &[f32]) -> Vec<f32> {
+    /// `None` if `stop` returned true.
+    pub fn smooth(&self, values: &[f32], stop: Stop) -> Option<Vec<f32>> {
         let Self { width, height, radius, at_emitters, .. } = *self;
-        let Some(shares) = &self.shares else { return blur(values, width, height, radius) };
+        let Some(shares) = &self.shares else { return blur(values, width, height, radius, stop) };
         let of = |is: bool| {
-            let inside = values.par_iter().zip(at_emitters).map(|(&value, &at)| if at == is { value } else { 0.0 });
-            blur(&inside.collect::<Vec<f32>>(), width, height, radius)
+            let inside = each(values.len(), stop, |i| if at_emitters[i] == is { values[i] } else { 0.0 })?;
+            blur(&inside, width, height, radius, stop)
         };
-        let sums = [true, false].map(of);
+        let sums = [of(true)?, of(false)?];
         let mean = |i: usize| {
             let which = usize::from(!at_emitters[i]);
             sums[which][i] / shares[which][i].max(1e-6)
         };
-        (0..values.len()).into_par_iter().map(mean).collect()
+        each(values.len(), stop, mean)
     }
 }

@@ -12,24 +12,21 @@ use super::blur::{Apart, RADIUS};
 use super::input::DenoiseInput;
 use super::noise::{Filtered, Noise, squared_bias};
 use super::risk::error_of;
-use super::{Denoised, go_on};
+use super::{Denoised, Stop, each};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Returns `None` if `stop` returned true.
 pub(super) fn combine(
     input: &DenoiseInput,
     noise: &Noise,
     filtered: &Filtered,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop,
 ) -> Option<Denoised> {
     let n = input.n_pixels();
     let by_filtered = |i: usize| (filtered.color[i] * filtered.color[i] + 0.01).recip();
-    let apart = Apart::of(input, &noise.at_emitters, RADIUS);
+    let apart = Apart::of(input, &noise.at_emitters, RADIUS, stop)?;
     let smooth = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {
-        go_on(stop)?;
-        let values: Vec<f32> = (0..n).into_par_iter().map(|i| by_filtered(i).dot(of(i))).collect();
-        Some(apart.smooth(&values))
+        apart.smooth(&each(n, stop, |i| by_filtered(i).dot(of(i)))?, stop)
     };
     let variance = smooth(&|i| noise.variance[i])?;
     let own = smooth(&|i| filtered.covariance[i])?;
@@ -37,17 +34,14 @@ pub(super) fn combine(
         let off = filtered.color[i] - input.color[i];
         off * off
     })?;
-    let share: Vec<f32> = (0..n)
-        .into_par_iter()
-        .map(|i| {
-            let gain = (variance[i] - own[i]).max(0.0);
-            let bias = squared_bias(difference[i], variance[i], own[i]);
-            (gain / (gain + bias).max(1e-12)).clamp(0.0, 1.0)
-        })
-        .collect();
+    let share: Vec<f32> = each(n, stop, |i| {
+        let gain = (variance[i] - own[i]).max(0.0);
+        let bias = squared_bias(difference[i], variance[i], own[i]);
+        (gain / (gain + bias).max(1e-12)).clamp(0.0, 1.0)
+    })?;
     // Where the filter is trusted, what is left of the raw value has no fireflies.
     let combined = |i: usize| (input.color[i] - share[i] * noise.excess[i]).lerp(filtered.color[i], share[i]);
-    let color = (0..n).into_par_iter().map(combined).collect();
+    let color = each(n, stop, combined)?;
     let (error, error_95) = error_of(input, noise, filtered, &share, stop)?;
     Some(Denoised { color, share, error, error_95 })
 }

@@ -1,8 +1,9 @@
 //! The best linear function of the features in one window, and its error.
 
-use super::each;
 use super::moments::{Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product};
 use super::noise::significant_part;
+use super::{Stop, each};
+use bytemuck::Zeroable;
 use glam::Vec3;
 
 /// Lower limit of the squared misfit of light over albedo: a fit without noise and misfit in its window is still
@@ -14,7 +15,7 @@ const LEAST_MISFIT: f32 = 1e-4;
 const MISFIT_BY_DISTANCE: f32 = 0.1;
 
 /// Light as a linear function of the features, by ridge regression in a window.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub(super) struct Fit {
     /// Mean features of the window.
     mean: [f32; N_FEATURES],
@@ -51,19 +52,6 @@ impl Prediction {
 }
 
 impl Fit {
-    /// Of a window that is left out.
-    const NOTHING: Self = Self {
-        mean: [0.0; N_FEATURES],
-        precision: [0.0; N_FEATURES],
-        light: [0.0; 3],
-        slope: [[0.0; 3]; N_FEATURES],
-        misfit: 0.0,
-        noise: 0.0,
-        unbias: 0.0,
-        inverse_count: 0.0,
-        mean_weight: 0.0,
-    };
-
     /// Returns the expected squared error of a prediction, which grows with the distance of the features from the
     /// window's mean.
     pub fn expected_error(&self, prediction: &Prediction) -> f32 {
@@ -95,14 +83,14 @@ pub(super) struct Fits {
 }
 
 impl Fits {
-    /// Fits all windows; `stop` is called before each; `None` if it returned true.
+    /// Fits all windows; `None` if `stop` returned true.
     ///
     /// - `significance`: standard deviations by which residuals must exceed the noise to be taken for misfit.
-    pub fn of(blocks: &Blocks, significance: f32, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+    pub fn of(blocks: &Blocks, significance: f32, stop: Stop) -> Option<Self> {
         let ridge = ridge(blocks.level);
         let (width, height) = (blocks.width, blocks.height);
         let fit = |i: usize| solve(&blocks.window(i % width, i / width), &ridge, significance);
-        let fits = each(width * height, Fit::NOTHING, stop, fit)?;
+        let fits = each(width * height, stop, fit)?;
         Some(Self { level: blocks.level, width, height, fits })
     }
 

@@ -11,8 +11,9 @@
 use super::blur::Apart;
 use super::input::DenoiseInput;
 use super::moments::Samples;
+use super::{AT_ONCE, Stop, each, fill};
+use bytemuck::zeroed_vec;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Largest step of a pixel, relative to the mean step around it. The mean of the absolute values: a mean of squares
 /// would be that of the fireflies themselves.
@@ -21,27 +22,39 @@ const LARGEST_STEP: f32 = 4.0;
 const RADIUS: usize = 6;
 
 /// Limits the light of each pixel, and with it its variance; returns by how much radiance is lowered. Nothing is changed
-/// at emitters, or if the halves are unknown.
+/// at emitters, or if the halves are unknown. `None` if `stop` returned true.
 ///
 /// - `albedo`: divisors of radiance.
-pub(super) fn limit(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool], samples: &mut Samples) -> Vec<Vec3> {
+pub(super) fn limit(
+    input: &DenoiseInput,
+    albedo: &[Vec3],
+    at_emitters: &[bool],
+    samples: &mut Samples,
+    stop: Stop,
+) -> Option<Vec<Vec3>> {
     let n = input.n_pixels();
-    let Some(halves) = input.half_steps else { return vec![Vec3::ZERO; n] };
-    let sizes: Vec<f32> = (0..n).into_par_iter().map(|i| (halves.steps[i] / albedo[i]).abs().element_sum()).collect();
-    let typical = Apart::of(input, at_emitters, RADIUS).smooth(&sizes);
-    let lowered = |(i, (light, variance)): (usize, (&mut Vec3, &mut f32))| {
+    let Some(halves) = input.half_steps else { return Some(zeroed_vec(n)) };
+    let sizes: Vec<f32> = each(n, stop, |i| (halves.steps[i] / albedo[i]).abs().element_sum())?;
+    let typical = Apart::of(input, at_emitters, RADIUS, stop)?.smooth(&sizes, stop)?;
+    // Part of the step that is kept.
+    let kept = |i: usize| {
         let most = LARGEST_STEP * typical[i];
-        if at_emitters[i] || sizes[i] <= most {
-            return Vec3::ZERO;
-        }
-        let kept = most / sizes[i];
-        let step = halves.steps[i] * halves.steps[i].element_sum().signum();
-        let excess = step * (1.0 - kept);
-        *light -= excess / albedo[i];
-        *variance *= kept * kept;
-        excess
+        if at_emitters[i] || sizes[i] <= most { 1.0 } else { most / sizes[i] }
     };
-    samples.light.par_iter_mut().zip(&mut samples.variance).enumerate().map(lowered).collect()
+    let excess = each(n, stop, |i| {
+        let step = halves.steps[i] * halves.steps[i].element_sum().signum();
+        step * (1.0 - kept(i))
+    })?;
+    fill(&mut samples.light, AT_ONCE, stop, |part, light| {
+        let first = part * AT_ONCE;
+        light.iter_mut().zip(&excess[first..]).zip(&albedo[first..]).for_each(|((to, excess), by)| *to -= excess / by);
+    })?;
+    fill(&mut samples.variance, AT_ONCE, stop, |part, variance| {
+        for (i, variance) in variance.iter_mut().enumerate() {
+            *variance *= kept(part * AT_ONCE + i).powi(2);
+        }
+    })?;
+    Some(excess)
 }
 
 #[cfg(test)]
@@ -77,7 +90,7 @@ mod tests {
             variance,
             weight: vec![1.0; N],
         };
-        let excess = limit(&input, &albedo, &at_emitters, &mut samples);
+        let excess = limit(&input, &albedo, &at_emitters, &mut samples, &|| false).unwrap();
         let others = (0..N).any(|i| i != FIREFLY && (samples.light[i] != light[i] || excess[i] != Vec3::ZERO));
         (samples.light[FIREFLY], samples.variance[FIREFLY], excess[FIREFLY], others)
     }

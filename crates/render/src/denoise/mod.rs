@@ -19,6 +19,7 @@ mod risk;
 pub use input::{DenoiseInput, Guides};
 pub use moving::{MovingFilter, MovingInput};
 
+use bytemuck::{Zeroable, zeroed_vec};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -40,31 +41,42 @@ pub struct Denoised {
 ///
 /// # Panics
 /// If the lists of the input do not have one entry per pixel.
-pub fn denoise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
+pub fn denoise(input: &DenoiseInput, stop: Stop) -> Option<Denoised> {
     input.check();
     let found = regression::regression(input, stop)?;
-    go_on(stop)?;
-    let filtered = regression::pick(input, &found);
-    go_on(stop)?;
+    let filtered = regression::pick(input, &found, stop)?;
     combine::combine(input, &found.noise, &filtered, stop)
 }
 
-/// What `of` returns for 0 up to `n`, in parallel; `None` if `stop`, which is called before each, returned true.
-///
-/// - `nothing`: takes the place of what is left out.
-fn each<T: Copy + Send + Sync>(
-    n: usize,
-    nothing: T,
-    stop: &(dyn Fn() -> bool + Sync),
-    of: impl Fn(usize) -> T + Sync,
-) -> Option<Vec<T>> {
-    let all: Vec<T> = (0..n).into_par_iter().map(|i| if stop() { nothing } else { of(i) }).collect();
-    go_on(stop)?;
+/// Whether to give up what is being done.
+type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Number of values between two calls of `stop`: some tenths of a millisecond at most.
+const AT_ONCE: usize = 256;
+
+/// What `of` returns for 0 up to `n`, in parallel; `None` if `stop` returned true.
+fn each<T: Zeroable + Send>(n: usize, stop: Stop, of: impl Fn(usize) -> T + Sync) -> Option<Vec<T>> {
+    // The system gives zeroed memory when it is written first: what is given up early costs nothing.
+    let mut all = zeroed_vec(n);
+    fill(&mut all, AT_ONCE, stop, |part, values| {
+        values.iter_mut().enumerate().for_each(|(i, value)| *value = of(part * AT_ONCE + i));
+    })?;
     Some(all)
 }
 
+/// Calls `of` with the number and the values of each part, in parallel; `None` if `stop` returned true.
+///
+/// - `length`: of a part; the last one may be shorter.
+fn fill<T: Send>(all: &mut [T], length: usize, stop: Stop, of: impl Fn(usize, &mut [T]) + Sync) -> Option<()> {
+    all.par_chunks_mut(length).enumerate().try_for_each(|(part, values)| {
+        go_on(stop)?;
+        of(part, values);
+        Some(())
+    })
+}
+
 /// `None` if `stop` returned true.
-fn go_on(stop: &(dyn Fn() -> bool + Sync)) -> Option<()> {
+fn go_on(stop: Stop) -> Option<()> {
     (!stop()).then_some(())
 }
 
@@ -76,12 +88,11 @@ fn go_on(stop: &(dyn Fn() -> bool + Sync)) -> Option<()> {
 pub fn denoise_with(
     input: &DenoiseInput,
     filter: &mut dyn FnMut(&[Vec3]) -> Option<Vec<Vec3>>,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop,
 ) -> Option<Denoised> {
     input.check();
     let noise = regression::noise(input, stop)?;
-    let filtered = noise.probed(input, filter)?;
-    go_on(stop)?;
+    let filtered = noise.probed(input, filter, stop)?;
     combine::combine(input, &noise, &filtered, stop)
 }
 

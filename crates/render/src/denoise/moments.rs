@@ -6,8 +6,8 @@
 //! Pixel positions are relative to the centre of the block, which avoids cancellation; they are shifted where blocks
 //! are added.
 
+use super::{Stop, each};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Features per pixel: normal (3), nearness, position in the image (2), mean albedo.
 pub(super) const N_FEATURES: usize = 7;
@@ -60,10 +60,10 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Sums blocks of 2 × 2 pixels.
-    pub fn finest(samples: &Samples) -> Self {
+    /// Sums blocks of 2 × 2 pixels; `None` if `stop` returned true.
+    pub fn finest(samples: &Samples, stop: Stop) -> Option<Self> {
         let (width, height) = (samples.width.div_ceil(2), samples.height.div_ceil(2));
-        let sums = (0..width * height).into_par_iter().map(|block| {
+        let sums = each(width * height, stop, |block| {
             let (left, top) = (2 * (block % width), 2 * (block / width));
             let mut sums = [0.0; N_SUMS];
             for (y, x) in (top..(top + 2).min(samples.height))
@@ -78,15 +78,15 @@ impl Blocks {
                 );
             }
             sums
-        });
-        Self { level: 1, width, height, sums: sums.collect() }
+        })?;
+        Some(Self { level: 1, width, height, sums })
     }
 
-    /// Merges to blocks with twice the side.
-    pub fn coarser(&self) -> Self {
+    /// Merges to blocks with twice the side; `None` if `stop` returned true.
+    pub fn coarser(&self, stop: Stop) -> Option<Self> {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let quarter = 0.25 * (2u32 << self.level) as f32;
-        let sums = (0..width * height).into_par_iter().map(|block| {
+        let sums = each(width * height, stop, |block| {
             let (left, top) = (2 * (block % width), 2 * (block / width));
             let mut sums = [0.0; N_SUMS];
             for (y, x) in
@@ -96,8 +96,8 @@ impl Blocks {
                 self.add_shifted(&mut sums, x, y, side(x, left), side(y, top));
             }
             sums
-        });
-        Self { level: self.level + 1, width, height, sums: sums.collect() }
+        })?;
+        Some(Self { level: self.level + 1, width, height, sums })
     }
 
     /// Returns the sums over the window of 3 × 3 blocks around a block, relative to its centre.
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn sums_of_windows_are_those_of_their_pixels() {
         let samples = samples(43, 29);
-        let mut blocks = Blocks::finest(&samples);
+        let mut blocks = Blocks::finest(&samples, &|| false).unwrap();
         for level in 1..=3 {
             assert_eq!(blocks.level, level);
             let side = 1i64 << level;
@@ -205,7 +205,7 @@ mod tests {
                     );
                 }
             }
-            blocks = blocks.coarser();
+            blocks = blocks.coarser(&|| false).unwrap();
         }
     }
 }

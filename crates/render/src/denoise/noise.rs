@@ -2,9 +2,9 @@
 
 use super::blur::N_AVERAGED;
 use super::input::DenoiseInput;
+use super::{Stop, each};
 use crate::sampling::hash_u32;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// The noise of the raw image.
 pub(super) struct Noise {
@@ -54,7 +54,7 @@ const PROBE: f32 = 0.25;
 const MISFIT_PER_VARIANCE: f32 = 1.2;
 
 impl Noise {
-    /// Applies a filter about which nothing is known; `None` if it fails or is stopped.
+    /// Applies a filter about which nothing is known; `None` if it fails or `stop` returned true.
     ///
     /// How much noise it passes on is measured by a second image, changed by a multiple of the actual noise: the mean
     /// product of a pixel's change and that of its filtered value is the covariance (Ramani, Blu and Unser 2008,
@@ -63,6 +63,7 @@ impl Noise {
         &self,
         input: &DenoiseInput,
         filter: &mut dyn FnMut(&[Vec3]) -> Option<Vec<Vec3>>,
+        stop: Stop,
     ) -> Option<Filtered> {
         let n = input.n_pixels();
         let noise = |i: usize| match input.half_steps {
@@ -73,12 +74,11 @@ impl Noise {
             }
         };
         let color = filter(input.color)?;
-        let changed: Vec<Vec3> = (0..n).into_par_iter().map(|i| input.color[i] + PROBE * noise(i)).collect();
+        let changed = each(n, stop, |i| input.color[i] + PROBE * noise(i))?;
         let of_changed = filter(&changed)?;
-        let covariance: Vec<Vec3> =
-            (0..n).into_par_iter().map(|i| (of_changed[i] - color[i]) * noise(i) / PROBE).collect();
+        let covariance: Vec<Vec3> = each(n, stop, |i| (of_changed[i] - color[i]) * noise(i) / PROBE)?;
         // Good filters let bias and variance grow alike.
-        let misfit = covariance.iter().map(|covariance| MISFIT_PER_VARIANCE * *covariance).collect();
+        let misfit = each(n, stop, |i| MISFIT_PER_VARIANCE * covariance[i])?;
         Some(Filtered { color, covariance, misfit })
     }
 }

@@ -15,9 +15,9 @@ use super::input::DenoiseInput;
 use super::limit::limit;
 use super::moments::{Blocks, N_FEATURES, Samples};
 use super::noise::{Filtered, Noise};
-use super::{each, go_on};
+use super::{Stop, each};
+use bytemuck::Zeroable;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// An image filtered by regression.
 pub(super) struct Candidate {
@@ -47,8 +47,8 @@ const LEAST_ALBEDO: f32 = 0.04;
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
-/// Returns `None` if `stop`, which is called often, returned true.
-pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Regression> {
+/// Returns `None` if `stop` returned true.
+pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression> {
     let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
     // Without halves the noise is that of the residuals.
     let (significance, n_small) = if input.half_steps.is_some() { (SIGNIFICANCE, 1) } else { (0.0, 2) };
@@ -58,24 +58,24 @@ pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync))
         if blocks.level == N_LEVELS || blocks.width.max(blocks.height) == 1 {
             break;
         }
-        go_on(stop)?;
-        blocks = blocks.coarser();
+        blocks = blocks.coarser(stop)?;
     }
     let width = input.width;
     let pixel = |i: usize| predict(&samples, &levels, n_small, i % width, i / width);
-    let predicted = each(input.n_pixels(), [Predicted::NOTHING; 2], stop, pixel)?;
-    let candidate = |k: usize| Candidate {
-        color: predicted.par_iter().zip(&albedo).map(|(of, albedo)| (of[k].light * *albedo).max(Vec3::ZERO)).collect(),
-        own: predicted.par_iter().map(|of| of[k].own.min(1.0)).collect(),
-        misfit: predicted.par_iter().map(|of| of[k].misfit).collect(),
+    let n = input.n_pixels();
+    let predicted: Vec<[Predicted; 2]> = each(n, stop, pixel)?;
+    let candidate = |k: usize| {
+        Some(Candidate {
+            color: each(n, stop, |i| (predicted[i][k].light * albedo[i]).max(Vec3::ZERO))?,
+            own: each(n, stop, |i| predicted[i][k].own.min(1.0))?,
+            misfit: each(n, stop, |i| predicted[i][k].misfit)?,
+        })
     };
-    let first = candidate(0);
-    go_on(stop)?;
-    Some(Regression { candidates: [first, candidate(1)], noise })
+    Some(Regression { candidates: [candidate(0)?, candidate(1)?], noise })
 }
 
 /// The noise of the raw image alone; `None` if `stop` returned true.
-pub(super) fn noise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Noise> {
+pub(super) fn noise(input: &DenoiseInput, stop: Stop) -> Option<Noise> {
     Start::of(input, stop).map(|start| start.noise)
 }
 
@@ -89,24 +89,21 @@ struct Start {
 }
 
 impl Start {
-    fn of(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+    fn of(input: &DenoiseInput, stop: Stop) -> Option<Self> {
         let guides = &input.guides;
-        let at_emitters = near(input, |pixel| guides.emitters[pixel]);
-        let albedo: Vec<Vec3> = guides.albedo.par_iter().map(|albedo| albedo.max(Vec3::splat(LEAST_ALBEDO))).collect();
-        go_on(stop)?;
-        let mut samples = samples(input, &albedo, &at_emitters);
-        go_on(stop)?;
-        let excess = limit(input, &albedo, &at_emitters, &mut samples);
-        go_on(stop)?;
-        let mut blocks = Blocks::finest(&samples);
         let n = input.n_pixels();
+        let at_emitters = near(input, |pixel| guides.emitters[pixel], stop)?;
+        let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
+        let mut samples = samples(input, &albedo, &at_emitters, stop)?;
+        let excess = limit(input, &albedo, &at_emitters, &mut samples, stop)?;
+        let mut blocks = Blocks::finest(&samples, stop)?;
         let variance = match input.half_steps {
-            Some(halves) => (0..n).into_par_iter().map(|i| halves.variance(i)).collect(),
+            Some(halves) => each(n, stop, |i| halves.variance(i))?,
             None => {
                 // The only estimate of the noise is the residual of small windows.
                 samples.variance = residuals(&samples, &Fits::of(&blocks, 0.0, stop)?, stop)?;
-                blocks = Blocks::finest(&samples);
-                (0..n).into_par_iter().map(|i| samples.variance[i] / 3.0 * albedo[i] * albedo[i]).collect()
+                blocks = Blocks::finest(&samples, stop)?;
+                each(n, stop, |i| samples.variance[i] / 3.0 * albedo[i] * albedo[i])?
             }
         };
         Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess } })
@@ -114,19 +111,19 @@ impl Start {
 }
 
 /// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and −1/2
-/// at infinity.
-fn nearness(depth: &[f32]) -> Vec<f32> {
+/// at infinity. `None` if `stop` returned true.
+fn nearness(depth: &[f32], stop: Stop) -> Option<Vec<f32>> {
     let mut finite: Vec<f32> = depth.iter().copied().filter(|depth| depth.is_finite() && *depth > 0.0).collect();
     let middle = finite.len() / 2;
     let typical = if finite.is_empty() { 1.0 } else { *finite.select_nth_unstable_by(middle, f32::total_cmp).1 };
-    let of = |&depth: &f32| if depth.is_finite() && depth > 0.0 { typical / (typical + depth) - 0.5 } else { -0.5 };
-    depth.par_iter().map(of).collect()
+    let of = |depth: f32| if depth.is_finite() && depth > 0.0 { typical / (typical + depth) - 0.5 } else { -0.5 };
+    each(depth.len(), stop, |i| of(depth[i]))
 }
 
-fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool]) -> Samples {
+fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool], stop: Stop) -> Option<Samples> {
     let guides = &input.guides;
     let n = input.n_pixels();
-    let near = nearness(guides.depth);
+    let near = nearness(guides.depth, stop)?;
     let features = |i: usize| {
         let normal = guides.normal[i];
         [normal.x, normal.y, normal.z, near[i], 0.0, 0.0, guides.albedo[i].element_sum() / 3.0]
@@ -140,28 +137,27 @@ fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool]) -> Sampl
         let mean = albedo[i].element_sum() / 3.0;
         mean * mean * if at_emitters[i] { WEIGHT_AT_EMITTERS } else { 1.0 }
     };
-    Samples {
+    Some(Samples {
         width: input.width,
         height: input.height,
-        features: (0..n).into_par_iter().map(features).collect(),
-        light: (0..n).into_par_iter().map(|i| input.color[i] / albedo[i]).collect(),
-        variance: (0..n).into_par_iter().map(variance).collect(),
-        weight: (0..n).into_par_iter().map(weight).collect(),
-    }
+        features: each(n, stop, features)?,
+        light: each(n, stop, |i| input.color[i] / albedo[i])?,
+        variance: each(n, stop, variance)?,
+        weight: each(n, stop, weight)?,
+    })
 }
 
-/// Whether `is` holds for a pixel or one of its eight neighbours.
-fn near(input: &DenoiseInput, is: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
+/// Whether `is` holds for a pixel or one of its eight neighbours; `None` if `stop` returned true.
+fn near(input: &DenoiseInput, is: impl Fn(usize) -> bool + Sync, stop: Stop) -> Option<Vec<bool>> {
     let (width, height) = (input.width, input.height);
     let around = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
-    let row = |y: usize| (0..width).map(move |x| (x, y));
-    let any = |(x, y): (usize, usize)| around(y, height).any(|y| around(x, width).any(|x| is(y * width + x)));
-    (0..height).into_par_iter().flat_map_iter(|y| row(y).map(any).collect::<Vec<_>>()).collect()
+    let any = |x: usize, y: usize| around(y, height).any(|y| around(x, width).any(|x| is(y * width + x)));
+    each(width * height, stop, |i| any(i % width, i / width))
 }
 
 /// Returns the squared residual of each pixel for the fits of one level, scaled so that it estimates the variance where
 /// the fits are unbiased.
-fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -> Option<Vec<f32>> {
+fn residuals(samples: &Samples, fits: &Fits, stop: Stop) -> Option<Vec<f32>> {
     let residual = |x: usize, y: usize| {
         let pixel = y * samples.width + x;
         let (mut sum, mut n) = (0.0, 0.0);
@@ -172,22 +168,17 @@ fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -
         sum / n
     };
     let width = samples.width;
-    each(width * samples.height, 0.0, stop, |i| residual(i % width, i / width))
+    each(width * samples.height, stop, |i| residual(i % width, i / width))
 }
 
 /// The weighted mean over windows at one pixel.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 struct Predicted {
     /// Light over albedo.
     light: Vec3,
     /// Weight of the pixel's own value in it.
     own: f32,
     misfit: f32,
-}
-
-impl Predicted {
-    /// Of a pixel that is left out.
-    const NOTHING: Self = Self { light: Vec3::ZERO, own: 0.0, misfit: 0.0 };
 }
 
 /// Returns the mean over all windows that contain a pixel, and over the small ones.
@@ -222,35 +213,35 @@ fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize)
 
 /// Blends both candidates per pixel, with weights that favour the smaller estimated risk (SURE, Stein 1981: the risk of
 /// a filter follows from its squared distance from its input, the variance, and the weight of a pixel's own value;
-/// it needs no reference).
-pub(super) fn pick(input: &DenoiseInput, found: &Regression) -> Filtered {
+/// it needs no reference). `None` if `stop` returned true.
+pub(super) fn pick(input: &DenoiseInput, found: &Regression, stop: Stop) -> Option<Filtered> {
     let n = input.n_pixels();
     let [all, small] = &found.candidates;
     let level = |i: usize| (all.color[i] * all.color[i] + 0.01).recip();
-    let smooth = |values: Vec<f32>| blur(&values, input.width, input.height, 1);
+    let smooth = |of: &(dyn Fn(usize) -> f32 + Sync)| blur(&each(n, stop, of)?, input.width, input.height, 1, stop);
     let risk = |of: &Candidate| {
         let of_pixel = |i: usize| {
             let variance = found.noise.variance[i];
             let off = of.color[i] - input.color[i];
             level(i).dot(off * off - (1.0 - 2.0 * of.own[i]) * variance)
         };
-        smooth((0..n).into_par_iter().map(of_pixel).collect())
+        smooth(&of_pixel)
     };
-    let noise = smooth((0..n).into_par_iter().map(|i| level(i).dot(found.noise.variance[i])).collect());
-    let (of_all, of_small) = (risk(all), risk(small));
+    let noise = smooth(&|i| level(i).dot(found.noise.variance[i]))?;
+    let (of_all, of_small) = (risk(all)?, risk(small)?);
     let share = |i: usize| {
         let [a, b] = [of_all[i], of_small[i]].map(|risk| (risk.max(0.02 * noise[i]) + 1e-9).powi(2));
         b / (a + b)
     };
-    let share = smooth((0..n).into_par_iter().map(share).collect());
+    let share = smooth(&share)?;
     let own = |i: usize| small.own[i] + (all.own[i] - small.own[i]) * share[i];
     let misfit = |i: usize| {
         let albedo = input.guides.albedo[i];
         (small.misfit[i] + (all.misfit[i] - small.misfit[i]) * share[i]) / 3.0 * albedo * albedo
     };
-    Filtered {
-        color: (0..n).into_par_iter().map(|i| small.color[i].lerp(all.color[i], share[i])).collect(),
-        covariance: (0..n).into_par_iter().map(|i| own(i) * found.noise.variance[i]).collect(),
-        misfit: (0..n).into_par_iter().map(misfit).collect(),
-    }
+    Some(Filtered {
+        color: each(n, stop, |i| small.color[i].lerp(all.color[i], share[i]))?,
+        covariance: each(n, stop, |i| own(i) * found.noise.variance[i])?,
+        misfit: each(n, stop, misfit)?,
+    })
 }

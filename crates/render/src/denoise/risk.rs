@@ -14,9 +14,9 @@
 //!   one: the narrow neighbourhood has decided the shares, which are raw where its variance is too small at random.
 
 use super::blur::{Apart, RADIUS};
-use super::go_on;
 use super::input::DenoiseInput;
 use super::noise::{Filtered, Noise, squared_bias};
+use super::{Stop, each};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -48,15 +48,14 @@ pub(super) fn error_of(
     noise: &Noise,
     filtered: &Filtered,
     share: &[f32],
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop,
 ) -> Option<(f64, [f64; 2])> {
     let n = input.n_pixels();
-    let weight: Vec<Vec3> = (0..n).into_par_iter().map(|i| one_over_level(input, noise, filtered, i)).collect();
-    let [narrow, wide] = [RADIUS, WIDE_RADIUS].map(|radius| Apart::of(input, &noise.at_emitters, radius));
+    let weight: Vec<Vec3> = each(n, stop, |i| one_over_level(input, noise, filtered, i))?;
+    let of_radius = |radius| Apart::of(input, &noise.at_emitters, radius, stop);
+    let (narrow, wide) = (of_radius(RADIUS)?, of_radius(WIDE_RADIUS)?);
     let smooth = |apart: &Apart, of: &(dyn Fn(usize) -> Vec3 + Sync)| {
-        go_on(stop)?;
-        let values: Vec<f32> = (0..n).into_par_iter().map(|i| weight[i].dot(of(i))).collect();
-        Some(apart.smooth(&values))
+        apart.smooth(&each(n, stop, |i| weight[i].dot(of(i)))?, stop)
     };
     let variance = smooth(&narrow, &|i| noise.variance[i])?;
     let wide_variance = smooth(&wide, &|i| noise.variance[i])?;

@@ -10,11 +10,12 @@ use crate::denoise::Guides;
 use crate::driver::features::{BAND, Look, Part, PartTracer};
 use crate::integrators::seen::Seen;
 use crate::prepare::prepared::Prepared;
+use bytemuck::{Zeroable, zeroed_vec};
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
 /// What guides the denoiser, row by row from the top.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceGuides {
     /// Pixels.
     pub width: u32,
@@ -51,20 +52,35 @@ pub fn gather_guides(
     samples: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<SurfaceGuides> {
-    GuideGatherer::new(size).gather(snapshot, settings, samples, stop).map(|gatherer| gatherer.guides())
+    let mut gatherer = GuideGatherer::default();
+    gatherer.start(size);
+    gatherer.gather(snapshot, settings, samples, stop).then_some(gatherer.guides)
 }
 
-/// Gathers guides in steps: the sums of those samples that each pixel has so far, 64 bytes per pixel.
+/// Gathers guides in steps, with 93 bytes of memory per pixel, which the next view uses again.
+#[derive(Default)]
 pub struct GuideGatherer {
-    size: UVec2,
     samples: u32,
+    /// Of those samples that each pixel has so far; meaningless without samples.
     sums: Vec<Sums>,
+    /// Their means.
+    guides: SurfaceGuides,
 }
 
 impl GuideGatherer {
-    /// - `size`: of the film, pixels.
-    pub fn new(size: UVec2) -> Self {
-        Self { size, samples: 0, sums: vec![Sums::default(); size.x as usize * size.y as usize] }
+    /// Begins with another view: there are no samples.
+    ///
+    /// - `size`: of the film, pixels, at least 1 each.
+    pub fn start(&mut self, size: UVec2) {
+        self.samples = 0;
+        let n = size.x as usize * size.y as usize;
+        (self.guides.width, self.guides.height) = (size.x, size.y);
+        if self.sums.len() != n {
+            let SurfaceGuides { albedo, normal, depth, emitters, .. } = &mut self.guides;
+            // The system gives zeroed memory when it is written first: by all threads, not here.
+            self.sums = zeroed_vec(n);
+            (*albedo, *normal, *depth, *emitters) = (zeroed_vec(n), zeroed_vec(n), zeroed_vec(n), zeroed_vec(n));
+        }
     }
 
     /// Samples per pixel so far.
@@ -72,10 +88,15 @@ impl GuideGatherer {
         self.samples
     }
 
-    /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool; `None` if `stop`, which is
-    /// called often, returned true.
+    /// Means over the samples so far; meaningless without any.
+    pub fn guides(&self) -> &SurfaceGuides {
+        &self.guides
+    }
+
+    /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool; false if `stop`, which is
+    /// called often, returned true: then there are no samples any more.
     ///
-    /// - `snapshot`, `settings`: the same in all steps.
+    /// - `snapshot`, `settings`: the same in all steps of a view.
     ///
     /// The sums are a function of scene, settings, size and number of samples, independent of the steps, the number of
     /// threads and the instruction set. Uses other samples than the image: with the same ones, the noise of features at
@@ -84,14 +105,17 @@ impl GuideGatherer {
     /// # Panics
     /// If the size is 0, or [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check) fails.
     pub fn gather(
-        mut self,
+        &mut self,
         snapshot: &Prepared,
         settings: &RenderSettings,
         samples: u32,
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Self> {
+    ) -> bool {
+        if self.samples >= samples {
+            return true;
+        }
         let settings = RenderSettings { seed: settings.seed ^ OTHER_SEED, ..*settings };
-        let (size, missing) = (self.size, self.samples..samples);
+        let (size, missing) = (UVec2::new(self.guides.width, self.guides.height), self.samples..samples);
         let filter = FilterSampler::new(settings.filter);
         let look = Look::new(snapshot, &settings, &filter, size);
         let media = snapshot.camera_media();
@@ -100,36 +124,64 @@ impl GuideGatherer {
                 && snapshot.tables.emission.get(seen.material as usize).is_some_and(Option::is_some)
         };
         let add = |sums: &mut Sums, seen: &Seen| sums.add(seen, is_emitter(seen));
-        let bands = self.sums.par_chunks_mut((size.x * BAND) as usize).enumerate();
-        let done = bands.map_init(
+        let done = self.bands((size.x * BAND) as usize).enumerate().map_init(
             || PartTracer::begin(snapshot, &media, true),
-            |tracer, (band, sums)| {
-                Part::of_band(band as u32 * BAND, size).all(|part| {
+            |tracer, (number, mut band)| {
+                if missing.start == 0 {
+                    band.sums.fill(Sums::default());
+                }
+                let done = Part::of_band(number as u32 * BAND, size).all(|part| {
                     tracer.trace(&look, &part, missing.clone(), stop, |seen| {
                         let rows = part.rows_in_band(size.x);
                         for (row, seen) in rows.zip(seen.chunks_exact(part.n_columns())) {
-                            sums[row].iter_mut().zip(seen).for_each(|(sums, seen)| add(sums, seen));
+                            band.sums[row].iter_mut().zip(seen).for_each(|(sums, seen)| add(sums, seen));
                         }
                     })
-                })
+                });
+                if done {
+                    band.set_means(samples as f32);
+                }
+                done
             },
         );
         let done = done.all(|done| done);
-        self.samples = self.samples.max(samples);
-        done.then_some(self)
+        self.samples = if done { samples } else { 0 };
+        done
     }
 
-    /// Means over the samples so far, at least one.
-    pub fn guides(&self) -> SurfaceGuides {
-        debug_assert!(self.samples > 0, "no samples");
-        let n = self.samples as f32;
-        SurfaceGuides {
-            width: self.size.x,
-            height: self.size.y,
-            albedo: self.sums.par_iter().map(|sums| sums.albedo.mean(n)).collect(),
-            normal: self.sums.par_iter().map(|sums| sums.normal.mean(n)).collect(),
-            depth: self.sums.par_iter().map(Sums::mean_depth).collect(),
-            emitters: self.sums.par_iter().map(|sums| sums.emits).collect(),
+    /// Sums and means of bands of the image, from the top.
+    ///
+    /// - `length`: of a band, pixels.
+    fn bands(&mut self, length: usize) -> impl IndexedParallelIterator<Item = Band<'_>> {
+        let SurfaceGuides { albedo, normal, depth, emitters, .. } = &mut self.guides;
+        let sums = self.sums.par_chunks_mut(length);
+        let surfaces = albedo.par_chunks_mut(length).zip(normal.par_chunks_mut(length));
+        let rest = depth.par_chunks_mut(length).zip(emitters.par_chunks_mut(length));
+        sums.zip(surfaces).zip(rest).map(|((sums, (albedo, normal)), (depth, emitters))| Band {
+            sums,
+            albedo,
+            normal,
+            depth,
+            emitters,
+        })
+    }
+}
+
+/// Some rows of the image.
+struct Band<'a> {
+    sums: &'a mut [Sums],
+    albedo: &'a mut [Vec3],
+    normal: &'a mut [Vec3],
+    depth: &'a mut [f32],
+    emitters: &'a mut [bool],
+}
+
+impl Band<'_> {
+    /// - `n`: number of samples.
+    fn set_means(&mut self, n: f32) {
+        for (i, sums) in self.sums.iter().enumerate() {
+            (self.albedo[i], self.normal[i]) = (sums.albedo.mean(n), sums.normal.mean(n));
+            (self.depth[i], self.emitters[i]) = (sums.mean_depth(), sums.emits);
         }
     }
 }
@@ -138,7 +190,7 @@ impl GuideGatherer {
 const OTHER_SEED: u32 = 0x9e37_79b9;
 
 /// Sums of one pixel.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, Zeroable)]
 struct Sums {
     albedo: Sum,
     normal: Sum,
@@ -175,7 +227,7 @@ impl Sums {
 }
 
 /// Sum relative to the first value, so that nothing is rounded where all are alike.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, Zeroable)]
 struct Sum {
     first: Vec3,
     away: Vec3,
