@@ -1,6 +1,7 @@
 //! Persistent settings, and the bookmarks of each scene: small RON files in the platform's folder for settings. A file
 //! that cannot be read is renamed and reported, and never stops the program.
 
+use super::denoising::{DenoiseFilter, Denoising};
 use super::navigation::Rig;
 use crate::scene::file::DisplayPart;
 use crate::scene::whole_file::write_whole;
@@ -14,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Settings that do not belong to a scene.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
     /// Size of the window in logical pixels.
@@ -25,6 +26,24 @@ pub struct Settings {
     pub recent: Vec<String>,
     /// Key bindings and gestures.
     pub navigation: Navigation,
+    /// The noise of the image in the window.
+    pub denoising: Denoising,
+    /// What denoises it.
+    pub denoiser: DenoiseFilter,
+}
+
+impl Default for Settings {
+    /// A window begins with the denoised image.
+    fn default() -> Self {
+        Self {
+            window: None,
+            display: None,
+            recent: Vec::new(),
+            navigation: Navigation::default(),
+            denoising: Denoising::Denoised,
+            denoiser: DenoiseFilter::default(),
+        }
+    }
 }
 
 /// Preset of key bindings and gestures.

@@ -35,6 +35,8 @@ pub struct Larger {
     /// Samples per pixel.
     pub spp: u32,
     pub threads: usize,
+    /// None for a raw image.
+    pub denoiser: Option<DenoiseFilter>,
 }
 
 /// The scene that a film shows, from which layers are gathered.
@@ -123,7 +125,7 @@ impl Saver {
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
-            let Larger { prepared, settings, size, spp, threads } = larger;
+            let Larger { prepared, settings, size, spp, threads, denoiser } = larger;
             let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // A separate pool: the window's threads belong to the visible image, and must not wait for this.
@@ -135,7 +137,10 @@ impl Saver {
             if film.spp() == 0 {
                 return Err(failed(&"the window was closed before every pixel had a sample"));
             }
-            print(&folder, &stem, (&film, None), draft, &display, size, format)
+            let with = denoiser.map(|filter| DenoiseWith { prepared, settings, filter, threads });
+            let denoised = with.and_then(|with| with.denoise(&film, &ending));
+            let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
+            print(&folder, &stem, (&film, denoised), draft, &display, size, format)
         });
     }
 

@@ -85,7 +85,7 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
                 assert_eq!(steps.samples(), 0);
             }
             steps.start(size);
-            for samples in [1, 4, 4, 7, 16] {
+            for samples in [1, 4, 4, 7, 16, 18] {
                 assert!(steps.gather(&scene, &settings, samples, &|| false));
                 assert_eq!(steps.samples(), samples);
                 assert_eq!(*steps.guides(), gather(samples), "{samples} samples, {simd:?}");
@@ -93,7 +93,7 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
         }
         // The seed of the guides differs from that of the image.
         let other = RenderSettings { seed: settings.seed ^ 0x9e37_79b9, ..settings };
-        let features = gather_features(&scene, &other, size, 16, &|| false).expect("nothing stops it");
+        let features = gather_features(&scene, &other, size, 18, &|| false).expect("nothing stops it");
         let guides = steps.guides();
         assert_eq!(guides.albedo, features.albedo);
         assert_eq!(guides.normal, features.normal);

@@ -43,6 +43,11 @@ impl Loop<'_> {
             self.views.settle_again = Some(Instant::now() + SAMPLES_FIRST * settled.took);
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             self.views.settled = Some(settled);
+            // This view will not be smoothed any more. Coarse images need little memory.
+            self.filter = MovingFilter::default();
+            if let Some((_, film)) = &mut self.film {
+                film.forget_surfaces();
+            }
         }
     }
 

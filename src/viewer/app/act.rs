@@ -263,24 +263,23 @@ impl App {
         let (display, scene) = (status.display, status.scene.clone());
         let spp = status.spp.max(1);
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
+        // A PNG looks like the window; linear light is what the samples say.
+        let look = self.session.world().resource::<ViewMode>().0;
+        let denoiser = (!linear && look.denoising != Denoising::Raw).then_some(look.filter);
         if self.panel.scale > 1
             && let Some((prepared, settings)) = self.session.rendered()
         {
             let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
-            let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads };
+            let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads, denoiser };
             let news = format!("screenshot: rendering {} × {} with {spp} spp in the background", size.0, size.1);
             self.toasts.add(Tone::News, news, Instant::now());
             self.saver.save_larger(larger, draft, display, &scene, format);
             return;
         }
-        // A PNG looks like the window; linear light is what the samples say.
-        let is_denoised = !linear && self.session.world().resource::<ViewMode>().0.denoising != Denoising::Raw;
-        let denoise = self.session.rendered().filter(|_| is_denoised).map(|(prepared, settings)| DenoiseWith {
-            prepared,
-            settings,
-            filter: self.session.world().resource::<ViewMode>().0.filter,
-            threads: self.session.status().threads,
-        });
+        let threads = self.session.status().threads;
+        let denoise = denoiser
+            .and_then(|filter| self.session.rendered().map(|rendered| (filter, rendered)))
+            .map(|(filter, (prepared, settings))| DenoiseWith { prepared, settings, filter, threads });
         self.saver.save((self.session.keep_film(), denoise), draft, display, size, &scene, format);
     }
 

@@ -1,6 +1,9 @@
-//! State kept between runs: the bookmarks of each scene, recent files, and the window's size.
+//! State kept between runs: the bookmarks of each scene, recent files, the window's size, and its noise.
 
-use crate::frame::{Bookmarks, Command, CurrentScene, Navigation, Recovery, SceneBookmarks, Session, SettingsStore};
+use crate::frame::{
+    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Recovery, SceneBookmarks, Session,
+    SettingsStore, ViewMode,
+};
 use crate::scene::SceneSource;
 
 /// The settings store, and its content as far as it is known here.
@@ -13,6 +16,8 @@ pub struct Memory {
     /// As they are in the store.
     bookmarks: Bookmarks,
     recent: Vec<String>,
+    /// As it is in the store.
+    noise: (Denoising, DenoiseFilter),
 }
 
 impl Memory {
@@ -21,8 +26,19 @@ impl Memory {
     }
 
     fn of(store: SettingsStore) -> Self {
-        let recent = store.settings().0.recent;
-        Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent }
+        let settings = store.settings().0;
+        let (recent, noise) = (settings.recent, (settings.denoising, settings.denoiser));
+        Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent, noise }
+    }
+
+    /// Has the image displayed with the noise that it had last.
+    pub fn begin(&self, session: &mut Session) {
+        let (denoising, denoiser) = self.noise;
+        session.send(Command::SetDenoising(denoising));
+        session.send(Command::SetDenoiseFilter(denoiser));
+        // Until these commands are carried out, nothing has been chosen.
+        let look = &mut session.world_mut().resource_mut::<ViewMode>().0;
+        (look.denoising, look.filter) = self.noise;
     }
 
     /// Returns storage for unsaved edits in the same folder.
@@ -46,6 +62,11 @@ impl Memory {
                 troubles.extend(self.open(source, session));
             }
             return troubles;
+        }
+        let look = session.world().resource::<ViewMode>().0;
+        if (look.denoising, look.filter) != self.noise {
+            self.noise = (look.denoising, look.filter);
+            troubles.extend(self.keep_noise());
         }
         let bookmarks = *session.world().resource::<Bookmarks>();
         let saved = session.scene_file().map(SceneSource::Scene);
@@ -100,6 +121,13 @@ impl Memory {
     pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
         let mut settings = self.store.settings().0;
         settings.navigation = navigation;
+        self.store.keep_settings(&settings).err().map(String::from)
+    }
+
+    /// Stores the noise of the image for the next window.
+    fn keep_noise(&self) -> Option<String> {
+        let mut settings = self.store.settings().0;
+        (settings.denoising, settings.denoiser) = self.noise;
         self.store.keep_settings(&settings).err().map(String::from)
     }
 
@@ -175,5 +203,29 @@ mod tests {
         assert_eq!((second.keep_window((700, 500)), second.navigation()), (None, Navigation::Maya));
         assert_eq!(second.store.settings().0.window, Some((700, 500)));
         assert_eq!(second.store.settings().0.recent[1..], ["cornell", "ball"]);
+    }
+
+    #[test]
+    fn a_window_begins_denoised_and_then_with_what_was_chosen_last() {
+        let folder = tempfile::tempdir().unwrap();
+        let memory = || Memory::of(SettingsStore::in_folder(folder.path()));
+        for (expected, chosen) in [
+            (Denoising::Denoised, Denoising::Split),
+            (Denoising::Split, Denoising::Raw),
+            (Denoising::Raw, Denoising::Raw),
+        ] {
+            let (mut session, mut memory) = (Session::new(SessionOptions::default()).unwrap(), memory());
+            memory.begin(&mut session);
+            for _ in 0..2 {
+                assert_eq!(session.world().resource::<ViewMode>().0.denoising, expected);
+                session.update(Duration::ZERO);
+                assert_eq!(memory.follow(&mut session), Vec::<String>::new());
+            }
+            session.send(Command::SetDenoising(chosen));
+            session.update(Duration::ZERO);
+            assert_eq!(memory.follow(&mut session), Vec::<String>::new());
+        }
+        assert_eq!(memory().store.settings().0.denoising, Denoising::Raw);
+        assert_eq!(memory().store.settings().0.denoiser, DenoiseFilter::Own);
     }
 }

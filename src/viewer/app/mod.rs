@@ -21,6 +21,7 @@ mod leave;
 mod leaving;
 mod memory;
 
+use super::arenas;
 use super::dialog::Dialog;
 use super::display::{self, DisplayServer};
 use super::handles::Handles;
@@ -125,6 +126,7 @@ const DEFAULT_TARGET: Target = Target { spp: None, seconds: None, error: Some(0.
 
 /// Opens a window and returns when it is closed.
 pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
+    arenas::limit();
     let mut builder = EventLoop::<Wake>::with_user_event();
     match display::find() {
         DisplayServer::Default => {}
@@ -273,6 +275,7 @@ impl App {
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
         let memory = Memory::of_platform();
+        memory.begin(&mut session);
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
         Ok(Self {

@@ -16,18 +16,12 @@ use super::{Denoised, Stop, each};
 use glam::Vec3;
 
 /// Returns `None` if `stop` returned true.
-pub(super) fn combine(
-    input: &DenoiseInput,
-    noise: &Noise,
-    filtered: &Filtered,
-    stop: Stop,
-) -> Option<Denoised> {
+pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, stop: Stop) -> Option<Denoised> {
     let n = input.n_pixels();
     let by_filtered = |i: usize| (filtered.color[i] * filtered.color[i] + 0.01).recip();
     let apart = Apart::of(input, &noise.at_emitters, RADIUS, stop)?;
-    let smooth = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {
-        apart.smooth(&each(n, stop, |i| by_filtered(i).dot(of(i)))?, stop)
-    };
+    let smooth =
+        |of: &(dyn Fn(usize) -> Vec3 + Sync)| apart.smooth(&each(n, stop, |i| by_filtered(i).dot(of(i)))?, stop);
     let variance = smooth(&|i| noise.variance[i])?;
     let own = smooth(&|i| filtered.covariance[i])?;
     let difference = smooth(&|i| {

@@ -45,7 +45,8 @@ pub fn denoise(input: &DenoiseInput, stop: Stop) -> Option<Denoised> {
     input.check();
     let found = regression::regression(input, stop)?;
     let filtered = regression::pick(input, &found, stop)?;
-    combine::combine(input, &found.noise, &filtered, stop)
+    let noise = found.noise;
+    combine::combine(input, &noise, &filtered, stop)
 }
 
 /// Whether to give up what is being done.

@@ -19,20 +19,21 @@ use super::{Stop, each};
 use bytemuck::Zeroable;
 use glam::Vec3;
 
-/// An image filtered by regression.
+/// A pixel filtered by regression.
+#[derive(Clone, Copy, Zeroable)]
 pub(super) struct Candidate {
-    /// Radiance of each pixel.
-    pub color: Vec<Vec3>,
-    /// Weight of each pixel's own value in its filtered value, 0..1.
-    pub own: Vec<f32>,
+    /// Radiance.
+    pub color: Vec3,
+    /// Weight of the pixel's own value in its filtered value, 0..1.
+    pub own: f32,
     /// Mean squared misfit of the windows, of light over albedo, sum over channels.
-    pub misfit: Vec<f32>,
+    pub misfit: f32,
 }
 
-/// Both candidates, and the noise of the raw image.
+/// Both candidates of each pixel, and the noise of the raw image.
 pub(super) struct Regression {
     /// From windows of all sizes, and from small windows only.
-    pub candidates: [Candidate; 2],
+    pub candidates: Vec<[Candidate; 2]>,
     pub noise: Noise,
 }
 
@@ -61,17 +62,13 @@ pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression>
         blocks = blocks.coarser(stop)?;
     }
     let width = input.width;
-    let pixel = |i: usize| predict(&samples, &levels, n_small, i % width, i / width);
-    let n = input.n_pixels();
-    let predicted: Vec<[Predicted; 2]> = each(n, stop, pixel)?;
-    let candidate = |k: usize| {
-        Some(Candidate {
-            color: each(n, stop, |i| (predicted[i][k].light * albedo[i]).max(Vec3::ZERO))?,
-            own: each(n, stop, |i| predicted[i][k].own.min(1.0))?,
-            misfit: each(n, stop, |i| predicted[i][k].misfit)?,
-        })
-    };
-    Some(Regression { candidates: [candidate(0)?, candidate(1)?], noise })
+    let pixel =
+        |i: usize| {
+            predict(&samples, &levels, n_small, i % width, i / width).map(|Predicted { light, own, misfit }| {
+                Candidate { color: (light * albedo[i]).max(Vec3::ZERO), own: own.min(1.0), misfit }
+            })
+        };
+    Some(Regression { candidates: each(input.n_pixels(), stop, pixel)?, noise })
 }
 
 /// The noise of the raw image alone; `None` if `stop` returned true.
@@ -172,7 +169,6 @@ fn residuals(samples: &Samples, fits: &Fits, stop: Stop) -> Option<Vec<f32>> {
 }
 
 /// The weighted mean over windows at one pixel.
-#[derive(Clone, Copy, Zeroable)]
 struct Predicted {
     /// Light over albedo.
     light: Vec3,
@@ -216,31 +212,38 @@ fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize)
 /// it needs no reference). `None` if `stop` returned true.
 pub(super) fn pick(input: &DenoiseInput, found: &Regression, stop: Stop) -> Option<Filtered> {
     let n = input.n_pixels();
-    let [all, small] = &found.candidates;
-    let level = |i: usize| (all.color[i] * all.color[i] + 0.01).recip();
+    let candidates = &found.candidates;
+    let level = |i: usize| (candidates[i][0].color * candidates[i][0].color + 0.01).recip();
     let smooth = |of: &(dyn Fn(usize) -> f32 + Sync)| blur(&each(n, stop, of)?, input.width, input.height, 1, stop);
-    let risk = |of: &Candidate| {
+    let risk = |which: usize| {
         let of_pixel = |i: usize| {
-            let variance = found.noise.variance[i];
-            let off = of.color[i] - input.color[i];
-            level(i).dot(off * off - (1.0 - 2.0 * of.own[i]) * variance)
+            let (of, variance) = (candidates[i][which], found.noise.variance[i]);
+            let off = of.color - input.color[i];
+            level(i).dot(off * off - (1.0 - 2.0 * of.own) * variance)
         };
         smooth(&of_pixel)
     };
     let noise = smooth(&|i| level(i).dot(found.noise.variance[i]))?;
-    let (of_all, of_small) = (risk(all)?, risk(small)?);
+    let (of_all, of_small) = (risk(0)?, risk(1)?);
     let share = |i: usize| {
         let [a, b] = [of_all[i], of_small[i]].map(|risk| (risk.max(0.02 * noise[i]) + 1e-9).powi(2));
         b / (a + b)
     };
     let share = smooth(&share)?;
-    let own = |i: usize| small.own[i] + (all.own[i] - small.own[i]) * share[i];
+    let own = |i: usize| {
+        let [all, small] = candidates[i].map(|of| of.own);
+        small + (all - small) * share[i]
+    };
     let misfit = |i: usize| {
-        let albedo = input.guides.albedo[i];
-        (small.misfit[i] + (all.misfit[i] - small.misfit[i]) * share[i]) / 3.0 * albedo * albedo
+        let ([all, small], albedo) = (candidates[i].map(|of| of.misfit), input.guides.albedo[i]);
+        (small + (all - small) * share[i]) / 3.0 * albedo * albedo
+    };
+    let color = |i: usize| {
+        let [all, small] = candidates[i].map(|of| of.color);
+        small.lerp(all, share[i])
     };
     Some(Filtered {
-        color: each(n, stop, |i| small.color[i].lerp(all.color[i], share[i]))?,
+        color: each(n, stop, color)?,
         covariance: each(n, stop, |i| own(i) * found.noise.variance[i])?,
         misfit: each(n, stop, misfit)?,
     })

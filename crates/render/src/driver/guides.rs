@@ -7,7 +7,7 @@
 use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
 use crate::denoise::Guides;
-use crate::driver::features::{BAND, Look, Part, PartTracer};
+use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, Part, PartTracer};
 use crate::integrators::seen::Seen;
 use crate::prepare::prepared::Prepared;
 use bytemuck::{Zeroable, zeroed_vec};
@@ -57,7 +57,8 @@ pub fn gather_guides(
     gatherer.gather(snapshot, settings, samples, stop).then_some(gatherer.guides)
 }
 
-/// Gathers guides in steps, with 93 bytes of memory per pixel, which the next view uses again.
+/// Gathers guides in steps, with 93 bytes of memory per pixel, which the next view uses again; 29 once there are
+/// [`FEATURE_SAMPLES`].
 #[derive(Default)]
 pub struct GuideGatherer {
     samples: u32,
@@ -75,10 +76,9 @@ impl GuideGatherer {
         self.samples = 0;
         let n = size.x as usize * size.y as usize;
         (self.guides.width, self.guides.height) = (size.x, size.y);
-        if self.sums.len() != n {
+        if self.guides.depth.len() != n {
             let SurfaceGuides { albedo, normal, depth, emitters, .. } = &mut self.guides;
             // The system gives zeroed memory when it is written first: by all threads, not here.
-            self.sums = zeroed_vec(n);
             (*albedo, *normal, *depth, *emitters) = (zeroed_vec(n), zeroed_vec(n), zeroed_vec(n), zeroed_vec(n));
         }
     }
@@ -114,6 +114,9 @@ impl GuideGatherer {
         if self.samples >= samples {
             return true;
         }
+        if self.sums.len() != self.guides.depth.len() {
+            (self.samples, self.sums) = (0, zeroed_vec(self.guides.depth.len()));
+        }
         let settings = RenderSettings { seed: settings.seed ^ OTHER_SEED, ..*settings };
         let (size, missing) = (UVec2::new(self.guides.width, self.guides.height), self.samples..samples);
         let filter = FilterSampler::new(settings.filter);
@@ -146,6 +149,10 @@ impl GuideGatherer {
         );
         let done = done.all(|done| done);
         self.samples = if done { samples } else { 0 };
+        if self.samples >= FEATURE_SAMPLES {
+            // Further samples are unusual, and begin again.
+            self.sums = Vec::new();
+        }
         done
     }
 

@@ -13,6 +13,11 @@ impl Film {
         self.tiles.par_iter_mut().for_each(all);
     }
 
+    /// Drops what was noted, 40 bytes per pixel; images of the film cannot be smoothed any more.
+    pub fn forget_surfaces(&mut self) {
+        self.tiles.iter_mut().for_each(|tile| tile.surfaces = Vec::new());
+    }
+
     /// Whether what the first samples see is noted.
     pub(crate) fn notes_surfaces(&self) -> bool {
         self.tiles.iter().all(|tile| !tile.surfaces.is_empty())
