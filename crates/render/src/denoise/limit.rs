@@ -41,9 +41,9 @@ pub(super) fn limit(
         let most = LARGEST_STEP * typical[i];
         if at_emitters[i] || sizes[i] <= most { 1.0 } else { most / sizes[i] }
     };
-    let excess = each(n, stop, |i| {
-        let step = halves.steps[i] * halves.steps[i].element_sum().signum();
-        step * (1.0 - kept(i))
+    let excess = each(n, stop, |i| match kept(i) {
+        1.0 => Vec3::ZERO,
+        kept => halves.steps[i] * halves.steps[i].element_sum().signum() * (1.0 - kept),
     })?;
     fill(&mut samples.light, AT_ONCE, stop, |part, light| {
         let first = part * AT_ONCE;
