@@ -229,9 +229,7 @@ impl RenderJob {
         let mut note = self.note(film, path);
         if denoised.is_some() {
             let raw = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
-            let filter = Some(args.denoise.name());
-            let (denoised_layer, denoised) = if args.layers.is_empty() { (None, filter) } else { (filter, None) };
-            note = ImageMetadata { denoised, denoised_layer, ..raw }.to_note();
+            note = raw.denoised_by(Some(args.denoise.name()), !args.layers.is_empty()).to_note();
         }
         if !args.layers.is_empty() {
             let layers = args.layers.of(film);

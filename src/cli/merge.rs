@@ -141,8 +141,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let denoised = denoiser.as_ref().map(|denoiser| denoiser.denoise(&film, &shot)).transpose()?;
     if let Some(path) = &args.image {
         let filter = denoiser.as_ref().map(FilmDenoiser::name);
-        let (denoised_layer, of_pixels) = if args.layers.is_empty() { (None, filter) } else { (filter, None) };
-        let shown = ImageMetadata { denoised: of_pixels, denoised_layer, ..shot.clone() };
+        let shown = shot.clone().denoised_by(filter, !args.layers.is_empty());
         let (size, note) = ((film.width(), film.height()), note_of(&film, shown, &first, path));
         let display = shot.display.into();
         let denoised = denoised.as_ref().map(|denoised| &denoised.color[..]);

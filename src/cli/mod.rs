@@ -4,6 +4,8 @@
 //! Every command can be interrupted, since it runs on a thread that can be abandoned (see `stop`).
 
 mod animate;
+#[cfg(feature = "viewer")]
+mod arenas;
 mod args;
 mod completions;
 mod console;

@@ -66,9 +66,11 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
 
 #[cfg(feature = "viewer")]
 fn open_window(args: &ShowArgs) -> Result<(), Failure> {
+    use super::arenas;
     use super::console::lines;
     use firstlight::frame::{SettingsStore, check_recordable};
     use firstlight::viewer::{ViewerError, ViewerOptions, run};
+    arenas::limit();
     let source = args.scene.source()?;
     args.scene.tell_ignored(&source);
     if let Some(record) = &args.record {

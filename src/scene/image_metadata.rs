@@ -144,6 +144,14 @@ pub struct ImageSamples {
 }
 
 impl ImageMetadata {
+    /// The same with the name of the filter of a denoised image; raw without one.
+    ///
+    /// - `in_layer`: the pixels are raw, and a layer is denoised.
+    pub fn denoised_by(self, filter: Option<String>, in_layer: bool) -> Self {
+        let (denoised_layer, denoised) = if in_layer { (filter, None) } else { (None, filter) };
+        Self { denoised, denoised_layer, ..self }
+    }
+
     /// Reads the metadata of a PNG or EXR image.
     ///
     /// # Errors

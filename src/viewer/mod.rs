@@ -24,7 +24,6 @@
 //! | [`display`] | detection of the display server |
 
 mod app;
-mod arenas;
 mod camera_text;
 mod change;
 mod dialog;

@@ -214,14 +214,10 @@ impl Saver {
     }
 }
 
-/// The metadata of an image with the name of its filter.
-///
-/// - `of_layer`: the pixels are raw, and a layer is denoised.
-fn with_filter(note: String, filter: DenoiseFilter, of_layer: bool) -> String {
+/// The metadata of an image with the name of its filter; see [`ImageMetadata::denoised_by`].
+fn with_filter(note: String, filter: DenoiseFilter, in_layer: bool) -> String {
     let Ok(raw) = ImageMetadata::from_note(&note) else { return note };
-    let name = Some(filter.name().to_owned());
-    let (denoised_layer, denoised) = if of_layer { (name, None) } else { (None, name) };
-    ImageMetadata { denoised, denoised_layer, ..raw }.to_note()
+    raw.denoised_by(Some(filter.name().to_owned()), in_layer).to_note()
 }
 
 /// Writes a film with its metadata, under the next free number.

@@ -44,7 +44,7 @@ impl Loop<'_> {
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             self.views.settled = Some(settled);
             // This view will not be smoothed any more. Coarse images need little memory.
-            self.filter = MovingFilter::default();
+            (self.filter, self.views.smooth_again) = (MovingFilter::default(), None);
             if let Some((_, film)) = &mut self.film {
                 film.forget_surfaces();
             }

@@ -164,9 +164,11 @@ fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
             Some(Some(Settled { key, filter, by, spp, guide_samples, denoised, took }))
         };
         let made = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
-        if made.is_err() {
+        match made {
             // A panic has been reported by its thread; the raw image stays.
-            known = KnownGuides::default();
+            Err(_) => known = KnownGuides::default(),
+            Ok(None) => tracing::trace!("denoising dropped"),
+            Ok(Some(_)) => {}
         }
         if let Ok(Some(settled)) = made {
             let mut slot = lock(&shared.slot);

@@ -21,7 +21,6 @@ mod leave;
 mod leaving;
 mod memory;
 
-use super::arenas;
 use super::dialog::Dialog;
 use super::display::{self, DisplayServer};
 use super::handles::Handles;
@@ -126,7 +125,6 @@ const DEFAULT_TARGET: Target = Target { spp: None, seconds: None, error: Some(0.
 
 /// Opens a window and returns when it is closed.
 pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
-    arenas::limit();
     let mut builder = EventLoop::<Wake>::with_user_event();
     match display::find() {
         DisplayServer::Default => {}

@@ -43,9 +43,9 @@ pub struct Denoised {
 /// If the lists of the input do not have one entry per pixel.
 pub fn denoise(input: &DenoiseInput, stop: Stop) -> Option<Denoised> {
     input.check();
-    let found = regression::regression(input, stop)?;
-    let filtered = regression::pick(input, &found, stop)?;
-    let noise = found.noise;
+    let regression::Regression { candidates, noise } = regression::regression(input, stop)?;
+    let filtered = regression::pick(input, &candidates, &noise, stop)?;
+    drop(candidates);
     combine::combine(input, &noise, &filtered, stop)
 }
 

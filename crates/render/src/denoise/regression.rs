@@ -210,20 +210,24 @@ fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize)
 /// Blends both candidates per pixel, with weights that favour the smaller estimated risk (SURE, Stein 1981: the risk of
 /// a filter follows from its squared distance from its input, the variance, and the weight of a pixel's own value;
 /// it needs no reference). `None` if `stop` returned true.
-pub(super) fn pick(input: &DenoiseInput, found: &Regression, stop: Stop) -> Option<Filtered> {
+pub(super) fn pick(
+    input: &DenoiseInput,
+    candidates: &[[Candidate; 2]],
+    of_raw: &Noise,
+    stop: Stop,
+) -> Option<Filtered> {
     let n = input.n_pixels();
-    let candidates = &found.candidates;
     let level = |i: usize| (candidates[i][0].color * candidates[i][0].color + 0.01).recip();
     let smooth = |of: &(dyn Fn(usize) -> f32 + Sync)| blur(&each(n, stop, of)?, input.width, input.height, 1, stop);
     let risk = |which: usize| {
         let of_pixel = |i: usize| {
-            let (of, variance) = (candidates[i][which], found.noise.variance[i]);
+            let (of, variance) = (candidates[i][which], of_raw.variance[i]);
             let off = of.color - input.color[i];
             level(i).dot(off * off - (1.0 - 2.0 * of.own) * variance)
         };
         smooth(&of_pixel)
     };
-    let noise = smooth(&|i| level(i).dot(found.noise.variance[i]))?;
+    let noise = smooth(&|i| level(i).dot(of_raw.variance[i]))?;
     let (of_all, of_small) = (risk(0)?, risk(1)?);
     let share = |i: usize| {
         let [a, b] = [of_all[i], of_small[i]].map(|risk| (risk.max(0.02 * noise[i]) + 1e-9).powi(2));
@@ -244,7 +248,7 @@ pub(super) fn pick(input: &DenoiseInput, found: &Regression, stop: Stop) -> Opti
     };
     Some(Filtered {
         color: each(n, stop, color)?,
-        covariance: each(n, stop, |i| own(i) * found.noise.variance[i])?,
+        covariance: each(n, stop, |i| own(i) * of_raw.variance[i])?,
         misfit: each(n, stop, misfit)?,
     })
 }
