@@ -206,6 +206,11 @@ impl Program<'_> {
         self.xdotool(&format!("key {keys}"));
     }
 
+    /// Shows the raw image and pauses: a denoised one could still come, and change what stood still.
+    pub fn pause_raw(&self) {
+        self.key("F2 F2 p");
+    }
+
     /// Holds a key for so many milliseconds.
     pub fn hold(&self, key: &str, ms: u64) {
         self.xdotool(&format!("keydown {key}"));

@@ -5,5 +5,6 @@ mod desktop;
 
 mod guest;
 mod navigation;
+mod noise;
 mod tools;
 mod window;

@@ -26,7 +26,7 @@ fn resting<'a>(desktop: &'a Desktop, scene: &str) -> Program<'a> {
         (picture.pixels().filter(|pixel| **pixel != first).count() > 5000).then_some(())
     });
     std::thread::sleep(Duration::from_secs(1));
-    program.key("p");
+    program.pause_raw();
     until("the picture to stand still", || {
         let before = program.pixels();
         std::thread::sleep(Duration::from_millis(1500));

@@ -169,7 +169,7 @@ fn a_pixel_is_explained_and_a_rectangle_gets_all_samples() {
     let Some(desktop) = Desktop::start() else { return };
     // Without glass, no traced light falls outside of a rectangle.
     let program = open(&desktop, "cornell");
-    program.key("p");
+    program.pause_raw();
     program.point_at(330, 300);
     // Until the first messages are gone.
     std::thread::sleep(Duration::from_secs(8));

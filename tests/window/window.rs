@@ -54,7 +54,7 @@ fn content(picture: &image::RgbImage) -> (usize, f64) {
     (colours.len(), variance.sqrt())
 }
 
-fn has_content(picture: &image::RgbImage) -> bool {
+pub fn has_content(picture: &image::RgbImage) -> bool {
     let (colours, spread) = content(picture);
     colours > 600 && spread > 10.0
 }
@@ -153,7 +153,7 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     assert_eq!(std::fs::read(file("gallery-0003.png")).expect("still there"), b"somebody else's");
 
     // The list of keys, shown and hidden, over a picture that stands still.
-    program.key("p");
+    program.pause_raw();
     let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 160, 90, 320, 180).to_image();
     until("the picture to stand still", || {
         let before = middle(&program);
@@ -234,7 +234,7 @@ fn a_person_edits_inspects_and_takes_it_back() {
     let Some(desktop) = Desktop::start() else { return };
     let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
     until("the box to be seen", || has_content(&program.pixels()).then_some(()));
-    program.key("p");
+    program.pause_raw();
     let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 150, 60, 200, 220).to_image();
     let steady = |program: &Program| {
         until("the picture to stand still", || {
@@ -291,7 +291,7 @@ fn a_window_with_unsaved_changes_asks_before_it_closes() {
     let whole = firstlight::scene::load(&source, &Default::default()).expect("a built-in scene").file.objects.len();
     let mut program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
     delete_something(&program, "cornell-balls");
-    program.key("p");
+    program.pause_raw();
     let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 180, 120, 280, 120).to_image();
     let asks = |program: &Program, bare: &image::RgbImage| {
         until("the question", || (difference(bare, &middle(program)) > 15.0).then_some(()));
