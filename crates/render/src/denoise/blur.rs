@@ -6,8 +6,13 @@ use bytemuck::zeroed_vec;
 
 /// Radius in pixels of the two box filters that average variance and difference of raw and filtered image.
 pub(super) const RADIUS: usize = 2;
-/// Number of pixels that these two average: one over the sum of the squares of their weights.
-pub(super) const N_AVERAGED: f32 = 54.0;
+
+/// Number of pixels that two box filters average: one over the sum of the squares of their weights, a triangle per axis.
+pub(super) fn n_averaged(radius: usize) -> f32 {
+    let side = (2 * radius + 1) as f32;
+    let of_axis = 3.0 * side.powi(3) / (2.0 * side * side + 1.0);
+    of_axis * of_axis
+}
 
 /// Applies a box filter of `2 * radius + 1` pixels per side twice, which is nearly a Gaussian. At the border the box is
 /// cut. `None` if `stop` returned true.

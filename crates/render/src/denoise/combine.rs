@@ -9,6 +9,7 @@
 //! uncertain as that: what exceeds the variance counts as bias as far as it is significant.
 
 use super::blur::{Apart, RADIUS};
+use super::energy::given_back;
 use super::input::DenoiseInput;
 use super::noise::{Filtered, Noise, squared_bias};
 use super::risk::error_of;
@@ -35,7 +36,11 @@ pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, 
     })?;
     // Where the filter is trusted, what is left of the raw value has no fireflies.
     let combined = |i: usize| (input.color[i] - share[i] * noise.excess[i]).lerp(filtered.color[i], share[i]);
-    let color = each(n, stop, combined)?;
+    let mut color = each(n, stop, combined)?;
+    if noise.excess.iter().any(|excess| *excess != Vec3::ZERO) {
+        let back = given_back(input, noise, filtered, &share, stop)?;
+        color.iter_mut().zip(&back).for_each(|(color, back)| *color += *back);
+    }
     let (error, error_95) = error_of(input, noise, filtered, &share, stop)?;
     Some(Denoised { color, share, error, error_95 })
 }

@@ -25,7 +25,7 @@ pub struct DenoiseInput<'a> {
     pub height: usize,
     /// Mean radiance of each pixel, linear Rec. 709, W·m⁻²·sr⁻¹.
     pub color: &'a [Vec3],
-    /// Variance estimate from the halves of the samples; `None` for a single sample per pixel.
+    /// Variance estimate from parts of the samples; `None` for a single sample per pixel.
     pub half_steps: Option<&'a HalfSteps>,
     /// Properties of the visible surfaces.
     pub guides: Guides<'a>,
@@ -43,7 +43,7 @@ impl DenoiseInput<'_> {
         let n = self.n_pixels();
         let Guides { albedo, normal, depth, emitters } = self.guides;
         let lengths = [self.color.len(), albedo.len(), normal.len(), depth.len(), emitters.len()];
-        let halves = self.half_steps.is_none_or(|halves| halves.steps.len() == n && halves.scale.len() == n);
+        let halves = self.half_steps.is_none_or(|of| [of.steps.len(), of.late.len(), of.doubled.len()] == [n; 3]);
         assert!(n > 0 && lengths == [n; 5] && halves, "lists of {lengths:?} for {n} pixels");
     }
 }

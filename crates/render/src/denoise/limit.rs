@@ -34,27 +34,44 @@ pub(super) fn limit(
 ) -> Option<Vec<Vec3>> {
     let n = input.n_pixels();
     let Some(halves) = input.half_steps else { return Some(zeroed_vec(n)) };
-    let sizes: Vec<f32> = each(n, stop, |i| (halves.steps[i] / albedo[i]).abs().element_sum())?;
+    let size = |i: usize, step: Vec3| (step / albedo[i]).abs().element_sum();
+    let sizes: Vec<f32> = each(n, stop, |i| size(i, halves.spread(i)))?;
     let typical = Apart::of(input, at_emitters, RADIUS, stop)?.smooth(&sizes, stop)?;
-    // Part of the step that is kept.
-    let kept = |i: usize| {
-        let most = LARGEST_STEP * typical[i];
-        if at_emitters[i] || sizes[i] <= most { 1.0 } else { most / sizes[i] }
+    // Both steps without what is unusual of them.
+    let limited = |i: usize| {
+        let (step, late, share) = (halves.steps[i], halves.late[i], halves.doubled[i]);
+        if at_emitters[i] || sizes[i] <= LARGEST_STEP * typical[i] {
+            return (step, late);
+        }
+        let part = |size: f32| (LARGEST_STEP * typical[i] / size.max(1e-30)).min(1.0);
+        let kept = part(size(i, share * step));
+        // The doubling becomes darker by what its brighter half loses, and so the samples since then change it by more.
+        let late = late + (1.0 - share) * (1.0 - kept) * brightness(step) * step;
+        let kept_late = if late.element_sum() > 0.0 { part(size(i, late)) } else { 1.0 };
+        (kept * step, kept_late * late)
     };
-    let excess = each(n, stop, |i| match kept(i) {
-        1.0 => Vec3::ZERO,
-        kept => halves.steps[i] * halves.steps[i].element_sum().signum() * (1.0 - kept),
+    let excess = each(n, stop, |i| {
+        let (step, late) = limited(i);
+        let of_half = (halves.steps[i] - step) * brightness(halves.steps[i]);
+        // What the mean of all samples was before, less what it is now.
+        halves.late[i] + of_half - late
     })?;
     fill(&mut samples.light, AT_ONCE, stop, |part, light| {
         let first = part * AT_ONCE;
         light.iter_mut().zip(&excess[first..]).zip(&albedo[first..]).for_each(|((to, excess), by)| *to -= excess / by);
     })?;
     fill(&mut samples.variance, AT_ONCE, stop, |part, variance| {
-        for (i, variance) in variance.iter_mut().enumerate() {
-            *variance *= kept(part * AT_ONCE + i).powi(2);
+        for (i, variance) in (part * AT_ONCE..).zip(variance) {
+            let (step, late) = limited(i);
+            *variance = (halves.variance_of(i, step, late) / (albedo[i] * albedo[i])).element_sum();
         }
     })?;
     Some(excess)
+}
+
+/// 1 or −1: the sign that makes a step brighter.
+fn brightness(step: Vec3) -> f32 {
+    step.element_sum().signum()
 }
 
 #[cfg(test)]
@@ -71,10 +88,18 @@ mod tests {
     /// Steps of ±0.1 around a radiance of 1, and what the limit makes of them with another radiance and step at one
     /// pixel: light, variance, and what was taken away there; and whether any other pixel was changed.
     fn limited(color: Vec3, step: Vec3, is_emitter: bool) -> (Vec3, f32, Vec3, bool) {
+        limited_later(color, step, Vec3::ZERO, 1.0, is_emitter)
+    }
+
+    /// The same with later samples.
+    ///
+    /// - `late`: change by them; `doubled`: share of the samples before them.
+    fn limited_later(color: Vec3, step: Vec3, late: Vec3, doubled: f32, is_emitter: bool) -> (Vec3, f32, Vec3, bool) {
         let mut colors = vec![Vec3::ONE; N];
         let mut steps: Vec<Vec3> = (0..N).map(|i| Vec3::splat(if i % 2 == 0 { 0.1 } else { -0.1 })).collect();
         (colors[FIREFLY], steps[FIREFLY]) = (color, step);
-        let halves = HalfSteps { steps, scale: vec![1.0; N] };
+        let mut halves = HalfSteps { steps, late: vec![Vec3::ZERO; N], doubled: vec![1.0; N], calibration: 1.0 };
+        (halves.late[FIREFLY], halves.doubled[FIREFLY]) = (late, doubled);
         let mut at_emitters = vec![false; N];
         at_emitters[FIREFLY] = is_emitter;
         let albedo = vec![Vec3::splat(0.5); N];
@@ -108,6 +133,26 @@ mod tests {
             assert!((variance / expected - 1.0).abs() < 1e-3, "{variance} for {expected}");
             assert!(!others);
         }
+    }
+
+    /// Four samples of radiance 1 and one of 100 among them or after them: in five samples, they raise the mean alike.
+    #[test]
+    fn a_firefly_is_lowered_alike_in_the_doubling_and_after_it() {
+        let (color, share) = (Vec3::splat(1.0 + 99.0 / 5.0), 0.8);
+        let before = limited_later(color, Vec3::splat(99.0 / 4.0), Vec3::splat(-99.0 / 20.0), share, false);
+        let after = limited_later(color, Vec3::ZERO, Vec3::splat(99.0 / 5.0), share, false);
+        for (light, variance, excess, others) in [before, after] {
+            let radiance = light * 0.5;
+            assert!((1.2..2.0).contains(&radiance.x), "{radiance}");
+            assert!((radiance + excess - color).abs().max_element() < 1e-4, "{radiance} and {excess}");
+            // About the square of what is left of the firefly.
+            let expected = (radiance.x - 1.0).powi(2) / 0.25 * 3.0;
+            assert!((0.5..2.0).contains(&(variance / expected)), "{variance} for {expected}");
+            assert!(!others);
+        }
+        // A dark sample after a bright doubling is none.
+        let dark = limited_later(Vec3::splat(0.8), Vec3::splat(0.1), Vec3::splat(-0.2), share, false);
+        assert_eq!(dark.2, Vec3::ZERO);
     }
 
     #[test]

@@ -7,6 +7,7 @@
 
 mod blur;
 mod combine;
+mod energy;
 mod fit;
 mod input;
 mod limit;
@@ -48,6 +49,10 @@ pub fn denoise(input: &DenoiseInput, stop: Stop) -> Option<Denoised> {
     drop(candidates);
     combine::combine(input, &noise, &filtered, stop)
 }
+
+/// Lower limit of the albedo as a divisor, so that light that dark surfaces reflect independently of it is not
+/// amplified.
+const LEAST_ALBEDO: f32 = 0.04;
 
 /// Whether to give up what is being done.
 type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
@@ -155,7 +160,9 @@ mod tests {
                 color: halves.iter().map(|[a, b]| 0.5 * (*a + *b)).collect(),
                 halves: HalfSteps {
                     steps: halves.iter().map(|[a, b]| 0.5 * (*b - *a)).collect(),
-                    scale: vec![1.0; halves.len()],
+                    late: vec![Vec3::ZERO; halves.len()],
+                    doubled: vec![1.0; halves.len()],
+                    calibration: 1.0,
                 },
             }
         }
@@ -247,6 +254,48 @@ mod tests {
         assert!(raw > 20.0 && denoised < 2e-3 * raw, "{denoised} of {raw}");
         let bright = (0..WIDTH * HEIGHT).filter(|&i| found.color[i].x > 2.0 * scene.truth[i].x).count();
         assert_eq!(bright, 0, "grains");
+    }
+
+    /// Samples that came after the last doubling, one in a hundred of them bright.
+    #[test]
+    fn fireflies_after_the_last_doubling_leave_neither_grains_nor_blotches() {
+        let scene = floor();
+        let rendered = scene.render(4, 0.4);
+        let Rendered { color: before, mut halves } = rendered;
+        // Two more: the doubling has 2/3 of the samples.
+        let more = scene.render(2, 0.4);
+        halves.doubled.fill(2.0 / 3.0);
+        for pixel in 0..WIDTH * HEIGHT {
+            // Other noise than that of the same pixel in the doubling.
+            let from = (pixel + WIDTH / 2) % (WIDTH * HEIGHT);
+            let noise = more.color[from] / scene.truth[from] * scene.truth[pixel];
+            let firefly = if hash_u32(pixel as u32).is_multiple_of(97) { 50.0 * scene.truth[pixel] } else { Vec3::ZERO };
+            halves.late[pixel] = (noise + firefly - before[pixel]) / 3.0;
+        }
+        let color = before.iter().zip(&halves.late).map(|(before, late)| *before + *late).collect();
+        let rendered = Rendered { color, halves };
+        let found = scene.denoise(&rendered, true);
+        let (raw, denoised) = (scene.relative_mse(&rendered.color), scene.relative_mse(&found.color));
+        assert!(raw > 1.0 && denoised < 3e-3 * raw, "{denoised} of {raw}");
+        let bright = (0..WIDTH * HEIGHT).filter(|&i| found.color[i].x > 2.5 * scene.truth[i].x).count();
+        assert_eq!(bright, 0, "grains");
+    }
+
+    /// One sample in eight carries all light: the limit takes much of it away.
+    #[test]
+    fn light_from_rare_samples_is_given_back() {
+        let scene = floor();
+        let mut rendered = scene.render(2, 0.0);
+        for pixel in 0..WIDTH * HEIGHT {
+            let hits = [0, 1].map(|k| hash_combine(hash_u32(pixel as u32), k).is_multiple_of(8));
+            let halves = hits.map(|hit| if hit { 8.0 * scene.truth[pixel] } else { Vec3::ZERO });
+            rendered.color[pixel] = 0.5 * (halves[0] + halves[1]);
+            rendered.halves.steps[pixel] = 0.5 * (halves[1] - halves[0]);
+        }
+        let found = scene.denoise(&rendered, true);
+        let sum = |colors: &[Vec3]| colors.iter().map(|color| f64::from(color.element_sum())).sum::<f64>();
+        let kept = sum(&found.color) / sum(&rendered.color);
+        assert!((0.9..1.02).contains(&kept), "{kept}");
     }
 
     /// Light that is unrelated to the features: every pixel has its own.

@@ -1,6 +1,6 @@
 //! The noise of the raw image, and how much of it a filter passes on.
 
-use super::blur::N_AVERAGED;
+use super::blur::{RADIUS, n_averaged};
 use super::input::DenoiseInput;
 use super::{Stop, each};
 use crate::sampling::hash_u32;
@@ -36,7 +36,7 @@ const SIGNIFICANCE: f32 = 3.0;
 pub(super) fn squared_bias(difference: f32, variance: f32, own: f32) -> f32 {
     let excess = (difference - variance + own).max(0.0);
     // Without bias it is a mean of products of the errors of both halves.
-    let deviation = (difference + variance) / N_AVERAGED.sqrt();
+    let deviation = (difference + variance) / n_averaged(RADIUS).sqrt();
     significant_part(excess, SIGNIFICANCE * deviation)
 }
 
@@ -67,7 +67,7 @@ impl Noise {
     ) -> Option<Filtered> {
         let n = input.n_pixels();
         let noise = |i: usize| match input.half_steps {
-            Some(halves) => halves.steps[i] * halves.scale[i].sqrt(),
+            Some(halves) => halves.noise(i),
             None => {
                 let sign = if hash_u32(i as u32) & 1 == 0 { 1.0 } else { -1.0 };
                 sign * self.variance[i].map(f32::sqrt)

@@ -15,7 +15,7 @@ use super::input::DenoiseInput;
 use super::limit::limit;
 use super::moments::{Blocks, N_FEATURES, Samples};
 use super::noise::{Filtered, Noise};
-use super::{Stop, each};
+use super::{LEAST_ALBEDO, Stop, each};
 use bytemuck::Zeroable;
 use glam::Vec3;
 
@@ -42,9 +42,6 @@ const N_LEVELS: u32 = 5;
 /// Standard deviations by which residuals must exceed the noise to be taken for misfit, if the noise is known apart from
 /// them.
 const SIGNIFICANCE: f32 = 3.0;
-/// Lower limit of the albedo as a divisor, so that light that dark surfaces reflect independently of it is not
-/// amplified.
-const LEAST_ALBEDO: f32 = 0.04;
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 

@@ -104,8 +104,8 @@ pub(super) fn error_of(
 fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, i: usize) -> Vec3 {
     let darker_half = match input.half_steps {
         // The filter has no information about pixels that show a light in part.
-        Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.steps[i].abs(),
-        Some(halves) => input.color[i] - halves.steps[i].abs(),
+        Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.spread(i),
+        Some(halves) => input.color[i] - halves.spread(i),
         None if noise.at_emitters[i] => input.color[i],
         None => Vec3::ZERO,
     };

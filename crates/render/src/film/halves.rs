@@ -1,28 +1,54 @@
-//! The change of each pixel's mean between the two halves of its samples, as an estimate of its variance.
+//! How each pixel's mean has changed with its latest samples, as an estimate of its variance.
 //!
 //! At 2n samples the film knows the mean of the first n; the step I₂ₙ − Iₙ is half of the difference between the
 //! halves. For independent samples its squared expectation is the variance of the mean. The second half of a scrambled
 //! net fills the gaps of the first, so their errors are negatively correlated and the square is too large; the error
 //! estimate of the whole image ([`crate::film::estimate`]) gives the factor.
+//!
+//! Between two doublings, the change since the last one tells what the later samples have brought. With a share w of
+//! the samples in the last doubling, w²·step² + w·change² has the variance of the mean as its expectation, and a single
+//! bright sample raises it by about the square of what it raises the mean by, whichever part it is in.
 
 use crate::film::tiles::Film;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-/// Steps of the last doubling. The square of one step is a poor variance estimate, with one degree of freedom per
-/// channel: average over pixels.
+/// Steps of the last doubling, and what has come since. The square of one step is a poor variance estimate, with one
+/// degree of freedom per channel: average over pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfSteps {
     /// Change of the mean of each pixel by the last doubling of its samples, W·m⁻²·sr⁻¹, row by row from the top.
     pub steps: Vec<Vec3>,
-    /// Per pixel: variance of the mean of all samples divided by the square of the step. The mean variance over the
-    /// image agrees with [`Film::error_estimate`].
-    pub scale: Vec<f32>,
+    /// Change of the mean of each pixel since then; zero right after a doubling.
+    pub late: Vec<Vec3>,
+    /// Share of the samples of each pixel that were in that doubling: 1 right after it, and more than 1/2 later.
+    pub doubled: Vec<f32>,
+    /// Variance of the mean divided by what independent samples would have: with it the mean variance over the image
+    /// agrees with [`Film::error_estimate`].
+    pub calibration: f32,
 }
 
 impl HalfSteps {
     /// Estimated variance of the mean of one pixel, per channel.
     pub fn variance(&self, pixel: usize) -> Vec3 {
-        self.steps[pixel] * self.steps[pixel] * self.scale[pixel]
+        self.variance_of(pixel, self.steps[pixel], self.late[pixel])
+    }
+
+    /// Like [`Self::variance`], with other steps.
+    pub(crate) fn variance_of(&self, pixel: usize, step: Vec3, late: Vec3) -> Vec3 {
+        let share = self.doubled[pixel];
+        (share * share * step * step + share * late * late) * self.calibration
+    }
+
+    /// A change of one pixel that is made of its own noise: the expectation of its square is the variance.
+    pub(crate) fn noise(&self, pixel: usize) -> Vec3 {
+        let share = self.doubled[pixel];
+        (share * self.steps[pixel] + share.sqrt() * self.late[pixel]) * self.calibration.sqrt()
+    }
+
+    /// How much the mean of one pixel depends on the part of its samples that is brightest: at least what a single
+    /// bright sample raises it by.
+    pub(crate) fn spread(&self, pixel: usize) -> Vec3 {
+        self.doubled[pixel] * self.steps[pixel].abs() + self.late[pixel].abs()
     }
 }
 
@@ -31,7 +57,8 @@ impl Film {
     /// a file of an older format and has not doubled since.
     pub fn half_steps(&self) -> Option<HalfSteps> {
         let n_pixels = self.width() as usize * self.height() as usize;
-        let (mut steps, mut scale) = (vec![Vec3::ZERO; n_pixels], vec![1.0_f32; n_pixels]);
+        let (mut steps, mut late) = (vec![Vec3::ZERO; n_pixels], vec![Vec3::ZERO; n_pixels]);
+        let mut doubled = vec![1.0_f32; n_pixels];
         let mut mean = 0.0;
         for tile in &self.tiles {
             if tile.half_steps.is_empty() {
@@ -47,19 +74,20 @@ impl Film {
                     return None;
                 }
                 let block = tile.block_of(local);
-                // Since the last doubling the variance has fallen approximately as 1 / samples.
-                let since = block.mean_of as f32 / block.spp.max(1) as f32;
+                let share = block.mean_of as f32 / block.spp.max(1) as f32;
                 let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
-                let at = (tile.origin.y + y) as usize * self.width() as usize + (tile.origin.x + x) as usize;
-                (steps[at], scale[at]) = (of_camera + of_light, since);
-                mean += f64::from(since * tile.last_step(local));
+                let (x, y) = (tile.origin.x + x, tile.origin.y + y);
+                let at = y as usize * self.width() as usize + x as usize;
+                let traced = self.light.as_ref().map_or(DVec3::ZERO, |light| light.mean(at));
+                let now = tile.mean(local) + traced;
+                (steps[at], late[at]) = (of_camera + of_light, (now - tile.shown_before(local)).as_vec3());
+                doubled[at] = share;
+                mean += f64::from(share * tile.last_step(local));
             }
         }
-        // Before the fourth sample only the scale of independent samples, 1, is known.
-        if let Some(error) = self.error_estimate().filter(|_| mean > 0.0) {
-            let calibration = (error.relative.powi(2) * n_pixels as f64 / mean) as f32;
-            scale.iter_mut().for_each(|scale| *scale *= calibration);
-        }
-        Some(HalfSteps { steps, scale })
+        // Before the fourth sample only that of independent samples is known.
+        let known = self.error_estimate().filter(|_| mean > 0.0);
+        let calibration = known.map_or(1.0, |error| (error.relative.powi(2) * n_pixels as f64 / mean) as f32);
+        Some(HalfSteps { steps, late, doubled, calibration })
     }
 }

@@ -152,6 +152,11 @@ impl FilmTile {
         }
     }
 
+    /// Mean radiance of a pixel, with light tracing, at the last powers of two of its samples.
+    pub fn shown_before(&self, local: usize) -> DVec3 {
+        self.before[local] + self.light.before(local)
+    }
+
     /// Returns the change of a pixel by its last doubling: the squared relative difference, mean over channels.
     pub fn last_step(&self, local: usize) -> f32 {
         let of = |steps: Steps, last: &[f32]| {
@@ -231,7 +236,7 @@ impl FilmTile {
             let mut sum = 0.0;
             for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
                 let before = self.before[local];
-                let shown_before = before + self.light.before(local);
+                let shown_before = self.shown_before(local);
                 let level = if of_tile.is_empty() {
                     local_level(&shown[..n], shown_before, size.x as usize, i)
                 } else {
