@@ -12,7 +12,7 @@ use glam::Vec3;
 use libloading::{Library, Symbol};
 use std::ffi::{CStr, OsString, c_char, c_int, c_void};
 use std::mem::ManuallyDrop;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Names the library if it is not where the system looks for libraries.
@@ -44,8 +44,13 @@ pub enum OidnError {
         reason: String,
     },
     /// The library has another interface.
-    #[error("the installed Open Image Denoise has no function {0}: version 2 or later is needed")]
-    Version(String),
+    #[error("{library} has no function {function}: Open Image Denoise 2 or later is needed")]
+    Version {
+        /// File name or path.
+        library: String,
+        /// The first one that is missing.
+        function: String,
+    },
     /// The library reports an error.
     #[error("Open Image Denoise: {0}")]
     Failed(String),
@@ -113,22 +118,29 @@ impl Oidn {
     /// # Errors
     /// If there is none, or it cannot be used.
     pub fn load(threads: usize) -> Result<Self, OidnError> {
-        Self::load_from(std::env::var_os(PATH_VARIABLE), threads)
+        // Empty like not set, as in most programs.
+        Self::load_from(std::env::var_os(PATH_VARIABLE).filter(|path| !path.is_empty()), threads)
     }
 
     fn load_from(path: Option<OsString>, threads: usize) -> Result<Self, OidnError> {
         // SAFETY: loading runs the initialisation of the library, which is that of Open Image Denoise, or what the user
         // names in its place.
         let open = |path: &Path| unsafe { Library::new(path) };
-        let library = match path {
-            Some(path) => open(Path::new(&path)).map_err(|error| OidnError::Unreadable {
-                path: path.to_string_lossy().into_owned(),
-                reason: error.to_string(),
-            })?,
-            None => NAMES.iter().find_map(|name| open(Path::new(name)).ok()).ok_or(OidnError::Missing)?,
+        let (library, name) = match path.map(|path| in_folder(path.into())) {
+            Some(path) => {
+                let name = path.to_string_lossy().into_owned();
+                match open(&path) {
+                    Ok(library) => (library, name),
+                    Err(error) => return Err(OidnError::Unreadable { path: name, reason: error.to_string() }),
+                }
+            }
+            None => {
+                let mut installed = NAMES.iter().filter_map(|name| Some((open(Path::new(name)).ok()?, (*name).to_owned())));
+                installed.next().ok_or(OidnError::Missing)?
+            }
         };
         let library = ManuallyDrop::new(library);
-        let calls = Calls::of(&library)?;
+        let calls = Calls::of(&library, &name)?;
         // SAFETY: arguments as `oidn.h` has them; texts end in zero.
         let device = unsafe {
             let device = (calls.new_device)(CPU);
@@ -233,14 +245,25 @@ impl Drop for Oidn {
     }
 }
 
+/// The library in a folder, or the path itself if it is none.
+fn in_folder(path: PathBuf) -> PathBuf {
+    if !path.is_dir() {
+        return path;
+    }
+    NAMES.iter().map(|name| path.join(name)).find(|path| path.exists()).unwrap_or_else(|| path.join(NAMES[0]))
+}
+
 impl Calls {
-    fn of(library: &Library) -> Result<Self, OidnError> {
+    /// - `file`: name or path of the library.
+    fn of(library: &Library, file: &str) -> Result<Self, OidnError> {
         /// The function of this name; its type must be that of `oidn.h`.
-        fn find<T: Copy>(library: &Library, name: &str) -> Result<T, OidnError> {
+        fn find<T: Copy>((library, file): (&Library, &str), name: &str) -> Result<T, OidnError> {
             // SAFETY: the fields of `Calls` have the types of the functions.
             let symbol: Result<Symbol<T>, _> = unsafe { library.get(name.as_bytes()) };
-            symbol.map(|symbol| *symbol).map_err(|_| OidnError::Version(name.to_owned()))
+            let missing = || OidnError::Version { library: file.to_owned(), function: name.to_owned() };
+            symbol.map(|symbol| *symbol).map_err(|_| missing())
         }
+        let library = (library, file);
         Ok(Self {
             new_device: find(library, "oidnNewDevice")?,
             set_device_bool: find(library, "oidnSetDeviceBool")?,

@@ -76,6 +76,10 @@ pub struct Status {
     pub denoised_by: DenoiseFilter,
     /// Relative error of the denoised image, if that is displayed.
     pub denoised_error: Option<f64>,
+    /// Samples per pixel of which it was made.
+    pub denoised_spp: u32,
+    /// Whether it is mixed with the raw image, which has more samples and the smaller error.
+    pub mixes_raw: bool,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,
     /// Cause of the last restart.

@@ -385,6 +385,7 @@ pub fn present(
     status.estimated_error = stats.error;
     status.caustics = stats.caustics;
     (status.denoising, status.denoised_error) = (stats.denoising, stats.denoised_error);
+    (status.denoised_spp, status.mixes_raw) = (stats.denoised_spp, stats.mixes_raw);
     status.denoised_by = stats.denoised_by;
     status.awaits_denoised = stats.awaits_denoised;
     status.camera_mrays = per_second(stats.recent_rays.camera);

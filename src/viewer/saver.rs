@@ -25,6 +25,8 @@ pub struct Kept {
     pub path: PathBuf,
     /// Whether the view changed before there was a film of full resolution.
     pub coarse: bool,
+    /// Samples per pixel that it has and was to have, if the window was closed before it had them.
+    pub cut_short: Option<(u32, u32)>,
 }
 
 /// An image that is rendered separately, larger than the window.
@@ -114,7 +116,7 @@ impl Saver {
     }
 
     /// Renders an image separately from the window, and saves it like [`save`](Self::save); if the window closes, the
-    /// samples so far are saved.
+    /// samples so far are saved, denoised if it was to be.
     pub fn save_larger(
         &mut self,
         larger: Larger,
@@ -138,9 +140,10 @@ impl Saver {
                 return Err(failed(&"the window was closed before every pixel had a sample"));
             }
             let with = denoiser.map(|filter| DenoiseWith { prepared, settings, filter, threads });
-            let denoised = with.and_then(|with| with.denoise(&film, &ending));
+            let denoised = with.and_then(|with| with.denoise(&film, &AtomicBool::new(false)));
             let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
-            print(&folder, &stem, (&film, denoised), draft, &display, size, format)
+            let kept = print(&folder, &stem, (&film, denoised), draft, &display, size, format)?;
+            Ok(Kept { cut_short: (film.spp() < spp).then_some((film.spp(), spp)), ..kept })
         });
     }
 
@@ -178,7 +181,7 @@ impl Saver {
                 layers: &layers,
                 note: note.as_deref(),
             };
-            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse })?)
+            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse, cut_short: None })?)
         });
     }
 
@@ -236,7 +239,7 @@ fn print(
     }
     let denoised = denoised.map(|(colors, _)| colors);
     let print = Print { film, display, size, note: note.as_deref(), denoised };
-    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
+    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse, cut_short: None })?)
 }
 
 /// Whether a film is coarser than the requested image, and the metadata of the image.
@@ -340,7 +343,7 @@ mod tests {
             let shown = Shown { prepared, names, settings, filter: DenoiseFilter::Own, threads: 1, size: (9, 7) };
             saver.save_layers(ready(film), shown, None, Display::default(), "cornell");
             saver.threads.drain(..).for_each(|thread| thread.join().unwrap());
-            let [Ok(Kept { path, coarse: false })] = &saver.finished()[..] else { panic!("it cannot be saved") };
+            let [Ok(Kept { path, coarse: false, cut_short: None })] = &saver.finished()[..] else { panic!("it cannot be saved") };
             assert_eq!(PictureLayer::in_file(path).len(), n_layers, "{spp} samples");
         }
     }

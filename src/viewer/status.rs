@@ -34,14 +34,15 @@ pub fn figures(status: &Status) -> String {
     let error = status.estimated_error.map_or("–".to_owned(), percent);
     write!(line, "   error {error}{place}").expect("a string takes all");
     if let Some(denoised) = status.denoised_error {
-        write!(line, " (denoised {})", percent(denoised)).expect("a string takes all");
+        // It may be older than the samples.
+        let of = if status.denoised_spp == spp { String::new() } else { format!(" of {} spp", status.denoised_spp) };
+        write!(line, " (denoised {}{of})", percent(denoised)).expect("a string takes all");
     }
-    // Raw is what the figures are of; everything else is named.
     let shown = match (status.denoising, status.denoised_error) {
-        (Denoising::Raw, None) => "",
-        (Denoising::Raw, Some(_)) => "   raw, the better one",
+        (Denoising::Raw, _) => "   raw",
         // Only at full resolution, and only once it is done, is an image denoised with a known error.
         (Denoising::Denoised, None) => "   smoothed",
+        (Denoising::Denoised, Some(_)) if status.mixes_raw => "   denoised, mixed with raw",
         (Denoising::Denoised, Some(_)) => "   denoised",
         (Denoising::Split, None) => "   raw | smoothed",
         (Denoising::Split, Some(_)) => "   raw | denoised",
@@ -52,7 +53,7 @@ pub fn figures(status: &Status) -> String {
         write!(line, " by {}", status.denoised_by.label()).expect("a string takes all");
     }
     if status.awaits_denoised {
-        line += if shown.is_empty() { "   denoising…" } else { ", denoising…" };
+        line += ", denoising…";
     }
     if !status.restart_cause.is_empty() {
         write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
@@ -159,7 +160,7 @@ mod tests {
         (status.estimated_error, status.restart_cause) = (Some(0.0234), "camera moved".to_owned());
         assert_eq!(
             figures(&status),
-            "37 spp   12.3 s   4.57 Mrays/s   320×180 (1/4)   error 2.3 %   restarted: camera moved"
+            "37 spp   12.3 s   4.57 Mrays/s   320×180 (1/4)   error 2.3 %   raw   restarted: camera moved"
         );
         (status.estimated_error, status.divider) = (None, 1);
         assert!(figures(&status).contains("320×180   error –"));
@@ -172,6 +173,7 @@ mod tests {
         status.region = None;
         (status.denoising, status.estimated_error, status.denoised_error) =
             (Denoising::Denoised, Some(0.02), Some(0.004));
+        status.denoised_spp = status.spp;
         assert!(
             figures(&status).contains("error 2.0 % (denoised 0.40 %)   denoised   restarted"),
             "{}",
@@ -187,10 +189,11 @@ mod tests {
         (status.denoising, status.awaits_denoised) = (Denoising::Denoised, true);
         assert!(figures(&status).contains("   smoothed, denoising…   "));
         status.denoising = Denoising::Raw;
-        assert!(figures(&status).contains("%   denoising…   "));
+        assert!(figures(&status).contains("%   raw, denoising…   "));
         status.awaits_denoised = false;
-        (status.denoising, status.denoised_error) = (Denoising::Raw, Some(0.03));
-        assert!(figures(&status).contains("(denoised 3.0 %)   raw, the better one   "));
+        (status.denoising, status.denoised_error) = (Denoising::Denoised, Some(0.03));
+        (status.denoised_spp, status.mixes_raw) = (8, true);
+        assert!(figures(&status).contains("(denoised 3.0 % of 8 spp)   denoised, mixed with raw   "));
         status.done = true;
         assert!(figures(&status).starts_with("finished   37 spp"));
         status.paused = true;

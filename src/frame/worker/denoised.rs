@@ -1,9 +1,10 @@
 //! When the film is denoised, and which denoised image is displayed.
 //!
 //! Images of a moving camera are smoothed at once, by the render thread. At full resolution the settled filter runs
-//! beside the samples ([`super::denoiser`]) on a copy of the film, as soon as it has guides and then each time that the
-//! film has a quarter more samples, sooner if the raw image is about to become the better one; until its first result,
-//! images are smoothed.
+//! beside the samples ([`super::denoiser`]) on a copy of the film, as soon as that has guides and a few samples, and then
+//! each time that the film has a quarter more and there was time for them; sooner if the raw image is about to become
+//! the better one. Until the first result, images are smoothed; while the raw image is the better one, it is mixed with
+//! the latest result.
 
 use super::denoiser::{Request, ToDenoise};
 use super::thread::Loop;
@@ -17,8 +18,16 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples,
-/// unless the raw image would become the better one within as much.
+/// unless the raw image would become the better one within as much. Half as much is enough if the film has doubled its
+/// samples, none if it has [`MANY_MORE`].
 const SAMPLES_FIRST: u32 = 4;
+/// Samples of the film over those of its denoised image that make a new one urgent.
+const MANY_MORE: u32 = 4;
+
+/// Samples per pixel of the first denoised image of a view, and those that it has if it takes that long to get them.
+/// With a single one nothing is known of the noise: the smoothed image is as good.
+const FIRST_SAMPLES: [(u32, Duration); 3] =
+    [(4, Duration::ZERO), (2, Duration::from_millis(700)), (1, Duration::from_secs(3))];
 
 /// Samples per pixel of the guides of the first denoised image of a view; all later ones have [`FEATURE_SAMPLES`].
 const FIRST_GUIDE_SAMPLES: u32 = 8;
@@ -75,13 +84,24 @@ impl Loop<'_> {
         let is_first = before == 0;
         let guide_samples = if is_first && !is_last { FIRST_GUIDE_SAMPLES } else { FEATURE_SAMPLES };
         let pool = lock(&self.shared.pool).clone();
+        let mut is_urgent = is_first;
         let image = if self.denoiser.guide_samples(key) < FIRST_GUIDE_SAMPLES && !is_last {
             // The film gets more samples meanwhile, from which the first image is made then.
             None
         } else {
             let spp = film.spp_in(self.active_region().as_ref());
-            let waits = self.views.settle_again.is_some_and(|at| Instant::now() < at);
-            let is_soon = waits && self.settled(key).is_some_and(|settled| !self.is_nearly_overtaken(settled, spp));
+            let left = self.views.settle_again.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()));
+            let took = self.settled(key).map_or(Duration::ZERO, |settled| settled.took);
+            // Half as long is enough for twice the samples.
+            let is_doubled = spp >= 2 * before;
+            let waits = left > if is_doubled { SAMPLES_FIRST / 2 * took } else { Duration::ZERO };
+            is_urgent |= self.settled(key).is_some_and(|settled| self.is_nearly_overtaken(settled, spp));
+            is_urgent |= spp >= MANY_MORE * before;
+            let elapsed = self.restarted_at.elapsed();
+            let is_soon = match is_first {
+                true => !FIRST_SAMPLES.iter().any(|(samples, after)| spp >= *samples && elapsed >= *after),
+                false => waits && !is_urgent,
+            };
             let is_due = match is_last {
                 true => spp > before || guides_before < FEATURE_SAMPLES,
                 false => spp > before && !is_soon && 4 * u64::from(spp) >= 5 * u64::from(before),
@@ -99,7 +119,7 @@ impl Loop<'_> {
             settings: job.settings,
             guide_samples,
             image,
-            is_first,
+            is_urgent,
             threads: pool.current_num_threads(),
         });
     }
@@ -119,15 +139,21 @@ impl Loop<'_> {
         let develop_raw = |rgba: &mut Vec<u8>| develop(film, &self.display, width, height, rgba);
         let Some(job) = self.job.as_ref().filter(|_| wanted != Denoising::Raw) else {
             develop_raw(rgba);
-            return Some(Developed::raw(None));
+            return Some(Developed::raw());
         };
         // The first image of a view is displayed whatever comes next, or nothing would be displayed during a long
         // movement.
         let stop = || self.pictured == job.generation && self.shared.interrupt.load(Ordering::Relaxed);
         let settled = self.settled(key).filter(|_| divider == 1);
-        if let Some(settled) = settled.filter(|settled| wanted == Denoising::Denoised && self.is_overtaken(settled)) {
-            develop_raw(rgba);
-            return Some(Developed::raw(Some(settled.denoised.error)));
+        let of_settled = settled.map(|settled| OfSettled { error: settled.denoised.error, spp: settled.spp });
+        if let Some((settled, share)) = settled.and_then(|settled| Some((settled, self.raw_share(settled)?)))
+            && wanted == Denoising::Denoised
+        {
+            let mut colors = film.means();
+            let denoised = &settled.denoised.color;
+            colors.iter_mut().zip(denoised).for_each(|(raw, denoised)| *raw = denoised.lerp(*raw, share));
+            develop_colors(&colors, key.size.into(), &self.display, (width, height), rgba);
+            return Some(Developed { denoising: wanted, settled: of_settled, is_mixed: true, smoothing: None });
         }
         let start = Instant::now();
         let (smoothed, smoothing) = match settled {
@@ -146,7 +172,7 @@ impl Loop<'_> {
                 return None;
             }
             develop_raw(rgba);
-            return Some(Developed::raw(None));
+            return Some(Developed::raw());
         };
         develop_colors(colors, key.size.into(), &self.display, (width, height), rgba);
         if wanted == Denoising::Split {
@@ -154,13 +180,14 @@ impl Loop<'_> {
             develop_raw(&mut raw);
             split(rgba, &raw, width as usize);
         }
-        Some(Developed { denoising: wanted, error: settled.map(|settled| settled.denoised.error), smoothing })
+        Some(Developed { denoising: wanted, settled: of_settled, is_mixed: false, smoothing })
     }
 
-    /// Whether the samples since an image was denoised have made the raw image the better one, as far as both errors
-    /// are known. A busy machine may leave no time for denoising.
-    fn is_overtaken(&self, settled: &Settled) -> bool {
-        self.active_region().is_none() && self.stats.error.is_some_and(|raw| raw < settled.denoised.error)
+    /// Share of the raw image in a mix with one that was denoised from fewer samples; `None` unless the raw image has
+    /// become the better one, as far as both errors are known. A busy machine may leave no time for denoising.
+    fn raw_share(&self, settled: &Settled) -> Option<f32> {
+        let raw = self.stats.error.filter(|_| self.active_region().is_none())?;
+        share_of_better(raw, settled.denoised.error)
     }
 
     /// Whether the raw image will be the better one before another image is denoised, if that does not begin now. Noise
@@ -180,7 +207,7 @@ impl Loop<'_> {
         }
         let settled = self.settled(key);
         match settled {
-            Some(settled) => self.wanted_denoising() == Denoising::Denoised && !self.is_overtaken(settled),
+            Some(settled) => self.wanted_denoising() == Denoising::Denoised && self.raw_share(settled).is_none(),
             None => self.is_smoothed(key),
         }
     }
@@ -201,17 +228,36 @@ impl Loop<'_> {
 /// How an image was developed.
 pub struct Developed {
     pub denoising: Denoising,
-    /// Error of the denoised image, if there is one.
-    pub error: Option<f64>,
+    /// The image of the settled filter, if there is one.
+    pub settled: Option<OfSettled>,
+    /// That one is mixed with the raw image, which has more samples.
+    pub is_mixed: bool,
     /// How long it was smoothed.
     pub smoothing: Option<Duration>,
 }
 
+/// A denoised image, for the status.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OfSettled {
+    /// Its relative error.
+    pub error: f64,
+    /// Samples per pixel of which it was made.
+    pub spp: u32,
+}
+
 impl Developed {
-    /// - `error`: of the denoised image that is there too.
-    pub fn raw(error: Option<f64>) -> Self {
-        Self { denoising: Denoising::Raw, error, smoothing: None }
+    pub fn raw() -> Self {
+        Self { denoising: Denoising::Raw, settled: None, is_mixed: false, smoothing: None }
     }
+}
+
+/// Share of the raw image in a mix of both that has the least error if their errors are independent; `None` if the
+/// denoised image is the better one.
+///
+/// - `raw`, `denoised`: relative errors.
+fn share_of_better(raw: f64, denoised: f64) -> Option<f32> {
+    let [a, b] = [raw, denoised].map(|error| error * error);
+    (raw < denoised).then_some((b / (a + b)) as f32)
 }
 
 /// Time until the raw image of a film has the error of a denoised one: errors fall with the square root of the time.
@@ -233,7 +279,7 @@ fn split(rgba: &mut [u8], raw: &[u8], width: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Duration, split, time_until_overtaken};
+    use super::{Duration, share_of_better, split, time_until_overtaken};
 
     #[test]
     fn a_denoised_image_is_overtaken_when_the_samples_have_its_error() {
@@ -241,6 +287,14 @@ mod tests {
         assert_eq!(left(0.1, 0.05), Duration::from_secs(12));
         assert_eq!((left(0.05, 0.05), left(0.01, 0.05)), (Duration::ZERO, Duration::ZERO));
         assert_eq!(left(0.1, 0.0), Duration::MAX);
+    }
+
+    #[test]
+    fn a_raw_image_is_mixed_in_once_it_is_the_better_one() {
+        assert_eq!(share_of_better(0.05, 0.05), None);
+        assert_eq!(share_of_better(0.1, 0.05), None);
+        assert_eq!(share_of_better(0.0, 0.05), Some(1.0));
+        assert!((share_of_better(0.01, 0.03).unwrap() - 0.9).abs() < 1e-6);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The thread that denoises: beside the render thread, on a copy of what the film shows.
 //!
 //! It gathers the guides of a view while the film gets its first samples. Then the render thread hands over a copy, adds
-//! more samples, and takes the result when it is there. The first image of a view is what the user waits for, and gets
-//! as much of the processor as samples do; later ones get less. Another view makes the thread drop what it is at within
+//! more samples, and takes the result when it is there. What the user waits for, such as the first image of a view, gets
+//! as much of the processor as samples do; other images get less. Another view makes the thread drop what it is at within
 //! some rows. Start reading at [`Denoiser::start`].
 
 use super::views::{Settled, ViewKey};
@@ -24,8 +24,8 @@ pub struct Request {
     pub guide_samples: u32,
     /// Without one, guides are all that is wanted so far.
     pub image: Option<ToDenoise>,
-    /// Nothing denoised is there yet.
-    pub is_first: bool,
+    /// The user waits for it: nothing denoised is there yet, or it is about to be worse than the raw image.
+    pub is_urgent: bool,
     pub threads: usize,
 }
 
@@ -183,19 +183,19 @@ fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
     }
 }
 
-/// The threads that denoise: of the first image of a view, and of later ones.
+/// The threads that denoise: what the user waits for, and everything else.
 #[derive(Default)]
 struct Pools {
     yielding: bool,
-    first: Option<Arc<rayon::ThreadPool>>,
-    later: Option<Arc<rayon::ThreadPool>>,
+    urgent: Option<Arc<rayon::ThreadPool>>,
+    usual: Option<Arc<rayon::ThreadPool>>,
 }
 
 impl Pools {
     /// The pool of a request; `None` if there can be none.
     fn of(&mut self, request: &Request) -> Option<Arc<rayon::ThreadPool>> {
         let (pool, niceness) =
-            if request.is_first { (&mut self.first, NICENESS) } else { (&mut self.later, DENOISE_NICENESS) };
+            if request.is_urgent { (&mut self.urgent, NICENESS) } else { (&mut self.usual, DENOISE_NICENESS) };
         if pool.as_ref().is_none_or(|pool| pool.current_num_threads() != request.threads) {
             *pool = make_pool(request.threads, DENOISE, self.yielding.then_some(niceness)).ok();
         }

@@ -108,6 +108,10 @@ pub struct Stats {
     pub denoised_by: DenoiseFilter,
     /// Relative error of the denoised image, if that is displayed and known.
     pub denoised_error: Option<f64>,
+    /// Samples per pixel of which it was made.
+    pub denoised_spp: u32,
+    /// Whether it is mixed with the raw image, which has more samples and the smaller error.
+    pub mixes_raw: bool,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,
     /// Rays of the latest steps, and the time that they took in seconds.

@@ -51,7 +51,7 @@ impl Loop<'_> {
         // Another view or job has arrived: this image would not be displayed.
         let stop = || interrupt.load(Ordering::Relaxed);
         let mut legend = None;
-        let mut developed = Developed::raw(None);
+        let mut developed = Developed::raw();
         if self.look.inspection == Inspection::Picture {
             let mut filter = std::mem::take(&mut self.filter);
             let develop = || self.develop_wanted(&mut filter, (*divider, film), key, (width, height), &mut rgba);
@@ -84,7 +84,8 @@ impl Loop<'_> {
             pool.install(|| tint_sharp_zone(&mut rgba, size, &depths, key.size, zone, camera.focus_distance));
             self.views.depths = Some((key, depths));
         }
-        let Developed { denoising, error: denoised_error, smoothing } = developed;
+        let Developed { denoising, settled, is_mixed, smoothing } = developed;
+        let denoised_error = settled.map(|settled| settled.error);
         self.n_pictures += 1;
         self.pictured = job.generation;
         let picture = &mut self.spare;
@@ -96,7 +97,8 @@ impl Loop<'_> {
         let awaits_denoised = divider == 1 && self.wanted_denoising() != Denoising::Raw && denoised_error.is_none();
         let denoised_by = self.views.settled.as_ref().map_or(self.look.filter, |settled| settled.by);
         (self.stats.denoising, self.stats.denoised_by) = (denoising, denoised_by);
-        self.stats.denoised_error = denoised_error;
+        (self.stats.denoised_error, self.stats.mixes_raw) = (denoised_error, is_mixed);
+        self.stats.denoised_spp = settled.map_or(0, |settled| settled.spp);
         self.stats.awaits_denoised = awaits_denoised;
         if let Some(took) = smoothing {
             self.note_smoothing(divider, key, took);
@@ -106,7 +108,8 @@ impl Loop<'_> {
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
             (outbox.stats.denoising, outbox.stats.denoised_by) = (denoising, denoised_by);
-            outbox.stats.denoised_error = denoised_error;
+            (outbox.stats.denoised_error, outbox.stats.mixes_raw) = (denoised_error, is_mixed);
+            outbox.stats.denoised_spp = self.stats.denoised_spp;
             outbox.stats.awaits_denoised = awaits_denoised;
         }
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);

@@ -303,7 +303,10 @@ impl App {
         match saved {
             Ok(kept) => {
                 let coarse = if kept.coarse { " (low resolution: the view changed too soon)" } else { "" };
-                let news = format!("saved {}{coarse}", kept.path.display());
+                let short = kept.cut_short.map_or_else(String::new, |(spp, wanted)| {
+                    format!(" (with {spp} of {wanted} samples per pixel, because the window was closed)")
+                });
+                let news = format!("saved {}{coarse}{short}", kept.path.display());
                 console::inform(&news);
                 // Replaces the message that saving has started.
                 self.toasts.add(Tone::News, format!("screenshot: {news}"), now);

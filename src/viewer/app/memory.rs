@@ -31,14 +31,20 @@ impl Memory {
         Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent, noise }
     }
 
-    /// Has the image displayed with the noise that it had last.
-    pub fn begin(&self, session: &mut Session) {
+    /// Has the image displayed with the noise that it had last; returns why it cannot be denoised by what denoised it
+    /// last. The choice stays in the store until another one is made.
+    pub fn begin(&mut self, session: &mut Session) -> Option<String> {
+        let trouble = self.noise.1.check().err();
+        if trouble.is_some() {
+            self.noise.1 = DenoiseFilter::Own;
+        }
         let (denoising, denoiser) = self.noise;
         session.send(Command::SetDenoising(denoising));
         session.send(Command::SetDenoiseFilter(denoiser));
         // Until these commands are carried out, nothing has been chosen.
         let look = &mut session.world_mut().resource_mut::<ViewMode>().0;
         (look.denoising, look.filter) = self.noise;
+        trouble.map(|reason| format!("{reason}. firstlight's own filter is used."))
     }
 
     /// Returns storage for unsaved edits in the same folder.
@@ -215,7 +221,7 @@ mod tests {
             (Denoising::Raw, Denoising::Raw),
         ] {
             let (mut session, mut memory) = (Session::new(SessionOptions::default()).unwrap(), memory());
-            memory.begin(&mut session);
+            assert_eq!(memory.begin(&mut session), None);
             for _ in 0..2 {
                 assert_eq!(session.world().resource::<ViewMode>().0.denoising, expected);
                 session.update(Duration::ZERO);

@@ -272,10 +272,15 @@ impl App {
             session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
-        let memory = Memory::of_platform();
-        memory.begin(&mut session);
+        let mut memory = Memory::of_platform();
+        let trouble = memory.begin(&mut session);
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
+        let mut toasts = Toasts::default();
+        if let Some(trouble) = trouble {
+            crate::console::remark(format_args!("warning: {trouble}"));
+            toasts.add(Tone::Problem, trouble, start);
+        }
         Ok(Self {
             start,
             steered_at: start,
@@ -284,7 +289,7 @@ impl App {
             saver: Saver::new(&options.folder, waker.clone()),
             dialog: Dialog::new(waker),
             input: Input::new(options.width, options.height, memory.navigation()),
-            toasts: Toasts::default(),
+            toasts,
             help: Help::default(),
             panel: PanelState::default(),
             handles: Handles::default(),
