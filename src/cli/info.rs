@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::info_objects::ObjectList;
 use super::number::{counted, two_digits};
 use clap::Args;
-use firstlight::frame::{PictureLayer, f_number, f_stop};
+use firstlight::frame::{DenoiseFilter, PictureLayer, f_number, f_stop};
 use firstlight::printable;
 use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
 use firstlight::scene::animation::Shutter;
@@ -115,6 +115,9 @@ impl Told<'_> {
         if !self.layers.is_empty() {
             row("layers", self.layers.join(", "));
         }
+        if let Some(filter) = self.denoised_by() {
+            row("denoised", format!("by {filter}; the raw image is in its film, if that was saved"));
+        }
         if let Some(caustics) = self.caustics {
             row("caustics", caustics.to_string());
         }
@@ -140,6 +143,13 @@ impl Told<'_> {
         out
     }
 
+    /// What denoised the pixels of the image that the scene is read from.
+    fn denoised_by(&self) -> Option<&str> {
+        let name = self.scene.shot.as_ref()?.denoised.as_deref()?;
+        let filter = DenoiseFilter::ALL.into_iter().find(|filter| filter.name() == name);
+        Some(filter.map_or(name, |filter| filter.label()))
+    }
+
     /// As one line of JSON.
     fn json(&self) -> serde_json::Value {
         let Self { scene, extraction, film, .. } = self;
@@ -148,6 +158,7 @@ impl Told<'_> {
         let [meshes, trees, film_bytes] = self.bytes();
         serde_json::json!({
             "scene": scene.source.title(),
+            "denoised": scene.shot.as_ref().and_then(|shot| shot.denoised.as_deref()),
             "fingerprint": scene.fingerprint().to_string(),
             "objects": self.objects(),
             "parts": self.list.json(),

@@ -9,7 +9,7 @@ use firstlight::render::Film;
 /// Layers of an image.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LayerArgs {
-    /// Layers of an .exr image besides its light, such as albedo,normal,depth
+    /// Layers of an .exr image besides its light, such as albedo,normal,depth, or all
     ///
     /// A film that is saved as well keeps them, for --resume and `firstlight merge`.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_enum, help_heading = "Output")]
@@ -18,6 +18,8 @@ pub struct LayerArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LayerArg {
+    /// All of these.
+    All,
     /// Colour without light, seen through mirrors and glass.
     Albedo,
     /// Shading normal in world space.
@@ -42,21 +44,23 @@ pub enum LayerArg {
     Denoised,
 }
 
-impl From<LayerArg> for PictureLayer {
-    fn from(arg: LayerArg) -> Self {
-        match arg {
-            LayerArg::Albedo => Self::Albedo,
-            LayerArg::Normal => Self::Normal,
-            LayerArg::Depth => Self::Depth,
-            LayerArg::Position => Self::Position,
-            LayerArg::Coverage => Self::Coverage,
-            LayerArg::Object => Self::Object,
-            LayerArg::Material => Self::Material,
-            LayerArg::Variance => Self::Variance,
-            LayerArg::Samples => Self::Samples,
-            LayerArg::Error => Self::Error,
-            LayerArg::Denoised => Self::Denoised,
-        }
+impl LayerArg {
+    /// The layers of this name.
+    fn layers(self) -> Vec<PictureLayer> {
+        vec![match self {
+            Self::All => return PictureLayer::ALL.to_vec(),
+            Self::Albedo => PictureLayer::Albedo,
+            Self::Normal => PictureLayer::Normal,
+            Self::Depth => PictureLayer::Depth,
+            Self::Position => PictureLayer::Position,
+            Self::Coverage => PictureLayer::Coverage,
+            Self::Object => PictureLayer::Object,
+            Self::Material => PictureLayer::Material,
+            Self::Variance => PictureLayer::Variance,
+            Self::Samples => PictureLayer::Samples,
+            Self::Error => PictureLayer::Error,
+            Self::Denoised => PictureLayer::Denoised,
+        }]
     }
 }
 
@@ -66,23 +70,35 @@ impl LayerArgs {
         self.layers.is_empty()
     }
 
+    /// All that are requested, in the order of the first mention.
+    fn wanted(&self) -> Vec<PictureLayer> {
+        let mut wanted = Vec::new();
+        for layer in self.layers.iter().flat_map(|name| name.layers()) {
+            if !wanted.contains(&layer) {
+                wanted.push(layer);
+            }
+        }
+        wanted
+    }
+
     /// Whether a layer needs feature buffers.
     pub fn have_features(&self) -> bool {
-        self.layers.iter().any(|&layer| PictureLayer::from(layer).is_feature())
+        self.wanted().into_iter().any(PictureLayer::is_feature)
     }
 
     pub fn has_denoised(&self) -> bool {
-        self.layers.contains(&LayerArg::Denoised)
+        self.wanted().contains(&PictureLayer::Denoised)
     }
 
     pub fn has_error(&self) -> bool {
-        self.layers.contains(&LayerArg::Error)
+        self.wanted().contains(&PictureLayer::Error)
     }
 
     /// Checks the combination of layers; called before rendering.
     pub fn check(&self) -> Result<(), Failure> {
-        const WITH_VARIANCE: [LayerArg; 4] = [LayerArg::Albedo, LayerArg::Normal, LayerArg::Depth, LayerArg::Position];
-        if self.layers.contains(&LayerArg::Variance) && !WITH_VARIANCE.iter().any(|one| self.layers.contains(one)) {
+        use PictureLayer::{Albedo, Depth, Normal, Position, Variance};
+        let wanted = self.wanted();
+        if wanted.contains(&Variance) && ![Albedo, Normal, Depth, Position].iter().any(|one| wanted.contains(one)) {
             let message = "--layers: variance goes with others: add albedo, normal, depth or position";
             return Err(Failure::Usage(message.to_owned()));
         }
@@ -95,8 +111,7 @@ impl LayerArgs {
         if self.has_error() && !error_known {
             remark(format_args!("warning: the image has no layer `error`: every pixel needs two samples for it"));
         }
-        let is_known = |layer: &LayerArg| *layer != LayerArg::Error || error_known;
-        self.layers.iter().filter(|layer| is_known(layer)).map(|&layer| layer.into()).collect()
+        self.wanted().into_iter().filter(|layer| *layer != PictureLayer::Error || error_known).collect()
     }
 
     /// Fails if feature layers are requested but the film was rendered without them.

@@ -5,7 +5,7 @@
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
-use super::denoising::DenoiserArg;
+use super::denoising::{DenoiserArg, check_layered};
 use super::failure::Failure;
 use super::film_denoiser::FilmDenoiser;
 use super::layers::LayerArgs;
@@ -50,7 +50,7 @@ pub struct MergeArgs {
     #[arg(long, value_name = "I/N")]
     part: Option<String>,
     /// Save the image denoised, like `render --denoise`; opens the scene of the films.
-    #[arg(long, requires = "image", conflicts_with = "layers")]
+    #[arg(long, requires = "image")]
     denoise: bool,
     /// The filter of --denoise and --layers denoised [default: own].
     #[arg(long, value_enum, value_name = "FILTER")]
@@ -99,6 +99,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         return Err(Failure::Usage("--layers belong to an image: name it with --image FILE.exr".to_owned()));
     }
     args.layers.check()?;
+    check_layered(args.denoise, !args.layers.is_empty())?;
     let is_denoised = args.denoise || args.layers.has_denoised();
     if args.denoiser.is_some() && !is_denoised {
         let message = "--denoiser needs an image that is denoised: add --denoise or --layers denoised";
@@ -175,8 +176,9 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     }
     let of_denoised = denoised.map_or_else(String::new, |denoised| format!(" (denoised: {})", percent(denoised.error)));
     let error = error.map_or_else(String::new, |error| format!(", estimated error {}{of_denoised}", percent(error)));
+    let image = args.image.as_ref().map_or_else(String::new, |path| format!(", image saved to {}", path.display()));
     let replaced = replaced(files.replaced());
-    inform(format_args!("{}: {} samples per pixel{error}{replaced}", output.display(), film.spp()));
+    inform(format_args!("{}: {} samples per pixel{error}{image}{replaced}", output.display(), film.spp()));
     Ok(())
 }
 

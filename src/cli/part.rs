@@ -66,6 +66,10 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     if args.is_sequence() {
         return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
     }
+    if args.denoise.denoise {
+        let message = "a part is a film, which stays raw: denoise what `firstlight merge … --image IMAGE --denoise` makes";
+        return Err(Failure::Usage(message.to_owned()));
+    }
     let path = film_path(args, part)?;
     let mut files = args.overwrite.files();
     let claim = files.go_on(&path).map_err(|error| Failure::from(error).of_part())?;

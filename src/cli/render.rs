@@ -278,10 +278,12 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if let Some(failure) = failure.take() {
         return Err(failure);
     }
+    let denoise_start = Instant::now();
     let denoised = match denoised.filter(|(spp, _)| *spp == film.spp()) {
         Some((_, found)) => Some(found),
         None => job.denoised(&film, &mut guides, &asked)?,
     };
+    let denoise_seconds = denoised.is_some().then(|| denoise_start.elapsed().as_secs_f64());
     if args.wants_denoised() && denoised.is_none() {
         remark(format_args!("warning: stopped before the image was denoised: {} is raw", args.output_name()));
     }
@@ -325,14 +327,20 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         ));
     }
     if args.json {
-        let seconds = (features_seconds, cpu_seconds);
+        let seconds = (features_seconds, cpu_seconds, denoise_seconds);
         print(json(&job, &report, seconds, (&film, region, is_dark), denoised_error, files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output_name(), job.size);
         let seconds = report.seconds;
         let error = error.filter(|_| !is_dark);
         let error = error.map_or(String::new(), |error| format!(", estimated error {}", percent(error)));
-        let denoised = denoised_error.map_or(String::new(), |(error, _)| format!(" (denoised: {})", percent(error)));
+        let denoised = match (denoised_error, denoise_seconds) {
+            (Some((error, _)), Some(seconds)) if seconds > 0.05 => {
+                format!(" (denoised: {}, in {seconds:.1} s)", percent(error))
+            }
+            (Some((error, _)), _) => format!(" (denoised: {})", percent(error)),
+            (None, _) => String::new(),
+        };
         let kept = film_path.map_or(String::new(), |path| format!(", film saved to {}", path.display()));
         let replaced = replaced(files.replaced());
         let spp = match region {
@@ -407,7 +415,7 @@ fn is_black(film: &Film) -> bool {
 fn json(
     job: &RenderJob,
     report: &OfflineReport,
-    (features_seconds, cpu_seconds): (f64, Option<f64>),
+    (features_seconds, cpu_seconds, denoise_seconds): (f64, Option<f64>, Option<f64>),
     (film, region, is_dark): (&Film, Option<&Region>, bool),
     denoised_error: Option<(f64, [f64; 2])>,
     replaced: &[PathBuf],
@@ -440,6 +448,8 @@ fn json(
         "features_s": features_seconds,
         "render_s": report.seconds,
         "cpu_s": cpu_seconds,
+        // Feature buffers of its own included; none of it is in `render_s` and `cpu_s`.
+        "denoise_s": denoise_seconds,
         "threads": rayon::current_num_threads(),
         "rays": {
             "camera": report.rays.camera,

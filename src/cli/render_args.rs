@@ -308,7 +308,7 @@ impl RenderArgs {
     /// Checks that the format supports the requested layers.
     fn check_layers(&self, format: PictureFormat) -> Result<PictureFormat, Failure> {
         self.layers.check()?;
-        self.denoise.check(self.wants_denoised())?;
+        self.denoise.check(self.wants_denoised(), !self.layers.is_empty())?;
         if !self.layers.is_empty() && format != PictureFormat::Exr {
             let message = "a .png has no layers: with --layers, choose a name that ends in .exr";
             return Err(Failure::Usage(format!("{}: {message}", self.output_name())));
