@@ -238,7 +238,8 @@ fn builtin_help() -> String {
         "Built-in scenes:{rows}\n\nEnvironment variables:\n  \
          NO_COLOR           Print help and errors without colours\n  \
          RUST_LOG           Log filter, such as info or firstlight=debug\n  \
-         FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2\n\n\
+         FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2\n  \
+         FIRSTLIGHT_OIDN    Path of Open Image Denoise, for --denoiser oidn\n\n\
          Exit status:\n  \
          0 success, 1 failure, 2 usage error, 130 stopped by Ctrl+C (what was rendered is saved);\n  \
          of render --part: 2 wrong input, 75 interrupted or blocked, try again\n\n\
