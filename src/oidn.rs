@@ -135,7 +135,8 @@ impl Oidn {
                 }
             }
             None => {
-                let mut installed = NAMES.iter().filter_map(|name| Some((open(Path::new(name)).ok()?, (*name).to_owned())));
+                let mut installed =
+                    NAMES.iter().filter_map(|name| Some((open(Path::new(name)).ok()?, (*name).to_owned())));
                 installed.next().ok_or(OidnError::Missing)?
             }
         };

@@ -67,7 +67,8 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
         return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
     }
     if args.denoise.denoise {
-        let message = "a part is a film, which stays raw: denoise what `firstlight merge … --image IMAGE --denoise` makes";
+        let message =
+            "a part is a film, which stays raw: denoise what `firstlight merge … --image IMAGE --denoise` makes";
         return Err(Failure::Usage(message.to_owned()));
     }
     let path = film_path(args, part)?;

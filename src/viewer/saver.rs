@@ -343,7 +343,9 @@ mod tests {
             let shown = Shown { prepared, names, settings, filter: DenoiseFilter::Own, threads: 1, size: (9, 7) };
             saver.save_layers(ready(film), shown, None, Display::default(), "cornell");
             saver.threads.drain(..).for_each(|thread| thread.join().unwrap());
-            let [Ok(Kept { path, coarse: false, cut_short: None })] = &saver.finished()[..] else { panic!("it cannot be saved") };
+            let [Ok(Kept { path, coarse: false, cut_short: None })] = &saver.finished()[..] else {
+                panic!("it cannot be saved")
+            };
             assert_eq!(PictureLayer::in_file(path).len(), n_layers, "{spp} samples");
         }
     }

@@ -90,7 +90,8 @@ impl Loop<'_> {
             None
         } else {
             let spp = film.spp_in(self.active_region().as_ref());
-            let left = self.views.settle_again.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()));
+            let left =
+                self.views.settle_again.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()));
             let took = self.settled(key).map_or(Duration::ZERO, |settled| settled.took);
             // Half as long is enough for twice the samples.
             let is_doubled = spp >= 2 * before;

@@ -378,7 +378,10 @@ pub static BINDINGS: &[KeyGroup] = &[
                 triggers: &[Trigger::Mouse("Panel: Lens")],
                 effect: "focus distance and what it follows, f-number, blades of the aperture",
             },
-            Binding { triggers: &[Trigger::Mouse("Panel: Display")], effect: "exposure, tone curve, noise and what denoises, inspection view" },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Display")],
+                effect: "exposure, tone curve, noise and what denoises, inspection view",
+            },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Add")],
                 effect: "a sphere, a plane, a cube, a light, a built-in mesh or a model (glTF, OBJ, PLY, STL)",

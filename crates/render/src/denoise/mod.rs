@@ -269,7 +269,8 @@ mod tests {
             // Other noise than that of the same pixel in the doubling.
             let from = (pixel + WIDTH / 2) % (WIDTH * HEIGHT);
             let noise = more.color[from] / scene.truth[from] * scene.truth[pixel];
-            let firefly = if hash_u32(pixel as u32).is_multiple_of(97) { 50.0 * scene.truth[pixel] } else { Vec3::ZERO };
+            let firefly =
+                if hash_u32(pixel as u32).is_multiple_of(97) { 50.0 * scene.truth[pixel] } else { Vec3::ZERO };
             halves.late[pixel] = (noise + firefly - before[pixel]) / 3.0;
         }
         let color = before.iter().zip(&halves.late).map(|(before, late)| *before + *late).collect();
