@@ -36,7 +36,7 @@ pub(super) fn given_back(
     each(n, stop, |i| {
         let mean = Vec3::new(red[i], green[i], blue[i]);
         let sum = mean.element_sum().max(0.0);
-        let deviation = SIGNIFICANCE * (squares[i] / n_averaged(RADIUS)).sqrt();
+        let deviation = SIGNIFICANCE * (squares[i].max(0.0) / n_averaged(RADIUS)).sqrt();
         let light = (filtered.color[i] / albedo(i)).element_sum();
         let square = sum * sum;
         let beyond = square / light.max(1e-12);

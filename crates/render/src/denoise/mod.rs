@@ -265,13 +265,13 @@ mod tests {
         // Two more: the doubling has 2/3 of the samples.
         let more = scene.render(2, 0.4);
         halves.doubled.fill(2.0 / 3.0);
-        for pixel in 0..WIDTH * HEIGHT {
+        for (pixel, before) in before.iter().enumerate() {
             // Other noise than that of the same pixel in the doubling.
             let from = (pixel + WIDTH / 2) % (WIDTH * HEIGHT);
             let noise = more.color[from] / scene.truth[from] * scene.truth[pixel];
             let firefly =
                 if hash_u32(pixel as u32).is_multiple_of(97) { 50.0 * scene.truth[pixel] } else { Vec3::ZERO };
-            halves.late[pixel] = (noise + firefly - before[pixel]) / 3.0;
+            halves.late[pixel] = (noise + firefly - *before) / 3.0;
         }
         let color = before.iter().zip(&halves.late).map(|(before, late)| *before + *late).collect();
         let rendered = Rendered { color, halves };
