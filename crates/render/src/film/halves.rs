@@ -11,6 +11,7 @@
 
 use crate::film::tiles::Film;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Steps of the last doubling, and what has come since. The square of one step is a poor variance estimate, with one
 /// degree of freedom per channel: average over pixels.
@@ -59,35 +60,49 @@ impl Film {
         let n_pixels = self.width() as usize * self.height() as usize;
         let (mut steps, mut late) = (vec![Vec3::ZERO; n_pixels], vec![Vec3::ZERO; n_pixels]);
         let mut doubled = vec![1.0_f32; n_pixels];
-        let mut mean = 0.0;
-        for tile in &self.tiles {
-            if tile.half_steps.is_empty() {
-                return None;
-            }
-            for (local, &of_camera) in tile.half_steps.iter().enumerate() {
-                // Light paths are independent of camera paths.
-                let of_light = match &self.light {
-                    Some(_) => *tile.light.half_steps.get(local)?,
-                    None => Vec3::ZERO,
-                };
-                if !(of_camera + of_light).is_finite() {
-                    return None;
-                }
-                let block = tile.block_of(local);
-                let share = block.mean_of as f32 / block.spp.max(1) as f32;
-                let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
-                let (x, y) = (tile.origin.x + x, tile.origin.y + y);
-                let at = y as usize * self.width() as usize + x as usize;
-                let traced = self.light.as_ref().map_or(DVec3::ZERO, |light| light.mean(at));
-                let now = tile.mean(local) + traced;
-                (steps[at], late[at]) = (of_camera + of_light, (now - tile.shown_before(local)).as_vec3());
-                doubled[at] = share;
-                mean += f64::from(share * tile.last_step(local));
-            }
-        }
+        let width = self.width() as usize;
+        let rows = steps.par_chunks_exact_mut(width).zip(late.par_chunks_exact_mut(width));
+        let rows = rows.zip(doubled.par_chunks_exact_mut(width)).zip(0..self.height());
+        let of_row = |(((steps, late), doubled), y)| self.half_steps_of_row(y, steps, late, doubled);
+        // In the order of the rows, so that the sum does not depend on the number of threads.
+        let means: Option<Vec<f64>> = rows.map(of_row).collect();
+        let mean: f64 = means?.iter().sum();
         // Before the fourth sample only that of independent samples is known.
         let known = self.error_estimate().filter(|_| mean > 0.0);
         let calibration = known.map_or(1.0, |error| (error.relative.powi(2) * n_pixels as f64 / mean) as f32);
         Some(HalfSteps { steps, late, doubled, calibration })
+    }
+    /// Fills in one row; returns the sum of the variances that independent samples would have, relative to the level of
+    /// each pixel; `None` like [`Self::half_steps`].
+    fn half_steps_of_row(&self, y: u32, steps: &mut [Vec3], late: &mut [Vec3], doubled: &mut [f32]) -> Option<f64> {
+        let mut sum = 0.0;
+        for tile in self.tiles_of_row(y) {
+            if tile.half_steps.is_empty() {
+                return None;
+            }
+            let first = ((y - tile.origin.y) * tile.size.x) as usize;
+            for block in tile.blocks_in_row(y - tile.origin.y) {
+                let share = block.mean_of as f32 / block.spp.max(1) as f32;
+                for x in block.start.x..block.start.x + block.size.x {
+                    let (local, at) = (first + x as usize, (tile.origin.x + x) as usize);
+                    // Light paths are independent of camera paths.
+                    let (of_light, traced) = match &self.light {
+                        Some(light) => {
+                            (*tile.light.half_steps.get(local)?, light.mean(y as usize * self.width() as usize + at))
+                        }
+                        None => (Vec3::ZERO, DVec3::ZERO),
+                    };
+                    let step = tile.half_steps[local] + of_light;
+                    if !step.is_finite() {
+                        return None;
+                    }
+                    let now = tile.mean_of(local, block.spp) + traced;
+                    (steps[at], late[at]) = (step, (now - tile.shown_before(local)).as_vec3());
+                    doubled[at] = share;
+                    sum += f64::from(share * tile.last_step_in(local, block.steps));
+                }
+            }
+        }
+        Some(sum)
     }
 }

@@ -144,7 +144,7 @@ impl FilmTile {
     }
 
     /// - `spp`: sample count of its block.
-    fn mean_of(&self, local: usize, spp: u32) -> DVec3 {
+    pub fn mean_of(&self, local: usize, spp: u32) -> DVec3 {
         let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
         match spp - n_bad {
             0 => DVec3::ZERO,
@@ -159,10 +159,15 @@ impl FilmTile {
 
     /// Returns the change of a pixel by its last doubling: the squared relative difference, mean over channels.
     pub fn last_step(&self, local: usize) -> f32 {
+        self.last_step_in(local, self.block_of(local).steps)
+    }
+
+    /// - `steps`: of its block.
+    pub fn last_step_in(&self, local: usize, steps: Steps) -> f32 {
         let of = |steps: Steps, last: &[f32]| {
             if steps.at > 0 { last.get(local).copied().unwrap_or(0.0) } else { 0.0 }
         };
-        of(self.block_of(local).steps, &self.last) + of(self.light.steps, &self.light.last)
+        of(steps, &self.last) + of(self.light.steps, &self.light.last)
     }
 
     /// Adds one sample of every pixel of a block, row by row; `sample` is its number, which must be the next one.
