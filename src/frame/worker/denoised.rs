@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// unless the raw image would become the better one within as much. Half as much is enough if the film has doubled its
 /// samples, none if it has [`MANY_MORE`].
 const SAMPLES_FIRST: u32 = 4;
-/// Samples of the film over those of its denoised image that make a new one urgent.
+/// Samples of the film over those of its denoised image from which on a new one does not wait.
 const MANY_MORE: u32 = 4;
 
 /// Samples per pixel of the first denoised image of a view, and those that it has if it takes that long to get them.
@@ -94,10 +94,9 @@ impl Loop<'_> {
                 self.views.settle_again.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()));
             let took = self.settled(key).map_or(Duration::ZERO, |settled| settled.took);
             // Half as long is enough for twice the samples.
-            let is_doubled = spp >= 2 * before;
-            let waits = left > if is_doubled { SAMPLES_FIRST / 2 * took } else { Duration::ZERO };
+            let most = if spp >= 2 * before { SAMPLES_FIRST / 2 * took } else { Duration::ZERO };
+            let waits = left > most && spp < MANY_MORE * before;
             is_urgent |= self.settled(key).is_some_and(|settled| self.is_nearly_overtaken(settled, spp));
-            is_urgent |= spp >= MANY_MORE * before;
             let elapsed = self.restarted_at.elapsed();
             let is_soon = match is_first {
                 true => !FIRST_SAMPLES.iter().any(|(samples, after)| spp >= *samples && elapsed >= *after),
