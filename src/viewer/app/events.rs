@@ -48,6 +48,7 @@ impl ApplicationHandler<Wake> for App {
         let response = presenter.on_window_event(&event);
         // Overlays get the keyboard only during text input; they always want Tab, which the window uses itself.
         let typing = presenter.egui_context().wants_keyboard_input();
+        let in_menu = egui::Popup::is_any_open(presenter.egui_context());
         if response.repaint && self.has_widgets() && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
@@ -78,7 +79,7 @@ impl ApplicationHandler<Wake> for App {
                 }
                 // Escape and F1 leave the list of keys even during text input.
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
-                if pressed && typing && !(leaves && self.help.open) {
+                if pressed && (typing || in_menu && is_for_menu(&event.logical_key)) && !(leaves && self.help.open) {
                     return;
                 }
                 if pressed {
@@ -207,4 +208,11 @@ impl App {
         }
         true
     }
+}
+
+/// Whether an open menu takes a key: those that move in it, choose, and close it.
+fn is_for_menu(key: &Key) -> bool {
+    use NamedKey::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Escape, Space, Tab};
+    let Key::Named(key) = key else { return false };
+    [ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Escape, Space, Tab].contains(key)
 }
