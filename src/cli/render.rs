@@ -278,12 +278,16 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if let Some(failure) = failure.take() {
         return Err(failure);
     }
-    let denoise_start = Instant::now();
-    let denoised = match denoised.filter(|(spp, _)| *spp == film.spp()) {
-        Some((_, found)) => Some(found),
-        None => job.denoised(&film, &mut guides, &asked)?,
+    let (denoised, denoise_seconds) = match denoised.filter(|(spp, _)| *spp == film.spp()) {
+        // `--error-of denoised` has made it.
+        Some((_, found)) => (Some(found), None),
+        None => {
+            let start = Instant::now();
+            let found = job.denoised(&film, &mut guides, &asked)?;
+            let seconds = found.is_some().then(|| start.elapsed().as_secs_f64());
+            (found, seconds)
+        }
     };
-    let denoise_seconds = denoised.is_some().then(|| denoise_start.elapsed().as_secs_f64());
     if args.wants_denoised() && denoised.is_none() {
         remark(format_args!("warning: stopped before the image was denoised: {} is raw", args.output_name()));
     }
@@ -448,7 +452,6 @@ fn json(
         "features_s": features_seconds,
         "render_s": report.seconds,
         "cpu_s": cpu_seconds,
-        // Feature buffers of its own included; none of it is in `render_s` and `cpu_s`.
         "denoise_s": denoise_seconds,
         "threads": rayon::current_num_threads(),
         "rays": {

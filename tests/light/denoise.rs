@@ -65,6 +65,26 @@ fn no_number_of_samples_makes_it_worse_than_raw() {
     }
 }
 
+/// Between two powers of two, the film knows what came since the last one beside the step of that one.
+#[test]
+fn what_came_since_the_last_doubling_is_the_change_of_the_mean() {
+    let scene = room();
+    let mut film = Film::new(SIZE.0, SIZE.1);
+    let mut to = |spp| {
+        advance(&scene, &RenderSettings::default(), &mut film, spp, &|| false);
+        (film.means(), film.half_steps().expect("from two samples on"))
+    };
+    let ((of_two, _), (of_four, at_four), (of_six, at_six)) = (to(2), to(4), to(6));
+    let is_near = |a: Vec3, b: Vec3| (a - b).abs().max_element() <= 1e-5 * (1.0 + b.abs().max_element());
+    for pixel in 0..of_four.len() {
+        assert!(is_near(at_four.steps[pixel], of_four[pixel] - of_two[pixel]), "{pixel}");
+        assert!(is_near(at_four.late[pixel], Vec3::ZERO) && at_four.doubled[pixel] == 1.0, "{pixel}");
+        assert_eq!(at_six.steps[pixel], at_four.steps[pixel]);
+        assert!(is_near(at_six.late[pixel], of_six[pixel] - of_four[pixel]), "{pixel}");
+        assert!((at_six.doubled[pixel] - 4.0 / 6.0).abs() < 1e-6);
+    }
+}
+
 /// Guides can be had at once and be made better later.
 #[test]
 fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {

@@ -282,7 +282,7 @@ mod tests {
         assert_eq!(bright, 0, "grains");
     }
 
-    /// One sample in eight carries all light: the limit takes much of it away.
+    /// One sample in eight carries all light: the limit takes an eighth of it away.
     #[test]
     fn light_from_rare_samples_is_given_back() {
         let scene = floor();
