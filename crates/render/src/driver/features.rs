@@ -253,11 +253,11 @@ pub(super) struct PartTracer {
 
 impl PartTracer {
     /// - `media`: in which camera paths start.
-    /// - `materials_beyond`: see [`FeatureWave::materials_beyond`].
-    pub fn begin(snapshot: &Prepared, media: &[u32], materials_beyond: bool) -> Self {
+    /// - `for_denoiser`: see [`FeatureWave::for_denoiser`].
+    pub fn begin(snapshot: &Prepared, media: &[u32], for_denoiser: bool) -> Self {
         let mut tracer = Self::default();
         tracer.wave.begin_in(snapshot, media);
-        tracer.wave.materials_beyond = materials_beyond;
+        tracer.wave.for_denoiser = for_denoiser;
         tracer
     }
 

@@ -4,6 +4,9 @@
 //! feature of a sample belongs to the radiance of that sample. No light is evaluated, and no path continues beyond the
 //! first scattering surface. The features are the same for both integrators.
 //!
+//! What guides the denoiser must have as little noise as possible: there both the reflected and the refracted path of
+//! the first glass are followed, mixed by their probabilities, and later the more probable one.
+//!
 //! Diffuse surfaces are handled sixteen at a time (`simd/first_hits.rs`), all others one by one. Start reading at
 //! [`FeatureWave::trace`].
 
@@ -35,6 +38,14 @@ const MOST_SEGMENTS: u32 = 32;
 
 const MISSES: usize = 0;
 
+/// A second path from the first surface of a slot.
+struct Branch {
+    /// Of the camera ray.
+    slot: u32,
+    /// Probability of this path, 0..1.
+    share: f32,
+}
+
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct FeatureWave {
@@ -47,9 +58,12 @@ pub(crate) struct FeatureWave {
     seen: Vec<Seen>,
     /// Per slot: depth along the view axis so far in metres, and depth per metre of the present segment.
     way: Vec<(f32, f32)>,
-    /// Whether the material is that of the surface that is seen, in mirrors and through glass too, instead of that which
-    /// the camera ray hits.
-    pub materials_beyond: bool,
+    /// The second paths of slots, in slots of their own.
+    branches: Vec<Branch>,
+    /// Whether the features are for the denoiser: free of the noise of glass as far as possible, and with the material of
+    /// the surface that is seen, in mirrors and through glass too, instead of that which the camera ray hits; an emitter's
+    /// if there is one.
+    pub for_denoiser: bool,
 }
 
 impl FeatureWave {
@@ -76,6 +90,7 @@ impl FeatureWave {
         self.seen.clear();
         self.seen.resize(n_slots, Seen::NOTHING);
         self.way.resize(n_slots.max(self.way.len()), (0.0, 0.0));
+        self.branches.clear();
         let most = settings.max_depth.min(MOST_SEGMENTS);
         for depth in 1..=most {
             if self.paths.is_empty() {
@@ -87,11 +102,18 @@ impl FeatureWave {
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
-            self.next.start(self.paths.len(), glass, false);
+            let most_next = if depth == 1 && self.for_denoiser { 2 * self.paths.len() } else { self.paths.len() };
+            self.next.start(most_next, glass, false);
             self.see(scene, settings, depth, depth == most);
             std::mem::swap(&mut self.paths, &mut self.next);
         }
-        Some(&self.seen)
+        let emits = |id: MaterialId| scene.tables.emission.get(id as usize).is_some_and(Option::is_some);
+        for (branch, k) in self.branches.iter().zip(n_slots..) {
+            let (first, second) = (self.seen[branch.slot as usize], self.seen[k]);
+            let material = if emits(second.material) { second.material } else { first.material };
+            self.seen[branch.slot as usize] = Seen { material, ..first.mixed_with(&second, branch.share) };
+        }
+        Some(&self.seen[..n_slots])
     }
 
     fn see(&mut self, scene: &Prepared, settings: &RenderSettings, depth: u32, is_last: bool) {
@@ -135,32 +157,46 @@ impl FeatureWave {
         let along = so_far + hit.t * axial;
         let at = Met { vertex: Vertex::new(scene, &ray, &hit, material), ray, hit, material };
         let vertex = &at.vertex;
-        if !is_last && let Some(sample) = self.specular_bounce(scene, depth, &path, &at) {
+        if !is_last && let Some(Bounces { first, second }) = self.specular_bounces(scene, depth, &path, &at) {
             self.way[slot].0 = along;
-            // Removes the n² scale of radiance, which is no colour.
-            let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze);
-            path.throughput *= sample.weight / (squeeze * squeeze);
-            let origin = match sample.through {
-                Some(interface) => {
-                    path.media = interface.beyond;
-                    vertex.passing(sample.wi)
-                }
-                None => vertex.leaving(sample.wi),
-            };
-            self.next.push(&Ray::new(origin, sample.wi), &path);
+            self.go_on(&path, vertex, &first);
+            if let Some(second) = second {
+                self.branches.push(Branch { slot: path.slot, share: second.chance / (first.chance + second.chance) });
+                path.slot = self.seen.len() as u32;
+                self.seen.push(self.seen[slot]);
+                self.way.resize(self.way.len().max(self.seen.len()), (0.0, 0.0));
+                self.way[path.slot as usize] = self.way[slot];
+                self.go_on(&path, vertex, &second);
+            }
             return;
         }
         let albedo = path.throughput * visible_albedo(scene, vertex, material);
         let seen = &mut self.seen[slot];
         (seen.albedo, seen.normal, seen.position) = (albedo, vertex.normal, vertex.position);
         seen.depth = along;
-        if self.materials_beyond {
+        if self.for_denoiser {
             seen.material = material;
         }
     }
 
-    /// Samples the continuation at a purely specular surface, as in the image; `None` at all others.
-    fn specular_bounce(&mut self, scene: &Prepared, depth: u32, path: &Path, at: &Met) -> Option<BsdfSample> {
+    /// Continues a path from a specular surface.
+    fn go_on(&mut self, path: &Path, vertex: &Vertex, sample: &BsdfSample) {
+        let mut path = *path;
+        // Removes the n² scale of radiance, which is no colour.
+        let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze);
+        path.throughput *= sample.weight / (squeeze * squeeze);
+        let origin = match sample.through {
+            Some(interface) => {
+                path.media = interface.beyond;
+                vertex.passing(sample.wi)
+            }
+            None => vertex.leaving(sample.wi),
+        };
+        self.next.push(&Ray::new(origin, sample.wi), &path);
+    }
+
+    /// Samples the continuations at a purely specular surface; `None` at all others, or if no path goes on.
+    fn specular_bounces(&mut self, scene: &Prepared, depth: u32, path: &Path, at: &Met) -> Option<Bounces> {
         let Met { ray, hit, material: id, vertex } = at;
         let id = *id;
         let material = &scene.shading.materials[id as usize];
@@ -172,22 +208,23 @@ impl FeatureWave {
         {
             return None;
         }
+        let lobes = match (self.for_denoiser, depth) {
+            (false, _) => Lobes::AsInImage,
+            (true, 1) => Lobes::Both,
+            (true, _) => Lobes::MoreProbable,
+        };
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, ray, hit, id, vertex.front));
-        let first = first_dimension(depth);
-        let sample = match material {
+        match material {
             Material::Principled { .. } => {
-                bounce(&principled_at(scene, id, vertex, &mut sides.as_mut(), 0, true)?, vertex, &path.sampler, first)
+                let bsdf = principled_at(scene, id, vertex, &mut sides.as_mut(), 0, true)?;
+                bounces(&bsdf, vertex, &path.sampler, depth, lobes)
             }
             Material::Blend { .. } | Material::Phong { .. } => {
-                bounce(&blend_at(scene, id, vertex, sides.as_mut())?, vertex, &path.sampler, first)
+                bounces(&blend_at(scene, id, vertex, sides.as_mut())?, vertex, &path.sampler, depth, lobes)
             }
-            _ => bounce(&lobe_at(scene, id, vertex, sides.as_mut())?, vertex, &path.sampler, first),
-        }?;
-        let passes = sample.through.is_some();
-        let leads_on =
-            if passes { sample.wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(sample.wi) };
-        (leads_on && sample.weight != Vec3::ZERO).then_some(sample)
+            _ => bounces(&lobe_at(scene, id, vertex, sides.as_mut())?, vertex, &path.sampler, depth, lobes),
+        }
     }
 }
 
@@ -199,10 +236,45 @@ struct Met {
     vertex: Vertex,
 }
 
-fn bounce(bsdf: &impl Scatter, vertex: &Vertex, sampler: &Sampler, first: u32) -> Option<BsdfSample> {
+/// Which lobes of a specular surface are followed.
+#[derive(Clone, Copy)]
+enum Lobes {
+    /// That of the image, at random.
+    AsInImage,
+    /// The more probable of two.
+    MoreProbable,
+    /// The first and the last one, if they differ.
+    Both,
+}
+
+/// Continuations of a path.
+struct Bounces {
+    first: BsdfSample,
+    second: Option<BsdfSample>,
+}
+
+/// Returns `None` if the surface is not purely specular, or no path goes on.
+fn bounces(bsdf: &impl Scatter, vertex: &Vertex, sampler: &Sampler, depth: u32, lobes: Lobes) -> Option<Bounces> {
     if bsdf.has_non_specular() {
         return None;
     }
-    let (u_lobe, u) = (|| sampler.single(first + DIM_LOBE), sampler.pair(first + DIM_DIRECTION));
-    bsdf.sample(vertex.wo, vertex.normal, u_lobe, u)
+    let dimension = first_dimension(depth);
+    let u = sampler.pair(dimension + DIM_DIRECTION);
+    let sample = |u_lobe: &dyn Fn() -> f32| {
+        let sample = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u)?;
+        let leads_on = match sample.through {
+            Some(_) => sample.wi.dot(vertex.geometric_normal) < 0.0,
+            None => vertex.is_reached_from(sample.wi),
+        };
+        (leads_on && sample.weight != Vec3::ZERO).then_some(sample)
+    };
+    let only = |first: BsdfSample| Bounces { first, second: None };
+    match lobes {
+        Lobes::AsInImage => sample(&|| sampler.single(dimension + DIM_LOBE)).map(only),
+        Lobes::MoreProbable => sample(&|| 0.5).map(only),
+        Lobes::Both => match (sample(&|| 0.0), sample(&|| 1.0f32.next_down())) {
+            (Some(first), Some(second)) => Some(Bounces { first, second: (second.wi != first.wi).then_some(second) }),
+            (one, other) => one.or(other).map(only),
+        },
+    }
 }

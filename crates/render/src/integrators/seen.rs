@@ -35,4 +35,21 @@ impl Seen {
         object: Self::NONE,
         material: Self::NONE,
     };
+
+    /// Features of two paths that begin alike, with this share of the other one, 0..1; the depth is that of the path
+    /// that hits something, if one does not.
+    pub fn mixed_with(&self, other: &Self, share: f32) -> Self {
+        let depth = match (self.depth.is_finite(), other.depth.is_finite()) {
+            (true, true) => self.depth + share * (other.depth - self.depth),
+            (true, false) => self.depth,
+            _ => other.depth,
+        };
+        Self {
+            albedo: self.albedo.lerp(other.albedo, share),
+            normal: self.normal.lerp(other.normal, share),
+            position: self.position.lerp(other.position, share),
+            depth,
+            ..*self
+        }
+    }
 }

@@ -102,7 +102,7 @@ impl Scatter for Lobe {
 
     #[inline]
     fn sample(&self, wo: Vec3, normal: Vec3, u_choice: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        let specular = |wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, through };
+        let specular = |chance, wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, chance, through };
         match *self {
             Self::Diffuse { albedo } => {
                 let local = cosine_hemisphere(u);
@@ -111,13 +111,14 @@ impl Scatter for Lobe {
                     wi,
                     weight: albedo,
                     pdf: cosine_hemisphere_pdf(local.z),
+                    chance: 1.0,
                     through: None,
                 })
             }
-            Self::Mirror { reflectance } => Some(specular(mirrored(wo, normal), reflectance, None)),
+            Self::Mirror { reflectance } => Some(specular(1.0, mirrored(wo, normal), reflectance, None)),
             Self::Metal { alpha, reflectance, fresnel, .. } if alpha < SMALLEST_ALPHA => {
                 let tint = fresnel.reflectance(reflectance, normal.dot(wo));
-                Some(specular(mirrored(wo, normal), tint, None))
+                Some(specular(1.0, mirrored(wo, normal), tint, None))
             }
             Self::Metal { alpha, reflectance, fresnel, compensate } => {
                 let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
@@ -131,7 +132,7 @@ impl Scatter for Lobe {
                 }
                 let found = metal.eval_one(local);
                 let weight = Vec3::from(found.tint) * found.weight;
-                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, through: None })
+                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, chance: 1.0, through: None })
             }
             Self::RoughGlass { interface, alpha, compensate } => {
                 let surface = RoughGlass::new(normal, wo, alpha, interface, compensate);
@@ -139,6 +140,7 @@ impl Scatter for Lobe {
                     wi,
                     weight: Vec3::splat(weight),
                     pdf,
+                    chance: 1.0,
                     through: passes.then_some(interface),
                 })
             }
@@ -147,11 +149,11 @@ impl Scatter for Lobe {
                 let (reflectance, cos_t) = fresnel(normal.dot(wo).clamp(0.0, 1.0), eta);
                 if u_choice() < reflectance {
                     // The weight f·cos/pdf is reflectance over the probability of reflection: one.
-                    Some(specular(mirrored(wo, normal), Vec3::ONE, None))
+                    Some(specular(reflectance, mirrored(wo, normal), Vec3::ONE, None))
                 } else {
                     // Radiance scales with n² across the interface: the factor η².
                     let wi = refract(wo.into(), normal.into(), eta, cos_t).into();
-                    Some(specular(wi, Vec3::splat(squeeze * squeeze), Some(interface)))
+                    Some(specular(1.0 - reflectance, wi, Vec3::splat(squeeze * squeeze), Some(interface)))
                 }
             }
         }

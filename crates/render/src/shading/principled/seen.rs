@@ -270,7 +270,7 @@ impl<'a> Seen<'a> {
         }
         let wi = frame.to_world(local).normalize();
         let (value, pdf) = self.eval(wi);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, through: None })
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, chance: 1.0, through: None })
     }
 
     fn sample_reflection(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
@@ -278,7 +278,7 @@ impl<'a> Seen<'a> {
             let wi = self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize();
             let below = self.below_coat(wi) * self.past_sheen;
             let weight = self.tint(self.wo.z) * (below / pmf);
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, through: None });
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
         }
         let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
         self.reflected(mirrored(self.wo, half), &self.frame)
@@ -290,7 +290,7 @@ impl<'a> Seen<'a> {
             let wi = coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize();
             let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.z);
             let weight = tint * (self.of.coat / pmf);
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, through: None });
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
         }
         let half: Vec3 = sample_anisotropic_normal(coat.wo.into(), [self.of.coat_alpha; 2], u.to_array()).into();
         let local = mirrored(coat.wo, half);
@@ -307,9 +307,10 @@ impl<'a> Seen<'a> {
             let cos = self.frame.z.dot(wi).abs();
             self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, cos))
         };
-        let specular = |wi: Vec3, weight: Vec3, passes: bool| {
+        let specular = |chance: f32, wi: Vec3, weight: Vec3, passes: bool| {
             let through = passes.then(|| transmission.interface());
-            Some(BsdfSample { wi, weight: weight * (share * below(wi)), pdf: f32::INFINITY, through })
+            let weight = weight * (share * below(wi));
+            Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf * chance, through })
         };
         let wo = self.frame.to_world(self.wo).normalize();
         match transmission.inside {
@@ -317,22 +318,31 @@ impl<'a> Seen<'a> {
                 let found = self.rough_glass(interface).sample(u_choice, u)?;
                 if !found.passes {
                     let (value, pdf) = self.eval(found.wi);
-                    return (pdf > 0.0).then(|| BsdfSample { wi: found.wi, weight: value / pdf, pdf, through: None });
+                    return (pdf > 0.0).then(|| BsdfSample {
+                        wi: found.wi,
+                        weight: value / pdf,
+                        pdf,
+                        chance: 1.0,
+                        through: None,
+                    });
                 }
                 let weight = transmission.tint * (found.weight * share * below(found.wi));
                 let pdf = if transmission.is_lit { found.pdf * pmf } else { f32::INFINITY };
-                Some(BsdfSample { wi: found.wi, weight, pdf, through: Some(interface) })
+                Some(BsdfSample { wi: found.wi, weight, pdf, chance: 1.0, through: Some(interface) })
             }
             Inside::Solid(interface) => {
                 let (reflectance, cos_t) = fresnel(self.wo.z.min(1.0), interface.eta);
                 if u_choice < reflectance {
-                    specular(self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize(), Vec3::ONE, false)
+                    let wi = self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize();
+                    specular(reflectance, wi, Vec3::ONE, false)
                 } else {
                     let wi = refract(wo.into(), self.frame.z.into(), interface.eta, cos_t).into();
-                    specular(wi, transmission.tint * interface.squeeze * interface.squeeze, true)
+                    specular(1.0 - reflectance, wi, transmission.tint * interface.squeeze * interface.squeeze, true)
                 }
             }
-            Inside::Thin(_) if self.of.is_smooth() => specular(-wo, transmission.tint * self.passed(self.wo.z), true),
+            Inside::Thin(_) if self.of.is_smooth() => {
+                specular(1.0, -wo, transmission.tint * self.passed(self.wo.z), true)
+            }
             Inside::Thin(_) => {
                 let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
                 let above = mirrored(self.wo, half);
@@ -344,7 +354,7 @@ impl<'a> Seen<'a> {
                 let (value, pdf) = self.eval_through(&transmission, wi, local);
                 let stated = if transmission.is_lit { pdf } else { f32::INFINITY };
                 let through = Some(transmission.interface());
-                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, through })
+                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, chance: 1.0, through })
             }
         }
     }
