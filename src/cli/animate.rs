@@ -11,6 +11,7 @@ use super::stop::Stop;
 use super::video;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{SettingsStore, Target, along, read_film_summary, turntable, write_film_with_features};
+use firstlight::render::GuideGatherer;
 use firstlight::scene::whole_file::WholeFile;
 use firstlight::scene::{ImageMetadata, ImageSamples};
 use std::path::Path;
@@ -53,7 +54,7 @@ pub(super) fn animate(
                 let claim = WholeFile::claim(path, replace)?;
                 write_film_with_features(&film, features.as_ref(), &job.note(&film, path), claim)?;
             }
-            let denoised = job.denoised(&film, &mut None, &|| false)?;
+            let denoised = job.denoised(&film, &mut GuideGatherer::default(), &|| false)?;
             job.write(args, (&film, features.as_ref()), denoised.as_ref(), &path, replace)?;
         }
         stop.has_saved(format!("{} of {n} frames are saved", done + 1));

@@ -9,7 +9,7 @@ use super::job::RenderJob;
 use super::progress::Progress;
 use super::render::Command;
 use super::render_args::RenderArgs;
-use firstlight::render::{Denoised, Film};
+use firstlight::render::{Denoised, Film, GuideGatherer};
 use firstlight::scene::{Files, ImageMetadata};
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,7 @@ impl FilmDenoiser {
             let message = "cannot be denoised: it was rendered with a different";
             return Err(Failure::Failed(format!("{}: {message} {what}", self.path.display())));
         }
-        let denoised = self.job.denoised(film, &mut None, &|| false)?;
+        let denoised = self.job.denoised(film, &mut GuideGatherer::default(), &|| false)?;
         Ok(denoised.expect("nothing stops it"))
     }
 }

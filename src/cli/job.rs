@@ -13,8 +13,8 @@ use firstlight::frame::{
 };
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
-    Denoised, Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
-    SurfaceGuides, gather_guides,
+    Denoised, Display, ErrorMetric, FEATURE_SAMPLES, Film, GuideGatherer, Purpose, RenderSettings, Room,
+    SampleAllocation, guide_samples,
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
@@ -202,19 +202,22 @@ impl RenderJob {
 
     /// The denoised film; `None` if it is not requested or `stop` returned true.
     ///
-    /// - `guides`: of this scene and view, gathered at the first call.
+    /// - `guides`: of this scene and view, gathered as far as the film's samples ask for; new at the first call.
     pub fn denoised(
         &self,
         film: &Film,
-        guides: &mut Option<SurfaceGuides>,
+        guides: &mut GuideGatherer,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Denoised>, Failure> {
         let Some(denoiser) = &self.denoiser else { return Ok(None) };
-        if guides.is_none() {
-            let size = UVec2::new(film.width(), film.height());
-            *guides = gather_guides(&self.extraction.prepared, &self.settings, size, FEATURE_SAMPLES, stop);
+        if guides.samples() == 0 {
+            guides.start(UVec2::new(film.width(), film.height()));
         }
-        guides.as_ref().map_or(Ok(None), |guides| denoiser.denoise(film, guides, stop))
+        let (scene, settings) = (&self.extraction.prepared, &self.settings);
+        if !guides.gather(scene, settings, guide_samples(film.spp()), stop) {
+            return Ok(None);
+        }
+        denoiser.denoise(film, guides.guides(), stop)
     }
 
     /// Writes an image with its metadata to a file or to standard output.

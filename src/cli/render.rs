@@ -17,7 +17,7 @@ use firstlight::frame::{
     OfflineReport, Progress as Measured, Target, read_film_file, render_measured_until, render_offline_until,
     render_region_until, write_errors, write_film_with_features,
 };
-use firstlight::render::{BadSample, Denoised, Film, Region, worker_threads};
+use firstlight::render::{BadSample, Denoised, Film, GuideGatherer, Region, worker_threads};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{Files, SceneSource};
@@ -224,7 +224,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let region = region.as_ref();
     let RenderJob { extraction, settings, .. } = &*job;
     // The denoised image with its samples per pixel, and what guides the denoiser.
-    let (mut denoised, mut guides) = (None, None);
+    let (mut denoised, mut guides) = (None, GuideGatherer::default());
     let failure = Cell::new(None);
     let told = |now: Measured| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));

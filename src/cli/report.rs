@@ -8,8 +8,7 @@ use super::stop::Stop;
 use clap::Args;
 use firstlight::oidn::{Oidn, OidnError};
 use firstlight::render::{
-    ErrorMetric, FEATURE_SAMPLES, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, gather_guides,
-    worker_threads,
+    ErrorMetric, GuideGatherer, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
 };
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
@@ -301,9 +300,14 @@ impl ReportScene {
                 .collect()
         };
         let prepared = self.prepared();
-        let gather = || gather_guides(&prepared, &self.settings, self.size.into(), FEATURE_SAMPLES, &|| false);
-        let (guides, took) = timed(|| gather().expect("nothing stops it"));
-        let denoised = denoised_curves(&steps, (&guides, took), oidn, &reference.picture, &display);
+        let (mut gatherer, mut took) = (GuideGatherer::default(), 0.0);
+        gatherer.start(self.size.into());
+        let mut gather = |samples| {
+            let (_, more) = timed(|| gatherer.gather(&prepared, &self.settings, samples, &|| false));
+            took += more;
+            (gatherer.guides().clone(), took)
+        };
+        let denoised = denoised_curves(&steps, &mut gather, oidn, &reference.picture, &display);
         let denoised = denoised.unwrap_or_else(|error| {
             remark(format_args!("warning: {error}"));
             Vec::new()

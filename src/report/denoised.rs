@@ -3,7 +3,7 @@
 use super::curve::{Seconds, seconds_to};
 use super::{CurveStep, Distance, LinearPicture, cpu_seconds};
 use crate::oidn::{Oidn, OidnError};
-use crate::render::{Denoised, Display, SurfaceGuides, denoise_source};
+use crate::render::{Denoised, Display, SurfaceGuides, denoise_source, guide_samples};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -68,19 +68,21 @@ const NAMES: [&str; 3] = ["denoised", "Open Image Denoise combined with raw", "O
 
 /// Denoises each step and compares it with `reference`, which must have the same size.
 ///
-/// - `guides`: of the scene, and the seconds that it took to gather them; `oidn`: the library, if it is installed.
+/// - `gather`: gathers guides of at least so many samples per pixel, and returns them with the seconds that all calls took
+///   so far; `oidn`: the library, if it is installed.
 ///
 /// # Errors
 /// If the library reports one.
 pub fn denoised_curves(
     steps: &[CurveStep],
-    (guides, guides_took): (&SurfaceGuides, f64),
+    gather: &mut dyn FnMut(u32) -> (SurfaceGuides, f64),
     oidn: Option<&Oidn>,
     reference: &LinearPicture,
     display: &Display,
 ) -> Result<Vec<DenoisedCurve>, OidnError> {
     let mut curves: Vec<DenoisedCurve> = NAMES.map(|name| DenoisedCurve { name, steps: Vec::new() }).into();
     for step in steps {
+        let (guides, guides_took) = &gather(guide_samples(step.spp));
         let measured = |pixels: Vec<Vec3>, took: f64, estimate| {
             let (width, height) = (step.picture.width, step.picture.height);
             let picture = LinearPicture { width, height, pixels };

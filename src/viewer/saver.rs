@@ -5,7 +5,8 @@ use crate::frame::{
     render_offline_until,
 };
 use crate::render::{
-    DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, worker_threads,
+    DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, guide_samples,
+    worker_threads,
 };
 use crate::scene::file::check_film_size;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
@@ -70,7 +71,8 @@ impl DenoiseWith {
         let pool = worker_threads().num_threads(self.threads).build().ok()?;
         let size = UVec2::new(film.width(), film.height());
         pool.install(|| {
-            let guides = gather_guides(&self.prepared, &self.settings, size, FEATURE_SAMPLES, &stop)?;
+            let samples = guide_samples(film.spp());
+            let guides = gather_guides(&self.prepared, &self.settings, size, samples, &stop)?;
             let (by, denoised) = self.filter.denoise(&DenoiseSource::of(film), &guides, &stop)?;
             Some((denoised.color, by))
         })

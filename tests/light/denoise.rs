@@ -101,11 +101,11 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
         }
         for is_stopped in [false, true] {
             if is_stopped {
-                assert!(!steps.gather(&scene, &settings, 32, &|| true), "it is told to stop");
+                assert!(!steps.gather(&scene, &settings, 100, &|| true), "it is told to stop");
                 assert_eq!(steps.samples(), 0);
             }
             steps.start(size);
-            for samples in [1, 4, 4, 7, 16, 18] {
+            for samples in [1, 4, 4, 7, 16, 18, 64] {
                 assert!(steps.gather(&scene, &settings, samples, &|| false));
                 assert_eq!(steps.samples(), samples);
                 assert_eq!(*steps.guides(), gather(samples), "{samples} samples, {simd:?}");
@@ -113,11 +113,24 @@ fn guides_in_steps_are_those_of_one_pass_and_of_feature_buffers() {
         }
         // The seed of the guides differs from that of the image.
         let other = RenderSettings { seed: settings.seed ^ 0x9e37_79b9, ..settings };
-        let features = gather_features(&scene, &other, size, 18, &|| false).expect("nothing stops it");
-        let guides = steps.guides();
-        assert_eq!(guides.albedo, features.albedo);
-        assert_eq!(guides.normal, features.normal);
-        assert_eq!(guides.depth, features.depth);
+        let features = |samples| gather_features(&scene, &other, size, samples, &|| false).expect("nothing stops it");
+        let (guides, of_all) = (gather(16), features(16));
+        assert_eq!(guides.albedo, of_all.albedo);
+        assert_eq!(guides.normal, of_all.normal);
+        assert_eq!(guides.depth, of_all.depth);
+        // Further samples of those pixels only that need them, but of all that do.
+        let (better, of_all) = (steps.guides(), features(64));
+        let n_better = (0..better.depth.len()).filter(|&i| better.depth[i] != guides.depth[i]).count();
+        assert!(n_better > 100 && n_better < better.depth.len() / 3, "{n_better}");
+        let mut n_off = 0;
+        for i in 0..better.depth.len() {
+            let is_better = better.depth[i] != guides.depth[i];
+            assert!(!is_better || better.albedo[i] == of_all.albedo[i] && better.normal[i] == of_all.normal[i], "{i}");
+            let off = better.albedo[i] - of_all.albedo[i];
+            n_off += usize::from(off.length() > 0.06 * of_all.albedo[i].length());
+        }
+        // What none of the first samples has seen.
+        assert!(n_off < better.depth.len() / 200, "{n_off}");
         let n_emitters = guides.emitters.iter().filter(|emits| **emits).count();
         assert!(n_emitters > 0 && n_emitters < guides.emitters.len() / 4, "{n_emitters}");
     }

@@ -39,7 +39,7 @@ pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
 pub use driver::denoised::{DenoiseSource, denoise_film, denoise_source, denoise_source_with};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
-pub use driver::guides::{GuideGatherer, SurfaceGuides, gather_guides};
+pub use driver::guides::{GuideGatherer, SurfaceGuides, gather_guides, guide_samples};
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };

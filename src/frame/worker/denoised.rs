@@ -11,7 +11,7 @@ use super::thread::Loop;
 use super::views::{Settled, ViewKey};
 use super::{Denoising, lock};
 use crate::render::{
-    DenoiseSource, FEATURE_SAMPLES, Film, Inspection, MovingFilter, develop, develop_colors, smooth_film,
+    DenoiseSource, Film, Inspection, MovingFilter, develop, develop_colors, guide_samples, smooth_film,
 };
 use glam::UVec2;
 use std::sync::atomic::Ordering;
@@ -29,7 +29,7 @@ const MANY_MORE: u32 = 4;
 const FIRST_SAMPLES: [(u32, Duration); 3] =
     [(4, Duration::ZERO), (2, Duration::from_millis(700)), (1, Duration::from_secs(3))];
 
-/// Samples per pixel of the guides of the first denoised image of a view; all later ones have [`FEATURE_SAMPLES`].
+/// Samples per pixel of the guides of the first denoised image of a view; later ones have [`guide_samples`].
 const FIRST_GUIDE_SAMPLES: u32 = 8;
 
 impl Loop<'_> {
@@ -82,14 +82,14 @@ impl Loop<'_> {
         let (Some(job), Some((1, film)), Some(key)) = (&self.job, &self.film, self.settled_key()) else { return };
         let (before, guides_before) = self.settled(key).map_or((0, 0), |settled| (settled.spp, settled.guide_samples));
         let is_first = before == 0;
-        let guide_samples = if is_first && !is_last { FIRST_GUIDE_SAMPLES } else { FEATURE_SAMPLES };
+        let spp = film.spp_in(self.active_region().as_ref());
+        let guide_samples = if is_first && !is_last { FIRST_GUIDE_SAMPLES } else { guide_samples(spp) };
         let pool = lock(&self.shared.pool).clone();
         let mut is_urgent = is_first;
         let image = if self.denoiser.guide_samples(key) < FIRST_GUIDE_SAMPLES && !is_last {
             // The film gets more samples meanwhile, from which the first image is made then.
             None
         } else {
-            let spp = film.spp_in(self.active_region().as_ref());
             let left =
                 self.views.settle_again.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()));
             let took = self.settled(key).map_or(Duration::ZERO, |settled| settled.took);
@@ -103,7 +103,7 @@ impl Loop<'_> {
                 false => waits && !is_urgent,
             };
             let is_due = match is_last {
-                true => spp > before || guides_before < FEATURE_SAMPLES,
+                true => spp > before || guides_before < guide_samples,
                 false => spp > before && !is_soon && 4 * u64::from(spp) >= 5 * u64::from(before),
             };
             // A copy of the film would delay the answer to what has arrived.

@@ -13,7 +13,7 @@ use crate::film::features::{FeatureBuffers, IdCounts, IdShares};
 use crate::integrators::features::FeatureWave;
 use crate::integrators::path::CameraPath;
 use crate::integrators::seen::Seen;
-use crate::integrators::simd::camera::CameraRays;
+use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
 use glam::{UVec2, Vec3};
@@ -61,6 +61,8 @@ pub fn gather_features_and_ids(
 /// Rows per band, and columns per part of it: blocks of 4 × 4 rays are traced together.
 pub(super) const BAND: u32 = 8;
 const PART: u32 = 128;
+/// Pixels that are traced together at most.
+pub(super) const PART_PIXELS: usize = (BAND * PART) as usize;
 
 /// Paths in flight at once.
 const WAVE_SIZE: usize = 4096;
@@ -174,7 +176,7 @@ impl Worker {
         self.ids.clear();
         self.ids.resize(if band.ids.is_some() { n_pixels } else { 0 }, Default::default());
         let Self { tracer, sums, ids } = self;
-        let done = tracer.trace(look, part, 0..samples, stop, |one| {
+        let done = tracer.trace(look, &part.pixels(), 0..samples, stop, |one| {
             if samples == 1 {
                 for (local, seen) in one.iter().enumerate() {
                     band.set_one(at(local), seen);
@@ -220,6 +222,12 @@ impl Part {
         })
     }
 
+    /// Its pixels, `local` row by row.
+    pub fn pixels(&self) -> Pixels {
+        let origin = UVec2::new(self.columns.start, self.rows.start);
+        pixels_in_blocks(origin, UVec2::new(self.columns.len() as u32, self.rows.len() as u32))
+    }
+
     pub fn n_pixels(&self) -> usize {
         self.rows.len() * self.columns.len()
     }
@@ -261,20 +269,20 @@ impl PartTracer {
         tracer
     }
 
-    /// Calls `each` with what each pixel of the part, row by row, sees in each of the samples, in ascending order; false
-    /// if `stop` returned true.
+    /// Calls `each` with what each of the pixels sees in each of the samples, in ascending order; false if `stop` returned
+    /// true.
+    ///
+    /// - `pixels`: `local` is the index in what `each` gets.
     pub fn trace(
         &mut self,
         look: &Look,
-        part: &Part,
+        pixels: &Pixels,
         samples: Range<u32>,
         stop: &(dyn Fn() -> bool + Sync),
         mut each: impl FnMut(&[Seen]),
     ) -> bool {
         let Look { snapshot, settings, lens } = look;
-        let origin = UVec2::new(part.columns.start, part.rows.start);
-        let pixels = pixels_in_blocks(origin, UVec2::new(part.columns.len() as u32, part.rows.len() as u32));
-        let n_pixels = part.n_pixels();
+        let n_pixels = pixels.local.len();
         let step = (WAVE_SIZE / n_pixels).clamp(1, samples.len().max(1)) as u32;
         for first in samples.clone().step_by(step as usize) {
             let numbers = first..samples.end.min(first.saturating_add(step));
@@ -284,7 +292,7 @@ impl PartTracer {
                     if let Some(set) = settings.simd
                         && lens.is_plain()
                     {
-                        lens.start_paths(set, &pixels, 0..pixels.local.len(), sample, slot(sample), paths);
+                        lens.start_paths(set, pixels, 0..n_pixels, sample, slot(sample), paths);
                         continue;
                     }
                     for i in 0..n_pixels {

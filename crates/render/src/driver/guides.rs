@@ -1,14 +1,16 @@
 //! What guides the denoiser: albedo, normal and depth of the first surface that is not specular.
 //!
 //! Gathered like [feature buffers](super::features), by camera rays alone, but only as sums of what the denoiser reads.
-//! They can be extended: the first samples of a view give guides at once, and more samples better ones. Start reading at
-//! [`GuideGatherer`].
+//! They can be extended: the first samples of a view give guides at once, and more samples better ones. The noise of the
+//! guides stays in the denoised image, at edges, in textures and in glass above all: pixels whose first samples differ
+//! get more than the others. Start reading at [`GuideGatherer`].
 
 use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
 use crate::denoise::Guides;
-use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, Part, PartTracer};
+use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, PART_PIXELS, Part, PartTracer};
 use crate::integrators::seen::Seen;
+use crate::integrators::simd::camera::Pixels;
 use crate::prepare::prepared::Prepared;
 use bytemuck::{Zeroable, zeroed_vec};
 use glam::{UVec2, Vec3};
@@ -39,9 +41,21 @@ impl SurfaceGuides {
     }
 }
 
+/// Samples per pixel that every pixel gets before any gets more.
+const EVEN_SAMPLES: u32 = FEATURE_SAMPLES;
+/// Samples per pixel beyond which guides do not get much better.
+const MOST_SAMPLES: u32 = 64;
+
+/// Samples per pixel of guides for the denoiser of an image: with more of its own, better ones pay.
+///
+/// - `spp`: samples per pixel of the image.
+pub fn guide_samples(spp: u32) -> u32 {
+    spp.saturating_mul(4).clamp(EVEN_SAMPLES, MOST_SAMPLES)
+}
+
 /// Gathers the guides of the denoiser, on the current rayon pool; `None` if `stop` returned true.
 ///
-/// - `size`: of the film, pixels, at least 1 each; `samples`: per pixel, at least 1.
+/// - `size`: of the film, pixels, at least 1 each; `samples`: per pixel, at least 1, see [`guide_samples`].
 ///
 /// # Panics
 /// As [`GuideGatherer::gather`].
@@ -57,8 +71,8 @@ pub fn gather_guides(
     gatherer.gather(snapshot, settings, samples, stop).then_some(gatherer.guides)
 }
 
-/// Gathers guides in steps, with 93 bytes of memory per pixel, which the next view uses again; 29 once there are
-/// [`FEATURE_SAMPLES`].
+/// Gathers guides in steps, with 101 bytes of memory per pixel, which the next view uses again; 29 once there are 64
+/// samples.
 #[derive(Default)]
 pub struct GuideGatherer {
     samples: u32,
@@ -83,7 +97,7 @@ impl GuideGatherer {
         }
     }
 
-    /// Samples per pixel so far.
+    /// Samples per pixel so far, of those pixels that have most.
     pub fn samples(&self) -> u32 {
         self.samples
     }
@@ -94,7 +108,8 @@ impl GuideGatherer {
     }
 
     /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool; false if `stop`, which is
-    /// called often, returned true: then there are no samples any more.
+    /// called often, returned true: then there are no samples any more. After the first sixteen, only pixels get more of
+    /// which they differ.
     ///
     /// - `snapshot`, `settings`: the same in all steps of a view.
     ///
@@ -118,7 +133,8 @@ impl GuideGatherer {
             (self.samples, self.sums) = (0, zeroed_vec(self.guides.depth.len()));
         }
         let settings = RenderSettings { seed: settings.seed ^ OTHER_SEED, ..*settings };
-        let (size, missing) = (UVec2::new(self.guides.width, self.guides.height), self.samples..samples);
+        let size = UVec2::new(self.guides.width, self.guides.height);
+        let (of_all, of_uneven) = (self.samples..samples.min(EVEN_SAMPLES), self.samples.max(EVEN_SAMPLES)..samples);
         let filter = FilterSampler::new(settings.filter);
         let look = Look::new(snapshot, &settings, &filter, size);
         let media = snapshot.camera_media();
@@ -130,26 +146,44 @@ impl GuideGatherer {
         let done = self.bands((size.x * BAND) as usize).enumerate().map_init(
             || PartTracer::begin(snapshot, &media, true),
             |tracer, (number, mut band)| {
-                if missing.start == 0 {
+                let first_row = number as u32 * BAND;
+                if of_all.start == 0 {
                     band.sums.fill(Sums::default());
                 }
-                let done = Part::of_band(number as u32 * BAND, size).all(|part| {
-                    tracer.trace(&look, &part, missing.clone(), stop, |seen| {
-                        let rows = part.rows_in_band(size.x);
-                        for (row, seen) in rows.zip(seen.chunks_exact(part.n_columns())) {
-                            band.sums[row].iter_mut().zip(seen).for_each(|(sums, seen)| add(sums, seen));
-                        }
-                    })
-                });
-                if done {
-                    band.set_means(samples as f32);
+                if !of_all.is_empty() {
+                    let done = Part::of_band(first_row, size).all(|part| {
+                        tracer.trace(&look, &part.pixels(), of_all.clone(), stop, |seen| {
+                            let rows = part.rows_in_band(size.x);
+                            for (row, seen) in rows.zip(seen.chunks_exact(part.n_columns())) {
+                                band.sums[row].iter_mut().zip(seen).for_each(|(sums, seen)| add(sums, seen));
+                            }
+                        })
+                    });
+                    if !done {
+                        return false;
+                    }
+                    (0..band.sums.len()).for_each(|i| band.set_mean(i, of_all.end));
                 }
-                done
+                of_uneven.is_empty()
+                    || band.uneven_pixels(size.x).chunks(PART_PIXELS).all(|uneven| {
+                        let pixels = Pixels {
+                            x: uneven.iter().map(|i| i % size.x).collect(),
+                            y: uneven.iter().map(|i| first_row + i / size.x).collect(),
+                            local: (0..uneven.len() as u32).collect(),
+                        };
+                        let done = tracer.trace(&look, &pixels, of_uneven.clone(), stop, |seen| {
+                            uneven.iter().zip(seen).for_each(|(&i, seen)| add(&mut band.sums[i as usize], seen));
+                        });
+                        if done {
+                            uneven.iter().for_each(|&i| band.set_mean(i as usize, of_uneven.end));
+                        }
+                        done
+                    })
             },
         );
         let done = done.all(|done| done);
         self.samples = if done { samples } else { 0 };
-        if self.samples >= FEATURE_SAMPLES {
+        if self.samples >= MOST_SAMPLES {
             // Further samples are unusual, and begin again.
             self.sums = Vec::new();
         }
@@ -184,12 +218,24 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// - `n`: number of samples.
-    fn set_means(&mut self, n: f32) {
-        for (i, sums) in self.sums.iter().enumerate() {
-            (self.albedo[i], self.normal[i]) = (sums.albedo.mean(n), sums.normal.mean(n));
-            (self.depth[i], self.emitters[i]) = (sums.mean_depth(), sums.emits);
+    /// - `i`: pixel of the band; `samples`: that it has.
+    fn set_mean(&mut self, i: usize, samples: u32) {
+        let sums = &mut self.sums[i];
+        if samples == EVEN_SAMPLES {
+            sums.is_uneven = sums.differ(samples as f32);
         }
+        (self.albedo[i], self.normal[i]) = (sums.albedo.mean(samples as f32), sums.normal.mean(samples as f32));
+        (self.depth[i], self.emitters[i]) = (sums.mean_depth(), sums.emits);
+    }
+
+    /// The pixels whose first samples differ, in columns of four pixels, so that consecutive rays are coherent.
+    ///
+    /// - `width`: of the image, pixels.
+    fn uneven_pixels(&self, width: u32) -> Vec<u32> {
+        let of_band = (0..).zip(&*self.sums).filter(|(_, sums)| sums.is_uneven);
+        let mut uneven: Vec<u32> = of_band.map(|(i, _)| i).collect();
+        uneven.sort_by_key(|i| (i % width / 4, i / width));
+        uneven
     }
 }
 
@@ -208,7 +254,14 @@ struct Sums {
     n_surfaces: u32,
     has_samples: bool,
     emits: bool,
+    is_uneven: bool,
 }
+
+/// Variance of one sample from which on the samples of a pixel differ: of the albedo, relative to its square, and of the
+/// normal.
+const UNEVEN: f32 = 0.03;
+/// Squared albedo below which differences do not count.
+const BLACK: f32 = 1e-3;
 
 impl Sums {
     #[inline]
@@ -228,6 +281,14 @@ impl Sums {
         self.emits |= emits;
     }
 
+    /// Whether the samples differ so much that their mean is uncertain.
+    ///
+    /// - `n`: number of samples.
+    fn differ(&self, n: f32) -> bool {
+        let level = self.albedo.mean(n).length_squared().max(BLACK);
+        self.albedo.variance(n) > UNEVEN * level || self.normal.variance(n) > UNEVEN
+    }
+
     fn mean_depth(&self) -> f32 {
         if self.n_surfaces == 0 { f32::INFINITY } else { self.first_depth + self.depth / self.n_surfaces as f32 }
     }
@@ -238,15 +299,23 @@ impl Sums {
 struct Sum {
     first: Vec3,
     away: Vec3,
+    squares: f32,
 }
 
 impl Sum {
     #[inline]
     fn add(&mut self, value: Vec3) {
-        self.away += value - self.first;
+        let away = value - self.first;
+        self.away += away;
+        self.squares += away.length_squared();
     }
 
     fn mean(&self, n: f32) -> Vec3 {
         self.first + self.away / n
+    }
+
+    /// Variance of one sample, sum over the components.
+    fn variance(&self, n: f32) -> f32 {
+        self.squares / n - (self.away / n).length_squared()
     }
 }
