@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use firstlight::render::{
-    Denoised, Environment, Film, GuideGatherer, MovingFilter, Prepared, RenderSettings, advance, denoise_film,
-    gather_features, gather_guides, smooth_film,
+    ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, Prepared, RenderSettings,
+    SurfaceGuides, advance, denoise_film, gather_features, gather_guides, smooth_film,
 };
 use glam::{UVec2, Vec3};
 
@@ -23,6 +23,10 @@ fn relative_mse(colors: &[Vec3], reference: &[Vec3]) -> f64 {
     colors.iter().zip(reference).map(of).sum::<f64>() / (3 * colors.len()) as f64
 }
 
+fn mirror() -> Material {
+    Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(0.9)) }
+}
+
 /// A sphere that throws a shadow, a mirror, and a lamp that is seen.
 fn room() -> Prepared {
     scene(
@@ -33,14 +37,7 @@ fn room() -> Prepared {
             (sphere(Vec3::new(1.0, -0.4, -2.2), 0.6), 2),
             (quad(Vec3::new(-0.5, 1.6, -3.0), Vec3::X, Vec3::Z * 0.8), 3),
         ],
-        vec![
-            diffuse(0.3),
-            diffuse(0.7),
-            firstlight::render::Material::Mirror {
-                reflectance: firstlight::render::ColorInput::Constant(Vec3::splat(0.9)),
-            },
-            emissive(12.0),
-        ],
+        vec![diffuse(0.3), diffuse(0.7), mirror(), emissive(12.0)],
         Environment::Constant(Vec3::splat(0.05)),
         camera(Vec3::new(0.0, 0.5, 3.0), Vec3::new(0.0, 0.0, -2.0), 55.0),
     )
@@ -63,6 +60,44 @@ fn no_number_of_samples_makes_it_worse_than_raw() {
         println!("{spp}: {} told {told}", error / raw);
         assert!(spp < 16 || (0.65..1.5).contains(&told), "{spp} samples: told {} for {}", found.error, error.sqrt());
     }
+}
+
+/// What is seen of a light without scattering is in the guides: its edges are sharp with few samples, in a mirror and in
+/// glass too, where most samples take the other path.
+#[test]
+fn lights_that_are_seen_have_sharp_edges() {
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
+    let scene = scene(
+        vec![
+            (plane(Vec3::Y * -1.0, Vec3::Y), 0),
+            (quad(Vec3::new(-1.0, 1.5, -3.0), Vec3::X * 2.0, Vec3::Y * 0.5), 1),
+            (quad(Vec3::new(-2.0, -0.9, -2.5), Vec3::X * 1.2, Vec3::new(0.0, 1.5, -1.0)), 2),
+            (sphere(Vec3::new(0.6, -0.1, -1.0), 0.8), 3),
+        ],
+        vec![diffuse(0.3), emissive(4.0), mirror(), glass],
+        Environment::Black,
+        camera(Vec3::new(0.0, 0.5, 3.0), Vec3::new(0.0, 0.2, -2.0), 55.0),
+    );
+    let guides = gather_guides(&scene, &RenderSettings::default(), UVec2::from(SIZE), 64, &|| false).expect("no stop");
+    let is_lit = |i: usize| guides.emitted[i] != Vec3::ZERO;
+    let lit = (0..guides.emitted.len()).filter(|&i| is_lit(i));
+    let (n_direct, n_lit) = (lit.clone().filter(|&i| guides.emitted[i].x > 3.99).count(), lit.clone().count());
+    assert!(n_direct > 40 && n_lit > 2 * n_direct && n_lit < guides.emitted.len() / 3, "{n_direct} of {n_lit}");
+    assert!(lit.clone().all(|i| guides.emitters[i]), "no light without an emitter");
+    let mut reference = Film::new(SIZE.0, SIZE.1);
+    advance(&scene, &RenderSettings { seed: 99, ..RenderSettings::default() }, &mut reference, 1024, &|| false);
+    let of_lit = |colors: &[Vec3]| lit.clone().map(|i| colors[i]).collect::<Vec<_>>();
+    let reference = of_lit(&reference.means());
+    let mut film = Film::new(SIZE.0, SIZE.1);
+    advance(&scene, &RenderSettings::default(), &mut film, 4, &|| false);
+    let error_with = |guides: &SurfaceGuides| {
+        let found = denoise_film(&film, guides, &|| false).expect("nothing stops it");
+        relative_mse(&of_lit(&found.color), &reference)
+    };
+    let unlit = SurfaceGuides { emitted: vec![Vec3::ZERO; guides.emitted.len()], ..guides.clone() };
+    let (error, unguided) = (error_with(&guides), error_with(&unlit));
+    let raw = relative_mse(&of_lit(&film.means()), &reference);
+    assert!(error < 0.25 * raw && error < 0.5 * unguided, "{error} of {raw}, {unguided} without");
 }
 
 /// Between two powers of two, the film knows what came since the last one beside the step of that one.

@@ -8,6 +8,8 @@ use glam::Vec3;
 pub struct Guides<'a> {
     /// Reflected share of light, 0..1 per channel; about 1 for emitters and misses.
     pub albedo: &'a [Vec3],
+    /// Radiance that arrives from emitters and from beyond the scene without scattering, W·m⁻²·sr⁻¹.
+    pub emitted: &'a [Vec3],
     /// Shading normal, mean over the pixel, so of length at most 1; zero for misses.
     pub normal: &'a [Vec3],
     /// Depth in metres; zero or infinite for misses.
@@ -41,9 +43,9 @@ impl DenoiseInput<'_> {
     /// If the length of a list is not the number of pixels.
     pub(super) fn check(&self) {
         let n = self.n_pixels();
-        let Guides { albedo, normal, depth, emitters } = self.guides;
-        let lengths = [self.color.len(), albedo.len(), normal.len(), depth.len(), emitters.len()];
+        let Guides { albedo, emitted, normal, depth, emitters } = self.guides;
+        let lengths = [self.color.len(), albedo.len(), emitted.len(), normal.len(), depth.len(), emitters.len()];
         let halves = self.half_steps.is_none_or(|of| [of.steps.len(), of.late.len(), of.doubled.len()] == [n; 3]);
-        assert!(n > 0 && lengths == [n; 5] && halves, "lists of {lengths:?} for {n} pixels");
+        assert!(n > 0 && lengths == [n; 6] && halves, "lists of {lengths:?} for {n} pixels");
     }
 }

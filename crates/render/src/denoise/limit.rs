@@ -103,7 +103,13 @@ mod tests {
         let mut at_emitters = vec![false; N];
         at_emitters[FIREFLY] = is_emitter;
         let albedo = vec![Vec3::splat(0.5); N];
-        let guides = Guides { albedo: &albedo, normal: &albedo, depth: &vec![1.0; N], emitters: &at_emitters };
+        let guides = Guides {
+            albedo: &albedo,
+            emitted: &[Vec3::ZERO; N],
+            normal: &albedo,
+            depth: &vec![1.0; N],
+            emitters: &at_emitters,
+        };
         let input = DenoiseInput { width: WIDTH, height: HEIGHT, color: &colors, half_steps: Some(&halves), guides };
         let light: Vec<Vec3> = colors.iter().map(|color| *color / 0.5).collect();
         let variance: Vec<f32> = (0..N).map(|i| (halves.variance(i) / 0.25).element_sum()).collect();

@@ -169,7 +169,8 @@ mod tests {
 
         fn denoise(&self, of: &Rendered, with_halves: bool) -> Denoised {
             let Self { albedo, normal, depth, emitters, .. } = self;
-            let guides = Guides { albedo, normal, depth, emitters };
+            let emitted = &vec![Vec3::ZERO; albedo.len()];
+            let guides = Guides { albedo, emitted, normal, depth, emitters };
             let half_steps = with_halves.then_some(&of.halves);
             let input = DenoiseInput { width: WIDTH, height: HEIGHT, color: &of.color, half_steps, guides };
             denoise(&input, &|| false).expect("nothing stops it")
@@ -340,7 +341,8 @@ mod tests {
         };
         assert_eq!(with(1), with(3));
         let Scene { albedo, normal, depth, emitters, .. } = &scene;
-        let guides = Guides { albedo, normal, depth, emitters };
+        let emitted = &vec![Vec3::ZERO; albedo.len()];
+        let guides = Guides { albedo, emitted, normal, depth, emitters };
         let input = DenoiseInput {
             width: WIDTH,
             height: HEIGHT,
@@ -359,6 +361,7 @@ mod tests {
             let depth: Vec<f32> = (0..n).map(|i| if i % 2 == 0 { f32::INFINITY } else { 1e20 }).collect();
             let guides = Guides {
                 albedo: &vec![Vec3::ZERO; n],
+                emitted: &vec![Vec3::ZERO; n],
                 normal: &vec![Vec3::ZERO; n],
                 depth: &depth,
                 emitters: &vec![n > 5; n],

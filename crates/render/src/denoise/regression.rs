@@ -59,12 +59,13 @@ pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression>
         blocks = blocks.coarser(stop)?;
     }
     let width = input.width;
-    let pixel =
-        |i: usize| {
-            predict(&samples, &levels, n_small, i % width, i / width).map(|Predicted { light, own, misfit }| {
-                Candidate { color: (light * albedo[i]).max(Vec3::ZERO), own: own.min(1.0), misfit }
-            })
-        };
+    let pixel = |i: usize| {
+        predict(&samples, &levels, n_small, i % width, i / width).map(|Predicted { light, own, misfit }| Candidate {
+            color: (light * albedo[i] + input.guides.emitted[i]).max(Vec3::ZERO),
+            own: own.min(1.0),
+            misfit,
+        })
+    };
     Some(Regression { candidates: each(input.n_pixels(), stop, pixel)?, noise })
 }
 
@@ -135,7 +136,7 @@ fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool], stop: St
         width: input.width,
         height: input.height,
         features: each(n, stop, features)?,
-        light: each(n, stop, |i| input.color[i] / albedo[i])?,
+        light: each(n, stop, |i| (input.color[i] - input.guides.emitted[i]) / albedo[i])?,
         variance: each(n, stop, variance)?,
         weight: each(n, stop, weight)?,
     })

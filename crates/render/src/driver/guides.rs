@@ -25,6 +25,8 @@ pub struct SurfaceGuides {
     pub height: u32,
     /// Share of light that the surface reflects, 0..1 per channel.
     pub albedo: Vec<Vec3>,
+    /// Radiance that arrives from emitters and from beyond the scene without scattering, W·m⁻²·sr⁻¹.
+    pub emitted: Vec<Vec3>,
     /// Shading normal, at most of length 1.
     pub normal: Vec<Vec3>,
     /// Metres along the view axis; infinite where nothing is hit.
@@ -36,8 +38,8 @@ pub struct SurfaceGuides {
 impl SurfaceGuides {
     /// The same as the denoiser takes them.
     pub fn as_guides(&self) -> Guides<'_> {
-        let Self { albedo, normal, depth, emitters, .. } = self;
-        Guides { albedo, normal, depth, emitters }
+        let Self { albedo, emitted, normal, depth, emitters, .. } = self;
+        Guides { albedo, emitted, normal, depth, emitters }
     }
 }
 
@@ -91,9 +93,10 @@ impl GuideGatherer {
         let n = size.x as usize * size.y as usize;
         (self.guides.width, self.guides.height) = (size.x, size.y);
         if self.guides.depth.len() != n {
-            let SurfaceGuides { albedo, normal, depth, emitters, .. } = &mut self.guides;
+            let SurfaceGuides { albedo, emitted, normal, depth, emitters, .. } = &mut self.guides;
             // The system gives zeroed memory when it is written first: by all threads, not here.
-            (*albedo, *normal, *depth, *emitters) = (zeroed_vec(n), zeroed_vec(n), zeroed_vec(n), zeroed_vec(n));
+            (*albedo, *emitted, *normal) = (zeroed_vec(n), zeroed_vec(n), zeroed_vec(n));
+            (*depth, *emitters) = (zeroed_vec(n), zeroed_vec(n));
         }
     }
 
@@ -194,13 +197,15 @@ impl GuideGatherer {
     ///
     /// - `length`: of a band, pixels.
     fn bands(&mut self, length: usize) -> impl IndexedParallelIterator<Item = Band<'_>> {
-        let SurfaceGuides { albedo, normal, depth, emitters, .. } = &mut self.guides;
+        let SurfaceGuides { albedo, emitted, normal, depth, emitters, .. } = &mut self.guides;
         let sums = self.sums.par_chunks_mut(length);
-        let surfaces = albedo.par_chunks_mut(length).zip(normal.par_chunks_mut(length));
+        let surfaces =
+            albedo.par_chunks_mut(length).zip(emitted.par_chunks_mut(length)).zip(normal.par_chunks_mut(length));
         let rest = depth.par_chunks_mut(length).zip(emitters.par_chunks_mut(length));
-        sums.zip(surfaces).zip(rest).map(|((sums, (albedo, normal)), (depth, emitters))| Band {
+        sums.zip(surfaces).zip(rest).map(|((sums, ((albedo, emitted), normal)), (depth, emitters))| Band {
             sums,
             albedo,
+            emitted,
             normal,
             depth,
             emitters,
@@ -212,6 +217,7 @@ impl GuideGatherer {
 struct Band<'a> {
     sums: &'a mut [Sums],
     albedo: &'a mut [Vec3],
+    emitted: &'a mut [Vec3],
     normal: &'a mut [Vec3],
     depth: &'a mut [f32],
     emitters: &'a mut [bool],
@@ -225,6 +231,7 @@ impl Band<'_> {
             sums.is_uneven = sums.differ(samples as f32);
         }
         (self.albedo[i], self.normal[i]) = (sums.albedo.mean(samples as f32), sums.normal.mean(samples as f32));
+        self.emitted[i] = sums.emitted.mean(samples as f32);
         (self.depth[i], self.emitters[i]) = (sums.mean_depth(), sums.emits);
     }
 
@@ -246,6 +253,7 @@ const OTHER_SEED: u32 = 0x9e37_79b9;
 #[derive(Clone, Copy, Default, Zeroable)]
 struct Sums {
     albedo: Sum,
+    emitted: Sum,
     normal: Sum,
     /// Of the first sample that hits a surface, metres.
     first_depth: f32,
@@ -268,8 +276,10 @@ impl Sums {
     fn add(&mut self, seen: &Seen, emits: bool) {
         if !self.has_samples {
             (self.albedo.first, self.normal.first, self.has_samples) = (seen.albedo, seen.normal, true);
+            self.emitted.first = seen.emitted;
         }
         self.albedo.add(seen.albedo);
+        self.emitted.add(seen.emitted);
         self.normal.add(seen.normal);
         if seen.depth.is_finite() {
             if self.n_surfaces == 0 {
@@ -286,7 +296,10 @@ impl Sums {
     /// - `n`: number of samples.
     fn differ(&self, n: f32) -> bool {
         let level = self.albedo.mean(n).length_squared().max(BLACK);
-        self.albedo.variance(n) > UNEVEN * level || self.normal.variance(n) > UNEVEN
+        let emitted = self.emitted.mean(n).length_squared().max(BLACK);
+        self.albedo.variance(n) > UNEVEN * level
+            || self.normal.variance(n) > UNEVEN
+            || self.emitted.variance(n) > UNEVEN * emitted
     }
 
     fn mean_depth(&self) -> f32 {

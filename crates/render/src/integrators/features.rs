@@ -60,9 +60,9 @@ pub(crate) struct FeatureWave {
     way: Vec<(f32, f32)>,
     /// The second paths of slots, in slots of their own.
     branches: Vec<Branch>,
-    /// Whether the features are for the denoiser: free of the noise of glass as far as possible, and with the material of
-    /// the surface that is seen, in mirrors and through glass too, instead of that which the camera ray hits; an emitter's
-    /// if there is one.
+    /// Whether the features are for the denoiser: free of the noise of glass as far as possible, with emitted light, and
+    /// with the material of the surface that is seen, in mirrors and through glass too, instead of that which the camera
+    /// ray hits; an emitter's if there is one.
     pub for_denoiser: bool,
 }
 
@@ -133,7 +133,12 @@ impl FeatureWave {
                 let i = self.sorted.of_kind(kind)[k] as usize;
                 if kind == MISSES {
                     let slot = self.paths.slot[i] as usize;
-                    self.seen[slot].albedo = self.paths.throughput_of(i);
+                    let seen = &mut self.seen[slot];
+                    seen.albedo = self.paths.throughput_of(i);
+                    if self.for_denoiser {
+                        let dir = self.paths.rays.get(i).dir;
+                        seen.emitted = seen.albedo * scene.shading.environment.radiance(dir);
+                    }
                 } else {
                     self.see_one(scene, depth, is_last, i);
                 }
@@ -176,6 +181,12 @@ impl FeatureWave {
         seen.depth = along;
         if self.for_denoiser {
             seen.material = material;
+            seen.emitted = match scene.tables.emission[material as usize] {
+                Some(emission) if vertex.front || emission.two_sided => {
+                    path.throughput * vertex.emitted(scene, &emission)
+                }
+                _ => Vec3::ZERO,
+            };
         }
     }
 

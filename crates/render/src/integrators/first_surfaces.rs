@@ -107,6 +107,7 @@ impl FirstSurfaces {
         let vertex = Vertex::new(scene, &ray, &hit, material);
         self.seen[slot] = Seen {
             albedo: within(paths.throughput_of(i) * visible_albedo(scene, &vertex, material)),
+            emitted: Vec3::ZERO,
             normal: vertex.normal,
             position: vertex.position,
             depth: hit.t * ray.dir.dot(scene.camera.forward),

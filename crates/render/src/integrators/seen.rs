@@ -9,6 +9,9 @@ pub(crate) struct Seen {
     /// Colour of the surface times those of the mirrors and glass on the path to it, 0..1; the product of the latter if
     /// the path leaves the scene.
     pub albedo: Vec3,
+    /// Radiance that arrives from an emitter or from beyond the scene without scattering, W·m⁻²·sr⁻¹; zero where it is
+    /// not asked for.
+    pub emitted: Vec3,
     /// Shading normal, unit, on the visible side; zero for a miss.
     pub normal: Vec3,
     /// Position in the snapshot's frame, metres; zero for a miss.
@@ -29,6 +32,7 @@ impl Seen {
     /// Features of a camera ray that leaves the scene.
     pub const NOTHING: Self = Self {
         albedo: Vec3::ONE,
+        emitted: Vec3::ZERO,
         normal: Vec3::ZERO,
         position: Vec3::ZERO,
         depth: f32::INFINITY,
@@ -46,6 +50,7 @@ impl Seen {
         };
         Self {
             albedo: self.albedo.lerp(other.albedo, share),
+            emitted: self.emitted.lerp(other.emitted, share),
             normal: self.normal.lerp(other.normal, share),
             position: self.position.lerp(other.position, share),
             depth,

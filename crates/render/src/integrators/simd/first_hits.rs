@@ -51,6 +51,7 @@ fn see<S: Simd>(s: S, group: DiffuseHits) {
             let i = indices[lane] as usize;
             seen[paths.slot[i] as usize] = Seen {
                 albedo: vector(&albedo, lane),
+                emitted: Vec3::ZERO,
                 normal: vector(&normal, lane),
                 position: vector(&position, lane),
                 depth: depth[lane],
