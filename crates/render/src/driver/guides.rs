@@ -1,4 +1,5 @@
-//! What guides the denoiser: albedo, normal and depth of the first surface that is not specular.
+//! What guides the denoiser: albedo, normal and depth of the first surface that is not specular, and the light that it
+//! emits.
 //!
 //! Gathered like [feature buffers](super::features), by camera rays alone, but only as sums of what the denoiser reads.
 //! They can be extended: the first samples of a view give guides at once, and more samples better ones. The noise of the
@@ -73,7 +74,7 @@ pub fn gather_guides(
     gatherer.gather(snapshot, settings, samples, stop).then_some(gatherer.guides)
 }
 
-/// Gathers guides in steps, with 101 bytes of memory per pixel, which the next view uses again; 29 once there are 64
+/// Gathers guides in steps, with 141 bytes of memory per pixel, which the next view uses again; 41 once there are 64
 /// samples.
 #[derive(Default)]
 pub struct GuideGatherer {
