@@ -5,6 +5,7 @@ use super::input_file::{FileKind, InputFile, ReadError};
 use super::limits::Limits;
 use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
+use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
@@ -84,9 +85,6 @@ fn texture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<(ImageTexture, Option<String>), PictureError> {
-    if reader.format().is_none() {
-        return Err(PictureError::Format);
-    }
     let picture = decode_picture(reader, limits)?;
     let (width, height) = (picture.width(), picture.height());
     let (texels, bad) = texels_of(picture);
@@ -136,13 +134,26 @@ fn limits_of_decoder(limits: &Limits) -> image::Limits {
     of_decoder
 }
 
+/// First bytes of HDR files. The full signature is `#?RADIANCE`, but many programs write `#?RGBE`.
+const HDR: &[u8] = b"#?";
+
 /// Decodes the image if it has no more pixels than the limit.
 pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<DynamicImage, PictureError> {
+    if reader.format().is_some_and(|format| format != image::ImageFormat::Hdr) {
+        return decode_within(reader.into_decoder()?, limits);
+    }
+    let mut bytes = reader.into_inner();
+    if !bytes.fill_buf().map_err(ReadError::from)?.starts_with(HDR) {
+        return Err(PictureError::Format);
+    }
+    decode_within(HdrDecoder::new_nonstrict(bytes)?, limits)
+}
+
+fn decode_within(decoder: impl ImageDecoder, limits: &Limits) -> Result<DynamicImage, PictureError> {
     // A few bytes can claim any size: it is checked before decoding.
-    let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
     if pixels > limits.picture_pixels {
@@ -166,6 +177,22 @@ mod tests {
         assert!(picture.linear(0).abs_diff_eq(Vec3::new(0.0, 0.5029, 1.0), 1e-3), "{}", picture.linear(0));
         assert_eq!(picture.linear(1), Vec3::X);
         assert_eq!(picture.bytes(), 6, "in its own depth");
+    }
+
+    /// Both signatures of HDR files are in use.
+    #[test]
+    fn hdr_files_of_any_program_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("sky.hdr");
+        for signature in ["#?RADIANCE", "#?RGBE"] {
+            let mut bytes = format!("{signature}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").into_bytes();
+            bytes.extend([128, 64, 0, 129, 128, 128, 128, 133]);
+            std::fs::write(&path, bytes).unwrap();
+            let (picture, _) = read_picture(&path).unwrap();
+            assert_eq!([picture.linear(0), picture.linear(1)], [Vec3::new(1.0, 0.5, 0.0), Vec3::splat(16.0)]);
+        }
+        std::fs::write(&path, "#?RGBE\n").unwrap();
+        assert!(read_picture(&path).unwrap_err().to_string().contains("decoded"));
     }
 
     /// A few hundred bytes that would decode to gigabytes are rejected by their size; devices and pipes are not opened.
