@@ -45,6 +45,9 @@ const SIGNIFICANCE: f32 = 3.0;
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
+/// Light from beyond the scene that counts as an emitter, relative to the mean of the image: a sun in an environment.
+const BRIGHT: f32 = 8.0;
+
 /// Returns `None` if `stop` returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression> {
     let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
@@ -61,7 +64,8 @@ pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression>
     let width = input.width;
     let pixel = |i: usize| {
         predict(&samples, &levels, n_small, i % width, i / width).map(|Predicted { light, own, misfit }| Candidate {
-            color: (light * albedo[i] + input.guides.emitted[i]).max(Vec3::ZERO),
+            // Scattered light is never negative, whatever noise of lights is around.
+            color: (light * albedo[i]).max(Vec3::ZERO) + input.guides.emitted[i],
             own: own.min(1.0),
             misfit,
         })
@@ -87,7 +91,9 @@ impl Start {
     fn of(input: &DenoiseInput, stop: Stop) -> Option<Self> {
         let guides = &input.guides;
         let n = input.n_pixels();
-        let at_emitters = near(input, |pixel| guides.emitters[pixel], stop)?;
+        let mean = input.color.iter().map(|color| color.element_sum()).sum::<f32>() / n as f32;
+        let shines = |pixel: usize| guides.emitters[pixel] || guides.emitted[pixel].element_sum() > BRIGHT * mean;
+        let at_emitters = near(input, shines, stop)?;
         let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
         let mut samples = samples(input, &albedo, &at_emitters, stop)?;
         let excess = limit(input, &albedo, &at_emitters, &mut samples, stop)?;

@@ -26,7 +26,8 @@ pub struct SurfaceGuides {
     pub height: u32,
     /// Share of light that the surface reflects, 0..1 per channel.
     pub albedo: Vec<Vec3>,
-    /// Radiance that arrives from emitters and from beyond the scene without scattering, W·m⁻²·sr⁻¹.
+    /// Radiance that arrives from emitters and from beyond the scene without scattering, W·m⁻²·sr⁻¹; less where few of
+    /// the samples have found it.
     pub emitted: Vec<Vec3>,
     /// Shading normal, at most of length 1.
     pub normal: Vec<Vec3>,
@@ -232,7 +233,7 @@ impl Band<'_> {
             sums.is_uneven = sums.differ(samples as f32);
         }
         (self.albedo[i], self.normal[i]) = (sums.albedo.mean(samples as f32), sums.normal.mean(samples as f32));
-        self.emitted[i] = sums.emitted.mean(samples as f32);
+        self.emitted[i] = sums.emitted.certain_part(samples as f32);
         (self.depth[i], self.emitters[i]) = (sums.mean_depth(), sums.emits);
     }
 
@@ -326,6 +327,14 @@ impl Sum {
 
     fn mean(&self, n: f32) -> Vec3 {
         self.first + self.away / n
+    }
+
+    /// The mean, less what is as uncertain as it is large: of a light that a single sample has hit nothing is left
+    /// (James and Stein 1961).
+    fn certain_part(&self, n: f32) -> Vec3 {
+        let mean = self.mean(n);
+        let uncertain = self.variance(n) / (n * mean.length_squared()).max(1e-30);
+        mean * (1.0 - uncertain).clamp(0.0, 1.0)
     }
 
     /// Variance of one sample, sum over the components.
