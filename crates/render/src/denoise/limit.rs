@@ -17,7 +17,7 @@ use glam::Vec3;
 
 /// Largest step of a pixel, relative to the mean step around it. The mean of the absolute values: a mean of squares
 /// would be that of the fireflies themselves.
-const LARGEST_STEP: f32 = 2.5;
+const LARGEST_STEP: f32 = 4.0;
 /// Radius in pixels of the two box filters that average steps.
 const RADIUS: usize = 6;
 
