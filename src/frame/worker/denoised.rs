@@ -83,7 +83,12 @@ impl Loop<'_> {
         let (before, guides_before) = self.settled(key).map_or((0, 0), |settled| (settled.spp, settled.guide_samples));
         let is_first = before == 0;
         let spp = film.spp_in(self.active_region().as_ref());
-        let guide_samples = if is_first && !is_last { FIRST_GUIDE_SAMPLES } else { guide_samples(spp) };
+        // Rays take time from samples: better guides come later here than where an image is made once.
+        let guide_samples = match (is_first, is_last) {
+            (true, false) => FIRST_GUIDE_SAMPLES,
+            (false, false) => guide_samples(spp / 4),
+            (_, true) => guide_samples(spp),
+        };
         let pool = lock(&self.shared.pool).clone();
         let mut is_urgent = is_first;
         let image = if self.denoiser.guide_samples(key) < FIRST_GUIDE_SAMPLES && !is_last {
