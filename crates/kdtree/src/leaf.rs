@@ -34,19 +34,24 @@ pub(super) trait LeafBlock: Sized + Send {
     /// Offers the nearest hit of the block.
     #[inline(always)]
     fn test<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
-        let hits = Self::hits(s, block, ray);
-        let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
-        if valid == 0 {
-            return;
-        }
-        let t = s.least(valid, hits.t);
-        // Primitives ascend within a block: the first lane has the lowest index among those at the same `t`.
-        let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize % BLOCK;
-        let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
-        s.store(hits.u, &mut u);
-        s.store(hits.v, &mut v);
-        nearest.offer(t, u[lane], v[lane], block.prims().get(lane));
+        offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims().get(lane));
     }
+}
+
+/// Offers the nearest of the hits, which belong to ascending primitives.
+#[inline(always)]
+pub(super) fn offer<S: KernelSimd>(s: S, hits: LaneHits<S>, nearest: &mut Nearest, prim: impl FnOnce(usize) -> u32) {
+    let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
+    if valid == 0 {
+        return;
+    }
+    let t = s.least(valid, hits.t);
+    // The first lane has the lowest index among those at the same `t`.
+    let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize % BLOCK;
+    let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
+    s.store(hits.u, &mut u);
+    s.store(hits.v, &mut v);
+    nearest.offer(t, u[lane], v[lane], prim(lane));
 }
 
 /// The indices of a block's primitives, ascending; empty lanes come last.

@@ -13,6 +13,7 @@ use super::objects::FrameF64;
 use super::ray::{Nearest, RELATIVE_PADDING};
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, LANES, Mask};
+use firstlight_simd::three;
 
 /// Sixteen rays in the mesh's own space, and their nearest hits so far.
 pub(super) struct MeshPacket<S: KernelSimd> {
@@ -59,9 +60,8 @@ pub(super) trait PacketBlock: LeafBlock {
 trait Triangles: LeafBlock<Ray = ShearedRay> {
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3];
 
-    /// Bounds of the three sheared corners over the rays of the footprint: two coordinates across the rays, one along
-    /// them, each as minimum and maximum.
-    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3];
+    /// Returns the triangles whose sheared vertices all lie on one side of the rays of the footprint, or behind them.
+    fn missed<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> Mask;
 }
 
 impl Triangles for TriangleBlock {
@@ -72,9 +72,15 @@ impl Triangles for TriangleBlock {
     }
 
     #[inline(always)]
-    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
-        let [a, b, c] = &self.vertices;
-        [footprint.reach(s, a, axes), footprint.reach(s, b, axes), footprint.reach(s, c, axes)]
+    fn missed<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> Mask {
+        let [a, b, c] = three!(|k| footprint.reach(s, &self.vertices[k], axes));
+        let mut missed = 0;
+        for axis in 0..3 {
+            let low = s.min(a[axis][0], s.min(b[axis][0], c[axis][0]));
+            let high = s.max(a[axis][1], s.max(b[axis][1], c[axis][1]));
+            missed |= s.lt(s.splat(0.0), low) | s.lt(high, s.splat(0.0));
+        }
+        missed
     }
 }
 
@@ -85,16 +91,10 @@ impl Triangles for SharedBlock {
     }
 
     #[inline(always)]
-    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
-        let mut corners = [[[s.splat(0.0); 2]; 3]; 3];
+    fn missed<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> Mask {
         let vertices = footprint.reach(s, self.vertices(), axes);
-        for axis in 0..3 {
-            for side in 0..2 {
-                let [a, b, c] = self.by_corner(s, vertices[axis][side]);
-                (corners[0][axis][side], corners[1][axis][side], corners[2][axis][side]) = (a, b, c);
-            }
-        }
-        corners
+        let [x, y, z] = three!(|axis| self.beside(s, vertices[axis][0], vertices[axis][1]));
+        x | y | z
     }
 }
 
@@ -187,36 +187,19 @@ struct Footprint {
 impl Footprint {
     const NONE: Self = Self { origin: [[0.0; 2]; 3], sx: [0.0; 2], sy: [0.0; 2], down: false };
 
-    /// Returns the lanes of the block whose triangle at least one of the rays might hit.
+    /// Bounds of sixteen sheared vertices over the rays of the footprint: two coordinates across the rays, one along
+    /// them, which is bounded on the side behind the rays only.
     ///
     /// Rounding is monotonic: the steps of the test in interval arithmetic, in the order of the test, bound its values
     /// for every ray. A triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by
     /// all of them.
-    #[inline(always)]
-    fn may_hit<S: KernelSimd>(&self, s: S, axes: [usize; 3], block: &impl Triangles) -> Mask {
-        let zero = s.splat(0.0);
-        let [first, second, third] = block.reach(s, self, axes);
-        let mut missed = 0;
-        for axis in 0..3 {
-            let low = s.min(first[axis][0], s.min(second[axis][0], third[axis][0]));
-            let high = s.max(first[axis][1], s.max(second[axis][1], third[axis][1]));
-            if axis < 2 {
-                missed |= s.lt(zero, low) | s.lt(high, zero);
-            } else {
-                missed |= if self.down { s.le(zero, low) } else { s.le(high, zero) };
-            }
-        }
-        !missed
-    }
-
-    /// Bounds of sixteen sheared vertices over the rays of the footprint.
     #[inline(always)]
     fn reach<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3], [x, y, z]: [usize; 3]) -> [[S::F; 2]; 3] {
         let depth = less(s, s.load(&points[z]), self.origin[2]);
         [
             self.across(s, s.load(&points[x]), self.origin[0], self.sx, depth),
             self.across(s, s.load(&points[y]), self.origin[1], self.sy, depth),
-            depth,
+            if self.down { [depth[0], s.splat(0.0)] } else { [s.splat(0.0), depth[1]] },
         ]
     }
 
@@ -369,7 +352,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         if n_rays <= FEW_RAYS {
             return self.test_by_ray(s, group, block, mask);
         }
-        let mut triangles = group.footprint.may_hit(s, group.axes, block) & block.prims().lanes(s);
+        let mut triangles = block.prims().lanes(s) & !block.missed(s, &group.footprint, group.axes);
         if n_rays < triangles.count_ones() {
             return self.test_by_ray(s, group, block, mask);
         }

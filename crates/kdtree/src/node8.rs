@@ -65,7 +65,7 @@ pub(super) struct DescentRay {
     pub padding: f32,
     /// Shortened reciprocals of the direction: multiplied by a distance they give the earliest crossing.
     pub inv_lo: [f32; 3],
-    /// [`PLANES`] if the far child is visited first, otherwise 0.
+    /// All bits set if the far child is visited first, otherwise 0.
     pub reversed: u32,
     /// Negated lengthened reciprocals: multiplied by a distance they give the negative of the latest crossing.
     pub minus_inv_hi: [f32; 3],
@@ -87,7 +87,7 @@ impl DescentRay {
     /// Returns the ray with the far child visited first.
     #[inline(always)]
     pub fn far_first(self) -> Self {
-        Self { reversed: PLANES, ..self }
+        Self { reversed: u32::MAX, ..self }
     }
 }
 
@@ -185,7 +185,7 @@ pub(super) fn descend_plain(
 ) -> usize {
     let axis = |plane: usize| (node.axes >> (3 * plane) & 7) as usize;
     let down: u32 = (0..7).map(|plane| u32::from(ray.inv_lo[axis(plane)].is_sign_negative()) << plane).sum();
-    let mut order = CHILD_ORDERS[(down ^ ray.reversed) as usize];
+    let mut order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
     for _ in 0..8 {
         let lane = (order & 7) as usize;
         order >>= 3;

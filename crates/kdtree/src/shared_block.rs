@@ -1,12 +1,15 @@
 //! Compact leaf blocks of triangles that share vertices: half the bytes of a regular block.
 //!
 //! The triangles of a leaf are neighbours on a surface, and sixteen of them rarely have more than sixteen vertices.
-//! Each vertex is stored, fetched and sheared once; the corners are looked up in registers. A corner has the same bits
-//! as in a [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
+//! Each vertex is stored, fetched and sheared once; the corners are looked up in registers. With eight lanes per register
+//! that takes long, so triangles that lie beside the ray are left out first, by a byte for each vertex. A corner has the
+//! same bits as in a [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
 
-use super::lanes::{LaneHits, may_hit, resolve};
-use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
-use super::simd::KernelSimd;
+use super::lanes::{LaneHits, Sheared, may_hit, resolve};
+use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay, offer};
+use super::ray::Nearest;
+use super::simd::{Corners, Eight, KernelSimd, Mask};
+use firstlight_simd::three;
 use glam::Vec3;
 
 /// Up to sixteen triangles over up to sixteen vertices.
@@ -15,9 +18,11 @@ use glam::Vec3;
 pub(super) struct SharedBlock {
     /// `[axis][vertex]`; 0 in unused entries.
     vertices: [[f32; BLOCK]; 3],
-    /// For each triangle the indices of its vertices, four bits each. Lanes without a triangle repeat the first one,
-    /// which loses every tie against itself.
-    corners: [u32; BLOCK],
+    /// For each corner the vertices of the triangles. Lanes without a triangle repeat the first one, which loses every
+    /// tie against itself.
+    corners: Corners,
+    /// The lanes with a triangle.
+    filled: Mask,
     prims: Prims,
 }
 const _: () = assert!(size_of::<SharedBlock>() == 320);
@@ -25,7 +30,7 @@ const _: () = assert!(size_of::<SharedBlock>() == 320);
 /// Compares bits.
 impl PartialEq for SharedBlock {
     fn eq(&self, other: &Self) -> bool {
-        let bits = |block: &Self| (block.vertices.map(|axis| axis.map(f32::to_bits)), block.corners);
+        let bits = |block: &Self| (block.vertices.map(|axis| axis.map(f32::to_bits)), block.corners, block.filled);
         self.prims == other.prims && bits(self) == bits(other)
     }
 }
@@ -42,7 +47,7 @@ impl SharedBlock {
         let mut blocks = Vec::new();
         let mut table = VertexTable::EMPTY;
         let mut first = 0;
-        let mut corners = [0; BLOCK];
+        let mut corners = [[0; 3]; BLOCK];
         for (i, &prim) in prims.iter().enumerate() {
             let points = triangle(prim);
             let mut packed = if i - first < BLOCK { table.add(&points) } else { None };
@@ -51,33 +56,35 @@ impl SharedBlock {
                 (table, first) = (VertexTable::EMPTY, i);
                 packed = table.add(&points);
             }
-            corners[i - first] = packed.unwrap_or(0);
+            corners[i - first] = packed.unwrap_or_default();
         }
         blocks.push(Self::new(&table, &corners[..prims.len() - first], &prims[first..]));
         blocks
     }
 
-    fn new(table: &VertexTable, corners: &[u32], prims: &[u32]) -> Self {
-        let mut all = [corners[0]; BLOCK];
-        all[..corners.len()].copy_from_slice(corners);
-        Self { vertices: table.points.map(|axis| axis.map(f32::from_bits)), corners: all, prims: Prims::new(prims) }
+    fn new(table: &VertexTable, triangles: &[[u8; 3]], prims: &[u32]) -> Self {
+        let of = |corner: usize| {
+            let at = |lane: usize| triangles.get(lane).unwrap_or(&triangles[0])[corner];
+            std::array::from_fn(at)
+        };
+        Self {
+            vertices: table.points.map(|axis| axis.map(f32::from_bits)),
+            corners: [of(0), of(1), of(2)],
+            filled: Mask::MAX >> (BLOCK - triangles.len()),
+            prims: Prims::new(prims),
+        }
     }
 
     #[inline(always)]
     pub fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
-        let vertex = (self.corners[lane] >> (4 * corner)) as usize % BLOCK;
+        let vertex = self.corners[corner][lane] as usize % BLOCK;
         [self.vertices[0][vertex], self.vertices[1][vertex], self.vertices[2][vertex]]
     }
 
-    /// Looks up a per-vertex value for each of the three corners of sixteen triangles.
+    /// Returns the triangles whose three vertices all lie above 0, or all below, see [`KernelSimd::beside`].
     #[inline(always)]
-    pub fn by_corner<S: KernelSimd>(&self, s: S, of_vertices: S::F) -> [S::F; 3] {
-        let corners = s.load_u(&self.corners);
-        [
-            s.lookup(of_vertices, corners),
-            s.lookup(of_vertices, s.shr_u(corners, 4)),
-            s.lookup(of_vertices, s.shr_u(corners, 8)),
-        ]
+    pub fn beside<S: KernelSimd>(&self, s: S, low: S::F, high: S::F) -> Mask {
+        s.beside(low, high, &self.corners)
     }
 
     #[inline(always)]
@@ -96,9 +103,9 @@ struct VertexTable {
 impl VertexTable {
     const EMPTY: Self = Self { points: [[0; BLOCK]; 3], len: 0 };
 
-    /// Returns the packed indices of three vertices; `None`, with the table unchanged, if they do not fit.
-    fn add(&mut self, triangle: &[Vec3; 3]) -> Option<u32> {
-        let (len, mut packed) = (self.len, 0);
+    /// Returns the indices of three vertices; `None`, with the table unchanged, if they do not fit.
+    fn add(&mut self, triangle: &[Vec3; 3]) -> Option<[u8; 3]> {
+        let (len, mut corners) = (self.len, [0; 3]);
         for (corner, point) in triangle.iter().enumerate() {
             let [x, y, z] = point.to_array().map(f32::to_bits);
             let [xs, ys, zs] = &self.points;
@@ -112,9 +119,9 @@ impl VertexTable {
             }
             (self.points[0][vertex], self.points[1][vertex], self.points[2][vertex]) = (x, y, z);
             self.len = self.len.max(vertex + 1);
-            packed |= (vertex as u32) << (4 * corner);
+            corners[corner] = vertex as u8;
         }
-        Some(packed)
+        Some(corners)
     }
 }
 
@@ -133,15 +140,42 @@ impl LeafBlock for SharedBlock {
 
     #[inline(always)]
     fn hits<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
-        let [x, y, z] = ray.shear(s, &block.vertices);
-        let ([ax, bx, cx], [ay, by, cy]) = (block.by_corner(s, x), block.by_corner(s, y));
-        let mask = may_hit(s, &[ax, ay, z], &[bx, by, z], &[cx, cy, z]);
-        if mask == 0 {
-            return LaneHits::none(s);
-        }
-        let [az, bz, cz] = block.by_corner(s, z);
-        resolve(s, mask, &[ax, ay, az], &[bx, by, bz], &[cx, cy, cz], s.splat(ray.sz))
+        let vertices = ray.shear(s, &block.vertices);
+        let corners = three!(|k| s.load_bytes(&block.corners[k]));
+        hits_of(s, &vertices, &corners, ray.sz)
     }
+
+    #[inline(always)]
+    fn test<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay, nearest: &mut Nearest) {
+        if !S::IS_NARROW {
+            return offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
+        }
+        let vertices = ray.shear(s, &block.vertices);
+        let [x, y, _] = vertices;
+        let mut left = block.filled & !(block.beside(s, x, x) | block.beside(s, y, y));
+        while left != 0 {
+            let some = if left.count_ones() <= 8 { left } else { left & 0xFF };
+            left &= !some;
+            let Eight { corners, places } = s.first_eight(some, &block.corners);
+            let mut hits = hits_of(s, &vertices, &corners, ray.sz);
+            hits.mask &= (1 << some.count_ones()) - 1;
+            offer(s, hits, nearest, |lane| block.prims.get((places >> (8 * lane)) as usize % BLOCK));
+        }
+    }
+}
+
+/// Intersects triangles over sheared vertices, with all lanes of `corners`.
+#[inline(always)]
+fn hits_of<S: KernelSimd>(s: S, vertices: &Sheared<S>, corners: &[S::U; 3], sz: f32) -> LaneHits<S> {
+    let [x, y, z] = *vertices;
+    let [ax, bx, cx] = three!(|k| s.lookup(x, corners[k]));
+    let [ay, by, cy] = three!(|k| s.lookup(y, corners[k]));
+    let mask = may_hit(s, &[ax, ay, z], &[bx, by, z], &[cx, cy, z]);
+    if mask == 0 {
+        return LaneHits::none(s);
+    }
+    let [az, bz, cz] = three!(|k| s.lookup(z, corners[k]));
+    resolve(s, mask, &[ax, ay, az], &[bx, by, bz], &[cx, cy, cz], s.splat(sz))
 }
 
 #[cfg(test)]

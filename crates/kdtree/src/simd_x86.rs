@@ -1,8 +1,8 @@
 //! The x86 implementations of [`KernelSimd`].
 
-use super::KernelSimd;
+use super::{Corners, Eight, KernelSimd, places};
 use crate::node8::{CHILD_ORDERS, DescentRay, EMPTY, Node8, PLANES, STACK, Stack};
-use firstlight_simd::{Avx2, Avx512, Mask};
+use firstlight_simd::{Avx2, Avx512, Mask, SET_BITS, three};
 use std::arch::x86_64::*;
 
 impl KernelSimd for Avx512 {
@@ -63,6 +63,17 @@ impl KernelSimd for Avx512 {
             height + met.count_ones() as usize
         }
     }
+
+    const IS_NARROW: bool = false;
+
+    #[inline(always)]
+    fn first_eight(self, triangles: Mask, corners: &Corners) -> Eight<Self> {
+        let places = places(triangles);
+        // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
+        let corners = unsafe { moved(places, corners).map(|corner| _mm512_cvtepu8_epi32(corner)) };
+        Eight { corners, places }
+    }
+
     #[inline(always)]
     fn prefetch(self, at: *const u8) {
         // SAFETY: a prefetch of a bad address does nothing.
@@ -84,10 +95,11 @@ impl KernelSimd for Avx2 {
         unsafe {
             // The stores below write eight entries each.
             assert!(height <= STACK - 8);
-            let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            // Lane 7 holds the axes: no child refers to this plane.
-            let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
-            let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
+            // The planes above the lower four children are in the lower half, those above the others in the upper one:
+            // so the steps from planes to children need not cross the halves.
+            let planes = load_lanes(&PLANE_OF_LANE);
+            let splits = _mm256_permutevar8x32_ps(_mm256_load_ps(std::ptr::from_ref(node).cast()), planes);
+            let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), load_lanes(&AXIS_OF_LANE));
             // The permutation within rows uses the low two bits of each lane, which are its axis.
             let rows = std::ptr::from_ref(ray).cast::<__m128>();
             let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows), axes);
@@ -97,44 +109,59 @@ impl KernelSimd for Avx2 {
             let distance = _mm256_sub_ps(splits, origin);
             let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);
             let hi = _mm256_sub_ps(padding, _mm256_mul_ps(distance, minus_inv_hi));
-            let (never, always) = (_mm256_set1_ps(f32::NEG_INFINITY), _mm256_set1_ps(f32::INFINITY));
-            // Where the direction is negative, the upper side comes first.
-            let lower_t0 = _mm256_blendv_ps(never, lo, inv_lo);
-            let upper_t0 = _mm256_blendv_ps(lo, never, inv_lo);
-            let lower_t1 = _mm256_blendv_ps(hi, always, inv_lo);
-            let upper_t1 = _mm256_blendv_ps(always, hi, inv_lo);
+            let (mut first, mut last) = (_mm256_set1_ps(t0), _mm256_set1_ps(t1));
+            // At each level, the upper side of a plane is the far one, unless the ray descends its axis.
+            (first, last) = clip::<0b00_00_00_00, 0b1111_0000>(first, last, lo, hi, inv_lo);
+            (first, last) = clip::<0b01_01_01_01, 0b1100_1100>(first, last, lo, hi, inv_lo);
+            (first, last) = clip::<0b11_11_10_10, 0b1010_1010>(first, last, lo, hi, inv_lo);
             let down = _mm256_movemask_ps(inv_lo) as u32;
-            // For each child its plane at each level, and which children are on the upper side.
-            let root = _mm256_setzero_si256();
-            let middle = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
-            let bottom = _mm256_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6);
-            // NaN as the first argument yields the second.
-            let mut first = _mm256_set1_ps(t0);
-            first = _mm256_max_ps(sides::<0b1111_0000>(lower_t0, root, upper_t0), first);
-            first = _mm256_max_ps(sides::<0b1100_1100>(lower_t0, middle, upper_t0), first);
-            first = _mm256_max_ps(sides::<0b1010_1010>(lower_t0, bottom, upper_t0), first);
-            let mut last = _mm256_set1_ps(t1);
-            last = _mm256_min_ps(sides::<0b1111_0000>(lower_t1, root, upper_t1), last);
-            last = _mm256_min_ps(sides::<0b1100_1100>(lower_t1, middle, upper_t1), last);
-            last = _mm256_min_ps(sides::<0b1010_1010>(lower_t1, bottom, upper_t1), last);
-            let order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
-            let order = _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), shifts);
-            let first = _mm256_permutevar8x32_ps(first, order);
-            let last = _mm256_permutevar8x32_ps(last, order);
-            let children = _mm256_permutevar8x32_epi32(_mm256_load_si256(node.children.as_ptr().cast()), order);
+            let order = ORDERS_BY_LANES[usize::from((down ^ ray.reversed) as u8)];
+            let order =
+                _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
+            let children = _mm256_load_si256(node.children.as_ptr().cast());
             let empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(EMPTY as i32));
-            let within = _mm256_cmp_ps::<_CMP_LE_OQ>(first, last);
-            let met = _mm256_movemask_ps(_mm256_andnot_ps(_mm256_castsi256_ps(empty), within)) as u32;
-            // Spreads the mask to bytes and collects its lane indices: a compress in two steps.
-            let bytes = _pdep_u64(u64::from(met), 0x0101_0101_0101_0101) * 0xFF;
-            let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(_pext_u64(0x0706_0504_0302_0100, bytes) as i64));
-            let children = _mm256_permutevar8x32_epi32(children, lanes);
+            let within = _mm256_andnot_ps(_mm256_castsi256_ps(empty), _mm256_cmp_ps::<_CMP_LE_OQ>(first, last));
+            let met = _mm256_movemask_ps(_mm256_permutevar8x32_ps(within, order)) as u32;
+            let order = _mm256_permutevar8x32_epi32(order, lanes_in(met as u8));
+            let children = _mm256_permutevar8x32_epi32(children, order);
             _mm256_storeu_si256(stack.child.as_mut_ptr().add(height).cast(), children);
-            _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(first, lanes));
-            _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(last, lanes));
+            _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(first, order));
+            _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(last, order));
             height + met.count_ones() as usize
         }
     }
+
+    const IS_NARROW: bool = true;
+
+    #[inline(always)]
+    fn beside(self, low: Self::F, high: Self::F, corners: &Corners) -> Mask {
+        // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
+        unsafe {
+            let zero = _mm256_setzero_ps();
+            let [a, b] = low.map(|low| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(zero, low)));
+            let [c, d] = high.map(|high| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(high, zero)));
+            // A byte for each vertex: above in the lower half, below in the upper one. Packing interleaves the halves.
+            let packed = _mm256_packs_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
+            let sides = _mm256_permutevar8x32_epi32(packed, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7));
+            let of = |corner: usize| {
+                let vertices = _mm256_broadcastsi128_si256(_mm_loadu_si128(corners[corner].as_ptr().cast()));
+                _mm256_shuffle_epi8(sides, vertices)
+            };
+            let all = _mm256_and_si256(_mm256_and_si256(of(0), of(1)), of(2));
+            let all = _mm256_movemask_epi8(all) as u32;
+            (all | all >> 16) as Mask
+        }
+    }
+
+    #[inline(always)]
+    fn first_eight(self, triangles: Mask, corners: &Corners) -> Eight<Self> {
+        let places = places(triangles);
+        // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
+        // Both halves are the same value, so the compiler computes what follows once.
+        let corners = unsafe { moved(places, corners).map(|corner| [_mm256_cvtepu8_epi32(corner); 2]) };
+        Eight { corners, places }
+    }
+
     #[inline(always)]
     fn prefetch(self, at: *const u8) {
         // SAFETY: a prefetch of a bad address does nothing.
@@ -142,16 +169,95 @@ impl KernelSimd for Avx2 {
     }
 }
 
-/// Returns for each child the value of its plane: from `upper` where the bit is set, else from `lower`.
+/// Moves the bytes of each row at these places, which are below sixteen, to the front.
 ///
 /// # Safety
 ///
 /// The processor must have AVX2.
 #[inline(always)]
-unsafe fn sides<const UPPER: i32>(lower: __m256, planes: __m256i, upper: __m256) -> __m256 {
+unsafe fn moved(places: u64, corners: &Corners) -> [__m128i; 3] {
+    // SAFETY: the caller ensures that the processor has AVX2; rows have the size that is read.
+    unsafe {
+        let places = _mm_cvtsi64_si128(places as i64);
+        three!(|k| _mm_shuffle_epi8(_mm_loadu_si128(corners[k].as_ptr().cast()), places))
+    }
+}
+
+/// The plane in each lane of an AVX2 visit: in each half the root, one of the second level, two of the third level.
+const PLANE_OF_LANE: [u32; 8] = [0, 1, 3, 4, 0, 2, 5, 6];
+
+/// Where the axis of this plane begins in [`Node8::axes`].
+const AXIS_OF_LANE: [u32; 8] = {
+    let mut shifts = PLANE_OF_LANE;
+    let mut lane = 0;
+    while lane < 8 {
+        shifts[lane] *= 3;
+        lane += 1;
+    }
+    shifts
+};
+
+/// The orders of [`CHILD_ORDERS`] for each set of lanes of [`PLANE_OF_LANE`] whose axis the ray descends.
+static ORDERS_BY_LANES: [u32; 256] = {
+    let mut orders = [0; 256];
+    let mut lanes = 0;
+    while lanes < 256 {
+        let (mut down, mut lane) = (0, 0);
+        while lane < 8 {
+            down |= (lanes >> lane & 1) << PLANE_OF_LANE[lane];
+            lane += 1;
+        }
+        orders[lanes] = CHILD_ORDERS[down] as u32 & 0xFF_FFFF;
+        lanes += 1;
+    }
+    orders
+};
+
+/// Loads eight integers.
+///
+/// # Safety
+///
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn load_lanes(from: &'static [u32; 8]) -> __m256i {
+    // SAFETY: the caller ensures that the processor has AVX2; the array has the size that is read.
+    unsafe { _mm256_loadu_si256(from.as_ptr().cast()) }
+}
+
+/// Returns the indices of the set bits of a mask, ascending, followed by zeros.
+///
+/// # Safety
+///
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn lanes_in(mask: u8) -> __m256i {
+    // SAFETY: the caller ensures that the processor has AVX2.
+    unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(SET_BITS[usize::from(mask)] as i64)) }
+}
+
+/// Clips the intervals of eight children by their planes at one level: `PLANES` selects them within each half, `UPPER`
+/// marks the children on the upper side.
+///
+/// # Safety
+///
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn clip<const PLANES: i32, const UPPER: i32>(
+    first: __m256,
+    last: __m256,
+    lo: __m256,
+    hi: __m256,
+    inv: __m256,
+) -> (__m256, __m256) {
     // SAFETY: the caller ensures that the processor has AVX2; only registers are read.
     unsafe {
-        let (lower, upper) = (_mm256_permutevar8x32_ps(lower, planes), _mm256_permutevar8x32_ps(upper, planes));
-        _mm256_blend_ps::<UPPER>(lower, upper)
+        let (lo, hi) = (_mm256_permute_ps::<PLANES>(lo), _mm256_permute_ps::<PLANES>(hi));
+        // The sign bit is set where the child is on the far side.
+        let sides = _mm256_blend_ps::<UPPER>(_mm256_setzero_ps(), _mm256_set1_ps(-0.0));
+        let far = _mm256_xor_ps(_mm256_permute_ps::<PLANES>(inv), sides);
+        // NaN as the first argument yields the second.
+        let entered = _mm256_max_ps(lo, first);
+        let left = _mm256_min_ps(hi, last);
+        (_mm256_blendv_ps(first, entered, far), _mm256_blendv_ps(left, last, far))
     }
 }

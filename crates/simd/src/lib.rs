@@ -20,7 +20,7 @@ pub use real::{Real, Truth, select};
 pub use simd::InstructionSet;
 #[cfg(target_arch = "x86_64")]
 pub use simd::{Avx2, Avx512};
-pub use simd::{Kernel, LANES, Mask, Portable, Simd};
+pub use simd::{Kernel, LANES, Mask, Portable, SET_BITS, Simd};
 pub use vector::{Vector, Vector3, frame_around, select_vector};
 pub use word::Word;
 

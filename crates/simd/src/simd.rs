@@ -81,6 +81,8 @@ pub trait Simd: Copy {
     fn splat_u(self, x: u32) -> Self::U;
     /// One lane per entry of the array, in order.
     fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    /// One lane per byte of the array, in order.
+    fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     /// Writes the lanes to an array, in order.
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     /// Lanes where `a < b`, both unsigned.
@@ -147,6 +149,25 @@ pub trait Simd: Copy {
     /// Like [`Self::compress`], for `u32`.
     fn compress_u(self, mask: Mask, a: Self::U) -> Self::U;
 }
+
+/// The indices of the set bits of each byte, ascending from the lowest byte on, followed by zeros: compresses eight lanes
+/// where no instruction does.
+pub static SET_BITS: [u64; 256] = {
+    let mut indices = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut bit, mut n) = (0, 0);
+        while bit < 8 {
+            if mask >> bit & 1 != 0 {
+                indices[mask] |= bit << (8 * n);
+                n += 1;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    indices
+};
 
 /// A function and its arguments, for [`Simd::call`].
 pub trait Kernel<S: Simd> {
@@ -402,6 +423,11 @@ impl Simd for Portable {
     #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
     fn load_u(self, from: &[u32; LANES]) -> Self::U {
         *from
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn load_bytes(self, from: &[u8; LANES]) -> Self::U {
+        from.map(u32::from)
     }
     #[cfg_attr(target_arch = "x86_64", inline(never))]
     #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
