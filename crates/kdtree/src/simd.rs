@@ -75,3 +75,55 @@ impl KernelSimd for Portable {
 #[cfg(target_arch = "x86_64")]
 #[path = "simd_x86.rs"]
 mod x86;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[inline(always)]
+    fn beside_and_first<S: KernelSimd>(s: S, cases: &[(u64, Mask)], out: &mut Vec<u32>) {
+        for &(seed, triangles) in cases {
+            let mut state = seed;
+            let mut next = move || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 40) as u32
+            };
+            let corners: Corners = std::array::from_fn(|_| std::array::from_fn(|_| next() as u8 % 16));
+            let mut numbers = || -> [f32; LANES] {
+                std::array::from_fn(|_| [0.0, -0.0, 1.0, -1.0, 2.0, -1e-40, 1e-40][next() as usize % 7])
+            };
+            let (low, high) = (s.load(&numbers()), s.load(&numbers()));
+            out.push(u32::from(s.beside(low, high, &corners)));
+            let Eight { corners, places } = s.first_eight(triangles, &corners);
+            for of_corner in corners {
+                let mut stored = [0; LANES];
+                s.store_u(of_corner, &mut stored);
+                out.extend(&stored[..triangles.count_ones() as usize]);
+            }
+            out.extend((0..triangles.count_ones()).map(|i| (places >> (8 * i)) as u32 & 0xFF));
+        }
+    }
+
+    #[test]
+    fn all_instruction_sets_leave_out_the_same_triangles() {
+        let masks = (0..=Mask::MAX).filter(|mask| mask.count_ones() <= 8);
+        let cases: Vec<(u64, Mask)> = (0..).zip(masks).map(|(i, mask)| (i * 7919, mask)).collect();
+        let cases = &cases[..];
+        let run = |set| {
+            let mut out = Vec::new();
+            let into = &mut out;
+            dispatch!(set, beside_and_first(cases: &[(u64, Mask)], into: &mut Vec<u32>));
+            out
+        };
+        let expected = run(InstructionSet::Portable);
+        for set in InstructionSet::available() {
+            assert!(run(set) == expected, "{set:?}");
+        }
+        // Few triangles lie beside, and not all of the others.
+        let portable = Portable;
+        let all = |value: f32| [value; LANES];
+        assert_eq!(portable.beside(all(1.0), all(1.0), &[[0; LANES]; 3]), Mask::MAX);
+        assert_eq!(portable.beside(all(0.0), all(-0.0), &[[0; LANES]; 3]), 0);
+        assert_eq!(portable.first_eight(0b1000_0000_0010_0001, &[[3; LANES]; 3]).places & 0xFF_FFFF, 0x0F_05_00);
+    }
+}
