@@ -231,29 +231,44 @@ impl LeafBlock for SphereBlock {
 }
 
 impl SphereBlock {
-    /// Returns the spheres that the ray may hit before `end`: all that it hits, and few others.
-    ///
-    /// In `f32`, with room for the rounding. Let C lead from the origin to the centre, and u be the roundoff 2⁻²⁴. The
-    /// difference of the centre has an error of u |C|, the distance along the ray one of 6 u |C|, and the perpendicular
-    /// one of 12 u |C|. The radius grows by 32 u times the sum of the coordinates of C, which also covers the rounding
-    /// of the squares: if |C| is a fifth of the radius or more, and otherwise the perpendicular is much shorter than the
-    /// radius. Squares of centres farther than `FAR` may overflow.
+    /// Returns the spheres that the ray may hit before `end`, see [`spheres_near`].
     #[inline(always)]
     fn near<S: KernelSimd>(&self, s: S, ray: &RoundedRay, end: f32) -> Mask {
-        const FAR: f32 = 1e18;
         let to_center = three!(|axis| s.sub(s.load(&self.center[axis]), s.splat(ray.origin[axis])));
         let unit = three!(|axis| s.splat(ray.unit[axis]));
-        let [x, y, z] = to_center;
-        let along = s.mul_add_about(z, unit[2], s.mul_add_about(y, unit[1], s.mul(x, unit[0])));
-        let [px, py, pz] = three!(|axis| s.neg_mul_add_about(unit[axis], along, to_center[axis]));
-        let perpendicular = s.mul_add_about(pz, pz, s.mul_add_about(py, py, s.mul(px, px)));
-        let distance = s.add(s.add(s.abs(x), s.abs(y)), s.abs(z));
-        let radius = s.mul_add_about(distance, s.splat(16.0 * f32::EPSILON), s.load(&self.radius));
-        let ahead = s.le(s.sub(s.splat(0.0), radius), along);
-        let before = s.le(s.sub(along, radius), s.splat(end * ray.length * (1.0 + 16.0 * f32::EPSILON)));
-        let met = s.le(perpendicular, s.mul(radius, radius));
-        met & ahead & before | s.lt(s.splat(FAR), distance)
+        spheres_near(s, &to_center, &unit, s.load(&self.radius), s.splat(end * ray.length))
     }
+}
+
+/// Returns the lanes whose sphere the ray may meet before `end`: all that do, and few others.
+///
+/// In `f32`, with room for the rounding. Let C lead from the origin to the centre, and u be the roundoff 2⁻²⁴. With errors
+/// of u |C| in `to_center` and of u in `unit`, the distance along the ray has an error of 8 u |C|, and the perpendicular
+/// one of 14 u |C|. The radius grows by 32 u times the sum of the coordinates of C, which also covers the
+/// rounding of the squares: if |C| is a fifth of the radius or more, and otherwise the perpendicular is much shorter
+/// than the radius. Squares of centres farther than `FAR` may overflow.
+///
+/// - `to_center`: from the origin of the ray, rounded once.
+/// - `end`: distance along the ray, metres, within 4 u of itself.
+#[inline(always)]
+pub(super) fn spheres_near<S: KernelSimd>(
+    s: S,
+    to_center: &[S::F; 3],
+    unit: &[S::F; 3],
+    radius: S::F,
+    end: S::F,
+) -> Mask {
+    const FAR: f32 = 1e18;
+    let [x, y, z] = *to_center;
+    let along = s.mul_add_about(z, unit[2], s.mul_add_about(y, unit[1], s.mul(x, unit[0])));
+    let [px, py, pz] = three!(|axis| s.neg_mul_add_about(unit[axis], along, to_center[axis]));
+    let perpendicular = s.mul_add_about(pz, pz, s.mul_add_about(py, py, s.mul(px, px)));
+    let distance = s.add(s.add(s.abs(x), s.abs(y)), s.abs(z));
+    let radius = s.mul_add_about(distance, s.splat(16.0 * f32::EPSILON), radius);
+    let ahead = s.le(s.sub(s.splat(0.0), radius), along);
+    let before = s.le(s.sub(along, radius), s.mul(end, s.splat(1.0 + 16.0 * f32::EPSILON)));
+    let met = s.le(perpendicular, s.mul(radius, radius));
+    met & ahead & before | s.lt(s.splat(FAR), distance)
 }
 
 #[cfg(test)]

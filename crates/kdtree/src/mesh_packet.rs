@@ -5,8 +5,8 @@
 //! traced in groups.
 
 use super::block_tree::{BlockTree, Leaf};
-use super::blocks::{PreciseRay, SphereBlock, TriangleBlock};
-use super::lanes::{LaneHits, longest_axis, may_hit, resolve, shear, sphere_hits};
+use super::blocks::{PreciseRay, SphereBlock, TriangleBlock, spheres_near};
+use super::lanes::{LaneHits, dot, longest_axis, may_hit, resolve, shear, sphere_hits};
 use super::leaf::{BLOCK, LeafBlock, ShearedRay};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::FrameF64;
@@ -124,20 +124,24 @@ impl PacketBlock for TriangleBlock {
 }
 
 impl PacketBlock for SphereBlock {
-    type Frame<S: KernelSimd> = FrameF64<S>;
+    type Frame<S: KernelSimd> = SphereFrame<S>;
 
     const HAS_FOOTPRINT: bool = false;
 
     #[inline(always)]
-    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> FrameF64<S> {
-        FrameF64::new(s, &packet.origin, &packet.dir)
+    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> SphereFrame<S> {
+        let precise = FrameF64::new(s, &packet.origin, &packet.dir);
+        let length = s.sqrt_d(dot(s, &precise.dir, &precise.dir));
+        let inv_length = s.mul_d(length, precise.inv_dir_squared);
+        let unit = three!(|axis| s.narrow(s.mul_d(precise.dir[axis], inv_length)));
+        SphereFrame { precise, unit, length: s.narrow(length) }
     }
 
     #[inline(always)]
     fn test_rays<S: KernelSimd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        (_, frame): (&PacketGroup<S>, &FrameF64<S>),
+        (_, frame): (&PacketGroup<S>, &SphereFrame<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
     ) {
@@ -145,6 +149,15 @@ impl PacketBlock for SphereBlock {
             packet.test_spheres(s, frame, block, mask);
         }
     }
+}
+
+/// Sixteen rays prepared for spheres.
+#[derive(Clone, Copy)]
+pub(super) struct SphereFrame<S: KernelSimd> {
+    precise: FrameF64<S>,
+    /// Direction of length 1, and the length of the ray's own direction.
+    unit: [S::F; 3],
+    length: S::F,
 }
 
 /// Up to so many rays are tested one after the other, without culling triangles by the footprint.
@@ -384,7 +397,7 @@ impl<S: KernelSimd> MeshPacket<S> {
 
     /// Tests one sphere or one ray after the other, whichever are fewer.
     #[inline(always)]
-    fn test_spheres(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, mut mask: Mask) {
+    fn test_spheres(&mut self, s: S, frame: &SphereFrame<S>, block: &SphereBlock, mut mask: Mask) {
         let n_spheres = block.prims().len();
         if n_spheres <= mask.count_ones() as usize {
             for lane in 0..n_spheres {
@@ -404,8 +417,23 @@ impl<S: KernelSimd> MeshPacket<S> {
 
     /// Tests one sphere against all rays.
     #[inline(always)]
-    fn test_sphere(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, lane: usize, mask: Mask) {
+    fn test_sphere(
+        &mut self,
+        s: S,
+        SphereFrame { precise: frame, unit, length }: &SphereFrame<S>,
+        block: &SphereBlock,
+        lane: usize,
+        mut mask: Mask,
+    ) {
         let (center, radius) = block.sphere(lane % BLOCK);
+        if S::IS_NARROW {
+            let to_center = three!(|axis| s.sub(s.splat(center[axis]), self.origin[axis]));
+            let end = s.mul(s.load(&self.nearest.t), *length);
+            mask &= spheres_near(s, &to_center, unit, s.splat(radius), end);
+            if mask == 0 {
+                return;
+            }
+        }
         let to_center = frame.towards(s, &center.as_dvec3().to_array());
         let radius_squared = s.splat_d(f64::from(radius).powi(2));
         let hits = sphere_hits(s, mask, &to_center, radius_squared, &frame.dir, frame.inv_dir_squared);
