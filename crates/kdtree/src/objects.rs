@@ -432,14 +432,26 @@ fn by_axis<S: KernelSimd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: 
 }
 
 /// Loads the first sixteen numbers, or all of them with `idle` in the remaining lanes.
+/// Loads the first sixteen numbers; `idle` where there are fewer.
 #[inline(always)]
-fn load_some<S: KernelSimd>(s: S, from: &[f32], idle: f32) -> S::F {
+pub(super) fn load_some<S: KernelSimd>(s: S, from: &[f32], idle: f32) -> S::F {
     if let Some(all) = from.first_chunk() {
         return s.load(all);
     }
     let mut some = [idle; LANES];
     some[..from.len()].copy_from_slice(from);
     s.load(&some)
+}
+
+/// Like [`load_some`], for integers.
+#[inline(always)]
+pub(super) fn load_some_u<S: KernelSimd>(s: S, from: &[u32], idle: u32) -> S::U {
+    if let Some(all) = from.first_chunk() {
+        return s.load_u(all);
+    }
+    let mut some = [idle; LANES];
+    some[..from.len()].copy_from_slice(from);
+    s.load_u(&some)
 }
 
 #[inline(always)]

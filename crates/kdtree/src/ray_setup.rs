@@ -17,19 +17,30 @@ type Lanes = [f32; LANES];
 pub(super) trait Source {
     /// Upper bound on the number of remaining rays.
     fn left(&self) -> usize;
-    /// Returns the next ray, its nearest hit so far, and an id that is passed to `finish`.
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
+    /// Stores the next rays, up to sixteen, and returns the lanes that have one; `None` if there are no more.
+    fn fetch<S: KernelSimd>(&mut self, s: S, to: &mut FetchedRays) -> Option<Mask>;
     /// Map from the space of the rays to the tree's own; `None` if they are the same.
     fn own_from_world(&self) -> Option<&Affine3A>;
     /// Called for rays that entered the tree's bounds; `nearest.found` says whether the tree has a nearer hit.
     fn finish(&mut self, ray: u32, nearest: &Nearest);
 }
 
+/// Up to sixteen rays.
+#[repr(C, align(64))]
+pub(super) struct FetchedRays {
+    pub origin: [Lanes; 3],
+    pub dir: [Lanes; 3],
+    /// Nearest hit so far: `t`, and the primitive index for ties.
+    pub t: Lanes,
+    pub prim: [u32; LANES],
+    /// Passed to [`Source::finish`].
+    pub id: [u32; LANES],
+}
+
 /// Sixteen rays in the tree's own space.
 #[repr(C, align(64))]
 pub(super) struct RaySetup {
-    origin: [Lanes; 3],
-    dir: [Lanes; 3],
+    rays: FetchedRays,
     /// As in `ray::TreeRay`.
     inv_lo: [Lanes; 3],
     inv_hi: [Lanes; 3],
@@ -42,11 +53,6 @@ pub(super) struct RaySetup {
     sx: Lanes,
     sy: Lanes,
     sz: Lanes,
-    /// Nearest hit so far: `t`, and the primitive index for ties.
-    t: Lanes,
-    prim: [u32; LANES],
-    /// Ids given by the source.
-    id: [u32; LANES],
     /// Lanes that have not been taken yet.
     waiting: Mask,
 }
@@ -55,9 +61,14 @@ impl RaySetup {
     #[inline(always)]
     pub fn new() -> Self {
         Self {
-            origin: [[0.0; LANES]; 3],
-            // Unused lanes take part in the computation and need finite values.
-            dir: [[1.0; LANES]; 3],
+            rays: FetchedRays {
+                origin: [[0.0; LANES]; 3],
+                // Unused lanes take part in the computation and need finite values.
+                dir: [[1.0; LANES]; 3],
+                t: [0.0; LANES],
+                prim: [0; LANES],
+                id: [0; LANES],
+            },
             inv_lo: [[0.0; LANES]; 3],
             inv_hi: [[0.0; LANES]; 3],
             padding: [0.0; LANES],
@@ -67,9 +78,6 @@ impl RaySetup {
             sx: [0.0; LANES],
             sy: [0.0; LANES],
             sz: [0.0; LANES],
-            t: [0.0; LANES],
-            prim: [0; LANES],
-            id: [0; LANES],
             waiting: 0,
         }
     }
@@ -80,42 +88,25 @@ impl RaySetup {
     #[inline(always)]
     pub fn next<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &mut impl Source) -> Option<usize> {
         while self.waiting == 0 {
-            let n = self.fetch(source);
-            if n == 0 {
-                return None;
-            }
+            let fetched = source.fetch(s, &mut self.rays)?;
             self.prepare(s, bounds, extent, source);
-            self.waiting &= Mask::MAX >> (LANES - n);
+            self.waiting &= fetched;
         }
         let lane = self.waiting.trailing_zeros() as usize % LANES;
         self.waiting &= self.waiting - 1;
         Some(lane)
     }
 
-    /// Loads up to sixteen rays; returns their number.
-    #[inline(always)]
-    fn fetch(&mut self, source: &mut impl Source) -> usize {
-        for lane in 0..LANES {
-            let Some((ray, nearest, id)) = source.next() else { return lane };
-            for axis in 0..3 {
-                self.origin[axis][lane] = ray.origin[axis];
-                self.dir[axis][lane] = ray.dir[axis];
-            }
-            (self.t[lane], self.prim[lane], self.id[lane]) = (nearest.t, nearest.prim, id);
-        }
-        LANES
-    }
-
     /// Does [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
     #[inline(always)]
     fn prepare<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
-        let mut origin = three!(|axis| s.load(&self.origin[axis]));
-        let mut dir = three!(|axis| s.load(&self.dir[axis]));
+        let mut origin = three!(|axis| s.load(&self.rays.origin[axis]));
+        let mut dir = three!(|axis| s.load(&self.rays.dir[axis]));
         if let Some(map) = source.own_from_world() {
             [origin, dir] = to_own_space(s, map, &origin, &dir);
             for axis in 0..3 {
-                s.store(origin[axis], &mut self.origin[axis]);
-                s.store(dir[axis], &mut self.dir[axis]);
+                s.store(origin[axis], &mut self.rays.origin[axis]);
+                s.store(dir[axis], &mut self.rays.dir[axis]);
             }
         }
         let (along_x, along_y) = longest_axis(s, &dir);
@@ -132,7 +123,7 @@ impl RaySetup {
         s.store(sz, &mut self.sz);
         let padding = s.mul(s.splat(RELATIVE_PADDING * extent), s.abs(sz));
         s.store(padding, &mut self.padding);
-        let (mut from, mut until) = (s.splat(0.0), s.load(&self.t));
+        let (mut from, mut until) = (s.splat(0.0), s.load(&self.rays.t));
         for axis in 0..3 {
             let inv = s.div(one, dir[axis]);
             let (lo, hi) = (s.mul(inv, s.splat(1.0 - RELATIVE_PADDING)), s.mul(inv, s.splat(1.0 + RELATIVE_PADDING)));
@@ -152,18 +143,18 @@ impl RaySetup {
 
     #[inline(always)]
     pub fn descent(&self, lane: usize) -> DescentRay {
-        let [x, y, z] = &self.origin;
+        let [x, y, z] = &self.rays.origin;
         let [lx, ly, lz] = &self.inv_lo;
         let [hx, hy, hz] = &self.inv_hi;
         let origin = [x[lane], y[lane], z[lane]];
         let (inv_lo, inv_hi) = ([lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]]);
-        DescentRay::new(origin, inv_lo, inv_hi, self.padding[lane], self.t[lane])
+        DescentRay::new(origin, inv_lo, inv_hi, self.padding[lane], self.rays.t[lane])
     }
 
     /// Returns origin and direction in the tree's own space.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> (Vec3, Vec3) {
-        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.dir);
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.rays.origin, &self.rays.dir);
         (Vec3::new(ox[lane], oy[lane], oz[lane]), Vec3::new(dx[lane], dy[lane], dz[lane]))
     }
 
@@ -173,17 +164,17 @@ impl RaySetup {
         let kz = self.kz[lane] as usize % 3;
         let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
         let shear = Shear { kz, kx, ky, sx: self.sx[lane], sy: self.sy[lane], sz: self.sz[lane] };
-        R::new(&Ray { origin, dir, t_max: self.t[lane] }, &shear)
+        R::new(&Ray { origin, dir, t_max: self.rays.t[lane] }, &shear)
     }
 
     #[inline(always)]
     pub fn nearest(&self, lane: usize) -> Nearest {
-        Nearest { prim: self.prim[lane], ..Nearest::before(self.t[lane]) }
+        Nearest { prim: self.rays.prim[lane], ..Nearest::before(self.rays.t[lane]) }
     }
 
     #[inline(always)]
     pub fn id(&self, lane: usize) -> u32 {
-        self.id[lane]
+        self.rays.id[lane]
     }
 
     /// Returns the first and the last `t` inside the bounds.

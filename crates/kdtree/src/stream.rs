@@ -251,6 +251,8 @@ impl<R: LeafRay> Slot<R> {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
+    use crate::ray_setup::FetchedRays;
+    use crate::simd::{LANES, Mask};
     use crate::{BuildPreset, MeshTree};
     use firstlight_simd::Portable;
     use glam::Affine3A;
@@ -270,10 +272,14 @@ mod tests {
             self.rays.len() - self.next
         }
 
-        fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
-            let ray = *self.rays.get(self.next)?;
-            self.next += 1;
-            Some((ray, Nearest::before(f32::INFINITY), self.next as u32 - 1))
+        fn fetch<S: KernelSimd>(&mut self, _: S, to: &mut FetchedRays) -> Option<Mask> {
+            let n = self.left().min(LANES);
+            for (lane, ray) in self.rays[self.next..][..n].iter().enumerate() {
+                (0..3).for_each(|axis| (to.origin[axis][lane], to.dir[axis][lane]) = (ray.origin[axis], ray.dir[axis]));
+                (to.t[lane], to.prim[lane], to.id[lane]) = (f32::INFINITY, 0, (self.next + lane) as u32);
+            }
+            self.next += n;
+            (n > 0).then(|| Mask::MAX >> (LANES - n))
         }
 
         fn own_from_world(&self) -> Option<&Affine3A> {

@@ -12,15 +12,15 @@ use super::instance_stream::{self, InstanceSource, InstanceState};
 use super::instance_tree::InstanceTree;
 use super::lanes::to_own_space;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
-use super::objects::{Packet, SimpleObjects};
+use super::objects::{Packet, SimpleObjects, load_some, load_some_u};
 use super::primitive_trees::PrimitiveTrees;
 use super::ray::Nearest;
-use super::ray_setup::Source;
+use super::ray_setup::{FetchedRays, Source};
 use super::shape::{RayClass, Shape};
 use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
 use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
-use crate::geometry::{Aabb, Ray};
+use crate::geometry::Aabb;
 use glam::Affine3A;
 use std::cell::RefCell;
 
@@ -110,8 +110,9 @@ enum StreamTree<'a> {
 
 /// Storage for the results of a batch.
 trait Answers {
-    /// Distance and object of the hit so far; `None` if the ray is done.
-    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)>;
+    /// Returns what is known of the rays from `first` on: those that are not done, the distance of their hits so far, by
+    /// default `t_max`, and the objects of these hits, by default [`HitBatch::MISS`].
+    fn so_far<S: KernelSimd>(&self, s: S, first: usize, t_max: S::F) -> (Mask, S::F, S::U);
 
     fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest);
 
@@ -127,9 +128,11 @@ trait Answers {
 
 impl Answers for HitBatch {
     #[inline(always)]
-    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
-        let object = self.object[ray];
-        Some(if object == Self::MISS { (t_max, None) } else { (self.t[ray], Some(object)) })
+    fn so_far<S: KernelSimd>(&self, s: S, first: usize, t_max: S::F) -> (Mask, S::F, S::U) {
+        let object = load_some_u(s, &self.object[first..], Self::MISS);
+        let t = load_some(s, &self.t[first..], 0.0);
+        let missed = s.eq_u(object, s.splat_u(Self::MISS));
+        (Mask::MAX, s.select(missed, t_max, t), object)
     }
 
     #[inline(always)]
@@ -157,8 +160,10 @@ impl Answers for HitBatch {
 /// Results of any-hit queries: whether each ray is occluded.
 impl Answers for [bool] {
     #[inline(always)]
-    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
-        (!self[ray]).then_some((t_max, None))
+    fn so_far<S: KernelSimd>(&self, s: S, first: usize, t_max: S::F) -> (Mask, S::F, S::U) {
+        let occluded = self[first..].iter().take(LANES).enumerate();
+        let done = occluded.fold(0, |done: Mask, (lane, occluded)| done | Mask::from(*occluded) << lane);
+        (!done, t_max, s.splat_u(HitBatch::MISS))
     }
 
     #[inline(always)]
@@ -192,13 +197,7 @@ fn trace<A: Answers + ?Sized>(
     class: RayClass,
     answers: &mut A,
 ) {
-    SCRATCH.with_borrow_mut(|scratch| trace_in(scratch, set, (top, scene), (rays, class), answers));
-}
-
-/// Buffers for tracing a batch, reused for the next.
-struct TraceScratch {
-    state: StreamStates,
-    all: Vec<u32>,
+    STATES.with_borrow_mut(|state| trace_in(state, set, (top, scene), (rays, class), answers));
 }
 
 /// State of streams over one level and over two.
@@ -208,12 +207,11 @@ struct StreamStates {
 }
 
 thread_local! {
-    static SCRATCH: RefCell<TraceScratch> =
-        RefCell::new(TraceScratch { state: StreamStates { one: StreamState::new(), two: None }, all: Vec::new() });
+    static STATES: RefCell<StreamStates> = RefCell::new(StreamStates { one: StreamState::new(), two: None });
 }
 
 fn trace_in<A: Answers + ?Sized>(
-    TraceScratch { state, all }: &mut TraceScratch,
+    state: &mut StreamStates,
     set: InstructionSet,
     (top, scene): (&TopLevel, &PlacedShapes),
     (rays, class): (&RayBatch, RayClass),
@@ -229,13 +227,13 @@ fn trace_in<A: Answers + ?Sized>(
         _ => false,
     };
     let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
-    all.clear();
-    all.extend(0..rays.len() as u32);
-    for queue in all.chunks(CHUNK) {
-        answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, queue });
+    for first in (0..rays.len()).step_by(CHUNK) {
+        let end = (first + CHUNK).min(rays.len());
+        answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, first, end });
         let own = |instance: Option<u32>| QueuedRays {
             rays,
-            queue,
+            first,
+            end,
             instance: instance.map(|i| (i, &scene.instances[i as usize])),
         };
         if let Some(tree) = &top.loose.spheres {
@@ -274,8 +272,9 @@ struct Packets<'a> {
     instances: &'a [u32],
     scene: &'a PlacedShapes,
     rays: &'a RayBatch,
-    /// Indices of consecutive rays.
-    queue: &'a [u32],
+    /// The first ray, and the one after the last.
+    first: usize,
+    end: usize,
 }
 
 #[inline(always)]
@@ -291,8 +290,7 @@ fn any_packets<S: KernelSimd>(s: S, packets: &Packets, answers: &mut [bool]) {
 #[inline(always)]
 fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &Packets, answers: &mut A) {
     let mut stack = PacketStack::new(s);
-    for sixteen in packets.queue.chunks(LANES) {
-        let first = sixteen[0] as usize;
+    for first in (packets.first..packets.end).step_by(LANES) {
         let mut packet = Packet::load(s, packets.rays, first);
         packet.test_objects::<ANY>(s, packets.simple);
         for &object in packets.instances {
@@ -387,7 +385,9 @@ fn run_stream<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(
 #[derive(Clone, Copy)]
 struct QueuedRays<'a> {
     rays: &'a RayBatch,
-    queue: &'a [u32],
+    /// The next ray, and the one after the last.
+    first: usize,
+    end: usize,
     /// The instance of the tree; `None` if the tree's primitives are themselves the objects.
     instance: Option<(u32, &'a Instance)>,
 }
@@ -400,25 +400,36 @@ struct Queue<'a, A: ?Sized> {
 impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     #[inline(always)]
     fn left(&self) -> usize {
-        self.rays.queue.len()
+        self.rays.end - self.rays.first
     }
 
     #[inline(always)]
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
-        loop {
-            let (&i, queue) = self.rays.queue.split_first()?;
-            self.rays.queue = queue;
-            let ray = self.rays.rays.get(i as usize);
-            let Some((t, so_far)) = self.answers.so_far(i as usize, ray.t_max) else { continue };
-            let mut nearest = Nearest::before(t);
-            // At equal distance the lower object wins, whatever its primitive.
-            let Some((object, _)) = self.rays.instance else {
-                nearest.prim = so_far.unwrap_or(0);
-                return Some((ray, nearest, i));
-            };
-            nearest.prim = if so_far.is_some_and(|other| object < other) { u32::MAX } else { 0 };
-            return Some((ray, nearest, i));
+    fn fetch<S: KernelSimd>(&mut self, s: S, to: &mut FetchedRays) -> Option<Mask> {
+        let QueuedRays { rays, first, end, instance } = self.rays;
+        if first == end {
+            return None;
         }
+        let n = (end - first).min(LANES);
+        self.rays.first += n;
+        for (to, from) in to.origin.iter_mut().zip([&rays.origin_x, &rays.origin_y, &rays.origin_z]) {
+            s.store(load_some(s, &from[first..], 0.0), to);
+        }
+        for (to, from) in to.dir.iter_mut().zip([&rays.dir_x, &rays.dir_y, &rays.dir_z]) {
+            s.store(load_some(s, &from[first..], 1.0), to);
+        }
+        let t_max = load_some(s, &rays.t_max[first..], 0.0);
+        let (lanes, t, object) = self.answers.so_far(s, first, t_max);
+        s.store(t, &mut to.t);
+        let known = s.lt_u(object, s.splat_u(HitBatch::MISS));
+        let zero = s.splat_u(0);
+        // At equal distance the lower object wins, whatever its primitive.
+        let prim = match instance {
+            None => s.select_u(known, object, zero),
+            Some((own, _)) => s.select_u(known & s.lt_u(s.splat_u(own), object), s.splat_u(u32::MAX), zero),
+        };
+        s.store_u(prim, &mut to.prim);
+        to.id = std::array::from_fn(|lane| (first + lane) as u32);
+        Some(lanes & Mask::MAX >> (LANES - n))
     }
 
     #[inline(always)]
