@@ -1,4 +1,5 @@
-//! SIMD operations of the traversal beyond [`firstlight_simd`]: visiting a node of eight children, and prefetching.
+//! SIMD operations of the traversal beyond [`firstlight_simd`]: visiting a node of eight children, leaving out triangles
+//! beside a ray, and prefetching.
 
 use super::node8::{DescentRay, Node8, Stack, descend_plain};
 pub(super) use firstlight_simd::{InstructionSet, LANES, Mask, dispatch};
@@ -28,12 +29,13 @@ pub(super) trait KernelSimd: firstlight_simd::Simd {
     /// Visits a node: see `node8::descend_plain`.
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
 
-    /// Whether [`Self::beside`] takes less time than the test of sixteen triangles, and eight less than sixteen.
+    /// Whether sixteen lanes take two registers: then it pays to look for the primitives near a ray before they are
+    /// tested.
     const IS_NARROW: bool;
 
     /// Returns the triangles whose three vertices all lie above 0, or all below: `0 < low` or `high < 0`.
     ///
-    /// - `low`, `high`: bounds of a coordinate of sixteen vertices; not a number lies on neither side.
+    /// - `low`, `high`: bounds of a coordinate of sixteen vertices.
     #[inline(always)]
     fn beside(self, low: Self::F, high: Self::F, corners: &Corners) -> Mask {
         let s = self;

@@ -2,7 +2,7 @@
 
 use super::{Corners, Eight, KernelSimd, places};
 use crate::node8::{CHILD_ORDERS, DescentRay, EMPTY, Node8, PLANES, STACK, Stack};
-use firstlight_simd::{Avx2, Avx512, Mask, SET_BITS, three};
+use firstlight_simd::{Avx2, Avx512, Mask, SET_BITS, three, two};
 use std::arch::x86_64::*;
 
 impl KernelSimd for Avx512 {
@@ -70,7 +70,10 @@ impl KernelSimd for Avx512 {
     fn first_eight(self, triangles: Mask, corners: &Corners) -> Eight<Self> {
         let places = places(triangles);
         // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
-        let corners = unsafe { moved(places, corners).map(|corner| _mm512_cvtepu8_epi32(corner)) };
+        let corners = unsafe {
+            let moved = moved(places, corners);
+            three!(|k| _mm512_cvtepu8_epi32(moved[k]))
+        };
         Eight { corners, places }
     }
 
@@ -138,16 +141,16 @@ impl KernelSimd for Avx2 {
         // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
         unsafe {
             let zero = _mm256_setzero_ps();
-            let [a, b] = low.map(|low| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(zero, low)));
-            let [c, d] = high.map(|high| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(high, zero)));
+            let [a, b] = two!(|half| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(zero, low[half])));
+            let [c, d] = two!(|half| _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(high[half], zero)));
             // A byte for each vertex: above in the lower half, below in the upper one. Packing interleaves the halves.
             let packed = _mm256_packs_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
             let sides = _mm256_permutevar8x32_epi32(packed, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7));
-            let of = |corner: usize| {
-                let vertices = _mm256_broadcastsi128_si256(_mm_loadu_si128(corners[corner].as_ptr().cast()));
+            let [a, b, c] = three!(|k| {
+                let vertices = _mm256_broadcastsi128_si256(_mm_loadu_si128(corners[k].as_ptr().cast()));
                 _mm256_shuffle_epi8(sides, vertices)
-            };
-            let all = _mm256_and_si256(_mm256_and_si256(of(0), of(1)), of(2));
+            });
+            let all = _mm256_and_si256(_mm256_and_si256(a, b), c);
             let all = _mm256_movemask_epi8(all) as u32;
             (all | all >> 16) as Mask
         }
@@ -158,7 +161,10 @@ impl KernelSimd for Avx2 {
         let places = places(triangles);
         // SAFETY: `self` proves that the processor has the instructions; rows of corners have the size that is read.
         // Both halves are the same value, so the compiler computes what follows once.
-        let corners = unsafe { moved(places, corners).map(|corner| [_mm256_cvtepu8_epi32(corner); 2]) };
+        let corners = unsafe {
+            let moved = moved(places, corners);
+            three!(|k| [_mm256_cvtepu8_epi32(moved[k]); 2])
+        };
         Eight { corners, places }
     }
 

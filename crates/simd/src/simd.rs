@@ -680,6 +680,7 @@ mod tests {
                 s.xor_u(u, v),
                 s.shl_u(u, 7),
                 s.shr_u(u, 13),
+                s.load_bytes(&std::array::from_fn(|i| (i * 37 + shift) as u8)),
                 s.gather_u(&[3, 1, 4, 1, 5], s.load_u(&std::array::from_fn(|i| i as u32 % 5))),
                 s.gather_u(&array(7).map(f32::to_bits), s.load_u(&std::array::from_fn(|i| i as u32 * 3 % 16))),
             ] {
