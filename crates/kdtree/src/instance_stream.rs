@@ -11,12 +11,12 @@ use super::block_tree::BlockTree;
 use super::blocks::PreciseRay;
 use super::instance_tree::{InstanceTree, OwnTree, Placement, Recent};
 use super::leaf::{BLOCK, LeafBlock, LeafRay, ShearedRay};
-use super::node8::{DescentRay, LEAF, Node8, Stack};
+use super::node8::{DONE, DescentRay, LEAF, Node8, Stack, Walk};
 use super::ray::{Nearest, TreeRay};
 use super::ray_setup::{RaySetup, Source};
 use super::shape::{transform_point, transform_vector};
 use super::simd::KernelSimd;
-use super::stream::{DONE, List, SLOTS, Walk};
+use super::stream::{List, SLOTS};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
 
@@ -136,6 +136,7 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
         slot.is_busy = false;
         lists.0[IDLE].push_if(true, i);
     }
+    let constants = s.visit_constants();
     let mut setup = RaySetup::new();
     loop {
         let (list, len) = lists.0[IDLE].take();
@@ -158,11 +159,20 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             return;
         }
         let (list, len) = lists.0[INNER].take();
-        for &i in &list[..len] {
+        let (pairs, single) = list[..len].as_chunks();
+        for pair in pairs {
+            let pair = pair.map(|i| i as usize % SLOTS);
+            let [a, b] = slots.get_disjoint_mut(pair).expect("a slot is in a list once");
+            let [of_a, of_b] = stacks.get_disjoint_mut(pair).expect("two for each slot");
+            let in_instance = pair.map(|at| usize::from(trees[at].is_some()));
+            let stacks = [&mut of_a[in_instance[0]], &mut of_b[in_instance[1]]];
+            let visited = [&nodes[pair[0]][a.walk.child as usize], &nodes[pair[1]][b.walk.child as usize]];
+            s.descend_two(constants, visited, [&mut a.walk, &mut b.walk], stacks);
+        }
+        for &i in single {
             let at = i as usize % SLOTS;
             let (slot, stack) = (&mut slots[at], &mut stacks[at][usize::from(trees[at].is_some())]);
-            let (node, height) = (&nodes[at][slot.walk.child as usize], slot.walk.height as usize);
-            slot.walk.height = s.descend(node, &slot.walk.descent, slot.walk.t0, slot.walk.t1, stack, height) as u32;
+            s.descend(&nodes[at][slot.walk.child as usize], &mut slot.walk, stack);
         }
         // A separate loop, so that a misprediction discards little work.
         for &i in &list[..len] {

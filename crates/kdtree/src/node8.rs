@@ -7,32 +7,88 @@ use super::nodes::{KdNodes, Node};
 
 /// The planes and children of three levels.
 ///
-/// Plane 0 is the root's, 1 and 2 are those of its lower and upper child, 3 to 6 those of the third level. The bits of
-/// a child's index, the highest first, select the side at each level, 1 for the upper side. Where the binary tree ends
-/// early, the missing planes lie at infinity and only the lowest of the lanes below has a child.
+/// Planes and children are numbered in order: plane `i` separates the children up to `i` from those above it, so plane 3
+/// is the root's, 1 and 5 are those of its lower and upper child, and the even ones are those of the third level. Where
+/// the binary tree ends early, the missing planes lie at infinity and only the lowest of the children below is there.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node8 {
     pub splits: [f32; 7],
-    /// Three bits per plane.
-    pub axes: u32,
+    pub axes: PlaneAxes,
     /// [`EMPTY`], the index of a node, or with [`LEAF`] set the first block of a leaf.
     pub children: [u32; 8],
 }
 // One cache line.
 const _: () = assert!(size_of::<Node8>() == 64);
 
-/// A bit for each plane of a node.
-pub(super) const PLANES: u32 = 0x7F;
+/// The axes of the planes of a node, twice: bits `2 i` and `2 i + 1` are the axis of plane `i`; bit `14 + i` is set if
+/// that is x, bit `21 + i` if it is y.
+///
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub(super) struct PlaneAxes(pub u32);
 
-/// The order of the children for each set of planes whose axis the ray descends: in the low 24 bits the children from
-/// far to near, three bits each; above them one byte per level from the root, whose bits mark the children on the far
-/// side of their plane.
-pub(super) static CHILD_ORDERS: [u64; 128] = {
+impl PlaneAxes {
+    const ALL_X: Self = Self(NORMAL | PLANES << ARE_X);
+
+    fn set(&mut self, plane: usize, axis: usize) {
+        let old = 3 << (2 * plane) | 1 << (ARE_X + plane) | 1 << (ARE_Y + plane);
+        let are = [1 << ARE_X, 1 << ARE_Y, 0][axis];
+        self.0 = self.0 & !old | (axis as u32) << (2 * plane) | are << plane;
+    }
+
+    #[inline(always)]
+    fn get(self, plane: usize) -> usize {
+        (self.0 >> (2 * plane) & 3) as usize
+    }
+
+    /// Returns the planes whose axis the ray descends, one bit each.
+    #[inline(always)]
+    pub fn descended(self, signs: Signs) -> usize {
+        let flipped = self.0 & signs.0;
+        ((signs.0 ^ flipped >> ARE_X ^ flipped >> ARE_Y) & PLANES) as usize
+    }
+}
+
+/// A bit for each plane of a node.
+const PLANES: u32 = 0x7F;
+const ARE_X: usize = 14;
+const ARE_Y: usize = 21;
+
+/// Makes the bits below it a normal number when they are read as an `f32`: SIMD computes with them in a lane that is not
+/// used, and takes long over subnormal ones.
+const NORMAL: u32 = 1 << 30;
+
+/// The signs of a ray's direction, for [`PlaneAxes::descended`]: the low seven bits are set if it descends z; the seven
+/// bits from `ARE_X` and from `ARE_Y` on are set if it descends x, or y, but not z, or the other way round.
+///
+/// The highest bit is set for a far-first ray.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub(super) struct Signs(u32);
+
+impl Signs {
+    const FAR_FIRST: u32 = 1 << 31;
+
+    #[inline(always)]
+    fn new(down: [bool; 3]) -> Self {
+        let [x, y, z] = down.map(|down| if down { PLANES } else { 0 });
+        Self(NORMAL | z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y)
+    }
+
+    /// 1 for a far-first ray, otherwise 0.
+    #[inline(always)]
+    pub fn far_first(self) -> usize {
+        (self.0 >> 31) as usize
+    }
+}
+
+/// The order of the children, three bits each, from far to near, for each set of planes whose axis the ray descends.
+pub(super) static CHILD_ORDERS: [u32; 128] = {
     let mut orders = [0; 128];
     let mut down = 0;
     while down < 128 {
-        orders[down] = child_order(down as u64);
+        orders[down] = child_order(down);
         down += 1;
     }
     orders
@@ -65,8 +121,7 @@ pub(super) struct DescentRay {
     pub padding: f32,
     /// Shortened reciprocals of the direction: multiplied by a distance they give the earliest crossing.
     pub inv_lo: [f32; 3],
-    /// All bits set if the far child is visited first, otherwise 0.
-    pub reversed: u32,
+    pub signs: Signs,
     /// Negated lengthened reciprocals: multiplied by a distance they give the negative of the latest crossing.
     pub minus_inv_hi: [f32; 3],
     /// Distance beyond which nothing matters: that of the nearest hit.
@@ -76,20 +131,60 @@ pub(super) struct DescentRay {
 const _: () = assert!(size_of::<DescentRay>() == 48);
 
 impl DescentRay {
-    pub const IDLE: Self =
-        Self { origin: [0.0; 3], padding: 0.0, inv_lo: [0.0; 3], reversed: 0, minus_inv_hi: [0.0; 3], end: 0.0 };
+    pub const IDLE: Self = Self {
+        origin: [0.0; 3],
+        padding: 0.0,
+        inv_lo: [0.0; 3],
+        signs: Signs(NORMAL),
+        minus_inv_hi: [0.0; 3],
+        end: 0.0,
+    };
 
     #[inline(always)]
     pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], padding: f32, end: f32) -> Self {
-        Self { origin, padding, inv_lo, reversed: 0, minus_inv_hi: inv_hi.map(|inv| -inv), end }
+        let signs = Signs::new(inv_lo.map(f32::is_sign_negative));
+        Self { origin, padding, inv_lo, signs, minus_inv_hi: inv_hi.map(|inv| -inv), end }
     }
 
     /// Returns the ray with the far child visited first.
     #[inline(always)]
     pub fn far_first(self) -> Self {
-        Self { reversed: u32::MAX, ..self }
+        Self { signs: Signs(self.signs.0 | Signs::FAR_FIRST), ..self }
     }
 }
+
+/// The way of a ray through a tree: all that visits of nodes touch, in one cache line.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Walk {
+    pub descent: DescentRay,
+    /// The entry that is visited next.
+    pub child: u32,
+    pub t0: f32,
+    pub t1: f32,
+    /// Number of entries on the stack.
+    pub height: u32,
+}
+const _: () = assert!(size_of::<Walk>() == 64);
+
+impl Walk {
+    pub const IDLE: Self = Self { descent: DescentRay::IDLE, child: 0, t0: 0.0, t1: 0.0, height: 1 };
+
+    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
+    #[inline(always)]
+    pub fn pop(&mut self, stack: &Stack) {
+        let (mut top, end) = (self.height as usize - 1, self.descent.end);
+        while stack.t0[top] > end {
+            top -= 1;
+        }
+        let t1 = stack.t1[top];
+        self.height = top as u32;
+        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
+    }
+}
+
+/// The entry at the bottom of every stack: the ray is finished.
+pub(super) const DONE: u32 = LEAF - 1;
 
 /// Collapses a binary tree into nodes of three levels each, root first.
 pub(super) fn collapse(tree: &KdNodes) -> Vec<Node8> {
@@ -112,28 +207,28 @@ pub(super) fn collapse(tree: &KdNodes) -> Vec<Node8> {
 }
 
 fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
-    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8] };
+    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: PlaneAxes::ALL_X, children: [EMPTY; 8] };
     // The subtree at each position of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
-    let mut plane = 0;
     for depth in 0..3 {
         let mut next = Vec::new();
         for (place, entry) in level.iter().enumerate() {
+            let first_child = place << (3 - depth);
             match entry.map(|index| tree.nodes[index as usize].unpack()) {
-                Some(Node::Inner { axis, split, first_child }) => {
+                Some(Node::Inner { axis, split, first_child: pair }) => {
+                    let plane = plane_above(first_child, depth);
                     node.splits[plane] = split;
-                    node.axes |= (axis as u32) << (3 * plane);
-                    next.extend([Some(first_child), Some(first_child + 1)]);
+                    node.axes.set(plane, axis);
+                    next.extend([Some(pair), Some(pair + 1)]);
                 }
                 Some(Node::Leaf { first, count }) => {
                     if count > 0 {
-                        node.children[place << (3 - depth)] = LEAF | first;
+                        node.children[first_child] = LEAF | first;
                     }
                     next.extend([None; 2]);
                 }
                 None => next.extend([None; 2]),
             }
-            plane += 1;
         }
         level = next;
     }
@@ -148,23 +243,26 @@ fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> 
     node
 }
 
-/// Returns the entry of [`CHILD_ORDERS`] for the planes that the ray descends.
+/// Returns the plane at a level, 0 for the root, on the way to a child.
+const fn plane_above(child: usize, level: usize) -> usize {
+    let below = 4 >> level;
+    child & (8 - 2 * below) | (below - 1)
+}
+
+/// Returns the entry of [`CHILD_ORDERS`] for the planes whose axis the ray descends.
 ///
 /// The rank of a child from the near end has one bit per level, 1 on the far side.
-const fn child_order(down: u64) -> u64 {
+const fn child_order(down: usize) -> u32 {
     let mut order = 0;
     let mut child = 0;
     while child < 8 {
-        let (mut rank, mut plane, mut depth) = (0, 0, 0);
-        while depth < 3 {
-            let side = child >> (2 - depth) & 1;
-            let far = side ^ (down >> plane & 1);
-            order |= far << (24 + 8 * depth + child);
-            rank = rank << 1 | far;
-            plane = 2 * plane + 1 + side;
-            depth += 1;
+        let (mut rank, mut level) = (0, 0);
+        while level < 3 {
+            let side = child >> (2 - level) & 1;
+            rank = rank << 1 | side ^ (down >> plane_above(child, level) & 1);
+            level += 1;
         }
-        order |= child << (3 * (7 - rank));
+        order |= (child as u32) << (3 * (7 - rank));
         child += 1;
     }
     order
@@ -172,41 +270,32 @@ const fn child_order(down: u64) -> u64 {
 
 /// Scalar reference of [`super::simd::KernelSimd::descend`].
 ///
-/// Pushes the children that the ray enters within `t0..=t1`, farthest first (nearest first for a far-first ray), and
-/// returns the new stack height.
+/// Pushes the children that the ray enters within `t0..=t1`, farthest first (nearest first for a far-first ray).
 #[inline(always)]
-pub(super) fn descend_plain(
-    node: &Node8,
-    ray: &DescentRay,
-    t0: f32,
-    t1: f32,
-    stack: &mut Stack,
-    mut height: usize,
-) -> usize {
-    let axis = |plane: usize| (node.axes >> (3 * plane) & 7) as usize;
-    let down: u32 = (0..7).map(|plane| u32::from(ray.inv_lo[axis(plane)].is_sign_negative()) << plane).sum();
-    let mut order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
-    for _ in 0..8 {
-        let lane = (order & 7) as usize;
-        order >>= 3;
-        let (mut t0, mut t1) = (t0, t1);
-        let mut plane = 0;
-        for depth in 0..3 {
-            let axis = axis(plane);
+pub(super) fn descend_plain(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
+    let Walk { descent: ray, t0, t1, height, .. } = walk;
+    let down = node.axes.descended(ray.signs);
+    let order = CHILD_ORDERS[down];
+    let mut top = *height as usize;
+    for i in 0..8 {
+        let place = if ray.signs.far_first() == 1 { 7 - i } else { i };
+        let child = (order >> (3 * place) & 7) as usize;
+        let (mut t0, mut t1) = (*t0, *t1);
+        for level in 0..3 {
+            let plane = plane_above(child, level);
+            let axis = node.axes.get(plane);
             let distance = node.splits[plane] - ray.origin[axis];
-            let side = lane >> (2 - depth) & 1;
             // NaN, for a ray in the plane, bounds neither side.
-            if (side == 1) == (down >> plane & 1 == 1) {
+            if (child >> (2 - level) & 1) == (down >> plane & 1) {
                 t1 = f32::min(t1, ray.padding - distance * ray.minus_inv_hi[axis]);
             } else {
                 t0 = f32::max(t0, distance * ray.inv_lo[axis] - ray.padding);
             }
-            plane = 2 * plane + 1 + side;
         }
-        (stack.child[height], stack.t0[height], stack.t1[height]) = (node.children[lane], t0, t1);
-        height += usize::from(t0 <= t1 && node.children[lane] != EMPTY);
+        (stack.child[top], stack.t0[top], stack.t1[top]) = (node.children[child], t0, t1);
+        top += usize::from(t0 <= t1 && node.children[child] != EMPTY);
     }
-    height
+    *height = top as u32;
 }
 
 #[cfg(test)]
@@ -214,16 +303,25 @@ mod tests {
     use super::*;
     use crate::simd::{InstructionSet, KernelSimd, dispatch};
 
+    type Case = (Node8, DescentRay, f32, f32);
+
+    /// Visits the nodes of pairs of cases together, and each alone.
     #[inline(always)]
-    fn run<S: KernelSimd>(s: S, cases: &[(Node8, DescentRay, f32, f32)], out: &mut Vec<u64>) {
-        for (node, ray, t0, t1) in cases {
-            let mut stack = Stack::NEW;
-            let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);
-            out.push(height as u64);
-            for i in 3..height {
-                // Adding 0 turns -0 into +0.
-                let bits = |t: f32| (t + 0.0).to_bits();
-                out.extend([stack.child[i], bits(stack.t0[i]), bits(stack.t1[i])].map(u64::from));
+    fn run<S: KernelSimd>(s: S, cases: &[Case], out: &mut Vec<u64>) {
+        for pair in cases.windows(2) {
+            let walk = |(_, descent, t0, t1): &Case| Walk { descent: *descent, child: 0, t0: *t0, t1: *t1, height: 3 };
+            let [mut a, mut b, mut alone] = [walk(&pair[0]), walk(&pair[1]), walk(&pair[0])];
+            let mut stacks = [Stack::NEW, Stack::NEW, Stack::NEW];
+            let [of_a, of_b, of_alone] = &mut stacks;
+            s.descend_two(s.visit_constants(), [&pair[0].0, &pair[1].0], [&mut a, &mut b], [of_a, of_b]);
+            s.descend(&pair[0].0, &mut alone, of_alone);
+            for (walk, stack) in [a, b, alone].iter().zip(&stacks) {
+                out.push(u64::from(walk.height));
+                for i in 3..walk.height as usize {
+                    // Adding 0 turns -0 into +0.
+                    let bits = |t: f32| (t + 0.0).to_bits();
+                    out.extend([stack.child[i], bits(stack.t0[i]), bits(stack.t1[i])].map(u64::from));
+                }
             }
         }
     }
@@ -238,10 +336,11 @@ mod tests {
         let cases: Vec<_> = (0..20_000)
             .map(|_| {
                 let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
-                let mut node = Node8 { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8] };
+                let splits = std::array::from_fn(|_| number());
+                let mut node = Node8 { splits, axes: PlaneAxes::ALL_X, children: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
-                (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
+                (0..7).for_each(|plane| node.axes.set(plane, next() as usize % 3));
                 if next() % 4 == 0 {
                     node.splits[2] = f32::INFINITY;
                 }
@@ -254,7 +353,7 @@ mod tests {
         let run_on = |set| {
             let mut out = Vec::new();
             let (into, cases) = (&mut out, &cases[..]);
-            dispatch!(set, run(cases: &[(Node8, DescentRay, f32, f32)], into: &mut Vec<u64>));
+            dispatch!(set, run(cases: &[Case], into: &mut Vec<u64>));
             out
         };
         let expected = run_on(InstructionSet::Portable);

@@ -1,7 +1,7 @@
 //! SIMD operations of the traversal beyond [`firstlight_simd`]: visiting a node of eight children, leaving out triangles
 //! beside a ray, and prefetching.
 
-use super::node8::{DescentRay, Node8, Stack, descend_plain};
+use super::node8::{Node8, Stack, Walk, descend_plain};
 pub(super) use firstlight_simd::{InstructionSet, LANES, Mask, dispatch};
 use firstlight_simd::{Portable, SET_BITS, three};
 
@@ -27,7 +27,20 @@ fn places(triangles: Mask) -> u64 {
 /// Extends [`firstlight_simd::Simd`].
 pub(super) trait KernelSimd: firstlight_simd::Simd {
     /// Visits a node: see `node8::descend_plain`.
-    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
+    fn descend(self, node: &Node8, walk: &mut Walk, stack: &mut Stack);
+
+    /// Constants of [`Self::descend_two`].
+    type VisitConstants: 'static;
+
+    fn visit_constants(self) -> &'static Self::VisitConstants;
+
+    /// Visits a node with each of two rays.
+    #[inline(always)]
+    fn descend_two(self, _: &Self::VisitConstants, nodes: [&Node8; 2], walks: [&mut Walk; 2], stacks: [&mut Stack; 2]) {
+        let ([first, second], [first_stack, second_stack]) = (walks, stacks);
+        self.descend(nodes[0], first, first_stack);
+        self.descend(nodes[1], second, second_stack);
+    }
 
     /// Whether sixteen lanes take two registers: then it pays to look for the primitives near a ray before they are
     /// tested.
@@ -56,8 +69,14 @@ pub(super) trait KernelSimd: firstlight_simd::Simd {
 
 impl KernelSimd for Portable {
     #[inline(always)]
-    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
-        descend_plain(node, ray, t0, t1, stack, height)
+    fn descend(self, node: &Node8, walk: &mut Walk, stack: &mut Stack) {
+        descend_plain(node, walk, stack);
+    }
+
+    type VisitConstants = ();
+
+    fn visit_constants(self) -> &'static () {
+        &()
     }
 
     const IS_NARROW: bool = false;

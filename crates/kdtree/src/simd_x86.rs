@@ -1,66 +1,97 @@
 //! The x86 implementations of [`KernelSimd`].
 
 use super::{Corners, Eight, KernelSimd, places};
-use crate::node8::{CHILD_ORDERS, DescentRay, EMPTY, Node8, PLANES, STACK, Stack};
+use crate::node8::{CHILD_ORDERS, EMPTY, Node8, STACK, Signs, Stack, Walk};
 use firstlight_simd::{Avx2, Avx512, Mask, SET_BITS, three, two};
 use std::arch::x86_64::*;
 
 impl KernelSimd for Avx512 {
     #[inline(always)]
-    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
-        // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.
+    fn descend(self, node: &Node8, walk: &mut Walk, stack: &mut Stack) {
+        // SAFETY: a processor with AVX-512 has AVX2.
+        unsafe { descend_one(node, walk, stack) }
+    }
+
+    type VisitConstants = TwoRays;
+
+    fn visit_constants(self) -> &'static TwoRays {
+        // Where the compiler knows which lanes are moved, it replaces loads under a mask by moves of lanes, of which Intel
+        // processors make one at a time.
+        std::hint::black_box(&TwoRays::CONSTANTS)
+    }
+
+    /// Each ray takes half a register. All steps are in the order of the children from far to near, in which the same
+    /// places are on the far side of a level's plane whatever the ray; so only the planes have to be looked up.
+    #[inline(always)]
+    fn descend_two(self, c: &TwoRays, nodes: [&Node8; 2], walks: [&mut Walk; 2], stacks: [&mut Stack; 2]) {
+        let ([a, b], [walk_a, walk_b], [stack_a, stack_b]) = (nodes, walks, stacks);
+        // The stores below write eight entries each.
+        assert!(walk_a.height as usize <= STACK - 8 && walk_b.height as usize <= STACK - 8);
+        // SAFETY: `self` proves that the processor has the instructions; walks, nodes and constants are aligned as they are
+        // read; stacks have room for eight entries from the height on.
         unsafe {
-            // The stores below write eight entries each.
-            assert!(height <= STACK - 8);
-            let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            let shifts = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(shifts), shifts);
-            let rows = std::ptr::from_ref(ray).cast::<f32>();
-            // Lane 7 holds the axes: no child refers to this plane.
-            let splits = _mm256_load_ps(std::ptr::from_ref(node).cast());
-            let splits = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(splits), splits);
-            let axes = _mm512_srlv_epi32(_mm512_set1_epi32(node.axes as i32), shifts);
+            let constant = |of: &[u32; 16]| _mm512_load_si512(of.as_ptr().cast());
+            let all = |bits: i32| _mm512_set1_epi32(bits);
+            let both = |a: f32, b: f32| _mm512_mask_mov_ps(_mm512_set1_ps(a), c.second, _mm512_set1_ps(b));
+            let both_u = |a: u32, b: u32| {
+                _mm512_mask_mov_epi32(_mm512_set1_epi32(a as i32), c.second, _mm512_set1_epi32(b as i32))
+            };
+            let (rows_a, rows_b) = (std::ptr::from_ref(&*walk_a).cast(), std::ptr::from_ref(&*walk_b).cast());
+            let row = |k: usize| {
+                let row = |rows: *const f32| _mm512_broadcast_f32x4(_mm_load_ps(rows.add(4 * k)));
+                _mm512_mask_mov_ps(row(rows_a), c.second, row(rows_b))
+            };
+            let halves = |a: *const f32, b: *const f32| {
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_load_ps(a)), _mm256_load_ps(b))
+            };
             // The permutation within rows uses the low two bits of each lane, which are its axis.
-            let origin = _mm512_broadcast_f32x4(_mm_load_ps(rows));
-            let origin = _mm512_permutevar_ps(origin, axes);
-            // The lower half holds entry times, the upper half negated exit times: then both are updated by a maximum.
-            let second_row = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4);
-            let axes = _mm512_ternarylogic_epi32::<0xF8>(second_row, axes, _mm512_set1_epi32(3));
-            let inv = _mm512_castps256_ps512(_mm256_loadu_ps(rows.add(4)));
-            let inv = _mm512_permutexvar_ps(axes, inv);
-            let down = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(inv))) & PLANES;
-            let times = _mm512_mul_ps(_mm512_sub_ps(splits, origin), inv);
-            let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.padding));
-            let root = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
-            let middle = _mm512_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2, 9, 9, 9, 9, 10, 10, 10, 10);
-            let bottom = _mm512_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6, 11, 11, 12, 12, 13, 13, 14, 14);
-            // The far side gets a new entry, the near side a new exit.
-            let far = CHILD_ORDERS[(down & PLANES) as usize];
-            let bounds = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(t0), _mm512_set1_ps(-t1));
+            let axes = _mm512_srlv_epi32(both_u(a.axes.0, b.axes.0), constant(&c.axis_shifts));
+            let origin = _mm512_permutevar_ps(row(0), axes);
+            let inv_lo = _mm512_permutevar_ps(row(1), axes);
+            let minus_inv_hi = _mm512_permutevar_ps(row(2), axes);
+            let padding = _mm512_permute_ps::<0xFF>(row(0));
+            let distance = _mm512_sub_ps(halves(a.splits.as_ptr(), b.splits.as_ptr()), origin);
+            let lo = _mm512_sub_ps(_mm512_mul_ps(distance, inv_lo), padding);
+            let hi = _mm512_sub_ps(padding, _mm512_mul_ps(distance, minus_inv_hi));
+            // Loads of their own: moves from vector registers take longer.
+            let signs = |walk: &Walk| std::ptr::from_ref(&walk.descent.signs).read_volatile();
+            let axes = |node: &Node8| std::ptr::from_ref(&node.axes).read_volatile();
+            let (signs_a, signs_b) = (signs(walk_a), signs(walk_b));
+            let order = |node: &Node8, signs| CHILD_ORDERS[axes(node).descended(signs)];
+            let order = both_u(order(a, signs_a), order(b, signs_b));
+            let order = _mm512_srlv_epi32(order, constant(&c.order_shifts));
+            // `base | order & bits`.
+            let middle = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.middle), order, all(4));
+            let bottom = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.half), order, all(6));
+            let order = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.half), order, all(7));
+            let (mut first, mut last) = (both(walk_a.t0, walk_b.t0), both(walk_a.t1, walk_b.t1));
+            let root = constant(&c.root);
             // NaN as the first argument yields the second.
-            let mask = both_halves(far >> 24);
-            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(root, times), bounds);
-            let mask = both_halves(far >> 32);
-            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(middle, times), bounds);
-            let mask = both_halves(far >> 40);
-            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(bottom, times), bounds);
-            let order = CHILD_ORDERS[((down ^ ray.reversed) & PLANES) as usize];
-            let order = _mm512_srlv_epi32(_mm512_set1_epi32(order as i32), shifts);
-            let upper_half = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
-            let order_twice = _mm512_ternarylogic_epi32::<0xF8>(upper_half, order, _mm512_set1_epi32(7));
-            let bounds = _mm512_permutexvar_ps(order_twice, bounds);
-            let first = _mm512_castps512_ps256(bounds);
-            let last = _mm256_xor_ps(_mm512_extractf32x8_ps::<1>(bounds), _mm256_set1_ps(-0.0));
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            let children = _mm256_permutexvar_epi32(_mm512_castsi512_si256(order), children);
-            let some = _mm256_cmpneq_epi32_mask(children, _mm256_set1_epi32(EMPTY as i32));
-            let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last);
-            _mm256_storeu_si256(
-                stack.child.as_mut_ptr().add(height).cast(),
-                _mm256_maskz_compress_epi32(met, children),
-            );
-            _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), _mm256_maskz_compress_ps(met, first));
-            _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), _mm256_maskz_compress_ps(met, last));
-            height + met.count_ones() as usize
+            first = _mm512_mask_max_ps(first, c.far[0], _mm512_permutexvar_ps(root, lo), first);
+            last = _mm512_mask_min_ps(last, c.near[0], _mm512_permutexvar_ps(root, hi), last);
+            first = _mm512_mask_max_ps(first, c.far[1], _mm512_permutexvar_ps(middle, lo), first);
+            last = _mm512_mask_min_ps(last, c.near[1], _mm512_permutexvar_ps(middle, hi), last);
+            first = _mm512_mask_max_ps(first, c.far[2], _mm512_permutexvar_ps(bottom, lo), first);
+            last = _mm512_mask_min_ps(last, c.near[2], _mm512_permutexvar_ps(bottom, hi), last);
+            let children = _mm512_castps_si512(halves(a.children.as_ptr().cast(), b.children.as_ptr().cast()));
+            let children = _mm512_permutexvar_epi32(order, children);
+            let some = _mm512_cmpneq_epi32_mask(children, _mm512_set1_epi32(EMPTY as i32));
+            let met = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last);
+            let (met_a, met_b) = (met as u8, (met >> 8) as u8);
+            let places = |signs: Signs, met: u8| PLACES[signs.far_first()][usize::from(met)] as i64;
+            let places = _mm_set_epi64x(places(signs_b, met_b), places(signs_a, met_a));
+            let places = _mm512_or_si512(_mm512_cvtepu8_epi32(places), constant(&c.half));
+            let children = _mm512_castsi512_ps(_mm512_permutexvar_epi32(places, children));
+            let (first, last) = (_mm512_permutexvar_ps(places, first), _mm512_permutexvar_ps(places, last));
+            for (walk, stack, met, is_second) in [(walk_a, stack_a, met_a, false), (walk_b, stack_b, met_b, true)] {
+                let height = walk.height as usize;
+                let of =
+                    |both| if is_second { _mm512_extractf32x8_ps::<1>(both) } else { _mm512_castps512_ps256(both) };
+                _mm256_storeu_ps(stack.child.as_mut_ptr().add(height).cast(), of(children));
+                _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), of(first));
+                _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), of(last));
+                walk.height += met.count_ones();
+            }
         }
     }
 
@@ -84,54 +115,77 @@ impl KernelSimd for Avx512 {
     }
 }
 
-/// Returns the low byte, with its complement in the byte above.
-#[inline(always)]
-fn both_halves(far: u64) -> Mask {
-    let far = far as Mask & 0xFF;
-    far | (far ^ 0xFF) << 8
+/// Constants of visits with two rays, each in half a register.
+#[repr(C, align(64))]
+pub(crate) struct TwoRays {
+    axis_shifts: [u32; 16],
+    order_shifts: [u32; 16],
+    /// Where the lanes of each half begin.
+    half: [u32; 16],
+    /// The plane above all children, and the lower one of the next level.
+    root: [u32; 16],
+    middle: [u32; 16],
+    /// The places on the far side at each level.
+    far: [Mask; 3],
+    near: [Mask; 3],
+    /// The lanes of the second ray.
+    second: Mask,
 }
+
+impl TwoRays {
+    const CONSTANTS: Self = {
+        let mut c = Self {
+            axis_shifts: [0; 16],
+            order_shifts: [0; 16],
+            half: [0; 16],
+            root: [0; 16],
+            middle: [0; 16],
+            far: [0x0F0F, 0x3333, 0x5555],
+            near: [!0x0F0F, !0x3333, !0x5555],
+            second: 0xFF00,
+        };
+        let mut lane = 0;
+        while lane < 16 {
+            let place = lane as u32 % 8;
+            (c.axis_shifts[lane], c.order_shifts[lane]) = (2 * place, 3 * place);
+            c.half[lane] = lane as u32 & 8;
+            (c.root[lane], c.middle[lane]) = (c.half[lane] | 3, c.half[lane] | 1);
+            lane += 1;
+        }
+        c
+    };
+}
+
+/// For a near-first and for a far-first ray, and for each set of eight places from far to near: these places in the order
+/// in which they are pushed, one byte each.
+static PLACES: [[u64; 256]; 2] = {
+    let mut places = [SET_BITS, [0; 256]];
+    let mut set = 0;
+    while set < 256 {
+        let (mut place, mut n) = (8, 0);
+        while place > 0 {
+            place -= 1;
+            if set >> place & 1 == 1 {
+                places[1][set] |= place << (8 * n);
+                n += 1;
+            }
+        }
+        set += 1;
+    }
+    places
+};
 
 impl KernelSimd for Avx2 {
     #[inline(always)]
-    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
-        // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.
-        unsafe {
-            // The stores below write eight entries each.
-            assert!(height <= STACK - 8);
-            // The planes above the lower four children are in the lower half, those above the others in the upper one:
-            // so the steps from planes to children need not cross the halves.
-            let planes = load_lanes(&PLANE_OF_LANE);
-            let splits = _mm256_permutevar8x32_ps(_mm256_load_ps(std::ptr::from_ref(node).cast()), planes);
-            let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), load_lanes(&AXIS_OF_LANE));
-            // The permutation within rows uses the low two bits of each lane, which are its axis.
-            let rows = std::ptr::from_ref(ray).cast::<__m128>();
-            let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows), axes);
-            let inv_lo = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(1)), axes);
-            let minus_inv_hi = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(2)), axes);
-            let padding = _mm256_set1_ps(ray.padding);
-            let distance = _mm256_sub_ps(splits, origin);
-            let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);
-            let hi = _mm256_sub_ps(padding, _mm256_mul_ps(distance, minus_inv_hi));
-            let (mut first, mut last) = (_mm256_set1_ps(t0), _mm256_set1_ps(t1));
-            // At each level, the upper side of a plane is the far one, unless the ray descends its axis.
-            (first, last) = clip::<0b00_00_00_00, 0b1111_0000>(first, last, lo, hi, inv_lo);
-            (first, last) = clip::<0b01_01_01_01, 0b1100_1100>(first, last, lo, hi, inv_lo);
-            (first, last) = clip::<0b11_11_10_10, 0b1010_1010>(first, last, lo, hi, inv_lo);
-            let down = _mm256_movemask_ps(inv_lo) as u32;
-            let order = ORDERS_BY_LANES[usize::from((down ^ ray.reversed) as u8)];
-            let order =
-                _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            let empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(EMPTY as i32));
-            let within = _mm256_andnot_ps(_mm256_castsi256_ps(empty), _mm256_cmp_ps::<_CMP_LE_OQ>(first, last));
-            let met = _mm256_movemask_ps(_mm256_permutevar8x32_ps(within, order)) as u32;
-            let order = _mm256_permutevar8x32_epi32(order, lanes_in(met as u8));
-            let children = _mm256_permutevar8x32_epi32(children, order);
-            _mm256_storeu_si256(stack.child.as_mut_ptr().add(height).cast(), children);
-            _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(first, order));
-            _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(last, order));
-            height + met.count_ones() as usize
-        }
+    fn descend(self, node: &Node8, walk: &mut Walk, stack: &mut Stack) {
+        // SAFETY: `self` proves that the processor has AVX2.
+        unsafe { descend_one(node, walk, stack) }
+    }
+
+    type VisitConstants = ();
+
+    fn visit_constants(self) -> &'static () {
+        &()
     }
 
     const IS_NARROW: bool = true;
@@ -175,6 +229,56 @@ impl KernelSimd for Avx2 {
     }
 }
 
+/// Visits a node, see `node8::descend_plain`.
+///
+/// # Safety
+///
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn descend_one(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
+    let height = walk.height as usize;
+    // The stores below write eight entries each.
+    assert!(height <= STACK - 8);
+    let signs = walk.descent.signs;
+    // SAFETY: the caller ensures that the processor has AVX2; walks and nodes are aligned as they are read; the stack has
+    // room for eight entries.
+    unsafe {
+        // The planes above the lower four children are in the lower half, those above the others in the upper one:
+        // so the steps from planes to children need not cross the halves.
+        let planes = load_lanes(&PLANE_OF_LANE);
+        let splits = _mm256_permutevar8x32_ps(_mm256_load_ps(std::ptr::from_ref(node).cast()), planes);
+        let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes.0 as i32), load_lanes(&AXIS_OF_LANE));
+        // The permutation within rows uses the low two bits of each lane, which are its axis.
+        let rows = std::ptr::from_ref(&*walk).cast::<__m128>();
+        let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows), axes);
+        let inv_lo = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(1)), axes);
+        let minus_inv_hi = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows.add(2)), axes);
+        let padding = _mm256_set1_ps(walk.descent.padding);
+        let distance = _mm256_sub_ps(splits, origin);
+        let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);
+        let hi = _mm256_sub_ps(padding, _mm256_mul_ps(distance, minus_inv_hi));
+        let (mut first, mut last) = (_mm256_set1_ps(walk.t0), _mm256_set1_ps(walk.t1));
+        // At each level, the upper side of a plane is the far one, unless the ray descends its axis.
+        (first, last) = clip::<0b00_00_00_00, 0b1111_0000>(first, last, lo, hi, inv_lo);
+        (first, last) = clip::<0b01_01_01_01, 0b1100_1100>(first, last, lo, hi, inv_lo);
+        (first, last) = clip::<0b11_11_10_10, 0b1010_1010>(first, last, lo, hi, inv_lo);
+        // All planes the other way round for a far-first ray.
+        let down = node.axes.descended(signs) ^ signs.far_first().wrapping_neg() & 0x7F;
+        let order = _mm256_set1_epi32(CHILD_ORDERS[down] as i32);
+        let order = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
+        let children = _mm256_load_si256(node.children.as_ptr().cast());
+        let empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(EMPTY as i32));
+        let within = _mm256_andnot_ps(_mm256_castsi256_ps(empty), _mm256_cmp_ps::<_CMP_LE_OQ>(first, last));
+        let met = _mm256_movemask_ps(_mm256_permutevar8x32_ps(within, order)) as u32;
+        let order = _mm256_permutevar8x32_epi32(order, lanes_in(met as u8));
+        let children = _mm256_permutevar8x32_epi32(children, order);
+        _mm256_storeu_si256(stack.child.as_mut_ptr().add(height).cast(), children);
+        _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(first, order));
+        _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(last, order));
+        walk.height += met.count_ones();
+    }
+}
+
 /// Moves the bytes of each row at these places, which are below sixteen, to the front.
 ///
 /// # Safety
@@ -190,33 +294,17 @@ unsafe fn moved(places: u64, corners: &Corners) -> [__m128i; 3] {
 }
 
 /// The plane in each lane of an AVX2 visit: in each half the root, one of the second level, two of the third level.
-const PLANE_OF_LANE: [u32; 8] = [0, 1, 3, 4, 0, 2, 5, 6];
+const PLANE_OF_LANE: [u32; 8] = [3, 1, 0, 2, 3, 5, 4, 6];
 
-/// Where the axis of this plane begins in [`Node8::axes`].
+/// Where the axis of this plane begins in `PlaneAxes`.
 const AXIS_OF_LANE: [u32; 8] = {
     let mut shifts = PLANE_OF_LANE;
     let mut lane = 0;
     while lane < 8 {
-        shifts[lane] *= 3;
+        shifts[lane] *= 2;
         lane += 1;
     }
     shifts
-};
-
-/// The orders of [`CHILD_ORDERS`] for each set of lanes of [`PLANE_OF_LANE`] whose axis the ray descends.
-static ORDERS_BY_LANES: [u32; 256] = {
-    let mut orders = [0; 256];
-    let mut lanes = 0;
-    while lanes < 256 {
-        let (mut down, mut lane) = (0, 0);
-        while lane < 8 {
-            down |= (lanes >> lane & 1) << PLANE_OF_LANE[lane];
-            lane += 1;
-        }
-        orders[lanes] = CHILD_ORDERS[down] as u32 & 0xFF_FFFF;
-        lanes += 1;
-    }
-    orders
 };
 
 /// Loads eight integers.

@@ -9,43 +9,13 @@
 use super::block_tree::BlockTree;
 use super::blocks::PreciseRay;
 use super::leaf::{LeafBlock, LeafRay, ShearedRay};
-use super::node8::{DescentRay, LEAF, Stack};
+use super::node8::{DONE, Stack, Walk};
 use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
 
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
 pub(super) const SLOTS: usize = 64;
-
-/// The way of a ray through a tree: all that visits of nodes touch, in one cache line.
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-pub(super) struct Walk {
-    pub descent: DescentRay,
-    /// The entry that is visited next.
-    pub child: u32,
-    pub t0: f32,
-    pub t1: f32,
-    /// Number of entries on the stack.
-    pub height: u32,
-}
-const _: () = assert!(size_of::<Walk>() == 64);
-
-impl Walk {
-    pub const IDLE: Self = Self { descent: DescentRay::IDLE, child: 0, t0: 0.0, t1: 0.0, height: 1 };
-
-    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
-    #[inline(always)]
-    pub fn pop(&mut self, stack: &Stack) {
-        let (mut top, end) = (self.height as usize - 1, self.descent.end);
-        while stack.t0[top] > end {
-            top -= 1;
-        }
-        let t1 = stack.t1[top];
-        self.height = top as u32;
-        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], if end < t1 { end } else { t1 });
-    }
-}
 
 /// A ray in state.
 #[derive(Clone, Copy)]
@@ -59,9 +29,6 @@ pub(super) struct Slot<R> {
 }
 // Two cache lines.
 const _: () = assert!(size_of::<Slot<ShearedRay>>() == 128);
-
-/// The entry at the bottom of every stack: the ray is finished.
-pub(super) const DONE: u32 = LEAF - 1;
 
 /// The slots in one state. A slot is written to every list and counted only in the list that it belongs to, which takes
 /// no branch; hence the spare element.
@@ -156,6 +123,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
         slot.is_busy = false;
         idle.push_if(true, i);
     }
+    let constants = s.visit_constants();
     let mut setup = RaySetup::new();
     loop {
         let (list, len) = idle.take();
@@ -171,10 +139,17 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
             return;
         }
         let (list, len) = inner.take();
-        for &i in &list[..len] {
-            let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
-            let (node, height) = (&nodes8[slot.walk.child as usize], slot.walk.height as usize);
-            slot.walk.height = s.descend(node, &slot.walk.descent, slot.walk.t0, slot.walk.t1, stack, height) as u32;
+        let (pairs, single) = list[..len].as_chunks();
+        for pair in pairs {
+            let pair = pair.map(|i| i as usize % SLOTS);
+            let [a, b] = slots.get_disjoint_mut(pair).expect("a slot is in a list once");
+            let stacks = stacks.get_disjoint_mut(pair).expect("one for each slot");
+            let nodes = [&nodes8[a.walk.child as usize], &nodes8[b.walk.child as usize]];
+            s.descend_two(constants, nodes, [&mut a.walk, &mut b.walk], stacks);
+        }
+        for &i in single {
+            let (walk, stack) = (&mut slots[i as usize % SLOTS].walk, &mut stacks[i as usize % SLOTS]);
+            s.descend(&nodes8[walk.child as usize], walk, stack);
         }
         // A separate loop, so that a misprediction discards little work.
         for &i in &list[..len] {
