@@ -65,15 +65,27 @@ const NORMAL: u32 = 1 << 30;
 /// The highest bit is set for a far-first ray.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub(super) struct Signs(u32);
+pub(super) struct Signs(pub u32);
 
 impl Signs {
     const FAR_FIRST: u32 = 1 << 31;
 
+    /// Of near-first rays: bit 0 of the index is set if the ray descends x, bit 1 if y, bit 2 if z.
+    pub const TABLE: [u32; 8] = {
+        let mut table = [0; 8];
+        let mut down = 0;
+        while down < 8 {
+            let (x, y, z) = (down & 1, down >> 1 & 1, down >> 2);
+            table[down as usize] = NORMAL | PLANES * (z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y);
+            down += 1;
+        }
+        table
+    };
+
     #[inline(always)]
     fn new(down: [bool; 3]) -> Self {
-        let [x, y, z] = down.map(|down| if down { PLANES } else { 0 });
-        Self(NORMAL | z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y)
+        let [x, y, z] = down.map(usize::from);
+        Self(Self::TABLE[x | y << 1 | z << 2])
     }
 
     /// 1 for a far-first ray, otherwise 0.

@@ -3,11 +3,11 @@
 //! For a single ray it takes five divisions and unpredictable branches on the direction.
 
 use super::lanes::{longest_axis, to_own_space};
-use super::leaf::LeafRay;
-use super::node8::DescentRay;
+use super::leaf::ShearedRay;
+use super::node8::{DescentRay, Signs};
 use super::ray::{Nearest, RELATIVE_PADDING};
 use super::simd::{KernelSimd, LANES, Mask};
-use crate::geometry::{Aabb, Ray, Shear};
+use crate::geometry::Aabb;
 use firstlight_simd::three;
 use glam::{Affine3A, Vec3};
 
@@ -43,13 +43,15 @@ pub(super) struct RaySetup {
     rays: FetchedRays,
     /// As in `ray::TreeRay`.
     inv_lo: [Lanes; 3],
-    inv_hi: [Lanes; 3],
+    minus_inv_hi: [Lanes; 3],
     padding: Lanes,
+    signs: [u32; LANES],
     /// The part of the ray inside the bounds.
     from: Lanes,
     until: Lanes,
-    /// As in [`Shear`].
-    kz: [u32; LANES],
+    /// As in [`ShearedRay`].
+    axes: [[u32; LANES]; 3],
+    sheared_origin: [Lanes; 3],
     sx: Lanes,
     sy: Lanes,
     sz: Lanes,
@@ -70,11 +72,13 @@ impl RaySetup {
                 id: [0; LANES],
             },
             inv_lo: [[0.0; LANES]; 3],
-            inv_hi: [[0.0; LANES]; 3],
+            minus_inv_hi: [[0.0; LANES]; 3],
             padding: [0.0; LANES],
+            signs: [0; LANES],
             from: [0.0; LANES],
             until: [0.0; LANES],
-            kz: [0; LANES],
+            axes: [[0; LANES]; 3],
+            sheared_origin: [[0.0; LANES]; 3],
             sx: [0.0; LANES],
             sy: [0.0; LANES],
             sz: [0.0; LANES],
@@ -97,7 +101,7 @@ impl RaySetup {
         Some(lane)
     }
 
-    /// Does [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
+    /// Does `Shear::new`, `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
     #[inline(always)]
     fn prepare<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
         let mut origin = three!(|axis| s.load(&self.rays.origin[axis]));
@@ -110,25 +114,34 @@ impl RaySetup {
             }
         }
         let (along_x, along_y) = longest_axis(s, &dir);
-        let kz = s.select_u(along_x, s.splat_u(0), s.select_u(along_y, s.splat_u(1), s.splat_u(2)));
+        // The axes across the ray and along it: x y z turned until the longest comes last.
+        for (place, axes) in [[1, 2, 0], [2, 0, 1], [0, 1, 2]].into_iter().enumerate() {
+            let [if_x, if_y, if_z] = axes;
+            let [by_x, by_y, by_z] = axes.map(|axis| s.splat_u(axis));
+            s.store_u(s.select_u(along_x, by_x, s.select_u(along_y, by_y, by_z)), &mut self.axes[place]);
+            let of = |axis: u32| origin[axis as usize];
+            let turned = s.select(along_x, of(if_x), s.select(along_y, of(if_y), of(if_z)));
+            s.store(turned, &mut self.sheared_origin[place]);
+        }
         let [dx, dy, dz] = dir;
         let longest = s.select(along_x, dx, s.select(along_y, dy, dz));
         let first = s.select(along_x, dy, s.select(along_y, dz, dx));
         let second = s.select(along_x, dz, s.select(along_y, dx, dy));
         let one = s.splat(1.0);
         let sz = s.div(one, longest);
-        s.store_u(kz, &mut self.kz);
         s.store(s.div(first, longest), &mut self.sx);
         s.store(s.div(second, longest), &mut self.sy);
         s.store(sz, &mut self.sz);
         let padding = s.mul(s.splat(RELATIVE_PADDING * extent), s.abs(sz));
         s.store(padding, &mut self.padding);
+        let [x, y, z] = three!(|axis| s.select_u(s.negative(dir[axis]), s.splat_u(1 << axis), s.splat_u(0)));
+        s.store_u(s.gather_u(&Signs::TABLE, s.or_u(x, s.or_u(y, z))), &mut self.signs);
         let (mut from, mut until) = (s.splat(0.0), s.load(&self.rays.t));
         for axis in 0..3 {
             let inv = s.div(one, dir[axis]);
             let (lo, hi) = (s.mul(inv, s.splat(1.0 - RELATIVE_PADDING)), s.mul(inv, s.splat(1.0 + RELATIVE_PADDING)));
             s.store(lo, &mut self.inv_lo[axis]);
-            s.store(hi, &mut self.inv_hi[axis]);
+            s.store(s.sub(s.splat(-0.0), hi), &mut self.minus_inv_hi[axis]);
             let (min, max) = (s.splat(bounds.min[axis]), s.splat(bounds.max[axis]));
             let down = s.negative(dir[axis]);
             let (entry, exit) = (s.select(down, max, min), s.select(down, min, max));
@@ -143,12 +156,15 @@ impl RaySetup {
 
     #[inline(always)]
     pub fn descent(&self, lane: usize) -> DescentRay {
-        let [x, y, z] = &self.rays.origin;
-        let [lx, ly, lz] = &self.inv_lo;
-        let [hx, hy, hz] = &self.inv_hi;
-        let origin = [x[lane], y[lane], z[lane]];
-        let (inv_lo, inv_hi) = ([lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]]);
-        DescentRay::new(origin, inv_lo, inv_hi, self.padding[lane], self.rays.t[lane])
+        let at = |lanes: &[Lanes; 3]| [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
+        DescentRay {
+            origin: at(&self.rays.origin),
+            padding: self.padding[lane],
+            inv_lo: at(&self.inv_lo),
+            signs: Signs(self.signs[lane]),
+            minus_inv_hi: at(&self.minus_inv_hi),
+            end: self.rays.t[lane],
+        }
     }
 
     /// Returns origin and direction in the tree's own space.
@@ -159,12 +175,15 @@ impl RaySetup {
     }
 
     #[inline(always)]
-    pub fn leaf<R: LeafRay>(&self, lane: usize) -> R {
-        let (origin, dir) = self.ray(lane);
-        let kz = self.kz[lane] as usize % 3;
-        let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-        let shear = Shear { kz, kx, ky, sx: self.sx[lane], sy: self.sy[lane], sz: self.sz[lane] };
-        R::new(&Ray { origin, dir, t_max: self.rays.t[lane] }, &shear)
+    pub fn sheared(&self, lane: usize) -> ShearedRay {
+        let ([kx, ky, kz], [x, y, z]) = (&self.axes, &self.sheared_origin);
+        ShearedRay {
+            axes: [kx[lane], ky[lane], kz[lane]],
+            origin: [x[lane], y[lane], z[lane]],
+            sx: self.sx[lane],
+            sy: self.sy[lane],
+            sz: self.sz[lane],
+        }
     }
 
     #[inline(always)]

@@ -80,6 +80,8 @@ impl StreamState {
 pub(super) trait StreamRay: LeafRay {
     /// The slots for rays of this kind.
     fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
+
+    fn of_lane(setup: &RaySetup, lane: usize) -> Self;
 }
 
 impl StreamRay for ShearedRay {
@@ -87,12 +89,23 @@ impl StreamRay for ShearedRay {
     fn slots<'a>(sheared: &'a mut [Slot<Self>], _: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>] {
         sheared
     }
+
+    #[inline(always)]
+    fn of_lane(setup: &RaySetup, lane: usize) -> Self {
+        setup.sheared(lane)
+    }
 }
 
 impl StreamRay for PreciseRay {
     #[inline(always)]
     fn slots<'a>(_: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<Self>]) -> &'a mut [Slot<Self>] {
         precise
+    }
+
+    #[inline(always)]
+    fn of_lane(setup: &RaySetup, lane: usize) -> Self {
+        let (origin, dir) = setup.ray(lane);
+        Self::of(origin.as_dvec3().to_array(), dir.as_dvec3().to_array())
     }
 }
 
@@ -198,13 +211,16 @@ fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     slot: &mut Slot<B::Ray>,
     setup: &mut RaySetup,
     source: &mut impl Source,
-) -> bool {
+) -> bool
+where
+    B::Ray: StreamRay,
+{
     let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
     let (t0, t1) = setup.within(lane);
     let descent = if ANY { setup.descent(lane).far_first() } else { setup.descent(lane) };
     *slot = Slot {
         walk: Walk { descent, child: 0, t0, t1, height: 1 },
-        leaf: setup.leaf(lane),
+        leaf: <B::Ray as StreamRay>::of_lane(setup, lane),
         nearest: setup.nearest(lane),
         id: setup.id(lane),
         is_busy: true,
