@@ -76,7 +76,7 @@ impl Signs {
         let mut down = 0;
         while down < 8 {
             let (x, y, z) = (down & 1, down >> 1 & 1, down >> 2);
-            table[down as usize] = NORMAL | PLANES * (z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y);
+            table[down as usize] = NORMAL | (PLANES * (z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y));
             down += 1;
         }
         table
