@@ -84,7 +84,10 @@ pub(super) fn resolve<S: KernelSimd>(
     let smallest = s.min(s.abs(edges[0]), s.min(s.abs(edges[1]), s.abs(edges[2])));
     let tiny = mask & s.lt(smallest, s.splat(TINY_EDGE));
     if tiny != 0 {
-        mask &= resolve_tiny(s, tiny, &mut edges, [a, b, c]);
+        // Copies, so that the originals need no memory.
+        let mut again = TinyEdges::new(s, &edges, [a, b, c]);
+        mask &= again.resolve(tiny);
+        edges = again.edges(s);
     }
     let [e0, e1, e2] = edges;
     mask &= same_sign(s, e0, e1, e2);
@@ -167,28 +170,43 @@ pub(super) fn dot<S: KernelSimd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
     s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }
 
-/// Repeats the test for the lanes of `tiny` in `f64`; returns the lanes that still hit, including all lanes outside
-/// `tiny`.
-#[inline(never)]
-fn resolve_tiny<S: KernelSimd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
-    let mut stored = [[0.0; LANES]; 3];
-    let mut points = [[[0.0; LANES]; 2]; 3];
-    for k in 0..3 {
-        s.store(edges[k], &mut stored[k]);
-        s.store(corners[k][0], &mut points[k][0]);
-        s.store(corners[k][1], &mut points[k][1]);
-    }
-    let mut hit = Mask::MAX;
-    for lane in (0..LANES).filter(|lane| tiny >> lane & 1 != 0) {
-        match tiny_edges(points.map(|[x, y]| [x[lane], y[lane]])) {
-            Some(again) => (0..3).for_each(|k| stored[k][lane] = again[k]),
-            None => hit &= !(1 << lane),
+/// The edge functions and corners of sixteen triangles in memory.
+struct TinyEdges {
+    edges: [[f32; LANES]; 3],
+    corners: [[[f32; LANES]; 2]; 3],
+}
+
+impl TinyEdges {
+    #[inline(always)]
+    fn new<S: KernelSimd>(s: S, edges: &[S::F; 3], corners: [&Sheared<S>; 3]) -> Self {
+        let mut stored = Self { edges: [[0.0; LANES]; 3], corners: [[[0.0; LANES]; 2]; 3] };
+        for k in 0..3 {
+            s.store(edges[k], &mut stored.edges[k]);
+            s.store(corners[k][0], &mut stored.corners[k][0]);
+            s.store(corners[k][1], &mut stored.corners[k][1]);
         }
+        stored
     }
-    for k in 0..3 {
-        edges[k] = s.load(&stored[k]);
+
+    /// Repeats the test for the lanes of `tiny` in `f64`; returns the lanes that still hit, including all lanes outside
+    /// `tiny`.
+    #[cold]
+    #[inline(never)]
+    fn resolve(&mut self, tiny: Mask) -> Mask {
+        let mut hit = Mask::MAX;
+        for lane in (0..LANES).filter(|lane| tiny >> lane & 1 != 0) {
+            match tiny_edges(self.corners.map(|[x, y]| [x[lane], y[lane]])) {
+                Some(again) => (0..3).for_each(|k| self.edges[k][lane] = again[k]),
+                None => hit &= !(1 << lane),
+            }
+        }
+        hit
     }
-    hit
+
+    #[inline(always)]
+    fn edges<S: KernelSimd>(&self, s: S) -> [S::F; 3] {
+        [s.load(&self.edges[0]), s.load(&self.edges[1]), s.load(&self.edges[2])]
+    }
 }
 
 /// Transforms origins and directions into an object's space.

@@ -41,6 +41,9 @@ pub(super) trait LeafBlock: Sized + Send {
 /// Offers the nearest of the hits, which belong to ascending primitives.
 #[inline(always)]
 pub(super) fn offer<S: KernelSimd>(s: S, hits: LaneHits<S>, nearest: &mut Nearest, prim: impl FnOnce(usize) -> u32) {
+    if hits.mask == 0 {
+        return;
+    }
     let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
     if valid == 0 {
         return;

@@ -7,104 +7,66 @@ use super::nodes::{KdNodes, Node};
 
 /// The planes and children of three levels.
 ///
-/// Planes and children are numbered in order: plane `i` separates the children up to `i` from those above it, so plane 3
-/// is the root's, 1 and 5 are those of its lower and upper child, and the even ones are those of the third level. Where
-/// the binary tree ends early, the missing planes lie at infinity and only the lowest of the children below is there.
+/// The bits of a child's index, the highest first, select the side at each level, 1 for the upper side. Where the binary
+/// tree ends early, the missing planes lie at infinity and only the lowest of the children below is there.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node8 {
-    pub splits: [f32; 7],
-    pub axes: PlaneAxes,
+    /// The positions of the planes, each at its [`plane_above`] the children that it bounds, and at [`AXES`] the bits of
+    /// their axes.
+    pub planes: [f32; 8],
     /// [`EMPTY`], the index of a node, or with [`LEAF`] set the first block of a leaf.
     pub children: [u32; 8],
 }
 // One cache line.
 const _: () = assert!(size_of::<Node8>() == 64);
 
-/// The axes of the planes of a node, twice: bits `2 i` and `2 i + 1` are the axis of plane `i`; bit `14 + i` is set if
-/// that is x, bit `21 + i` if it is y.
+/// Where a node keeps the axes of its planes: bits `2 i` and `2 i + 1` are the axis of plane `i`, 0 here.
 ///
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(transparent)]
-pub(super) struct PlaneAxes(pub u32);
-
-impl PlaneAxes {
-    const ALL_X: Self = Self(NORMAL | PLANES << ARE_X);
-
-    fn set(&mut self, plane: usize, axis: usize) {
-        let old = 3 << (2 * plane) | 1 << (ARE_X + plane) | 1 << (ARE_Y + plane);
-        let are = [1 << ARE_X, 1 << ARE_Y, 0][axis];
-        self.0 = self.0 & !old | (axis as u32) << (2 * plane) | are << plane;
-    }
-
-    #[inline(always)]
-    fn get(self, plane: usize) -> usize {
-        (self.0 >> (2 * plane) & 3) as usize
-    }
-
-    /// Returns the planes whose axis the ray descends, one bit each.
-    #[inline(always)]
-    pub fn descended(self, signs: Signs) -> usize {
-        let flipped = self.0 & signs.0;
-        ((signs.0 ^ flipped >> ARE_X ^ flipped >> ARE_Y) & PLANES) as usize
-    }
-}
-
-/// A bit for each plane of a node.
-const PLANES: u32 = 0x7F;
-const ARE_X: usize = 14;
-const ARE_Y: usize = 21;
-
-/// Makes the bits below it a normal number when they are read as an `f32`: SIMD computes with them in a lane that is not
-/// used, and takes long over subnormal ones.
+/// As an `f32` it is a normal number: SIMD computes with it in a lane that is not used, and takes long over subnormal ones.
+pub(super) const AXES: usize = 5;
 const NORMAL: u32 = 1 << 30;
 
-/// The signs of a ray's direction, for [`PlaneAxes::descended`]: the low seven bits are set if it descends z; the seven
-/// bits from `ARE_X` and from `ARE_Y` on are set if it descends x, or y, but not z, or the other way round.
-///
-/// The highest bit is set for a far-first ray.
-#[derive(Clone, Copy, Debug)]
-#[repr(transparent)]
-pub(super) struct Signs(pub u32);
-
-impl Signs {
-    const FAR_FIRST: u32 = 1 << 31;
-
-    /// Of near-first rays: bit 0 of the index is set if the ray descends x, bit 1 if y, bit 2 if z.
-    pub const TABLE: [u32; 8] = {
-        let mut table = [0; 8];
-        let mut down = 0;
-        while down < 8 {
-            let (x, y, z) = (down & 1, down >> 1 & 1, down >> 2);
-            table[down as usize] = NORMAL | (PLANES * (z | (x ^ z) << ARE_X | (y ^ z) << ARE_Y));
-            down += 1;
-        }
-        table
-    };
-
-    #[inline(always)]
-    fn new(down: [bool; 3]) -> Self {
-        let [x, y, z] = down.map(usize::from);
-        Self(Self::TABLE[x | y << 1 | z << 2])
-    }
-
-    /// 1 for a far-first ray, otherwise 0.
-    #[inline(always)]
-    pub fn far_first(self) -> usize {
-        (self.0 >> 31) as usize
+/// Returns the plane at a level, 0 for the root, on the way to a child.
+pub(super) const fn plane_above(child: usize, level: usize) -> usize {
+    match level {
+        0 => 1,
+        1 => child | 3,
+        _ => child & 6,
     }
 }
 
 /// The order of the children, three bits each, from far to near, for each set of planes whose axis the ray descends.
-pub(super) static CHILD_ORDERS: [u32; 128] = {
-    let mut orders = [0; 128];
+pub(super) static CHILD_ORDERS: [u32; 256] = {
+    let mut orders = [0; 256];
     let mut down = 0;
-    while down < 128 {
+    while down < 256 {
         orders[down] = child_order(down);
         down += 1;
     }
     orders
 };
+
+impl Node8 {
+    const EMPTY: Self = Self {
+        planes: {
+            let mut planes = [f32::INFINITY; 8];
+            planes[AXES] = f32::from_bits(NORMAL);
+            planes
+        },
+        children: [EMPTY; 8],
+    };
+
+    fn set_plane(&mut self, plane: usize, axis: usize, split: f32) {
+        let axes = self.planes[AXES].to_bits() & !(3 << (2 * plane)) | (axis as u32) << (2 * plane);
+        self.planes[AXES] = f32::from_bits(axes);
+        self.planes[plane] = split;
+    }
+
+    fn axis(&self, plane: usize) -> usize {
+        (self.planes[AXES].to_bits() >> (2 * plane) & 3) as usize
+    }
+}
 
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
@@ -133,7 +95,8 @@ pub(super) struct DescentRay {
     pub padding: f32,
     /// Shortened reciprocals of the direction: multiplied by a distance they give the earliest crossing.
     pub inv_lo: [f32; 3],
-    pub signs: Signs,
+    /// All bits set if the far child is visited first, otherwise 0.
+    pub reversed: u32,
     /// Negated lengthened reciprocals: multiplied by a distance they give the negative of the latest crossing.
     pub minus_inv_hi: [f32; 3],
     /// Distance beyond which nothing matters: that of the nearest hit.
@@ -143,25 +106,18 @@ pub(super) struct DescentRay {
 const _: () = assert!(size_of::<DescentRay>() == 48);
 
 impl DescentRay {
-    pub const IDLE: Self = Self {
-        origin: [0.0; 3],
-        padding: 0.0,
-        inv_lo: [0.0; 3],
-        signs: Signs(NORMAL),
-        minus_inv_hi: [0.0; 3],
-        end: 0.0,
-    };
+    pub const IDLE: Self =
+        Self { origin: [0.0; 3], padding: 0.0, inv_lo: [0.0; 3], reversed: 0, minus_inv_hi: [0.0; 3], end: 0.0 };
 
     #[inline(always)]
     pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], padding: f32, end: f32) -> Self {
-        let signs = Signs::new(inv_lo.map(f32::is_sign_negative));
-        Self { origin, padding, inv_lo, signs, minus_inv_hi: inv_hi.map(|inv| -inv), end }
+        Self { origin, padding, inv_lo, reversed: 0, minus_inv_hi: inv_hi.map(|inv| -inv), end }
     }
 
     /// Returns the ray with the far child visited first.
     #[inline(always)]
     pub fn far_first(self) -> Self {
-        Self { signs: Signs(self.signs.0 | Signs::FAR_FIRST), ..self }
+        Self { reversed: u32::MAX, ..self }
     }
 }
 
@@ -219,7 +175,7 @@ pub(super) fn collapse(tree: &KdNodes) -> Vec<Node8> {
 }
 
 fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
-    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: PlaneAxes::ALL_X, children: [EMPTY; 8] };
+    let mut node = Node8::EMPTY;
     // The subtree at each position of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
     for depth in 0..3 {
@@ -228,9 +184,7 @@ fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> 
             let first_child = place << (3 - depth);
             match entry.map(|index| tree.nodes[index as usize].unpack()) {
                 Some(Node::Inner { axis, split, first_child: pair }) => {
-                    let plane = plane_above(first_child, depth);
-                    node.splits[plane] = split;
-                    node.axes.set(plane, axis);
+                    node.set_plane(plane_above(first_child, depth), axis, split);
                     next.extend([Some(pair), Some(pair + 1)]);
                 }
                 Some(Node::Leaf { first, count }) => {
@@ -253,12 +207,6 @@ fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> 
         };
     }
     node
-}
-
-/// Returns the plane at a level, 0 for the root, on the way to a child.
-const fn plane_above(child: usize, level: usize) -> usize {
-    let below = 4 >> level;
-    child & (8 - 2 * below) | (below - 1)
 }
 
 /// Returns the entry of [`CHILD_ORDERS`] for the planes whose axis the ray descends.
@@ -286,17 +234,18 @@ const fn child_order(down: usize) -> u32 {
 #[inline(always)]
 pub(super) fn descend_plain(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
     let Walk { descent: ray, t0, t1, height, .. } = walk;
-    let down = node.axes.descended(ray.signs);
+    let descends = |plane| ray.inv_lo[node.axis(plane)].is_sign_negative();
+    let down: usize = (0..8).map(|plane| usize::from(descends(plane)) << plane).sum();
     let order = CHILD_ORDERS[down];
     let mut top = *height as usize;
     for i in 0..8 {
-        let place = if ray.signs.far_first() == 1 { 7 - i } else { i };
+        let place = if ray.reversed != 0 { 7 - i } else { i };
         let child = (order >> (3 * place) & 7) as usize;
         let (mut t0, mut t1) = (*t0, *t1);
         for level in 0..3 {
             let plane = plane_above(child, level);
-            let axis = node.axes.get(plane);
-            let distance = node.splits[plane] - ray.origin[axis];
+            let axis = node.axis(plane);
+            let distance = node.planes[plane] - ray.origin[axis];
             // NaN, for a ray in the plane, bounds neither side.
             if (child >> (2 - level) & 1) == (down >> plane & 1) {
                 t1 = f32::min(t1, ray.padding - distance * ray.minus_inv_hi[axis]);
@@ -347,14 +296,16 @@ mod tests {
         };
         let cases: Vec<_> = (0..20_000)
             .map(|_| {
+                let mut node = Node8::EMPTY;
+                for plane in (0..8).filter(|&plane| plane != AXES) {
+                    let split = [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
+                    node.set_plane(plane, next() as usize % 3, split);
+                }
                 let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
-                let splits = std::array::from_fn(|_| number());
-                let mut node = Node8 { splits, axes: PlaneAxes::ALL_X, children: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
-                (0..7).for_each(|plane| node.axes.set(plane, next() as usize % 3));
                 if next() % 4 == 0 {
-                    node.splits[2] = f32::INFINITY;
+                    node.planes[7] = f32::INFINITY;
                 }
                 node.children = std::array::from_fn(|c| if next() % 5 == 0 { EMPTY } else { c as u32 * 7 });
                 let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6, f32::INFINITY);

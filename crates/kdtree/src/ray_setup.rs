@@ -4,7 +4,7 @@
 
 use super::lanes::{longest_axis, to_own_space};
 use super::leaf::ShearedRay;
-use super::node8::{DescentRay, Signs};
+use super::node8::DescentRay;
 use super::ray::{Nearest, RELATIVE_PADDING};
 use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::Aabb;
@@ -45,7 +45,6 @@ pub(super) struct RaySetup {
     inv_lo: [Lanes; 3],
     minus_inv_hi: [Lanes; 3],
     padding: Lanes,
-    signs: [u32; LANES],
     /// The part of the ray inside the bounds.
     from: Lanes,
     until: Lanes,
@@ -74,7 +73,6 @@ impl RaySetup {
             inv_lo: [[0.0; LANES]; 3],
             minus_inv_hi: [[0.0; LANES]; 3],
             padding: [0.0; LANES],
-            signs: [0; LANES],
             from: [0.0; LANES],
             until: [0.0; LANES],
             axes: [[0; LANES]; 3],
@@ -134,8 +132,6 @@ impl RaySetup {
         s.store(sz, &mut self.sz);
         let padding = s.mul(s.splat(RELATIVE_PADDING * extent), s.abs(sz));
         s.store(padding, &mut self.padding);
-        let [x, y, z] = three!(|axis| s.select_u(s.negative(dir[axis]), s.splat_u(1 << axis), s.splat_u(0)));
-        s.store_u(s.gather_u(&Signs::TABLE, s.or_u(x, s.or_u(y, z))), &mut self.signs);
         let (mut from, mut until) = (s.splat(0.0), s.load(&self.rays.t));
         for axis in 0..3 {
             let inv = s.div(one, dir[axis]);
@@ -161,7 +157,7 @@ impl RaySetup {
             origin: at(&self.rays.origin),
             padding: self.padding[lane],
             inv_lo: at(&self.inv_lo),
-            signs: Signs(self.signs[lane]),
+            reversed: 0,
             minus_inv_hi: at(&self.minus_inv_hi),
             end: self.rays.t[lane],
         }

@@ -1,7 +1,7 @@
 //! The x86 implementations of [`KernelSimd`].
 
 use super::{Corners, Eight, KernelSimd, places};
-use crate::node8::{CHILD_ORDERS, EMPTY, Node8, STACK, Signs, Stack, Walk};
+use crate::node8::{AXES, CHILD_ORDERS, EMPTY, Node8, STACK, Stack, Walk, plane_above};
 use firstlight_simd::{Avx2, Avx512, Mask, SET_BITS, three, two};
 use std::arch::x86_64::*;
 
@@ -31,58 +31,52 @@ impl KernelSimd for Avx512 {
         // read; stacks have room for eight entries from the height on.
         unsafe {
             let constant = |of: &[u32; 16]| _mm512_load_si512(of.as_ptr().cast());
-            let all = |bits: i32| _mm512_set1_epi32(bits);
             let both = |a: f32, b: f32| _mm512_mask_mov_ps(_mm512_set1_ps(a), c.second, _mm512_set1_ps(b));
-            let both_u = |a: u32, b: u32| {
-                _mm512_mask_mov_epi32(_mm512_set1_epi32(a as i32), c.second, _mm512_set1_epi32(b as i32))
+            let both_u = |a: *const u32, b: *const u32| {
+                let all = |from: *const u32| _mm512_set1_epi32(from.read_volatile() as i32);
+                _mm512_mask_mov_epi32(all(a), c.second, all(b))
+            };
+            let halves = |a: *const f32, b: *const f32| {
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_load_ps(a)), _mm256_load_ps(b))
             };
             let (rows_a, rows_b) = (std::ptr::from_ref(&*walk_a).cast(), std::ptr::from_ref(&*walk_b).cast());
             let row = |k: usize| {
                 let row = |rows: *const f32| _mm512_broadcast_f32x4(_mm_load_ps(rows.add(4 * k)));
                 _mm512_mask_mov_ps(row(rows_a), c.second, row(rows_b))
             };
-            let halves = |a: *const f32, b: *const f32| {
-                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_load_ps(a)), _mm256_load_ps(b))
-            };
             // The permutation within rows uses the low two bits of each lane, which are its axis.
-            let axes = _mm512_srlv_epi32(both_u(a.axes.0, b.axes.0), constant(&c.axis_shifts));
+            let axes = |node: &Node8| node.planes.as_ptr().add(AXES).cast();
+            let axes = _mm512_srlv_epi32(both_u(axes(a), axes(b)), constant(&c.axis_shifts));
             let origin = _mm512_permutevar_ps(row(0), axes);
             let inv_lo = _mm512_permutevar_ps(row(1), axes);
             let minus_inv_hi = _mm512_permutevar_ps(row(2), axes);
+            let down = usize::from(_mm512_movepi32_mask(_mm512_castps_si512(inv_lo)));
+            let order = both_u(&ORDERS_OF_TWO[0][down & 0xFF], &ORDERS_OF_TWO[1][down >> 8]);
+            // The permutations use the low four bits: a child, and above it the half of the ray.
+            let order = _mm512_srlv_epi32(order, constant(&c.order_shifts));
             let padding = _mm512_permute_ps::<0xFF>(row(0));
-            let distance = _mm512_sub_ps(halves(a.splits.as_ptr(), b.splits.as_ptr()), origin);
+            let distance = _mm512_sub_ps(halves(a.planes.as_ptr(), b.planes.as_ptr()), origin);
             let lo = _mm512_sub_ps(_mm512_mul_ps(distance, inv_lo), padding);
             let hi = _mm512_sub_ps(padding, _mm512_mul_ps(distance, minus_inv_hi));
-            // Loads of their own: moves from vector registers take longer.
-            let signs = |walk: &Walk| std::ptr::from_ref(&walk.descent.signs).read_volatile();
-            let axes = |node: &Node8| std::ptr::from_ref(&node.axes).read_volatile();
-            let (signs_a, signs_b) = (signs(walk_a), signs(walk_b));
-            let order = |node: &Node8, signs| CHILD_ORDERS[axes(node).descended(signs)];
-            let order = both_u(order(a, signs_a), order(b, signs_b));
-            let order = _mm512_srlv_epi32(order, constant(&c.order_shifts));
-            // `base | order & bits`.
-            let middle = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.middle), order, all(4));
-            let bottom = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.half), order, all(6));
-            let order = _mm512_ternarylogic_epi32::<0xF8>(constant(&c.half), order, all(7));
             let (mut first, mut last) = (both(walk_a.t0, walk_b.t0), both(walk_a.t1, walk_b.t1));
             let root = constant(&c.root);
-            // NaN as the first argument yields the second.
-            first = _mm512_mask_max_ps(first, c.far[0], _mm512_permutexvar_ps(root, lo), first);
-            last = _mm512_mask_min_ps(last, c.near[0], _mm512_permutexvar_ps(root, hi), last);
-            first = _mm512_mask_max_ps(first, c.far[1], _mm512_permutexvar_ps(middle, lo), first);
-            last = _mm512_mask_min_ps(last, c.near[1], _mm512_permutexvar_ps(middle, hi), last);
-            first = _mm512_mask_max_ps(first, c.far[2], _mm512_permutexvar_ps(bottom, lo), first);
-            last = _mm512_mask_min_ps(last, c.near[2], _mm512_permutexvar_ps(bottom, hi), last);
+            let middle = _mm512_or_si512(order, _mm512_set1_epi32(3));
+            let bottom = _mm512_and_si512(order, _mm512_set1_epi32(!1));
+            for (planes, far) in [(root, c.far[0]), (middle, c.far[1]), (bottom, c.far[2])] {
+                // NaN as the first argument yields the second.
+                first = _mm512_mask_max_ps(first, far, _mm512_permutexvar_ps(planes, lo), first);
+                last = _mm512_mask_mov_ps(_mm512_min_ps(_mm512_permutexvar_ps(planes, hi), last), far, last);
+            }
             let children = _mm512_castps_si512(halves(a.children.as_ptr().cast(), b.children.as_ptr().cast()));
             let children = _mm512_permutexvar_epi32(order, children);
             let some = _mm512_cmpneq_epi32_mask(children, _mm512_set1_epi32(EMPTY as i32));
-            let met = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last);
-            let (met_a, met_b) = (met as u8, (met >> 8) as u8);
-            let places = |signs: Signs, met: u8| PLACES[signs.far_first()][usize::from(met)] as i64;
-            let places = _mm_set_epi64x(places(signs_b, met_b), places(signs_a, met_a));
+            let met = usize::from(_mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last));
+            let places = |walk: &Walk, met: usize| PLACES[(walk.descent.reversed & 256) as usize + met] as i64;
+            let places = _mm_set_epi64x(places(walk_b, met >> 8), places(walk_a, met & 0xFF));
             let places = _mm512_or_si512(_mm512_cvtepu8_epi32(places), constant(&c.half));
             let children = _mm512_castsi512_ps(_mm512_permutexvar_epi32(places, children));
             let (first, last) = (_mm512_permutexvar_ps(places, first), _mm512_permutexvar_ps(places, last));
+            let (met_a, met_b) = ((met & 0xFF).count_ones(), (met >> 8).count_ones());
             for (walk, stack, met, is_second) in [(walk_a, stack_a, met_a, false), (walk_b, stack_b, met_b, true)] {
                 let height = walk.height as usize;
                 let of =
@@ -90,7 +84,7 @@ impl KernelSimd for Avx512 {
                 _mm256_storeu_ps(stack.child.as_mut_ptr().add(height).cast(), of(children));
                 _mm256_storeu_ps(stack.t0.as_mut_ptr().add(height), of(first));
                 _mm256_storeu_ps(stack.t1.as_mut_ptr().add(height), of(last));
-                walk.height += met.count_ones();
+                walk.height += met;
             }
         }
     }
@@ -122,12 +116,10 @@ pub(crate) struct TwoRays {
     order_shifts: [u32; 16],
     /// Where the lanes of each half begin.
     half: [u32; 16],
-    /// The plane above all children, and the lower one of the next level.
+    /// The plane of the root.
     root: [u32; 16],
-    middle: [u32; 16],
     /// The places on the far side at each level.
     far: [Mask; 3],
-    near: [Mask; 3],
     /// The lanes of the second ray.
     second: Mask,
 }
@@ -139,34 +131,49 @@ impl TwoRays {
             order_shifts: [0; 16],
             half: [0; 16],
             root: [0; 16],
-            middle: [0; 16],
             far: [0x0F0F, 0x3333, 0x5555],
-            near: [!0x0F0F, !0x3333, !0x5555],
             second: 0xFF00,
         };
         let mut lane = 0;
         while lane < 16 {
             let place = lane as u32 % 8;
-            (c.axis_shifts[lane], c.order_shifts[lane]) = (2 * place, 3 * place);
+            (c.axis_shifts[lane], c.order_shifts[lane]) = (2 * place, 4 * place);
             c.half[lane] = lane as u32 & 8;
-            (c.root[lane], c.middle[lane]) = (c.half[lane] | 3, c.half[lane] | 1);
+            c.root[lane] = c.half[lane] | plane_above(0, 0) as u32;
             lane += 1;
         }
         c
     };
 }
 
-/// For a near-first and for a far-first ray, and for each set of eight places from far to near: these places in the order
-/// in which they are pushed, one byte each.
-static PLACES: [[u64; 256]; 2] = {
-    let mut places = [SET_BITS, [0; 256]];
+/// [`CHILD_ORDERS`] with four bits for each child, of which the highest is 0 for the first ray and 1 for the second.
+static ORDERS_OF_TWO: [[u32; 256]; 2] = {
+    let mut orders = [[0; 256]; 2];
+    let mut down = 0;
+    while down < 256 {
+        let mut place = 0;
+        while place < 8 {
+            orders[0][down] |= (CHILD_ORDERS[down] >> (3 * place) & 7) << (4 * place);
+            place += 1;
+        }
+        orders[1][down] = orders[0][down] | 0x8888_8888;
+        down += 1;
+    }
+    orders
+};
+
+/// For each set of eight places from far to near: these places in the order in which they are pushed, one byte each.
+/// First for near-first rays, then for far-first rays.
+static PLACES: [u64; 512] = {
+    let mut places = [0; 512];
     let mut set = 0;
     while set < 256 {
+        places[set] = SET_BITS[set];
         let (mut place, mut n) = (8, 0);
         while place > 0 {
             place -= 1;
             if set >> place & 1 == 1 {
-                places[1][set] |= place << (8 * n);
+                places[256 + set] |= place << (8 * n);
                 n += 1;
             }
         }
@@ -239,7 +246,6 @@ unsafe fn descend_one(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
     let height = walk.height as usize;
     // The stores below write eight entries each.
     assert!(height <= STACK - 8);
-    let signs = walk.descent.signs;
     // SAFETY: the caller ensures that the processor has AVX2; walks and nodes are aligned as they are read; the stack has
     // room for eight entries.
     unsafe {
@@ -247,7 +253,7 @@ unsafe fn descend_one(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
         // so the steps from planes to children need not cross the halves.
         let planes = load_lanes(&PLANE_OF_LANE);
         let splits = _mm256_permutevar8x32_ps(_mm256_load_ps(std::ptr::from_ref(node).cast()), planes);
-        let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes.0 as i32), load_lanes(&AXIS_OF_LANE));
+        let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.planes[AXES].to_bits() as i32), load_lanes(&AXIS_OF_LANE));
         // The permutation within rows uses the low two bits of each lane, which are its axis.
         let rows = std::ptr::from_ref(&*walk).cast::<__m128>();
         let origin = _mm256_permutevar_ps(_mm256_broadcast_ps(&*rows), axes);
@@ -263,8 +269,8 @@ unsafe fn descend_one(node: &Node8, walk: &mut Walk, stack: &mut Stack) {
         (first, last) = clip::<0b01_01_01_01, 0b1100_1100>(first, last, lo, hi, inv_lo);
         (first, last) = clip::<0b11_11_10_10, 0b1010_1010>(first, last, lo, hi, inv_lo);
         // All planes the other way round for a far-first ray.
-        let down = node.axes.descended(signs) ^ signs.far_first().wrapping_neg() & 0x7F;
-        let order = _mm256_set1_epi32(CHILD_ORDERS[down] as i32);
+        let down = _mm256_movemask_ps(inv_lo) as u32 ^ walk.descent.reversed;
+        let order = _mm256_set1_epi32(ORDERS_BY_LANES[usize::from(down as u8)] as i32);
         let order = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
         let children = _mm256_load_si256(node.children.as_ptr().cast());
         let empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(EMPTY as i32));
@@ -294,9 +300,21 @@ unsafe fn moved(places: u64, corners: &Corners) -> [__m128i; 3] {
 }
 
 /// The plane in each lane of an AVX2 visit: in each half the root, one of the second level, two of the third level.
-const PLANE_OF_LANE: [u32; 8] = [3, 1, 0, 2, 3, 5, 4, 6];
+const PLANE_OF_LANE: [u32; 8] = {
+    let mut planes = [0; 8];
+    let mut half = 0;
+    while half < 2 {
+        let (lane, child) = (4 * half, 4 * half);
+        planes[lane] = plane_above(child, 0) as u32;
+        planes[lane + 1] = plane_above(child, 1) as u32;
+        planes[lane + 2] = plane_above(child, 2) as u32;
+        planes[lane + 3] = plane_above(child + 2, 2) as u32;
+        half += 1;
+    }
+    planes
+};
 
-/// Where the axis of this plane begins in `PlaneAxes`.
+/// Where the axis of this plane begins in the axes of a node.
 const AXIS_OF_LANE: [u32; 8] = {
     let mut shifts = PLANE_OF_LANE;
     let mut lane = 0;
@@ -305,6 +323,22 @@ const AXIS_OF_LANE: [u32; 8] = {
         lane += 1;
     }
     shifts
+};
+
+/// The orders of [`CHILD_ORDERS`] for each set of lanes of [`PLANE_OF_LANE`] whose axis the ray descends.
+static ORDERS_BY_LANES: [u32; 256] = {
+    let mut orders = [0; 256];
+    let mut lanes = 0;
+    while lanes < 256 {
+        let (mut down, mut lane) = (0, 0);
+        while lane < 8 {
+            down |= (lanes >> lane & 1) << PLANE_OF_LANE[lane];
+            lane += 1;
+        }
+        orders[lanes] = CHILD_ORDERS[down];
+        lanes += 1;
+    }
+    orders
 };
 
 /// Loads eight integers.
