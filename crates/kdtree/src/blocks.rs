@@ -213,7 +213,7 @@ impl LeafBlock for SphereBlock {
     fn test<S: KernelSimd>(s: S, block: &Self, ray: &PreciseRay, nearest: &mut Nearest) {
         /// More spheres are tested together.
         const FEW: u32 = 3;
-        let mut near = if S::IS_NARROW { block.near(s, &ray.rounded, nearest.t) } else { Mask::MAX };
+        let mut near = block.near(s, &ray.rounded, nearest.t);
         if near.count_ones() > FEW {
             return offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
         }
@@ -227,6 +227,15 @@ impl LeafBlock for SphereBlock {
                 nearest.offer(t, 0.0, 0.0, block.prims.get(lane));
             }
         }
+    }
+
+    /// The rounded ray takes as long as the test, unless sixteen lanes take two registers.
+    #[inline(always)]
+    fn test_once<S: KernelSimd>(s: S, block: &Self, ray: &PreciseRay, nearest: &mut Nearest) {
+        if S::IS_NARROW {
+            return Self::test(s, block, ray, nearest);
+        }
+        offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
     }
 }
 

@@ -36,6 +36,12 @@ pub(super) trait LeafBlock: Sized + Send {
     fn test<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
         offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims().get(lane));
     }
+
+    /// Does [`Self::test`] for a ray that is prepared for this block alone.
+    #[inline(always)]
+    fn test_once<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
+        Self::test(s, block, ray, nearest);
+    }
 }
 
 /// Offers the nearest of the hits, which belong to ascending primitives.

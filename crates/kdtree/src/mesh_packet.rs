@@ -426,13 +426,11 @@ impl<S: KernelSimd> MeshPacket<S> {
         mut mask: Mask,
     ) {
         let (center, radius) = block.sphere(lane % BLOCK);
-        if S::IS_NARROW {
-            let to_center = three!(|axis| s.sub(s.splat(center[axis]), self.origin[axis]));
-            let end = s.mul(s.load(&self.nearest.t), *length);
-            mask &= spheres_near(s, &to_center, unit, s.splat(radius), end);
-            if mask == 0 {
-                return;
-            }
+        let to_center = three!(|axis| s.sub(s.splat(center[axis]), self.origin[axis]));
+        let end = s.mul(s.load(&self.nearest.t), *length);
+        mask &= spheres_near(s, &to_center, unit, s.splat(radius), end);
+        if mask == 0 {
+            return;
         }
         let to_center = frame.towards(s, &center.as_dvec3().to_array());
         let radius_squared = s.splat_d(f64::from(radius).powi(2));
@@ -489,7 +487,7 @@ impl NearestLanes {
     fn offer_one<S: KernelSimd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
         let (t, prim) = (self.t[lane], self.prim[lane]);
         let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
-        B::test(s, block, ray, &mut nearest);
+        B::test_once(s, block, ray, &mut nearest);
         if nearest.found {
             (self.t[lane], self.u[lane], self.v[lane]) = (nearest.t, nearest.u, nearest.v);
             self.prim[lane] = nearest.prim;
