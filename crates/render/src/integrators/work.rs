@@ -13,7 +13,7 @@ const LEVEL: f64 = 0.35;
 const COHERENT: f64 = 0.5;
 const SHADOW_RAY: f64 = 0.6;
 /// Cost of finding the guiding distributions of a vertex, and of evaluating two directions.
-const HINTS: f64 = 2.0;
+const HINTS: f64 = 3.0;
 
 /// Sums the cost of the paths of one worker.
 #[derive(Clone, Debug)]

@@ -52,9 +52,13 @@ const LIGHT_PATHS_AT_ONCE: u32 = 256;
 /// Cost of sampling the start of a light path, in the unit of [`Work`].
 const LIGHT_PATH_START: f64 = 2.0;
 
-/// Factor by which the variance of the rest exceeds that of a few thousand camera paths: much of it comes from rare
-/// bright samples. About the value for the built-in scenes with glass, and for glass meshes.
-const RARE: f64 = 2.5;
+/// The variance of the rest is known within this factor: rare bright samples, which the pilot misses, can make it larger;
+/// samples of the image that are more even than the few of the pilot can make it smaller. About the range over the
+/// built-in scenes and glass meshes.
+const REST_WITHIN: f64 = 3.0;
+
+/// The factor that fits most of them, for what is told of a choice.
+const REST_MOSTLY: f64 = 2.0;
 
 /// Cost factor of camera paths that are weighted against light paths.
 const TRACKING: f64 = 1.04;
@@ -199,40 +203,41 @@ impl Pilot {
         let light: Vec<_> = STRIDES.iter().map(|&stride| (stride, self.found_by_light(stride))).collect();
         let found = |of: u32| light.iter().find(|(stride, _)| *stride == of).expect("all are there").1;
         let known = CausticPlan::UNKNOWN;
-        let value = |plan: CausticPlan| {
+        // Variance and cost of a plan, with the variance of the rest multiplied by a factor.
+        let value = |plan: CausticPlan, factor: f64| {
             let CameraPilot { spots, cost } = if plan.guided { &self.guided } else { &self.plain };
             let variance = self.mean_over_spots(spots, |spot| spot.variance);
             // Everything that light paths cannot find.
-            let rest = (variance - found(known.light_path_stride).camera).max(0.5 * variance) * RARE;
+            let rest = (variance - found(known.light_path_stride).camera).max(0.5 * variance);
             let Found { camera, light } = found(plan.light_path_stride);
             let tracking = if plan.is_none() { 1.0 } else { TRACKING };
             let paths = if plan.has_light_paths() { 1.0 / f64::from(plan.light_path_stride) } else { 0.0 };
-            (rest + camera + light, cost * tracking + paths * self.light_cost)
+            (factor * rest + camera + light, cost * tracking + paths * self.light_cost)
         };
-        let product = |plan: CausticPlan| {
-            let (variance, cost) = value(plan);
-            variance * cost * if plan.guided { CLEARLY } else { 1.0 }
-        };
+        let guiding_pays = self.guiding_pays();
         let plans = STRIDES
             .into_iter()
-            .flat_map(|light_path_stride| [false, true].map(|guided| CausticPlan { light_path_stride, guided }));
-        let guiding_pays = self.guiding_pays();
+            .flat_map(|light_path_stride| [false, true].map(|guided| CausticPlan { light_path_stride, guided }))
+            .filter(|plan| plan.has_light_paths() || !self.needs_light_paths)
+            .filter(|plan| !plan.guided || guiding_pays);
+        // The mean over both ends of the range, on a logarithmic scale.
+        let product = |plan: &CausticPlan| {
+            let [few, many] = [1.0 / REST_WITHIN, REST_WITHIN].map(|factor| {
+                let (variance, cost) = value(*plan, factor);
+                variance * cost
+            });
+            (few * many).sqrt() * if plan.guided { CLEARLY } else { 1.0 }
+        };
+        // Where the pilot found nothing, all products are zero: the first one is taken.
         let known = CausticPlan { guided: guiding_pays, ..known };
-        let (mut best, mut least) = (known, product(known));
-        for plan in plans.clone().filter(|plan| plan.has_light_paths() || !self.needs_light_paths) {
-            if plan.guided && !guiding_pays {
-                continue;
-            }
-            if product(plan) < least {
-                (best, least) = (plan, product(plan));
-            }
-        }
+        let best = std::iter::once(known).chain(plans).min_by(|a, b| product(a).total_cmp(&product(b)));
+        let best = best.unwrap_or(known);
         if self.needs_light_paths {
             return CausticChoice { plan: best, ..CausticChoice::NONE };
         }
         let without = CausticPlan { light_path_stride: 0, ..best };
         let shown = if best.has_light_paths() { best } else { CausticPlan { light_path_stride: 8, ..best } };
-        let ((variance, cost), (less, more)) = (value(without), value(shown));
+        let ((variance, cost), (less, more)) = (value(without, REST_MOSTLY), value(shown, REST_MOSTLY));
         CausticChoice { plan: best, cost: (more / cost) as f32, gain: (variance / less) as f32 }
     }
 
