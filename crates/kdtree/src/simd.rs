@@ -34,7 +34,7 @@ pub(super) trait KernelSimd: firstlight_simd::Simd {
 
     fn visit_constants(self) -> &'static Self::VisitConstants;
 
-    /// Visits a node with each of two rays.
+    /// Visits a node with each of two rays: does [`Self::descend`] for both.
     #[inline(always)]
     fn descend_two(self, _: &Self::VisitConstants, nodes: [&Node8; 2], walks: [&mut Walk; 2], stacks: [&mut Stack; 2]) {
         let ([first, second], [first_stack, second_stack]) = (walks, stacks);

@@ -32,6 +32,7 @@ impl KernelSimd for Avx512 {
         unsafe {
             let constant = |of: &[u32; 16]| _mm512_load_si512(of.as_ptr().cast());
             let both = |a: f32, b: f32| _mm512_mask_mov_ps(_mm512_set1_ps(a), c.second, _mm512_set1_ps(b));
+            // Volatile, so that each is a load of its own, and no lane of something loaded before.
             let both_u = |a: *const u32, b: *const u32| {
                 let all = |from: *const u32| _mm512_set1_epi32(from.read_volatile() as i32);
                 _mm512_mask_mov_epi32(all(a), c.second, all(b))
@@ -71,6 +72,7 @@ impl KernelSimd for Avx512 {
             let children = _mm512_permutexvar_epi32(order, children);
             let some = _mm512_cmpneq_epi32_mask(children, _mm512_set1_epi32(EMPTY as i32));
             let met = usize::from(_mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last));
+            // All bits of `reversed` are set, or none.
             let places = |walk: &Walk, met: usize| PLACES[(walk.descent.reversed & 256) as usize + met] as i64;
             let places = _mm_set_epi64x(places(walk_b, met >> 8), places(walk_a, met & 0xFF));
             let places = _mm512_or_si512(_mm512_cvtepu8_epi32(places), constant(&c.half));
