@@ -192,7 +192,7 @@ fn advance_group(
     wave: &mut Wave,
 ) -> PassReport {
     let mut report = PassReport::nothing();
-    let even = due.round.is_none_or(|round| round.even);
+    let even = passes.iter().all(|(_, pass)| pass.is_even());
     wave.pixels = Pixels::default();
     let mut pieces = Vec::new();
     for (i, tile) in tiles.iter().enumerate() {

@@ -208,7 +208,7 @@ fn advance_tile(
             missing[of_block] -= 1;
             runs_left = rest;
         }
-        tile.record(round.is_none_or(|round| round.even));
+        tile.record(pass.is_even());
         (wave.radiance, wave.runs) = (radiance, runs);
     }
     report

@@ -3,7 +3,7 @@
 use crate::core::caustic_plan::CausticPlan;
 use crate::core::counts::RayCounts;
 use crate::core::filter::FilterSampler;
-use crate::core::settings::{Integrator, RenderSettings};
+use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::core::techniques::Techniques;
 use crate::film::block::{BLOCK_SIZE, doubled};
 use crate::film::tile::FilmTile;
@@ -163,6 +163,12 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
+    /// Whether all pixels get the same number of samples, see [`FilmTile::record`]: not if they are allocated by error,
+    /// also while they are even, so that no decision depends on the division into tiles.
+    pub fn is_even(&self) -> bool {
+        self.settings.allocation == SampleAllocation::Uniform
+    }
+
     /// Returns the pass for an image, after choosing the plan for caustics if it is not known.
     pub fn planned(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
         let choice = choose(snapshot, settings, size, &|| false).expect("nobody stops it");
