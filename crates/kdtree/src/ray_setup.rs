@@ -170,6 +170,7 @@ impl RaySetup {
         (Vec3::new(ox[lane], oy[lane], oz[lane]), Vec3::new(dx[lane], dy[lane], dz[lane]))
     }
 
+    /// Returns the ray prepared for triangles.
     #[inline(always)]
     pub fn sheared(&self, lane: usize) -> ShearedRay {
         let ([kx, ky, kz], [x, y, z]) = (&self.axes, &self.sheared_origin);

@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 impl KernelSimd for Avx512 {
     #[inline(always)]
     fn descend(self, node: &Node8, walk: &mut Walk, stack: &mut Stack) {
-        // SAFETY: a processor with AVX-512 has AVX2.
+        // SAFETY: `self` proves that the processor has AVX-512, and with it AVX2.
         unsafe { descend_one(node, walk, stack) }
     }
 

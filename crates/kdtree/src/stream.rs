@@ -81,6 +81,7 @@ pub(super) trait StreamRay: LeafRay {
     /// The slots for rays of this kind.
     fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
 
+    /// Returns the ray of a lane, in the tree's own space.
     fn of_lane(setup: &RaySetup, lane: usize) -> Self;
 }
 
