@@ -183,7 +183,13 @@ mod tests {
     /// A film of tiles with these samples each.
     fn film(tiles: &[&[(u32, u32)]]) -> FilmLayout {
         let tile = |samples: &&[(u32, u32)]| TileRecord {
-            blocks: vec![BlockRecord { samples: samples.to_vec(), mean_of: 0, steps: Default::default(), due: None }],
+            blocks: vec![BlockRecord {
+                samples: samples.to_vec(),
+                mean_of: 0,
+                steps: Default::default(),
+                due: None,
+                shadow_share: 0,
+            }],
             bad: Vec::new(),
             light_mean_of: 0,
             light_steps: Default::default(),

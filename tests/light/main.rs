@@ -19,6 +19,7 @@ mod orthographic;
 mod phong;
 mod principled;
 mod region;
+mod resampling;
 mod rough_glass;
 mod stability;
 mod terminator;

@@ -26,6 +26,7 @@ const PLAIN: Techniques = Techniques {
     light_selection: false,
     caustics: false,
     caustic_plan: None,
+    resampling: false,
     roulette: false,
 };
 

@@ -17,11 +17,13 @@ pub struct Techniques {
     pub solid_angle: bool,
     /// Lights are selected by estimated contribution or by power; off: uniformly.
     pub light_selection: bool,
+    /// Several points on lights compete for the shadow ray of a rough metal; off: one point.
+    pub resampling: bool,
     /// Paths are also traced from the lights if there are specular casters; off: from the camera only.
     pub caustics: bool,
     /// Plan for caustics, if [`Self::caustics`] is set; `None`: the choice of a pilot, see [`crate::CausticChoice`].
     pub caustic_plan: Option<CausticPlan>,
-    /// Russian roulette by throughput; off: for very long paths only.
+    /// Russian roulette by throughput, and of shadow rays by contribution; off: for very long paths only.
     pub roulette: bool,
 }
 
@@ -33,6 +35,7 @@ impl Techniques {
         even_samples: true,
         solid_angle: true,
         light_selection: true,
+        resampling: true,
         caustics: true,
         caustic_plan: None,
         roulette: true,
@@ -47,7 +50,7 @@ impl Default for Techniques {
 
 impl Techniques {
     /// One technique switched off at a time, with its name.
-    pub fn ablations() -> [(&'static str, Self); 7] {
+    pub fn ablations() -> [(&'static str, Self); 8] {
         let all = Self::default();
         [
             ("light sampling", Self { light_sampling: false, ..all }),
@@ -55,6 +58,7 @@ impl Techniques {
             ("even samples (Owen-Sobol\u{2019})", Self { even_samples: false, ..all }),
             ("lights by solid angle", Self { solid_angle: false, ..all }),
             ("choice of lights by contribution", Self { light_selection: false, ..all }),
+            ("resampling of lights", Self { resampling: false, ..all }),
             ("light paths", Self { caustics: false, ..all }),
             ("Russian roulette", Self { roulette: false, ..all }),
         ]

@@ -211,9 +211,14 @@ fn advance_group(
         let is_due = |piece: &&Piece| piece.samples.contains(sample);
         let mut slot = 0;
         runs.clear();
+        wave.path.shadow_thresholds.clear();
         for piece in pieces.iter().filter(is_due) {
             runs.push(Run { pixels: piece.pixels.clone(), sample: *sample, slot });
             slot += piece.pixels.len() as u32;
+            if due.round.is_some() {
+                let tile = &tiles[piece.tile];
+                wave.path.shadow_thresholds.extend(tile.shadow_thresholds(&tile.blocks[piece.block]));
+            }
         }
         if runs.is_empty() {
             continue;

@@ -185,7 +185,7 @@ fn advance_tile(
     wave.take_tile(tile);
     let emits = |material: u32| pass.snapshot.tables.emission[material as usize].is_some();
     while missing.iter().any(|missing| *missing > 0) {
-        wave.take_runs(tile, &missing);
+        wave.take_runs(tile, &missing, round.is_some());
         let (mut radiance, runs) = (std::mem::take(&mut wave.radiance), std::mem::take(&mut wave.runs));
         let notes_surfaces = pass.notes_surfaces && runs.iter().any(|run| run.sample < SurfaceSums::MOST);
         wave.note_surfaces(notes_surfaces);

@@ -87,9 +87,13 @@ impl Wave {
     }
 
     /// Takes the next samples of the blocks of a tile, as many as are in flight at once; every unfinished block gets
-    /// some, so that all blocks advance together. `missing` is the number of missing samples per block.
-    pub fn take_runs(&mut self, tile: &FilmTile, missing: &[u32]) {
+    /// some, so that all blocks advance together.
+    ///
+    /// - `missing`: number of missing samples per block.
+    /// - `has_roulette`: whether shadow rays are subject to the roulette of the blocks.
+    pub fn take_runs(&mut self, tile: &FilmTile, missing: &[u32], has_roulette: bool) {
         self.runs.clear();
+        self.path.shadow_thresholds.clear();
         let n_pixels: usize = tile.blocks.iter().zip(missing).filter(|(_, n)| **n > 0).map(|(b, _)| b.n_pixels()).sum();
         let at_once = (WAVE_SIZE / n_pixels.max(1)).max(1) as u32;
         let mut slot = 0;
@@ -100,6 +104,9 @@ impl Wave {
             for sample in first..first + at_once.min(*missing).min(to_power) {
                 self.runs.push(Run { pixels: pixels.clone(), sample, slot });
                 slot += pixels.len() as u32;
+                if has_roulette {
+                    self.path.shadow_thresholds.extend(tile.shadow_thresholds(block));
+                }
             }
         }
         self.radiance.clear();

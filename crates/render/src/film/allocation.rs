@@ -2,9 +2,9 @@
 //!
 //! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per
 //! pixel on average, and doubles the budget. At its beginning, the film and the costs of its blocks determine which
-//! blocks double their samples, once or twice, and in which order; the decision is stored in the film. So a film is a
-//! function of scene, seed and settings, independent of threads and portions, and resuming a stopped film gives the same
-//! result.
+//! blocks double their samples, once or twice, and in which order, and which of their shadow rays are subject to
+//! roulette ([`crate::film::shadow_roulette`]); the decision is stored in the film. So a film is a function of scene, seed
+//! and settings, independent of threads and portions, and resuming a stopped film gives the same result.
 //!
 //! Between passes the sample count of every block is a power of two, so that each pixel's sequence stays stratified,
 //! and doublings measure the error. The optimal allocation has n ∝ √(variance / cost); powers of two lose 2 %. Doublings
@@ -19,12 +19,13 @@
 use crate::core::settings::ErrorMetric;
 use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps, doubled};
 use crate::film::round::Round;
+use crate::film::shadow_roulette::share_of;
 use crate::film::tile::FilmTile;
 use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 
 /// Samples per pixel before the first allocation by error.
-pub(crate) const FIRST_ROUND: u32 = 8;
+pub(crate) const FIRST_ROUND: u32 = 4;
 
 /// No block has less than 1 / `LEAST_SHARE` of the mean samples per pixel, and none more than `MOST_SHARE` times the
 /// mean.
@@ -42,6 +43,8 @@ struct Candidate {
     spp: u32,
     /// Variance of one sample relative to the squared level, mean over pixels and channels; `None` if unknown.
     variance: Option<f64>,
+    /// Weight of the block in the metric.
+    weight: f64,
     /// Cost of one sample per pixel.
     cost: f64,
 }
@@ -78,6 +81,7 @@ pub(crate) fn begin_round(
     for (block, cost) in grid.blocks.iter_mut().zip(costs.unwrap_or_default()) {
         block.cost = *cost;
     }
+    let shadow_shares = if costs.is_some() { grid.shadow_shares() } else { vec![0.0; grid.blocks.len()] };
     grid.smooth();
     let n_pixels: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels)).sum();
     let doublings = grid.best_doublings(to);
@@ -100,12 +104,12 @@ pub(crate) fn begin_round(
         *place = (from + share.max(1)).min(to);
     }
     let even = grid.is_better_even(&due, from, to);
-    let place = |tile: &FilmTile, block: &Block| place_of(tile, block, grid.width);
     for tile in tiles {
         for i in 0..tile.blocks.len() {
-            let due = if even { [NEVER; MAX_DOUBLINGS] } else { due[place(tile, &tile.blocks[i])] };
+            let place = place_of(tile, &tile.blocks[i], grid.width);
+            let due = if even { [NEVER; MAX_DOUBLINGS] } else { due[place] };
             let block = &mut tile.blocks[i];
-            (block.base, block.due) = (block.spp, due);
+            (block.base, block.due, block.shadow_share) = (block.spp, due, shadow_shares[place]);
         }
     }
     Round { from, to, budget: from, even, irregular }
@@ -115,7 +119,7 @@ pub(crate) fn begin_round(
 /// counts.
 pub(crate) fn end_round(tiles: &mut [FilmTile], budget: u32) -> Round {
     for block in tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
-        (block.base, block.due) = (block.spp, [NEVER; MAX_DOUBLINGS]);
+        (block.base, block.due, block.shadow_share) = (block.spp, [NEVER; MAX_DOUBLINGS], 0.0);
     }
     Round { from: budget, to: budget, budget, even: false, irregular: true }
 }
@@ -128,7 +132,7 @@ fn place_of(tile: &FilmTile, block: &Block, width: usize) -> usize {
 
 impl Grid {
     fn of(tiles: &[FilmTile], size: UVec2, metric: ErrorMetric) -> Self {
-        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None, cost: 1.0 };
+        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None, weight: 1.0, cost: 1.0 };
         let mut grid = Self { width: size.x as usize, blocks: vec![nothing; (size.x * size.y) as usize] };
         let known: Vec<Vec<(usize, Candidate)>> = tiles
             .par_iter()
@@ -139,8 +143,8 @@ impl Grid {
                         ErrorMetric::RelativeMse => 1.0,
                         ErrorMetric::Display { exposure_stops } => display_weight(tile, block, exposure_stops),
                     };
-                    let variance = variance_of(&block.steps, 3 * n_pixels).map(|variance| variance * weight);
-                    let candidate = Candidate { n_pixels, spp: block.spp, variance, cost: 1.0 };
+                    let variance = variance_of(&block.steps, 3 * n_pixels);
+                    let candidate = Candidate { n_pixels, spp: block.spp, variance, weight, cost: 1.0 };
                     (place_of(tile, &tile.blocks[i], size.x as usize), candidate)
                 };
                 tile.blocks.iter().enumerate().map(of).collect()
@@ -152,17 +156,32 @@ impl Grid {
         grid
     }
 
-    /// Replaces variance and cost of each block by a weighted mean over itself and its neighbours. Where no variance is
-    /// known, that of the whole image is taken.
+    /// Replaces variance and cost of each block by a weighted mean over itself and its neighbours, with the weights of
+    /// the metric.
     fn smooth(&mut self) {
+        let smoothed = self.smoothed(|block| block.variance.map(|variance| variance * block.weight));
+        for (block, (variance, cost)) in self.blocks.iter_mut().zip(smoothed) {
+            (block.variance, block.cost) = (Some(variance), cost);
+        }
+    }
+
+    /// Returns [`Block::shadow_share`] of each block. To be called before [`Self::smooth`].
+    fn shadow_shares(&self) -> Vec<f32> {
+        let smoothed = self.smoothed(|block| block.variance).into_iter();
+        smoothed.map(|(variance, cost)| share_of(variance, cost)).collect()
+    }
+
+    /// Returns the weighted means of a variance and of the cost over each block and its neighbours. Where no variance is
+    /// known, that of the whole image is taken.
+    fn smoothed(&self, variance_of: impl Fn(&Candidate) -> Option<f64> + Sync) -> Vec<(f64, f64)> {
         const WEIGHTS: [[f64; 3]; 3] = [[1.0, 2.0, 1.0], [2.0, 8.0, 2.0], [1.0, 2.0, 1.0]];
         let (width, height) = (self.width, self.blocks.len() / self.width);
         let of = |block: &Candidate| {
-            block.variance.map_or((0.0, 0.0), |v| (v * f64::from(block.n_pixels), f64::from(block.n_pixels)))
+            variance_of(block).map_or((0.0, 0.0), |v| (v * f64::from(block.n_pixels), f64::from(block.n_pixels)))
         };
         let (sum, n) = self.blocks.iter().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         let everywhere = if n > 0.0 { sum / n } else { 1.0 };
-        let smoothed: Vec<(f64, f64)> = (0..self.blocks.len())
+        (0..self.blocks.len())
             .into_par_iter()
             .map(|i| {
                 let (x, y) = (i % width, i / width);
@@ -178,10 +197,7 @@ impl Grid {
                 }
                 (if n > 0.0 { sum / n } else { everywhere }, cost / weights)
             })
-            .collect();
-        for (block, (variance, cost)) in self.blocks.iter_mut().zip(smoothed) {
-            (block.variance, block.cost) = (Some(variance), cost);
-        }
+            .collect()
     }
 
     /// Returns all permitted doublings up to a mean of `to` samples per pixel, the most effective first.
@@ -262,6 +278,7 @@ fn display_weight(tile: &FilmTile, block: &Block, exposure_stops: f32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::block::{BLOCK_PIXELS, BLOCK_SIZE};
     use crate::film::tiles::Film;
     use crate::sampling::Sampler;
     use glam::Vec3;
@@ -281,10 +298,10 @@ mod tests {
                     while tile.blocks[i].spp < tile.blocks[i].target(round.as_ref(), goal) {
                         let sample = tile.blocks[i].next_sample();
                         let seen = |p: u32| {
-                            let (x, y) = (origin.x + p % 8, origin.y + p / 8);
+                            let (x, y) = (origin.x + p % BLOCK_SIZE, origin.y + p / BLOCK_SIZE);
                             light(x, y, Sampler::new(seed, x, y, sample).pair(0))
                         };
-                        let radiance: Vec<Vec3> = (0..64).map(|p| Vec3::splat(seen(p))).collect();
+                        let radiance: Vec<Vec3> = (0..BLOCK_PIXELS as u32).map(|p| Vec3::splat(seen(p))).collect();
                         tile.add_sample(i, sample, &radiance);
                         tile.record(false);
                     }

@@ -38,13 +38,16 @@ pub(crate) struct Block {
     pub base: u32,
     /// The budgets from which on the samples are doubled once and twice; [`NEVER`] if not in this round.
     pub due: [u32; MAX_DOUBLINGS],
+    /// Share of a pixel's level below which shadow rays are subject to roulette, see [`crate::film::shadow_roulette`]; 0
+    /// for none.
+    pub shadow_share: f32,
 }
 
 impl Block {
     pub fn new(start: UVec2, size: UVec2) -> Self {
         let ranges = std::iter::once(0..0).collect();
         let (steps, due) = (Steps::default(), [NEVER; MAX_DOUBLINGS]);
-        Self { start, size, spp: 0, ranges, mean_of: 0, steps, base: 0, due }
+        Self { start, size, spp: 0, ranges, mean_of: 0, steps, base: 0, due, shadow_share: 0.0 }
     }
 
     /// Number of blocks in a tile of this size.
@@ -69,8 +72,9 @@ impl Block {
 
     /// Removes all samples; the next one has number `first`.
     pub fn clear(&mut self, first: u32) {
-        let Self { start: _, size: _, spp, ranges, mean_of, steps, base, due } = self;
+        let Self { start: _, size: _, spp, ranges, mean_of, steps, base, due, shadow_share } = self;
         (*spp, *mean_of, *base, *steps, *due) = (0, 0, 0, Steps::default(), [NEVER; MAX_DOUBLINGS]);
+        *shadow_share = 0.0;
         ranges.clear();
         ranges.push(first..first);
     }

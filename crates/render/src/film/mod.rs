@@ -14,6 +14,7 @@ pub(crate) mod record;
 pub(crate) mod region;
 pub(crate) mod room;
 pub(crate) mod round;
+pub(crate) mod shadow_roulette;
 pub(crate) mod surfaces;
 pub(crate) mod tile;
 pub(crate) mod tiles;

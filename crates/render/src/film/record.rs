@@ -108,6 +108,9 @@ pub struct BlockRecord {
     /// Samples per pixel when the round began, and the budgets from which on they are doubled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub due: Option<(u32, Vec<u32>)>,
+    /// Bits of the `f32` share of a pixel's level below which shadow rays are subject to roulette; 0 for none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub shadow_share: u32,
 }
 
 /// Samples per pixel after the newest doubling (0 before the first), and the bits of the `f32` values of `Steps`,
@@ -179,7 +182,8 @@ impl OldFilmLayout {
         let renew = |(i, tile): (usize, OldTileRecord)| {
             let at = UVec2::new(i as u32 % n_tiles_x, i as u32 / n_tiles_x).saturating_mul(UVec2::splat(tile_size));
             let size = UVec2::new(width, height).saturating_sub(at).min(UVec2::splat(tile_size));
-            let block = BlockRecord { samples: tile.samples, mean_of: 0, steps: StepsRecord::default(), due: None };
+            let steps = StepsRecord::default();
+            let block = BlockRecord { samples: tile.samples, mean_of: 0, steps, due: None, shadow_share: 0 };
             // Missing tiles are rejected later.
             let blocks = vec![block; Block::count(size)];
             TileRecord { blocks, bad: tile.bad, light_mean_of: 0, light_steps: StepsRecord::default() }
@@ -217,6 +221,7 @@ impl Film {
             mean_of: block.mean_of,
             steps: StepsRecord::of(&block.steps),
             due: is_uneven.then(|| (block.base, block.due.into_iter().filter(|due| *due != NEVER).collect())),
+            shadow_share: block.shadow_share.to_bits(),
         };
         let record = |tile: &FilmTile| {
             // Sorted, so that it does not depend on the order in which blocks were rendered.
@@ -377,6 +382,10 @@ impl FilmTile {
                 }
                 block.base = *base;
                 block.due.iter_mut().zip(due).for_each(|(to, from)| *to = *from);
+            }
+            block.shadow_share = f32::from_bits(record.shadow_share);
+            if !(block.shadow_share >= 0.0 && block.shadow_share.is_finite()) {
+                return Err(RecordError::Allocation);
             }
         }
         self.bad = record.bad.clone();

@@ -6,6 +6,7 @@ pub(crate) mod first_surfaces;
 pub(crate) mod path;
 pub(crate) mod phong;
 pub(crate) mod record;
+pub(crate) mod resampling;
 pub(crate) mod seen;
 pub(crate) mod simd;
 pub(crate) mod survival;

@@ -75,6 +75,9 @@ pub(crate) struct PathWave {
     pub work: Option<Box<Work>>,
     /// Notes what the paths see, likewise.
     pub first_surfaces: Option<Box<FirstSurfaces>>,
+    /// Per slot, see [`FilmTile::shadow_thresholds`](crate::film::tile::FilmTile::shadow_thresholds); empty if all
+    /// shadow rays are traced.
+    pub shadow_thresholds: Vec<f32>,
 }
 
 /// Returns whether the shadow rays of the first hits, which start close together, have similar directions.
@@ -205,6 +208,7 @@ impl PathWave {
                 order,
                 next: &mut self.next,
                 shadows: &mut self.shadows,
+                shadow_thresholds: if settings.techniques.roulette { &self.shadow_thresholds } else { &[] },
                 sets: &mut self.sets,
             };
             match (settings.simd, kind) {

@@ -11,7 +11,7 @@ use firstlight_kdtree::{HitBatch, RayClass, Shape};
 const LEVEL: f64 = 0.35;
 /// Cost factor of coherent rays.
 const COHERENT: f64 = 0.5;
-const SHADOW_RAY: f64 = 0.6;
+pub(crate) const SHADOW_RAY: f64 = 0.6;
 /// Cost of finding the guiding distributions of a vertex, and of evaluating two directions.
 const HINTS: f64 = 3.0;
 

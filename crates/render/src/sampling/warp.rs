@@ -78,6 +78,29 @@ pub fn uniform_triangle<R: Real>([u, v]: [R; 2]) -> [R; 2] {
     [select(below, halves[0], u - halves[1]), select(below, v - halves[0], halves[1])]
 }
 
+/// Point `k` of a two-dimensional low-discrepancy sequence, shifted by `u` on the torus: the R₂ sequence (Roberts 2018).
+/// Each point alone is as uniform as `u`; point 0 is `u`.
+#[inline(always)]
+pub(crate) fn shifted<R: Real>([u, v]: [R; 2], k: u32) -> [R; 2] {
+    if k == 0 {
+        return [u, v];
+    }
+    [shifted_by(u, k, 0.754_877_666_246_693), shifted_by(v, k, 0.569_840_290_998_053)]
+}
+
+/// The same in one dimension, with the golden ratio.
+#[inline(always)]
+pub(crate) fn shifted_single<R: Real>(u: R, k: u32) -> R {
+    if k == 0 { u } else { shifted_by(u, k, 0.618_033_988_749_895) }
+}
+
+#[inline(always)]
+fn shifted_by<R: Real>(u: R, k: u32, step: f64) -> R {
+    let moved = u + (f64::from(k) * step).fract() as f32;
+    let wrapped = select(moved.lt(moved.all(1.0)), moved, moved - 1.0);
+    wrapped.at_most(1.0f32.next_down())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

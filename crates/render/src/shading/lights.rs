@@ -4,31 +4,35 @@ use crate::core::techniques::Techniques;
 use crate::prepare::light::emitter::LightSample;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
+use crate::sampling::warp::{shifted, shifted_single};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::paths::Path;
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, select};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// Where a shadow ray ends, `None` for light from outside the scene, and the light that arrives from there.
 pub(crate) type LightPoint = (Option<Vec3>, LightSample);
 
 /// Samples a point on a light, or a direction of the environment, which has no target. Uses two pairs of dimensions.
+///
+/// - `candidate`: number of the sample, if several are taken.
 #[inline]
 pub(crate) fn choose_light_point(
     scene: &Prepared,
     techniques: &Techniques,
-    position: Vec3,
-    normal: Vec3,
+    [position, normal]: [Vec3; 2],
     sampler: &Sampler,
     dimension: u32,
+    candidate: u32,
 ) -> Option<LightPoint> {
-    let u = sampler.pair(dimension + DIM_LIGHT_POINT);
+    let u = Vec2::from(shifted(sampler.pair(dimension + DIM_LIGHT_POINT).to_array(), candidate));
     let tables = &*scene.tables;
     let share = environment_share(scene);
     let mut u_select = None;
-    let mut select = || *u_select.get_or_insert_with(|| sampler.single(dimension + DIM_LIGHT));
+    let mut select =
+        || *u_select.get_or_insert_with(|| shifted_single(sampler.single(dimension + DIM_LIGHT), candidate));
     if share > 0.0 && (share >= 1.0 || select() < share) {
         let environment = tables.environment_sampler.as_ref().expect("a share without a sampler");
         let (wi, pdf) = environment.sample(u)?;

@@ -6,11 +6,14 @@ use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::weight::MisBounce;
+use crate::integrators::resampling::{CANDIDATES, is_resampled};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::prepared::Prepared;
 use crate::shading::blend::Blend;
 use crate::shading::bsdf::Lobe;
-use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
+use crate::shading::dimensions::{
+    DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension, resampling_dimension, shadow_roulette_dimension,
+};
 use crate::shading::guided::Guided;
 use crate::shading::lights::{LightPoint, choose_light_point, emitter_weight, light_weight};
 use crate::shading::paths::Path;
@@ -49,8 +52,10 @@ impl PathWave {
                 surfaces.extend(self.surface_at(scene, depth, settings, caustics, i, radiance));
             }
             let lights = light_points(scene, settings, first_dimension(depth), &surfaces);
-            for (surface, light) in surfaces.drain(..).zip(lights) {
-                let Surface { path, vertex, hit, material, bsdf } = &surface;
+            for (lane, surface) in surfaces.drain(..).enumerate() {
+                let lights = lights.each_ref().map(|candidates| candidates[lane]);
+                let lights = if surface.is_resampled { &lights[..] } else { &lights[..1] };
+                let Surface { path, vertex, hit, material, is_resampled, bsdf } = &surface;
                 let step = PathStep {
                     scene,
                     techniques,
@@ -60,13 +65,14 @@ impl PathWave {
                     material: *material,
                     depth,
                     caustics,
+                    is_resampled: *is_resampled,
                     is_told: false,
                 };
                 match bsdf {
-                    Bsdf::Lobe(lobe) => self.scatter_told(step, lobe, light),
-                    Bsdf::Blend(blend) => self.scatter_told(step, blend, light),
+                    Bsdf::Lobe(lobe) => self.scatter_told(step, lobe, lights),
+                    Bsdf::Blend(blend) => self.scatter_told(step, blend, lights),
                     Bsdf::Layers(layers) => {
-                        self.scatter_told(step, &layers.seen_along(vertex.wo, vertex.normal), light)
+                        self.scatter_told(step, &layers.seen_along(vertex.wo, vertex.normal), lights)
                     }
                 }
             }
@@ -146,44 +152,47 @@ impl PathWave {
             }
             _ => Bsdf::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?),
         };
-        Some(Surface { path, vertex, hit, material, bsdf })
+        let is_resampled = is_resampled(techniques, &scene.shading.materials[material as usize]);
+        Some(Surface { path, vertex, hit, material, is_resampled, bsdf })
     }
 
     /// Scatters with guiding distributions, if there are any.
     #[inline]
-    fn scatter_told(&mut self, step: PathStep, bsdf: &impl Scatter, light: Option<LightPoint>) {
+    fn scatter_told(&mut self, step: PathStep, bsdf: &impl Scatter, lights: &[Option<LightPoint>]) {
         let PathStep { path, vertex, depth, .. } = step;
         let hints = step.caustics.filter(|_| bsdf.has_non_specular());
         match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
-            Some(hints) => self.scatter(PathStep { is_told: true, ..step }, &Guided { surface: bsdf, hints }, light),
-            None => self.scatter(step, bsdf, light),
+            Some(hints) => self.scatter(PathStep { is_told: true, ..step }, &Guided { surface: bsdf, hints }, lights),
+            None => self.scatter(step, bsdf, lights),
         }
     }
 
     #[inline]
-    fn scatter(&mut self, step: PathStep, bsdf: &impl Scatter, light: Option<LightPoint>) {
-        if let Some(light) = light {
-            self.add_light(&step, bsdf, light);
+    fn scatter(&mut self, step: PathStep, bsdf: &impl Scatter, lights: &[Option<LightPoint>]) {
+        if let Some((point, light)) = step.chosen_light(bsdf, lights) {
+            self.add_light(&step, bsdf, point, light);
         }
         self.bounce(&step, bsdf);
     }
 
-    /// Light sampling: light from a point on a light, and a shadow ray to it.
+    /// Adds a shadow ray to a point on a light, with its unoccluded contribution.
     #[inline]
-    fn add_light(&mut self, step: &PathStep, bsdf: &impl Scatter, (target, sample): LightPoint) {
-        let &PathStep { scene, techniques, path, vertex, .. } = step;
+    fn add_light(&mut self, step: &PathStep, bsdf: &impl Scatter, (target, sample): LightPoint, mut light: Vec3) {
+        let &PathStep { scene, path, vertex, .. } = step;
         let tables = &*scene.tables;
-        let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
+        if let Some(&threshold) = self.shadow_thresholds.get(path.slot as usize)
+            && step.techniques.roulette
+        {
+            let kept = worth(light) / threshold;
+            if kept < 1.0 {
+                if path.sampler.single(shadow_roulette_dimension(step.depth)) >= kept {
+                    return;
+                }
+                light /= kept;
+            }
+        }
         let through = bsdf.through().filter(|_| sample.wi.dot(vertex.normal) < 0.0);
-        if pdf <= 0.0 || !leads_on(vertex, sample.wi, through.is_some()) {
-            return;
-        }
         let media = through.map_or(path.media, |interface| interface.beyond);
-        let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
-        let mut light = path.throughput * value * sample.radiance * weight;
-        if light == Vec3::ZERO {
-            return;
-        }
         if tables.features.glass && target.is_none() {
             light *= self.sets.environment_scale(media);
         }
@@ -252,6 +261,9 @@ impl PathWave {
             return;
         }
         path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
+        if step.is_resampled {
+            path.pdf /= CANDIDATES as f32;
+        }
         path.position = vertex.position;
         path.normal = lit_side(vertex, bsdf);
         let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
@@ -282,6 +294,8 @@ struct PathStep<'a> {
     /// Number of segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
+    /// Whether several light samples compete, see [`crate::integrators::resampling`].
+    is_resampled: bool,
     /// Whether directions are sampled with guiding.
     is_told: bool,
 }
@@ -291,6 +305,55 @@ impl PathStep<'_> {
     fn dimension(&self) -> u32 {
         first_dimension(self.depth)
     }
+
+    /// Returns one of the light samples and its contribution, if it is unoccluded.
+    #[inline]
+    fn chosen_light(&self, bsdf: &impl Scatter, candidates: &[Option<LightPoint>]) -> Option<(LightPoint, Vec3)> {
+        if let [candidate] = candidates {
+            let point = (*candidate)?;
+            return Some((point, self.light_of(bsdf, &point, 1.0)?));
+        }
+        let n = candidates.len() as f32;
+        let mut u = self.path.sampler.single(resampling_dimension(self.depth));
+        let mut chosen = None;
+        let mut sum = 0.0;
+        for point in candidates.iter().flatten() {
+            let Some(light) = self.light_of(bsdf, point, n) else { continue };
+            sum += worth(light);
+            let share = worth(light) / sum;
+            let takes = chosen.is_none() || u < share;
+            if chosen.is_some() {
+                u = if takes { u / share } else { (u - share) / (1.0 - share) }.min(1.0f32.next_down());
+            }
+            if takes {
+                chosen = Some((*point, light));
+            }
+        }
+        let (point, light) = chosen?;
+        Some((point, light * (sum / (n * worth(light)))))
+    }
+
+    /// Contribution of a light sample, if it is unoccluded; `None` if it is nothing.
+    ///
+    /// - `n`: number of light samples per sample of the BSDF, for the MIS weight.
+    #[inline]
+    fn light_of(&self, bsdf: &impl Scatter, (_, sample): &LightPoint, n: f32) -> Option<Vec3> {
+        let &Self { techniques, path, vertex, .. } = self;
+        let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
+        let passes = bsdf.through().is_some() && sample.wi.dot(vertex.normal) < 0.0;
+        if pdf <= 0.0 || !leads_on(vertex, sample.wi, passes) {
+            return None;
+        }
+        let weight = light_weight(techniques, n * sample.pdf, pdf) / sample.pdf;
+        let light = path.throughput * value * sample.radiance * weight;
+        (light != Vec3::ZERO).then_some(light)
+    }
+}
+
+/// What the choice of light samples and the roulette of shadow rays go by: the mean of the channels.
+#[inline]
+fn worth(light: Vec3) -> f32 {
+    light.abs().element_sum() * (1.0 / 3.0)
 }
 
 /// A hit that scatters.
@@ -299,6 +362,8 @@ struct Surface {
     vertex: Vertex,
     hit: Hit,
     material: MaterialId,
+    /// See [`PathStep::is_resampled`].
+    is_resampled: bool,
     bsdf: Bsdf,
 }
 
@@ -323,7 +388,7 @@ impl Surface {
     }
 }
 
-/// A point on a light for each surface that light sampling can light.
+/// Points on lights for each surface that light sampling can light: the first for all, others for resampled ones.
 ///
 /// - `surfaces`: at most [`LANES`].
 fn light_points(
@@ -331,7 +396,7 @@ fn light_points(
     settings: &RenderSettings,
     dimension: u32,
     surfaces: &[Surface],
-) -> [Option<LightPoint>; LANES] {
+) -> [[Option<LightPoint>; LANES]; CANDIDATES as usize] {
     let techniques = &settings.techniques;
     let mut places = [None; LANES];
     if scene.tables.features.light_sampling && techniques.light_sampling {
@@ -340,11 +405,23 @@ fn light_points(
             *place = normal.map(|normal| (surface.vertex.position, normal, surface.path.sampler));
         }
     }
-    match settings.simd {
-        Some(set) => choose_light_points(set, scene, techniques, dimension, &places),
-        None => places.map(|place| {
-            let (position, normal, sampler) = place?;
-            choose_light_point(scene, techniques, position, normal, &sampler, dimension)
-        }),
+    let mut resampled = places;
+    for (lane, place) in resampled.iter_mut().enumerate() {
+        place.take_if(|_| !surfaces.get(lane).is_some_and(|surface| surface.is_resampled));
     }
+    let is_any_resampled = resampled.iter().any(Option::is_some);
+    std::array::from_fn(|candidate| {
+        let places = if candidate == 0 { &places } else { &resampled };
+        if candidate > 0 && !is_any_resampled {
+            return [None; LANES];
+        }
+        let candidate = candidate as u32;
+        match settings.simd {
+            Some(set) => choose_light_points(set, scene, techniques, dimension, candidate, places),
+            None => places.map(|place| {
+                let (position, normal, sampler) = place?;
+                choose_light_point(scene, techniques, [position, normal], &sampler, dimension, candidate)
+            }),
+        }
+    })
 }

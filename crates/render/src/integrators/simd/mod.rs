@@ -8,6 +8,7 @@
 
 pub(crate) mod camera;
 pub(crate) mod classic;
+pub(crate) mod direct;
 pub(crate) mod emitters;
 pub(crate) mod first_hits;
 pub(crate) mod misses;

@@ -2,19 +2,19 @@
 
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::resampling::{CANDIDATES, is_resampled_kind};
+use crate::integrators::simd::direct::LitLanes;
 use crate::integrators::simd::track::BounceMisStates;
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;
-use crate::shading::lights::light_weight;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::lights::LightPoints;
-use crate::shading::simd::scatter::{eval, sample, surface_of};
+use crate::shading::simd::scatter::{sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
@@ -37,6 +37,8 @@ pub(crate) struct KindHits<'a> {
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut ShadowBatch,
+    /// See [`LitLanes::thresholds`].
+    pub shadow_thresholds: &'a [f32],
     pub sets: &'a mut MediumSets,
 }
 
@@ -89,7 +91,7 @@ fn shade_coated<S: Simd>(s: S, group: KindHits) {
 #[inline(always)]
 fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
     let KindHits { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
-    let KindHits { next, shadows, sets, .. } = group;
+    let KindHits { next, shadows, shadow_thresholds, sets, .. } = group;
     let features = &scene.tables.features;
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);
@@ -115,41 +117,23 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
         if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
             let lit = mask & surface.non_specular;
             if lit != 0 {
-                let points = s.call(LightPoints {
+                let (mask, place, surface, hints, media, sampler) = (lit, &place, &surface, &hints, &media, &sampler);
+                let thresholds = shadow_thresholds;
+                LitLanes {
                     scene,
                     techniques,
-                    mask: lit,
-                    position: place.position,
-                    normal: place.normal,
-                    sampler: &sampler,
-                    dimension,
-                });
-                let (wi, found) = (points.wi, points.found);
-                let (value, pdf) = eval::<S, KIND>(&surface, &place, wi);
-                let pdf = hints.mixed(s, wi, pdf);
-                let reached = wi.dot(place.reach_normal).is_positive();
-                let found = found & reached & pdf.is_positive();
-                let weight = light_weight(techniques, points.pdf, pdf) / points.pdf;
-                let mut light = throughput.times(value).times(points.radiance) * weight;
-                let found = found & !light.is_zero();
-                if found != 0 {
-                    let origin = place.leaving();
-                    let infinite = points.infinite;
-                    if features.glass && infinite & found != 0 {
-                        let ior = iors(s, scene, sets, infinite & found, &media);
-                        light = light * (ior * ior);
-                    }
-                    if features.media {
-                        let distance = (points.target - place.position).length();
-                        let passed = light.times(transmittance(s, sets, found & !infinite, &media, distance));
-                        light = select_vector(infinite, light, passed);
-                    }
-                    // `dir` leads to the light's own bounded point, where the ray ends.
-                    let dir = select_vector(infinite, wi, points.target - origin);
-                    let one = Float::splat(s, 1.0);
-                    let t_max = select(infinite, one.all(f32::INFINITY), one);
-                    shadows.append(found, [origin, dir], t_max, slot, light);
+                    depth,
+                    mask,
+                    place,
+                    surface,
+                    hints,
+                    media,
+                    throughput,
+                    sampler,
+                    slot,
+                    thresholds,
                 }
+                .add::<KIND>(s, sets, shadows);
             }
         }
         let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension);
@@ -195,7 +179,10 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
                 BounceMisStates { pass, at: &at, place: &place, hints: &hints, bounce: &bounce, media: &media };
             of_bounce.append::<KIND>(s, go_on, depth == 1, tracks);
         }
-        let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
+        let mut pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
+        if is_resampled_kind(techniques, KIND) {
+            pdf = pdf / CANDIDATES as f32;
+        }
         let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
         next.append(go_on, origin, bounce.wi, &path);
         if let Some(next_media) = &mut next.media {

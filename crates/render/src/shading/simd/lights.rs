@@ -5,6 +5,7 @@ use crate::core::techniques::Techniques;
 use crate::prepare::light::arrays::LightLanes;
 use crate::prepare::light::emitter::LightSample;
 use crate::prepare::prepared::Prepared;
+use crate::sampling::warp::{shifted, shifted_single};
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::lights::{LightPoint, choose_light_point};
@@ -33,6 +34,8 @@ pub(crate) struct LightPoints<'a, S: Simd> {
     pub normal: Vector<S>,
     pub sampler: &'a SamplerLanes<S>,
     pub dimension: u32,
+    /// Number of the sample, if several are taken.
+    pub candidate: u32,
 }
 
 impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
@@ -46,13 +49,13 @@ impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
 
 #[inline(always)]
 fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
-    let &LightPoints { scene, techniques, mask, position, normal, sampler, dimension } = asked;
+    let &LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate } = asked;
     let tables = &*scene.tables;
     if tables.environment_sampler.is_none() {
-        let u = sampler.pair(dimension + DIM_LIGHT_POINT);
+        let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
         let mut u_select = u[0];
         if tables.lights.selects_apart() {
-            u_select = sampler.single(dimension + DIM_LIGHT);
+            u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
         }
         let found = tables.lights.sample_lanes(techniques, mask, position, normal, u_select, u);
         if let Some(LightLanes { found, target, wi, pdf, radiance, is_far }) = found {
@@ -66,7 +69,8 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
     for lane in lanes_of(mask) {
         let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
         let sampler = Sampler::from_parts([parts[0][lane], parts[1][lane], parts[2][lane]]);
-        let point = choose_light_point(scene, techniques, at(&positions), at(&normals), &sampler, dimension);
+        let place = [at(&positions), at(&normals)];
+        let point = choose_light_point(scene, techniques, place, &sampler, dimension, candidate);
         if let Some((target, sample)) = point {
             found |= 1 << lane;
             infinite |= Mask::from(target.is_none()) << lane;
@@ -96,6 +100,7 @@ pub(crate) fn choose_light_points(
     scene: &Prepared,
     techniques: &Techniques,
     dimension: u32,
+    candidate: u32,
     places: &[Option<LitPlace>; LANES],
 ) -> [Option<LightPoint>; LANES] {
     let mut points = [None; LANES];
@@ -103,7 +108,8 @@ pub(crate) fn choose_light_points(
     for (lane, place) in places.iter().enumerate() {
         let Some((position, normal, sampler)) = place else { continue };
         if *normal == Vec3::ZERO {
-            points[lane] = choose_light_point(scene, techniques, *position, *normal, sampler, dimension);
+            let place = [*position, *normal];
+            points[lane] = choose_light_point(scene, techniques, place, sampler, dimension, candidate);
         } else {
             lanes.push(lane, *position, *normal, sampler);
         }
@@ -116,6 +122,7 @@ pub(crate) fn choose_light_points(
                 scene: &Prepared,
                 techniques: &Techniques,
                 dimension: u32,
+                candidate: u32,
                 lanes: &LitLanes,
                 points: &mut [Option<LightPoint>; LANES],
             )
@@ -150,13 +157,15 @@ fn choose<S: Simd>(
     scene: &Prepared,
     techniques: &Techniques,
     dimension: u32,
+    candidate: u32,
     lanes: &LitLanes,
     points: &mut [Option<LightPoint>; LANES],
 ) {
     let [stream, reversed_index, screen] = lanes.samplers.each_ref().map(|part| Bits::load(s, part));
     let sampler = &SamplerLanes { stream, reversed_index, screen };
     let [position, normal] = [&lanes.positions, &lanes.normals].map(|values| Vector::from_arrays(s, values));
-    let found = s.call(LightPoints { scene, techniques, mask: lanes.mask, position, normal, sampler, dimension });
+    let mask = lanes.mask;
+    let found = s.call(LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate });
     let [target, wi, radiance] = [found.target, found.wi, found.radiance].map(|values| values.to_arrays());
     let pdf = found.pdf.to_array();
     for lane in lanes_of(found.found & lanes.mask) {
@@ -208,14 +217,15 @@ mod tests {
                         if lane % 5 == 3 { Vec3::ZERO } else { Vec3::new(u.y - 0.5, 0.7, v.y - 0.5).normalize() };
                     (lane % 7 != 6).then_some((position, normal, sampler))
                 });
-                let points = choose_light_points(InstructionSet::detect(), &scene, &techniques, 3, &places);
+                let candidate = first % 4;
+                let points = choose_light_points(InstructionSet::detect(), &scene, &techniques, 3, candidate, &places);
                 for set in InstructionSet::available() {
-                    let again = choose_light_points(set, &scene, &techniques, 3, &places);
+                    let again = choose_light_points(set, &scene, &techniques, 3, candidate, &places);
                     assert_eq!(format!("{points:?}"), format!("{again:?}"), "{set:?}");
                 }
                 for (place, point) in places.iter().zip(points) {
                     let expected = place.and_then(|(position, normal, sampler)| {
-                        choose_light_point(&scene, &techniques, position, normal, &sampler, 3)
+                        choose_light_point(&scene, &techniques, [position, normal], &sampler, 3, candidate)
                     });
                     assert_eq!(point.is_some(), expected.is_some());
                     let (Some((target, sample)), Some((expected_target, expected))) = (point, expected) else {
