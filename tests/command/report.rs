@@ -154,7 +154,7 @@ fn the_command_writes_a_page_and_a_table() {
     let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     // The column `denoiser` is empty in rows of raw images.
-    assert_eq!(rows.iter().filter(|row| row[4].is_empty()).count(), 9 * 3, "{table}");
+    assert_eq!(rows.iter().filter(|row| row[4].is_empty()).count(), 10 * 3, "{table}");
     assert_eq!(rows.iter().filter(|row| row[4] == "denoised").count(), 3, "{table}");
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
 

@@ -46,16 +46,17 @@ impl PathWave {
         let n = self.sorted.of_kind(kind).len();
         let mut surfaces = Vec::with_capacity(n.min(LANES));
         for first in (0..n).step_by(LANES) {
+            surfaces.clear();
             self.touch_textures(scene, &self.sorted.of_kind(kind)[first..n.min(first + LANES)]);
             for k in first..n.min(first + LANES) {
                 let i = self.sorted.of_kind(kind)[k] as usize;
                 surfaces.extend(self.surface_at(scene, depth, settings, caustics, i, radiance));
             }
             let lights = light_points(scene, settings, first_dimension(depth), &surfaces);
-            for (lane, surface) in surfaces.drain(..).enumerate() {
+            for (lane, surface) in surfaces.iter().enumerate() {
                 let lights = lights.each_ref().map(|candidates| candidates[lane]);
                 let lights = if surface.is_resampled { &lights[..] } else { &lights[..1] };
-                let Surface { path, vertex, hit, material, is_resampled, bsdf } = &surface;
+                let Surface { path, vertex, hit, material, is_resampled, bsdf } = surface;
                 let step = PathStep {
                     scene,
                     techniques,
