@@ -2,7 +2,9 @@
 
 use super::curve::{Seconds, seconds_at, seconds_to, slope};
 use super::{Distance, LinearPicture};
-use crate::render::{DenoiseSource, Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
+use crate::render::{
+    DenoiseSource, Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance, compute_tables,
+};
 use std::time::{Duration, Instant};
 
 /// Where a curve ends: at the last power of two within both limits, but never before the first step.
@@ -62,6 +64,7 @@ pub fn measure_curve(
     progress: &mut dyn FnMut(f64),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<CurveStep> {
+    compute_tables(prepared);
     let mut film = Film::new(width, height);
     let mut steps: Vec<CurveStep> = Vec::new();
     let mut rays = RayCounts::default();

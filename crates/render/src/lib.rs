@@ -43,7 +43,7 @@ pub use driver::guides::{GuideGatherer, SurfaceGuides, gather_guides, guide_samp
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
-pub use driver::renderer::{advance, advance_region};
+pub use driver::renderer::{advance, advance_region, compute_tables};
 pub use driver::report::{BadSample, PassReport};
 pub use driver::single::replay_sample;
 pub use driver::smooth::smooth_film;

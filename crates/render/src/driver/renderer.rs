@@ -14,6 +14,8 @@ use crate::film::tiles::Film;
 use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::survival::at_depth;
 use crate::prepare::exposed::Exposed;
+use crate::prepare::prepared::Prepared;
+use crate::shading::precomputed;
 use glam::UVec2;
 use rayon::prelude::*;
 
@@ -36,6 +38,12 @@ pub fn advance<'a>(
     advance_region(scene, settings, film, None, target_spp, stop)
 }
 
+/// Computes the tables of integrals that the materials of a scene need: up to half a second of one processor, divided
+/// among all, once per process. [`advance`] does it if nobody else has.
+pub fn compute_tables(scene: &Prepared) {
+    precomputed::compute_for(&scene.shading.materials);
+}
+
 /// Like [`advance`], for the tiles of a region only; all of its pixels get the same number of samples. Light paths are
 /// traced for the whole image, so other pixels may get contributions from them.
 ///
@@ -53,6 +61,7 @@ pub fn advance_region<'a>(
     let snapshot = scene.middle();
     settings.check().unwrap_or_else(|error| panic!("{error}"));
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
+    compute_tables(snapshot);
     let size = UVec2::new(film.width(), film.height());
     let Some(plan) = plan_of_film(snapshot, settings, film, stop) else { return PassReport::default() };
     let mut pass = Pass::new(snapshot, settings, size, plan);

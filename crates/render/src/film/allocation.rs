@@ -265,8 +265,8 @@ fn display_weight(tile: &FilmTile, block: &Block, exposure_stops: f32) -> f64 {
     let exposure = f64::from(exposure_stops).exp2();
     let encoded = |light: f64| (1.0 - (-light.max(0.0) * exposure).exp()).powf(1.0 / 2.2);
     let of = |light: f64| {
-        // A finite difference as wide as the error of a noisy mean, so that black is no pole.
-        let step = 0.1 * light.abs() + 0.01;
+        // A finite difference as wide as the error of a noisy mean, and a hundredth of white, so that black is no pole.
+        let step = 0.1 * light.abs() + 0.01 / exposure;
         let slope = (encoded(light + step) - encoded(light - step)) / (2.0 * step);
         slope * slope * (light * light + 0.01)
     };

@@ -4,10 +4,10 @@
 //! All vectors are unit and in the shading frame, with the normal along +z.
 
 use crate::sampling::warp::uniform_disc;
+use crate::shading::integral_table::IntegralTable;
 use firstlight_simd::{Real, Vector3, select, select_vector};
 use glam::Vec3;
 use std::f32::consts::PI;
-use std::sync::OnceLock;
 
 /// Distribution of normals D, per steradian (Walter et al. 2007, equation 33).
 #[inline(always)]
@@ -133,10 +133,7 @@ fn stretched<R: Real>(v: Vector3<R>, [x, y]: [R; 2]) -> Vector3<R> {
 /// From a table, within 5 · 10⁻⁴ of the integral for every angle and every `alpha` ≥ 10⁻⁴.
 #[inline]
 pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    let table = TABLE.get_or_init(|| {
-        (0..N * N).map(|i| integrate_albedo(table_cos(i % N, i / N), table_alpha(i / N), 64, 32).0).collect()
-    });
+    let table = ALBEDOS.get();
     let alpha = alpha.clamp(0.0, 1.0);
     let cos_theta = cos_theta.clamp(1e-6, 1.0);
     let x = (cos_theta * (1.0 + BEND * alpha) / (cos_theta + BEND * alpha)).sqrt() * (N - 1) as f32;
@@ -147,6 +144,10 @@ pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
     let row = |dy| at(0, dy) + fx * (at(1, dy) - at(0, dy));
     row(0) + fy * (row(1) - row(0))
 }
+
+/// See [`single_scattering_albedo`].
+pub(crate) static ALBEDOS: IntegralTable =
+    IntegralTable::new(N * N, |i| integrate_albedo(table_cos(i % N, i / N), table_alpha(i / N), 64, 32).0);
 
 /// Returns lost energy over returned energy of single scattering, for [`crate::shading::metal::Metal`]; arguments as
 /// for [`single_scattering_albedo`].
@@ -179,28 +180,28 @@ fn table_alpha(row: usize) -> f32 {
 /// From a table, within 10⁻³ of the integral.
 #[inline]
 pub(crate) fn mean_schlick(cos_theta: f32, alpha: f32) -> f32 {
-    const N: usize = 64;
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    let at = |k: usize| k as f32 / (N - 1) as f32;
-    let table = TABLE.get_or_init(|| {
-        (0..N * N)
-            .map(|i| {
-                let (cos, alpha) = (at(i % N).powi(2).max(1e-6), at(i / N).powi(2).max(TABLE_LEAST_ALPHA));
-                let (whole, of_schlick) = integrate_albedo(cos, alpha, 32, 16);
-                of_schlick / whole
-            })
-            .collect()
-    });
+    let table = SCHLICK_MEANS.get();
     let place = |at: f32| {
-        let x = at.clamp(0.0, 1.0).sqrt() * (N - 1) as f32;
-        let i = (x as usize).min(N - 2);
+        let x = at.clamp(0.0, 1.0).sqrt() * (N_MEANS - 1) as f32;
+        let i = (x as usize).min(N_MEANS - 2);
         (i, x - i as f32)
     };
     let ((ix, fx), (iy, fy)) = (place(cos_theta), place(alpha));
-    let entry = |dx, dy| table[(iy + dy) * N + ix + dx];
+    let entry = |dx, dy| table[(iy + dy) * N_MEANS + ix + dx];
     let row = |dy| entry(0, dy) + fx * (entry(1, dy) - entry(0, dy));
     row(0) + fy * (row(1) - row(0))
 }
+
+/// Entries per side of the table of means.
+const N_MEANS: usize = 64;
+
+/// See [`mean_schlick`].
+pub(crate) static SCHLICK_MEANS: IntegralTable = IntegralTable::new(N_MEANS * N_MEANS, |i| {
+    let at = |k: usize| k as f32 / (N_MEANS - 1) as f32;
+    let (cos, alpha) = (at(i % N_MEANS).powi(2).max(1e-6), at(i / N_MEANS).powi(2).max(TABLE_LEAST_ALPHA));
+    let (whole, of_schlick) = integrate_albedo(cos, alpha, 32, 16);
+    of_schlick / whole
+});
 
 /// Smoother surfaces have the same values, to the accuracy of the tables.
 const TABLE_LEAST_ALPHA: f32 = 1e-4;

@@ -5,10 +5,9 @@
 use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
+use crate::shading::integral_table::IntegralTable;
 use firstlight_simd::Vector3;
-use rayon::prelude::*;
 use std::f32::consts::PI;
-use std::sync::OnceLock;
 
 const N_COS: usize = 24;
 const N_ALPHA: usize = 16;
@@ -22,12 +21,19 @@ const MOST_CONTRAST: f32 = 0.6;
 /// `cos (1 + BEND α) / (cos + BEND α)`.
 const BEND: f32 = 2.0;
 
-struct LossTable {
-    /// Losses by contrast of the indices, root of alpha, cosine.
-    at_angles: Vec<f32>,
-    /// Cosine-weighted means by contrast of the indices and root of alpha.
-    means: Vec<f32>,
-}
+/// Losses by contrast of the indices, root of alpha, cosine.
+pub(crate) static LOSSES: IntegralTable = IntegralTable::new(N_ETA * N_ALPHA * N_COS, |i| {
+    let (layer, row, column) = (i / N_COS / N_ALPHA, i / N_COS % N_ALPHA, i % N_COS);
+    integrate(cos_of(column, row), alpha_of(row), eta_of(layer), 24, 16)
+});
+
+/// Cosine-weighted means by contrast of the indices and root of alpha.
+static MEAN_LOSSES: IntegralTable = IntegralTable::new(N_ETA * N_ALPHA, |i| {
+    // ∫ 2 cos · lost dcos of the interpolated table, in uniform steps of cos².
+    let (n, row, losses) = (256, i % N_ALPHA, LOSSES.get());
+    let at = |cos: f32| cos_at(cos, alpha_of(row)).mean(|column| losses[i * N_COS + column]);
+    (0..n).map(|k| at(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32
+});
 
 /// Linear interpolation between two neighbours in a table.
 struct Between {
@@ -68,40 +74,17 @@ fn alpha_at(alpha: f32) -> Between {
 /// - `cos`: cosine with the normal; `alpha`: GGX width; `eta`: index on the side of the light over that on the far
 ///   side.
 pub(crate) fn lost(cos: f32, alpha: f32, eta: f32) -> f32 {
-    let table = table();
+    let table = LOSSES.get();
     let columns = cos_at(cos, alpha.clamp(SMALLEST_ALPHA, 1.0));
     contrast_at(eta).mean(|layer| {
-        alpha_at(alpha).mean(|row| columns.mean(|column| table.at_angles[(layer * N_ALPHA + row) * N_COS + column]))
+        alpha_at(alpha).mean(|row| columns.mean(|column| table[(layer * N_ALPHA + row) * N_COS + column]))
     })
 }
 
 /// Like [`lost`], for uniform light from one side.
 pub(crate) fn mean_lost(alpha: f32, eta: f32) -> f32 {
-    let table = table();
-    contrast_at(eta).mean(|layer| alpha_at(alpha).mean(|row| table.means[layer * N_ALPHA + row]))
-}
-
-fn table() -> &'static LossTable {
-    static TABLE: OnceLock<LossTable> = OnceLock::new();
-    TABLE.get_or_init(|| {
-        let place = |i: usize| (i / N_COS / N_ALPHA, i / N_COS % N_ALPHA, i % N_COS);
-        let at_angles: Vec<f32> = (0..N_ETA * N_ALPHA * N_COS)
-            .into_par_iter()
-            .map(|i| {
-                let (layer, row, column) = place(i);
-                integrate(cos_of(column, row), alpha_of(row), eta_of(layer), 24, 16)
-            })
-            .collect();
-        let means = (0..N_ETA * N_ALPHA)
-            .map(|i| {
-                // ∫ 2 cos · lost dcos of the interpolated table, in uniform steps of cos².
-                let (n, row) = (256, i % N_ALPHA);
-                let at = |cos: f32| cos_at(cos, alpha_of(row)).mean(|column| at_angles[i * N_COS + column]);
-                (0..n).map(|k| at(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32
-            })
-            .collect();
-        LossTable { at_angles, means }
-    })
+    let table = MEAN_LOSSES.get();
+    contrast_at(eta).mean(|layer| alpha_at(alpha).mean(|row| table[layer * N_ALPHA + row]))
 }
 
 fn alpha_of(row: usize) -> f32 {
