@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Traces one sample of one pixel: the same radiance that [`advance`](crate::advance) adds to the film, without light
-/// paths, which belong to no pixel.
+/// paths, which belong to no pixel, and without the roulette of shadow rays in adaptive films.
 pub fn replay_sample<'a>(
     scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
