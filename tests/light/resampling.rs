@@ -15,7 +15,7 @@ fn allocated(allocation: SampleAllocation) -> RenderSettings {
     RenderSettings { allocation, ..RenderSettings::default() }
 }
 
-/// Luminance of every pixel in renders with different seeds, and shadow rays per hit of a surface or of nothing.
+/// Mean of the channels of every pixel in renders with different seeds, and shadow rays per other ray.
 fn renders(scene: &Prepared, settings: RenderSettings, spp: u32, n: u32) -> (Vec<Vec<f64>>, f64) {
     let found: Vec<_> = (0..n)
         .into_par_iter()

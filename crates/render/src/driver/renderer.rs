@@ -61,7 +61,9 @@ pub fn advance_region<'a>(
     let snapshot = scene.middle();
     settings.check().unwrap_or_else(|error| panic!("{error}"));
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
-    compute_tables(snapshot);
+    if settings.integrator == Integrator::Path {
+        compute_tables(snapshot);
+    }
     let size = UVec2::new(film.width(), film.height());
     let Some(plan) = plan_of_film(snapshot, settings, film, stop) else { return PassReport::default() };
     let mut pass = Pass::new(snapshot, settings, size, plan);

@@ -5,7 +5,7 @@ use crate::core::counts::RayCounts;
 use crate::core::filter::FilterSampler;
 use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::core::techniques::Techniques;
-use crate::film::block::{BLOCK_PIXELS, BLOCK_SIZE, doubled};
+use crate::film::block::{BLOCK_SIZE, doubled};
 use crate::film::tile::FilmTile;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::plan::choose;
@@ -98,19 +98,19 @@ impl Wave {
         let at_once = (WAVE_SIZE / n_pixels.max(1)).max(1) as u32;
         let mut slot = 0;
         for ((block, pixels), missing) in tile.blocks.iter().zip(&self.blocks).zip(missing) {
-            let (mut thresholds, mut n_thresholds) = ([0.0; BLOCK_PIXELS], 0);
-            if has_roulette {
-                for (to, threshold) in thresholds.iter_mut().zip(tile.shadow_thresholds(block)) {
-                    (*to, n_thresholds) = (threshold, n_thresholds + 1);
-                }
-            }
+            let first_slot = slot;
             let first = block.next_sample();
             // Not beyond the next power of two, where the error estimate records the block.
             let to_power = doubled(block.spp) - block.spp;
             for sample in first..first + at_once.min(*missing).min(to_power) {
                 self.runs.push(Run { pixels: pixels.clone(), sample, slot });
                 slot += pixels.len() as u32;
-                self.path.shadow_thresholds.extend_from_slice(&thresholds[..n_thresholds]);
+                if has_roulette && sample == first {
+                    self.path.shadow_thresholds.extend(tile.shadow_thresholds(block));
+                } else if has_roulette {
+                    let of_first = first_slot as usize..first_slot as usize + pixels.len();
+                    self.path.shadow_thresholds.extend_from_within(of_first);
+                }
             }
         }
         self.radiance.clear();

@@ -8,20 +8,24 @@
 //! The MIS weights are those of M light samples per sample of the BSDF. The pdf that a path keeps of its last direction is
 //! therefore that of the BSDF over M.
 
-use crate::core::material::Material;
 use crate::core::techniques::Techniques;
 use crate::shading::simd::lanes::METAL;
+use firstlight_simd::{Real, Vector3};
 
 /// Points on lights per shadow ray of a resampled surface: with eight, a sample of a metal mesh costs more than it gains.
 pub(crate) const CANDIDATES: u32 = 4;
 
-/// Whether the lights of surfaces with SIMD code for this kind of material are resampled; see [`is_resampled`].
+/// Whether the lights of surfaces of a kind are resampled: of rough metal, which has a lobe and nothing else.
+///
+/// - `kind`: see [`MaterialKind`](crate::core::material_kind::MaterialKind).
 #[inline(always)]
-pub(crate) fn is_resampled_kind(techniques: &Techniques, kind: usize) -> bool {
+pub(crate) fn is_resampled(techniques: &Techniques, kind: usize) -> bool {
     techniques.resampling && kind == METAL
 }
 
-/// Whether the lights of a surface are resampled: of rough metal, which has a lobe and nothing else.
-pub(crate) fn is_resampled(techniques: &Techniques, material: &Material) -> bool {
-    techniques.resampling && matches!(material, Material::Metal { .. })
+/// What the choice of light samples and the roulette of shadow rays go by: the mean of the channels.
+#[inline(always)]
+pub(crate) fn worth<R: Real>(light: Vector3<R>) -> R {
+    let light = light.abs();
+    (light.x + light.y + light.z) * (1.0 / 3.0)
 }

@@ -6,7 +6,7 @@ use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::weight::MisBounce;
-use crate::integrators::resampling::{CANDIDATES, is_resampled};
+use crate::integrators::resampling::{CANDIDATES, is_resampled, worth};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::prepared::Prepared;
 use crate::shading::blend::Blend;
@@ -43,6 +43,8 @@ impl PathWave {
         radiance: &mut [Vec3],
     ) {
         let techniques = &settings.techniques;
+        // Misses are sorted before all materials.
+        let n_candidates = if is_resampled(techniques, kind - 1) { CANDIDATES } else { 1 };
         let n = self.sorted.of_kind(kind).len();
         let mut surfaces = Vec::with_capacity(n.min(LANES));
         for first in (0..n).step_by(LANES) {
@@ -52,11 +54,11 @@ impl PathWave {
                 let i = self.sorted.of_kind(kind)[k] as usize;
                 surfaces.extend(self.surface_at(scene, depth, settings, caustics, i, radiance));
             }
-            let lights = light_points(scene, settings, first_dimension(depth), &surfaces);
+            let lights = light_points(scene, settings, first_dimension(depth), n_candidates, &surfaces);
             for (lane, surface) in surfaces.iter().enumerate() {
                 let lights = lights.each_ref().map(|candidates| candidates[lane]);
-                let lights = if surface.is_resampled { &lights[..] } else { &lights[..1] };
-                let Surface { path, vertex, hit, material, is_resampled, bsdf } = surface;
+                let lights = &lights[..n_candidates as usize];
+                let Surface { path, vertex, hit, material, bsdf } = surface;
                 let step = PathStep {
                     scene,
                     techniques,
@@ -66,7 +68,7 @@ impl PathWave {
                     material: *material,
                     depth,
                     caustics,
-                    is_resampled: *is_resampled,
+                    n_candidates,
                     is_told: false,
                 };
                 match bsdf {
@@ -153,8 +155,7 @@ impl PathWave {
             }
             _ => Bsdf::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?),
         };
-        let is_resampled = is_resampled(techniques, &scene.shading.materials[material as usize]);
-        Some(Surface { path, vertex, hit, material, is_resampled, bsdf })
+        Some(Surface { path, vertex, hit, material, bsdf })
     }
 
     /// Scatters with guiding distributions, if there are any.
@@ -184,7 +185,7 @@ impl PathWave {
         if let Some(&threshold) = self.shadow_thresholds.get(path.slot as usize)
             && step.techniques.roulette
         {
-            let kept = worth(light) / threshold;
+            let kept = worth(light.into()) / threshold;
             if kept < 1.0 {
                 if path.sampler.single(shadow_roulette_dimension(step.depth)) >= kept {
                     return;
@@ -262,9 +263,7 @@ impl PathWave {
             return;
         }
         path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
-        if step.is_resampled {
-            path.pdf /= CANDIDATES as f32;
-        }
+        path.pdf /= step.n_candidates as f32;
         path.position = vertex.position;
         path.normal = lit_side(vertex, bsdf);
         let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
@@ -295,8 +294,8 @@ struct PathStep<'a> {
     /// Number of segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
-    /// Whether several light samples compete, see [`crate::integrators::resampling`].
-    is_resampled: bool,
+    /// Number of light samples of which one is chosen, see [`crate::integrators::resampling`].
+    n_candidates: u32,
     /// Whether directions are sampled with guiding.
     is_told: bool,
 }
@@ -320,8 +319,9 @@ impl PathStep<'_> {
         let mut sum = 0.0;
         for point in candidates.iter().flatten() {
             let Some(light) = self.light_of(bsdf, point, n) else { continue };
-            sum += worth(light);
-            let share = worth(light) / sum;
+            let own = worth(light.into());
+            sum += own;
+            let share = own / sum;
             let takes = chosen.is_none() || u < share;
             if chosen.is_some() {
                 u = if takes { u / share } else { (u - share) / (1.0 - share) }.min(1.0f32.next_down());
@@ -331,7 +331,7 @@ impl PathStep<'_> {
             }
         }
         let (point, light) = chosen?;
-        Some((point, light * (sum / (n * worth(light)))))
+        Some((point, light * (sum / (n * worth(light.into())))))
     }
 
     /// Contribution of a light sample, if it is unoccluded; `None` if it is nothing.
@@ -351,20 +351,12 @@ impl PathStep<'_> {
     }
 }
 
-/// What the choice of light samples and the roulette of shadow rays go by: the mean of the channels.
-#[inline]
-fn worth(light: Vec3) -> f32 {
-    light.abs().element_sum() * (1.0 / 3.0)
-}
-
 /// A hit that scatters.
 struct Surface {
     path: Path,
     vertex: Vertex,
     hit: Hit,
     material: MaterialId,
-    /// See [`PathStep::is_resampled`].
-    is_resampled: bool,
     bsdf: Bsdf,
 }
 
@@ -389,13 +381,14 @@ impl Surface {
     }
 }
 
-/// Points on lights for each surface that light sampling can light: the first for all, others for resampled ones.
+/// Points on lights for each surface that light sampling can light.
 ///
-/// - `surfaces`: at most [`LANES`].
+/// - `n_candidates`: number of points per surface; `surfaces`: at most [`LANES`].
 fn light_points(
     scene: &Prepared,
     settings: &RenderSettings,
     dimension: u32,
+    n_candidates: u32,
     surfaces: &[Surface],
 ) -> [[Option<LightPoint>; LANES]; CANDIDATES as usize] {
     let techniques = &settings.techniques;
@@ -406,23 +399,12 @@ fn light_points(
             *place = normal.map(|normal| (surface.vertex.position, normal, surface.path.sampler));
         }
     }
-    let mut resampled = places;
-    for (lane, place) in resampled.iter_mut().enumerate() {
-        place.take_if(|_| !surfaces.get(lane).is_some_and(|surface| surface.is_resampled));
-    }
-    let is_any_resampled = resampled.iter().any(Option::is_some);
-    std::array::from_fn(|candidate| {
-        let places = if candidate == 0 { &places } else { &resampled };
-        if candidate > 0 && !is_any_resampled {
-            return [None; LANES];
-        }
-        let candidate = candidate as u32;
-        match settings.simd {
-            Some(set) => choose_light_points(set, scene, techniques, dimension, candidate, places),
-            None => places.map(|place| {
-                let (position, normal, sampler) = place?;
-                choose_light_point(scene, techniques, [position, normal], &sampler, dimension, candidate)
-            }),
-        }
+    std::array::from_fn(|candidate| match (candidate as u32, settings.simd) {
+        (candidate, _) if candidate >= n_candidates => [None; LANES],
+        (candidate, Some(set)) => choose_light_points(set, scene, techniques, dimension, candidate, &places),
+        (candidate, None) => places.map(|place| {
+            let (position, normal, sampler) = place?;
+            choose_light_point(scene, techniques, [position, normal], &sampler, dimension, candidate)
+        }),
     })
 }

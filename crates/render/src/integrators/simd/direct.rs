@@ -1,7 +1,7 @@
 //! Direct light of sixteen hits: points on lights, and shadow rays to them.
 
 use crate::core::techniques::Techniques;
-use crate::integrators::resampling::{CANDIDATES, is_resampled_kind};
+use crate::integrators::resampling::{CANDIDATES, is_resampled, worth};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::SamplerLanes;
 use crate::shading::dimensions::{first_dimension, resampling_dimension, shadow_roulette_dimension};
@@ -51,8 +51,10 @@ impl<S: Simd> LitLanes<'_, S> {
     #[inline(always)]
     pub fn add<const KIND: usize>(&self, s: S, sets: &mut MediumSets, shadows: &mut ShadowBatch) {
         let &Self { scene, place, media, slot, .. } = self;
-        let is_resampled = is_resampled_kind(self.techniques, KIND);
-        let chosen = if is_resampled { self.resampled::<KIND>(s) } else { self.candidate::<KIND>(s, 0, 1.0) };
+        let chosen = match is_resampled(self.techniques, KIND) {
+            true => self.resampled::<KIND>(s),
+            false => self.candidate::<KIND>(s, 0, 1.0),
+        };
         let Candidate { infinite, target, wi, mut light, .. } = chosen;
         let found = self.roulette(chosen.found, &mut light);
         if found == 0 {
@@ -148,11 +150,4 @@ impl<S: Simd> LitLanes<'_, S> {
         *light = *light * select(at_stake, one / kept, one);
         found & (!at_stake | survives)
     }
-}
-
-/// Mean of the channels.
-#[inline(always)]
-fn worth<S: Simd>(light: Vector<S>) -> Float<S> {
-    let light = light.abs();
-    (light.x + light.y + light.z) * (1.0 / 3.0)
 }

@@ -2,7 +2,7 @@
 
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::resampling::{CANDIDATES, is_resampled_kind};
+use crate::integrators::resampling::{CANDIDATES, is_resampled};
 use crate::integrators::simd::direct::LitLanes;
 use crate::integrators::simd::track::BounceMisStates;
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
@@ -180,7 +180,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
             of_bounce.append::<KIND>(s, go_on, depth == 1, tracks);
         }
         let mut pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
-        if is_resampled_kind(techniques, KIND) {
+        if is_resampled(techniques, KIND) {
             pdf = pdf / CANDIDATES as f32;
         }
         let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
