@@ -15,6 +15,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether only warnings and errors are printed beside results.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
+/// Whether everything is listed that is otherwise summarised.
+static VERBOSE: AtomicBool = AtomicBool::new(false);
+
+/// From now on, [`is_verbose`] is true.
+pub fn be_verbose() {
+    VERBOSE.store(true, Ordering::Relaxed);
+}
+
+/// Whether the user wants details.
+pub fn is_verbose() -> bool {
+    VERBOSE.load(Ordering::Relaxed)
+}
+
 /// From now on, [`inform`] prints nothing and no [`Bar`] is shown.
 pub fn be_quiet() {
     QUIET.store(true, Ordering::Relaxed);
@@ -106,11 +119,11 @@ pub fn inform(message: impl Message) {
 
 /// Prints a warning or an error beside the result.
 pub fn remark(message: impl Message) {
-    // Nobody listens, and there is nobody left to tell.
+    // If stderr is closed, there is nowhere to report the error.
     let _ = writeln!(io::stderr().lock(), "{}", message.text());
 }
 
-/// From now on, panics are told like anything else: their messages quote foreign names too.
+/// Prints panic messages through [`remark`], so that names from foreign files are escaped.
 pub fn tell_panics() {
     std::panic::set_hook(Box::new(|panic| remark(panic_lines(panic, &Backtrace::capture()))));
 }
@@ -131,7 +144,7 @@ fn panic_lines(panic: &PanicHookInfo, trace: &Backtrace) -> Vec<String> {
     told
 }
 
-/// Takes away what a bar has left in the line of a terminal; nobody is told if that fails.
+/// Clears the line of a terminal in which a bar was; errors are ignored.
 pub fn clear_line() {
     let mut out = io::stderr().lock();
     if out.is_terminal() {

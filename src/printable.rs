@@ -14,8 +14,8 @@ const LONGEST_WORD: usize = 240;
 /// Characters of one line that are shown.
 const LONGEST_LINE: usize = 2000;
 
-/// One line of a message. What does not print is escaped, line ends included; what stands in backticks is cut as a
-/// [`name`] is, other words and the whole line where nobody would read on.
+/// One line of a message. Characters that do not print are escaped, line ends included. Text in backticks is truncated
+/// like a [`name`]; other words and the line have limits of their own.
 pub fn line(text: &str) -> Cow<'_, str> {
     // Nearly all that is ever said.
     if text.len() <= LONGEST_NAME && text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
@@ -88,7 +88,7 @@ pub fn json(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// At most so many characters: the first and the last of them, `…` between, and no escape in two.
+/// Truncates to `most` characters by replacing the middle with `…`; never splits an escape.
 fn cut(text: &str, most: usize) -> Cow<'_, str> {
     // As many bytes or fewer can only be as many characters or fewer.
     if text.len() <= most || text.chars().count() <= most {

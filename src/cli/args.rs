@@ -1,6 +1,6 @@
 //! Arguments shared by several commands.
 
-use super::console::remark;
+use super::console::{remark, tell};
 use super::failure::Failure;
 use super::number::{parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
@@ -170,9 +170,7 @@ impl SceneArgs {
         let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;
-        for warning in &scene.warnings {
-            remark(format_args!("warning: {warning}"));
-        }
+        tell(&scene.warnings);
         Ok(scene)
     }
 

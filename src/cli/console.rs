@@ -2,7 +2,27 @@
 //! panic.
 
 use super::failure::Failure;
+use firstlight::console::is_verbose;
 pub use firstlight::console::{Bar, Message, inform, lines, prints_to_terminal, remark};
+use firstlight::scene::{Severity, Warnings};
+
+/// Prints what there is to say about a scene: a line per kind, or all with `--verbose`.
+pub fn tell(warnings: &Warnings) {
+    let lines = if is_verbose() { warnings.to_vec() } else { warnings.summary() };
+    for line in &lines {
+        match line.severity {
+            Severity::Notice => inform(format_args!("note: {line}")),
+            Severity::Warning => remark(format_args!("warning: {line}")),
+        }
+    }
+    let total = warnings.total();
+    if total > lines.len() {
+        inform(match is_verbose() {
+            true => format!("{} of {total} warnings are listed", lines.len()),
+            false => format!("{total} warnings, which -v lists"),
+        });
+    }
+}
 
 /// Writes a binary result to standard output.
 pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {

@@ -1,7 +1,8 @@
 //! `firstlight info SCENE`: contents of a scene, features in use, unsupported features, memory.
 
 use super::args::{SceneArgs, ScenesArgs, check_scenes};
-use super::console::{print, remark};
+use super::console;
+use super::console::print;
 use super::failure::Failure;
 use super::info_objects::ObjectList;
 use super::number::{counted, two_digits};
@@ -14,7 +15,7 @@ use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
     self, Animation, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Projection,
-    Rendering, SceneInputs, SceneSource, Shape,
+    Rendering, SceneInputs, SceneSource, Severity, Shape, Warning, Warnings,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -48,9 +49,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     scene.spawn(&mut world);
     let inputs = SceneInputs::of(&mut world);
     let extraction = Extraction::new(&inputs, &scene.trees);
-    for problem in &extraction.problems {
-        remark(format_args!("warning: {problem}"));
-    }
+    console::tell(&extraction.problems.iter().cloned().collect());
     if args.tree {
         return super::trees::run(&inputs, &extraction, args.json);
     }
@@ -184,7 +183,8 @@ impl Told<'_> {
             "caustics": self.caustics.map(caustics_json),
             "animation": self.animation.as_ref().map(|animation| animation_json(&scene.file.animation, animation)),
             "model": scene.facts.as_ref().map(facts_json),
-            "warnings": scene.warnings,
+            "warnings": texts_of(&scene.warnings, Severity::Warning),
+            "notices": texts_of(&scene.warnings, Severity::Notice),
             "problems": extraction.problems,
         })
     }
@@ -194,7 +194,7 @@ impl Told<'_> {
         let Some(facts) = &self.scene.facts else {
             // For other formats they are in the warnings.
             let warnings = self.scene.warnings.iter().filter(|warning| warning.contains("not modelled"));
-            return warnings.cloned().collect();
+            return warnings.map(Warning::to_string).collect();
         };
         let extensions = facts.unknown_extensions.iter().map(|name| format!("extension {}", printable::name(name)));
         let notes = facts.notes.iter().map(|(material, note)| format!("{}: {note}", printable::name(material)));
@@ -426,6 +426,10 @@ fn features(extraction: &Extraction, lens: &Lens) -> [bool; 9] {
 
 fn list(names: &[&str]) -> String {
     if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
+}
+
+fn texts_of(warnings: &Warnings, severity: Severity) -> Vec<&str> {
+    warnings.iter().filter(|warning| warning.severity == severity).map(|warning| &**warning).collect()
 }
 
 fn counts<'a>(kinds: impl Iterator<Item = &'a str>) -> BTreeMap<&'a str, usize> {

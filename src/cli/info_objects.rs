@@ -1,6 +1,6 @@
 //! The objects of a scene as a readable list: instances of one mesh in one line, with counts and sizes.
 
-use super::number::counted;
+use super::number::{counted, three_digits};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::scene::{ExtentCache, ObjectInput, SceneInputs, Shape};
@@ -152,40 +152,10 @@ impl ObjectGroup<'_> {
     }
 }
 
-/// A number with three significant digits.
-fn short(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
-    let text = format!("{value:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
 fn sides(size: DVec3) -> String {
-    format!("{} × {} × {} m", short(size.x), short(size.y), short(size.z))
+    format!("{} × {} × {} m", three_digits(size.x), three_digits(size.y), three_digits(size.z))
 }
 
 fn point(point: DVec3) -> String {
-    format!("({}, {}, {})", short(point.x), short(point.y), short(point.z))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::short;
-
-    #[test]
-    fn lengths_have_three_digits() {
-        for (value, text) in [
-            (0.0, "0"),
-            (1.0, "1"),
-            (-0.5, "-0.5"),
-            (12.345, "12.3"),
-            (1234.5, "1234"),
-            (0.000123456, "0.000123"),
-            (3e7, "30000000"),
-        ] {
-            assert_eq!(short(value), text);
-        }
-    }
+    format!("({}, {}, {})", three_digits(point.x), three_digits(point.y), three_digits(point.z))
 }

@@ -1,6 +1,6 @@
 //! A scene that is rendered without a window, and its images.
 
-use super::console::{inform, print_bytes, remark};
+use super::console::{inform, print_bytes, remark, tell};
 use super::denoising::Denoiser;
 use super::failure::Failure;
 use super::progress::Progress;
@@ -66,9 +66,7 @@ impl RenderJob {
             rayon::current_num_threads(),
             InstructionSet::detect()
         );
-        for problem in &extraction.problems {
-            remark(format_args!("warning: {problem}"));
-        }
+        tell(&extraction.problems.iter().cloned().collect());
         // Options that are not given come from the film that is resumed, else from the scene.
         let Rendering(of_scene) = *world.resource();
         let mut display = world.resource::<DisplaySettings>().0;

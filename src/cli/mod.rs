@@ -66,7 +66,7 @@ struct CommandLine {
     /// Print only what was asked for, such as JSON or tables, and warnings and errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Log details to standard error; RUST_LOG selects them exactly.
+    /// List all warnings, and log details to standard error; RUST_LOG selects them exactly.
     #[arg(short, long, global = true)]
     verbose: bool,
 }
@@ -159,6 +159,9 @@ pub fn main() -> ExitCode {
         Err(error) => return not_understood(error),
     };
     start_log(line.verbose);
+    if line.verbose {
+        firstlight::console::be_verbose();
+    }
     if line.quiet {
         firstlight::console::be_quiet();
     }

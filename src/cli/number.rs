@@ -88,6 +88,16 @@ pub fn two_digits(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
+/// A number with three significant digits, without zeros at the end.
+pub fn three_digits(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// A number and a noun, whose plural ends in s.
 pub fn counted(n: usize, one: &str) -> String {
     format!("{n} {one}{}", if n == 1 { "" } else { "s" })
@@ -171,6 +181,21 @@ mod tests {
             (0.0, "0 %"),
         ] {
             assert_eq!(percent(share), text);
+        }
+    }
+
+    #[test]
+    fn lengths_have_three_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.0, "1"),
+            (-0.5, "-0.5"),
+            (1.6694, "1.67"),
+            (1234.5, "1234"),
+            (0.000123456, "0.000123"),
+            (3e7, "30000000"),
+        ] {
+            assert_eq!(three_digits(value), text);
         }
     }
 

@@ -1,9 +1,9 @@
 //! `firstlight simplify IN -o OUT.obj`: reduces the number of triangles and measures the error.
 
 use super::args::{OverwriteArgs, replaced};
-use super::console::{inform, print, remark};
+use super::console::{inform, print, remark, tell};
 use super::failure::Failure;
-use super::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent};
+use super::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent, three_digits};
 use super::stop::Stop;
 use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
@@ -85,12 +85,10 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         model = load_model(&args.input, format, &options).map_err(|error| failed(&error))?;
     }
     files.read_all(model.libraries.iter().cloned())?;
-    for warning in model.warnings.iter().chain(&model.material_warnings) {
-        remark(format_args!("warning: {warning}"));
-    }
-    for fault in faults(&model) {
-        remark(format_args!("warning: {}: {fault}", args.input.display()));
-    }
+    let mut warnings = model.warnings.clone();
+    warnings.append(&model.material_warnings);
+    warnings.extend(faults(&model).into_iter().map(|fault| format!("{}: {fault}", args.input.display())));
+    tell(&warnings);
     let before = model.mesh.triangles.len();
     let diagonal = model.mesh.bounds().size().as_dvec3().length();
     let target = match (args.ratio, args.faces, args.error) {
@@ -150,10 +148,10 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     for (name, d) in [("original to result", deviation.forward), ("result to original", deviation.backward)] {
         let percent = |length: f64| percent(length / diagonal);
         print(format_args!(
-            "{name}: mean {:.3e}, RMS {:.3e}, maximum {:.3e} ({}, {}, {} of the diagonal)",
-            d.mean,
-            d.rms,
-            d.max,
+            "{name}: mean {}, RMS {}, maximum {} ({}, {}, {} of the diagonal)",
+            three_digits(d.mean),
+            three_digits(d.rms),
+            three_digits(d.max),
             percent(d.mean),
             percent(d.rms),
             percent(d.max)

@@ -4,7 +4,7 @@ use super::Error;
 use crate::frame::{OfflineReport, Print};
 use crate::render::{Display, ErrorEstimate, Film};
 use crate::scene::whole_file::Replace;
-use crate::scene::{ImageSamples, MetadataDraft};
+use crate::scene::{ImageSamples, MetadataDraft, Warning, Warnings};
 use std::path::Path;
 
 /// A rendered image.
@@ -16,7 +16,7 @@ pub struct Image {
     display: Display,
     metadata: MetadataDraft,
     report: OfflineReport,
-    warnings: Vec<String>,
+    warnings: Warnings,
 }
 
 impl Image {
@@ -25,7 +25,7 @@ impl Image {
         display: Display,
         metadata: MetadataDraft,
         report: OfflineReport,
-        warnings: Vec<String>,
+        warnings: Warnings,
     ) -> Self {
         let pixels = (0..film.height()).flat_map(|y| film.row(y)).flat_map(|rgb| rgb.to_array()).collect();
         Self { film, pixels, display, metadata, report, warnings }
@@ -62,7 +62,7 @@ impl Image {
     }
 
     /// Objects of the world that could not be rendered, each with the reason.
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 

@@ -5,7 +5,7 @@ use crate::frame::{check_film_source, render_offline_until};
 use crate::render::{Film, NoRoom, worker_threads};
 use crate::scene::{
     Description, DisplaySettings, Extraction, FilmSize, LoadOptions, LoadedScene, MetadataDraft, Rendering, SceneError,
-    SceneInputs, SceneSource, Trees, load,
+    SceneInputs, SceneSource, Trees, Warning, load,
 };
 use bevy_ecs::world::World;
 use std::ffi::OsStr;
@@ -69,7 +69,7 @@ impl Scene {
     }
 
     /// Warnings of opening: where the scene differs from the file, for example because an image is missing.
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         self.loaded.as_ref().map_or(&[], |loaded| &loaded.warnings)
     }
 
@@ -114,7 +114,7 @@ impl Scene {
         let progress = |now| options.progress(&now);
         let report =
             render_offline_until(&extraction.prepared, &settings, &mut film, options.target(), &stop, progress);
-        Ok(Image::new(film, display, metadata, report, extraction.problems))
+        Ok(Image::new(film, display, metadata, report, extraction.problems.into_iter().collect()))
     }
 }
 

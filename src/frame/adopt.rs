@@ -10,7 +10,7 @@ use super::saving::SavedAs;
 use super::scene_bounds::SceneBounds;
 use super::status::{MessageKind, Status};
 use super::views::ViewTrail;
-use crate::scene::{DisplaySettings, Lens, LoadedScene, Projection, Rendering, SceneInputs, View};
+use crate::scene::{DisplaySettings, Lens, LoadedScene, Projection, Rendering, SceneInputs, Severity, View};
 use bevy_ecs::prelude::World;
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,8 +33,12 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     shown.adopted = Some(SCENE_OPENED.to_owned());
     let mut status = world.resource_mut::<Status>();
     status.scene = scene.source.title();
-    for warning in &scene.warnings {
-        status.say(now, MessageKind::Warning, warning.clone());
+    for warning in scene.warnings.summary() {
+        let kind = match warning.severity {
+            Severity::Notice => MessageKind::Note,
+            Severity::Warning => MessageKind::Warning,
+        };
+        status.say(now, kind, warning.to_string());
     }
     world.insert_resource(CurrentScene(Arc::new(scene)));
     world.insert_resource(SavedAs::default());
@@ -74,7 +78,7 @@ pub fn adopt_moment(world: &mut World, mut scene: LoadedScene, now: Duration) {
     let Some(old) = world.get_resource::<CurrentScene>().map(|current| current.0.clone()) else {
         return adopt(world, scene, now);
     };
-    scene.warnings.retain(|warning| !old.warnings.contains(warning));
+    scene.warnings = scene.warnings.iter().filter(|warning| !old.warnings.contains(warning)).cloned().collect();
     let at = scene.choice.at.map_or_else(|| "stored pose".to_owned(), |at| format!("moment {at:.3} s"));
     adopt_again(world, &old, scene, at, now);
 }

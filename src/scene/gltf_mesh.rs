@@ -8,6 +8,7 @@ use super::own_materials::{rename_textures, texture_names};
 use super::relative::{path_to_text, text_to_path};
 use super::sources::{MeshShading, TextureSource};
 use super::stamp::Stamp;
+use super::warnings::Warnings;
 use crate::mesh::Mesh;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -19,9 +20,9 @@ pub(super) struct GltfBase {
     pub slots: Vec<(String, MaterialPart)>,
     /// The textures of `slots`, with the paths of their images.
     pub textures: Vec<(String, TextureSource, PathBuf)>,
-    pub warnings: Vec<String>,
+    pub warnings: Warnings,
     /// Warnings about `slots`.
-    pub material_warnings: Vec<String>,
+    pub material_warnings: Warnings,
     /// All files that were read for it, each with its stamp.
     pub files: Vec<(PathBuf, Stamp)>,
 }
@@ -63,7 +64,7 @@ impl GltfMesh<'_> {
                     (built.mesh, built.keys, built.warnings)
                 };
                 let slots = keys.iter().map(|key| surfaces.index(key.material)).collect();
-                (mesh, slots, warnings)
+                (mesh, slots, warnings.into_iter().collect::<Warnings>())
             }
             None => {
                 let model = document.baked(&ModelOptions { normals, ..ModelOptions::default() }).map_err(wrong)?;
@@ -73,8 +74,7 @@ impl GltfMesh<'_> {
                 (model.mesh, slots, model.warnings)
             }
         };
-        let told = |warning: &String| format!("{}: {warning}", self.path.display());
-        let warnings = warnings.iter().map(told).collect();
+        let warnings = warnings.of_file(self.path);
         let mut base = GltfBase { mesh, warnings, files: opened.files.clone(), ..GltfBase::default() };
         self.add_materials(&mut base, &surfaces, &slots, &file);
         Ok(base)

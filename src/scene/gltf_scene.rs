@@ -14,6 +14,7 @@ use super::gltf_parts::{camera_of, corners_of, extend, is_placement, light_of, t
 use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
+use super::warnings::{Warning, Warnings};
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -24,7 +25,7 @@ use std::sync::Arc;
 pub(super) struct Generated {
     pub file: SceneFile,
     pub facts: GltfFacts,
-    pub warnings: Vec<String>,
+    pub warnings: Warnings,
     /// Where a moment was asked for.
     pub motion: Option<GltfMotion>,
 }
@@ -66,7 +67,7 @@ impl Maker<'_> {
         let surfaces = self.opened.surfaces(self.wish.file).map_err(wrong)?;
         let facts = document.facts(&assembly, &surfaces);
         let variant = self.variant(&facts)?;
-        let mut warnings = assembly.warnings.clone();
+        let mut warnings: Warnings = assembly.warnings.iter().map(|warning| self.told(warning)).collect();
         if let Some(ignored) = choice.at.and_then(|at| beyond_animation(at, facts.animation_length)) {
             warnings.push(self.told(&ignored));
         }
@@ -86,10 +87,8 @@ impl Maker<'_> {
             let at = placed.key.node.and(choice.at);
             if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let mesh = match self.documents.mesh(self.opened, placed.key, at) {
-                    Ok(mesh) => {
-                        warnings.extend(mesh.warnings.iter().map(|warning| self.told(warning)));
-                        Some(mesh)
-                    }
+                    // Its warnings are told when the object is loaded.
+                    Ok(mesh) => Some(mesh),
                     Err((place, problem @ GltfProblem::NoTriangles)) => {
                         warnings.push(self.told(&format!("{place} {problem} and is left out")));
                         None
@@ -169,7 +168,7 @@ impl Maker<'_> {
             animation: Default::default(),
         };
         if !has_light && !self.wish.is_lit {
-            warnings.push(self.told("has no light: an environment and a key light are added"));
+            warnings.push(Warning::notice(self.told("has no light: an environment and a key light are added")));
             default_scene::light(&mut file, bounds);
         }
         if !has_light && chosen.is_none() {
@@ -241,7 +240,7 @@ impl Maker<'_> {
         }
     }
 
-    fn lights(&self, lights: &[PlacedLight], warnings: &mut Vec<String>) -> Vec<LightPart> {
+    fn lights(&self, lights: &[PlacedLight], warnings: &mut Warnings) -> Vec<LightPart> {
         let mut parts = Vec::new();
         for (i, placed) in lights.iter().enumerate() {
             let name = Some(placed.name.clone().unwrap_or_else(|| format!("light {}", i + 1)));
@@ -250,7 +249,8 @@ impl Maker<'_> {
             }
             if placed.light.has_range {
                 let name = crate::printable::name(name.as_deref().unwrap_or_default()).into_owned();
-                warnings.push(self.told(&format!("the range of light `{name}` is not used: light goes on for ever")));
+                warnings
+                    .push(self.told(&format!("`range` of light `{name}` is ignored: lights have no cutoff distance")));
             }
             parts.push(light_of(placed, name));
         }

@@ -20,6 +20,7 @@ use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
 use super::value::Rgb;
+use super::warnings::Warnings;
 use crate::render::ImageTexture;
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -94,7 +95,8 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             };
             let made = gltf_scene::generate(&documents, path, &wish)?;
             let mut scene = resolve(source, made.file, None, folder, options, &documents)?;
-            scene.warnings.splice(0..0, made.warnings);
+            let of_objects = std::mem::replace(&mut scene.warnings, made.warnings);
+            scene.warnings.append(&of_objects);
             scene.facts = Some(made.facts);
             scene.motion = made.motion.map(Arc::new);
             scene
@@ -114,7 +116,8 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();
-            scene.warnings.extend(mesh.warnings.iter().chain(&mesh.material_warnings).cloned());
+            scene.warnings.append(&mesh.warnings);
+            scene.warnings.append(&mesh.material_warnings);
             let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
             scene.add_mesh_pictures(options, &documents);
@@ -218,8 +221,9 @@ fn resolve(
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
                     let loaded =
                         kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder, documents), Ok);
-                    let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
-                    scene.warnings.extend_from_slice(warnings);
+                    if let Ok(loaded) = &loaded {
+                        scene.warnings.append(&loaded.warnings);
+                    }
                     loaded
                 };
                 match known.entry((source.clone(), *shading, simplify.map(f64::to_bits))).or_insert_with(read) {
@@ -268,10 +272,9 @@ fn resolve(
         }
     }
     scene.add_mesh_pictures(options, documents);
-    let mut told = HashSet::new();
-    let of_materials = scene.meshes_with_own_materials().flat_map(|mesh| &mesh.material_warnings);
-    let of_materials: Vec<String> = of_materials.filter(|warning| told.insert(*warning)).cloned().collect();
-    scene.warnings.extend(of_materials);
+    let mut of_materials = Warnings::default();
+    scene.meshes_with_own_materials().for_each(|mesh| of_materials.append(&mesh.material_warnings));
+    scene.warnings.append(&of_materials);
     if problems.is_empty() { Ok(scene) } else { Err(SceneError::of(problems, untold, Some(&title))) }
 }
 

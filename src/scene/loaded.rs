@@ -10,6 +10,7 @@ use super::meshes::LoadedMesh;
 use super::source::{SceneSource, UpAxis};
 use super::stamp::Stamp;
 use super::trees::Trees;
+use super::warnings::Warnings;
 use crate::render::ImageTexture;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -34,8 +35,8 @@ pub struct LoadedScene {
     pub(super) picture_files: HashMap<String, (PathBuf, Stamp)>,
     /// Trees of its meshes and of its groups of spheres.
     pub trees: Trees,
-    /// Warnings for the user, one sentence each.
-    pub warnings: Vec<String>,
+    /// What the user should know about how it was read.
+    pub warnings: Warnings,
     /// The up axis that was given for a model.
     pub up: Option<UpAxis>,
     /// The image that replaced the environment of the scene.
@@ -65,7 +66,7 @@ impl LoadedScene {
             pictures: HashMap::new(),
             picture_files: HashMap::new(),
             trees: Trees::default(),
-            warnings: Vec::new(),
+            warnings: Warnings::default(),
             up: None,
             environment: None,
             choice: ModelChoice::DEFAULT,

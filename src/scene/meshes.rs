@@ -11,6 +11,7 @@ use super::relative::text_to_path;
 use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
 use super::value::{ColorValue, Rgb, ScalarValue};
+use super::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use crate::render::Encoding;
 use glam::{DVec3, Vec3};
@@ -61,9 +62,9 @@ pub struct LoadedMesh {
     pub slots: Vec<(String, MaterialPart)>,
     /// The textures of `slots`, with the paths of their images.
     pub textures: Vec<(String, TextureSource, PathBuf)>,
-    pub warnings: Vec<String>,
+    pub warnings: Warnings,
     /// Warnings about `slots`, for objects that use them.
-    pub material_warnings: Vec<String>,
+    pub material_warnings: Warnings,
     /// All files that were read for it, each with its stamp.
     pub files: Vec<(PathBuf, Stamp)>,
 }
@@ -94,8 +95,8 @@ pub fn load_mesh(
                 mesh: Arc::new(mesh),
                 slots: Vec::new(),
                 textures: Vec::new(),
-                warnings: Vec::new(),
-                material_warnings: Vec::new(),
+                warnings: Warnings::default(),
+                material_warnings: Warnings::default(),
                 files: Vec::new(),
             })
         }

@@ -56,6 +56,7 @@ pub(crate) mod units;
 mod up_axis;
 mod value;
 mod view;
+mod warnings;
 pub mod whole_file;
 mod write_error;
 
@@ -98,4 +99,5 @@ pub use stamp::{Stamp, stamp};
 pub use trees::Trees;
 pub use value::{ColorValue, Rgb, ScalarValue};
 pub use view::{Lens, Projection, View, ViewError};
+pub use warnings::{Severity, Warning, Warnings};
 pub use write_error::WriteError;

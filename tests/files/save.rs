@@ -184,7 +184,7 @@ fn files_that_a_scene_points_at_are_found_from_its_new_place() {
     let (mut world, scene) = open(SceneSource::Scene(path.join("old/room.ron")));
     let (mut again, loaded) = through_a_file(&mut world, &scene, &path.join("new/room.ron"));
     assert_same(&mut world, &mut again, "moved");
-    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     let text = std::fs::read_to_string(path.join("new/room.ron")).unwrap();
     for expected in ["../old/parts/tent.obj", "../old/sky.png", "../old/parts/tiles.png", "\"unused\"", "\"spare\""] {
         assert!(text.contains(expected), "expected {expected} in:\n{text}");
@@ -221,7 +221,7 @@ fn what_a_program_spawned_is_saved_as_well() {
     let saved = save_scene(&mut world, None, &path).unwrap();
     assert_eq!(saved.notes, ["a mesh without a file was saved as made-mesh-1.obj"]);
     let (mut again, loaded) = open(SceneSource::Scene(path));
-    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     let inputs = SceneInputs::of(&mut again);
     assert_eq!(inputs.camera.unwrap().view.eye, DVec3::new(0.1, 1.0, 2.0));
     let is_torus = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() == 2 * 24 * 12);

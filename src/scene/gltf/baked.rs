@@ -7,6 +7,7 @@ use super::mesh::BuiltMesh;
 use crate::mesh::Mesh;
 use crate::scene::model::imported::{ImportedModel, ModelOptions};
 use crate::scene::obj::ImportedMaterial;
+use crate::scene::warnings::Warnings;
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -110,8 +111,8 @@ impl Document {
             libraries: self.files[1..].to_vec(),
             normals_from_file,
             polygons: 0,
-            warnings,
-            material_warnings: Vec::new(),
+            warnings: warnings.into_iter().collect(),
+            material_warnings: Warnings::default(),
         })
     }
 }

@@ -2,8 +2,8 @@
 
 use super::error::{ModelError, ModelProblem, Place};
 use super::imported::{ModelNormals, ModelOptions, has_area, with_normals};
-use super::warnings::Warnings;
 use crate::mesh::{Mesh, Welding};
+use crate::scene::warnings::Warnings;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::path::Path;
 

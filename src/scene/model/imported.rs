@@ -3,6 +3,7 @@
 use crate::mesh::{Mesh, NormalWeight};
 use crate::scene::limits::Limits;
 use crate::scene::obj::ImportedMaterial;
+use crate::scene::warnings::Warnings;
 use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 
@@ -19,10 +20,10 @@ pub struct ImportedModel {
     pub normals_from_file: bool,
     /// Number of faces with more than three corners, which were triangulated.
     pub polygons: usize,
-    /// Omissions and replacements, one sentence each.
-    pub warnings: Vec<String>,
+    /// Omissions and replacements.
+    pub warnings: Warnings,
     /// Warnings about the materials, which matter only if they are used.
-    pub material_warnings: Vec<String>,
+    pub material_warnings: Warnings,
 }
 
 /// Source of the shading normals.

@@ -9,7 +9,6 @@ pub(in crate::scene) mod error;
 mod format;
 pub(in crate::scene) mod imported;
 pub(in crate::scene) mod polygon;
-pub(in crate::scene) mod warnings;
 
 pub use error::{ModelError, ModelProblem, Place};
 pub use format::ModelFormat;

@@ -18,7 +18,7 @@ pub use write::{ObjExtras, save_obj};
 use self::parse::{Corner, ParsedObj};
 use super::model::imported::{ImportedModel, ModelNormals, ModelOptions, has_area, with_normals};
 use super::model::polygon;
-use super::model::warnings::Warnings;
+use super::warnings::Warnings;
 use crate::mesh::Mesh;
 use crate::scene::{FileKind, InputFile, text_to_path};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -91,8 +91,15 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
     let (materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
-    let (warnings, material_warnings) = (warnings.into_list(), of_materials.into_list());
-    Ok(ImportedModel { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })
+    Ok(ImportedModel {
+        mesh,
+        materials,
+        libraries,
+        normals_from_file,
+        polygons,
+        warnings,
+        material_warnings: of_materials,
+    })
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {

@@ -1,6 +1,6 @@
 //! Materials of an OBJ file (MTL) as numbers and paths.
 
-use crate::scene::model::warnings::Warnings;
+use crate::scene::warnings::Warnings;
 use crate::scene::{FileKind, InputFile};
 use glam::Vec3;
 use std::io::Cursor;
@@ -253,11 +253,11 @@ fn texture_path(value: &str, folder: &Path) -> Option<PathBuf> {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> (Vec<ImportedMaterial>, Vec<String>) {
+    fn parse(text: &str) -> (Vec<ImportedMaterial>, Warnings) {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         let mut warnings = Warnings::default();
-        (load_library(file.path(), 1 << 20, &mut warnings), warnings.into_list())
+        (load_library(file.path(), 1 << 20, &mut warnings), warnings)
     }
 
     #[test]
@@ -328,6 +328,6 @@ mod tests {
         let mut warnings = Warnings::default();
         assert!(load_library(Path::new("no such.mtl"), 9, &mut warnings).is_empty());
         assert!(load_library(&std::env::temp_dir(), 9, &mut warnings).is_empty());
-        assert_eq!(warnings.into_list().len(), 2);
+        assert_eq!(warnings.len(), 2);
     }
 }

@@ -17,8 +17,8 @@ use super::model::assemble::{Indexed, assemble};
 use super::model::error::{ModelError, Place};
 use super::model::imported::{ImportedModel, ModelOptions};
 use super::model::polygon::triangulate;
-use super::model::warnings::Warnings;
 use super::obj::ImportedMaterial;
+use super::warnings::Warnings;
 use crate::printable;
 use crate::render::decode_srgb;
 use crate::scene::input_file::{FileKind, InputFile};
@@ -70,8 +70,8 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         libraries: Vec::new(),
         normals_from_file,
         polygons,
-        warnings: warnings.into_list(),
-        material_warnings: Vec::new(),
+        warnings,
+        material_warnings: Warnings::default(),
     })
 }
 

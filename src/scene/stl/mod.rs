@@ -12,8 +12,8 @@ pub use error::StlProblem;
 use super::model::assemble::{Indexed, assemble};
 use super::model::error::{ModelError, ModelProblem, Place};
 use super::model::imported::{ImportedModel, ModelOptions};
-use super::model::warnings::Warnings;
 use super::obj::ImportedMaterial;
+use super::warnings::Warnings;
 use crate::mesh::Welding;
 use crate::scene::input_file::{FileKind, InputFile};
 use glam::DVec3;
@@ -61,8 +61,8 @@ pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         libraries: Vec::new(),
         normals_from_file,
         polygons,
-        warnings: warnings.into_list(),
-        material_warnings: Vec::new(),
+        warnings,
+        material_warnings: Warnings::default(),
     })
 }
 
