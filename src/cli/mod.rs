@@ -28,6 +28,7 @@ mod render;
 mod render_args;
 mod report;
 mod save;
+mod scenes;
 mod sequence;
 mod show;
 mod simplify;
@@ -47,7 +48,7 @@ use failure::Failure;
 use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
-use firstlight::scene::{BUILTIN_SCENES, Limits};
+use firstlight::scene::Limits;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 use stop::Stop;
@@ -115,7 +116,9 @@ enum CliCommand {
     Stability(stability::StabilityArgs),
     /// Show what a scene contains, which features it uses and what is not modelled.
     Info(info::InfoArgs),
-    /// Explain a pixel: which lights contribute to it, after how many bounces, along which paths.
+    /// List the built-in scenes.
+    Scenes(scenes::ScenesCommand),
+    /// Explain a pixel: what it shows, which lights contribute to it, after how many bounces, along which paths.
     #[command(after_help = explain::COLUMNS)]
     Explain(explain::ExplainArgs),
     /// Reduce the number of triangles of a model and measure the deviation from the original.
@@ -140,6 +143,7 @@ impl CliCommand {
             Self::Work(args) => work::run(args, stop),
             Self::Stability(args) => stability::run(args),
             Self::Info(args) => info::run(args),
+            Self::Scenes(args) => scenes::run(args),
             Self::Explain(args) => explain::run(args),
             Self::Simplify(args) => simplify::run(args, stop),
             Self::Completions(args) => completions::run(args),
@@ -205,7 +209,7 @@ fn not_understood(error: clap::Error) -> ExitCode {
             _ => ExitCode::SUCCESS,
         };
     }
-    if let Some(message) = words::mistyped_command() {
+    if let Some(message) = words::mistyped_command().or_else(words::second_scene) {
         remark(format_args!("error: {message}"));
         return ExitCode::from(2);
     }
@@ -235,8 +239,7 @@ fn start_log(verbose: bool) {
 }
 
 fn builtin_help() -> String {
-    let width = BUILTIN_SCENES.iter().map(|(name, _, _)| name.len()).max().unwrap_or(0);
-    let rows: String = BUILTIN_SCENES.iter().map(|(name, about, _)| format!("\n  {name:width$}  {about}")).collect();
+    let rows: String = scenes::rows().map(|row| format!("\n  {row}")).collect();
     format!(
         "Built-in scenes:{rows}\n\nEnvironment variables:\n  \
          NO_COLOR           Print help and errors without colours\n  \

@@ -18,6 +18,13 @@ pub fn mistyped_command() -> Option<String> {
     mistyped(words.get(1 + n_leading_options(&words))?, &commands())
 }
 
+/// An error message if a second scene or a command follows the first scene.
+pub fn second_scene() -> Option<String> {
+    let words = typed();
+    let n = n_leading_options(&words);
+    second(words.get(1 + n)?, words.get(2 + n)?, &commands())
+}
+
 fn commands() -> Vec<String> {
     let names = CommandLine::command();
     names.get_subcommands().map(|command| command.get_name().to_owned()).chain(["help".to_owned()]).collect()
@@ -44,6 +51,22 @@ fn ordered(mut words: Vec<OsString>, commands: &[String]) -> Vec<OsString> {
         words[1..2 + n].rotate_right(1);
     }
     words
+}
+
+fn second(first: &OsStr, second: &OsStr, commands: &[String]) -> Option<String> {
+    let is_command = |word: &OsStr| commands.iter().any(|command| OsStr::new(command) == word);
+    let is_option = |word: &OsStr| word.to_string_lossy().starts_with('-');
+    if is_command(first) || is_option(first) || is_option(second) {
+        return None;
+    }
+    let [a, b] = [first, second].map(|word| printable::name(&word.to_string_lossy()).into_owned());
+    Some(match is_command(second) {
+        true => format!("the command comes first: firstlight {b} {a}"),
+        false => format!(
+            "a window shows one scene, and `{b}` follows `{a}`: start one window for each, or render several to a \
+             folder: firstlight render {a} {b} -o FOLDER"
+        ),
+    })
 }
 
 fn mistyped(word: &OsStr, commands: &[String]) -> Option<String> {
@@ -74,6 +97,17 @@ mod tests {
         assert_eq!(of("Info").as_deref(), Some("unknown command `Info` (did you mean `info`?)"));
         for other in ["render", "--rendr", "cornell", "galery", "xyzzy", "room.ron", ""] {
             assert_eq!(of(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn a_second_scene_is_told() {
+        let of = |a: &str, b: &str| second(OsStr::new(a), OsStr::new(b), &commands());
+        let told = of("cornell", "gallery").unwrap();
+        assert!(told.starts_with("a window shows one scene, and `gallery` follows `cornell`"), "{told}");
+        assert_eq!(of("cornell", "render").as_deref(), Some("the command comes first: firstlight render cornell"));
+        for (a, b) in [("render", "cornell"), ("cornell", "--size"), ("--size", "9x9")] {
+            assert_eq!(of(a, b), None, "{a} {b}");
         }
     }
 
