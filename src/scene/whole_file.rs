@@ -2,6 +2,7 @@
 //! files in this way.
 //!
 //! - A symbolic link is followed and kept; its target is replaced.
+//! - Missing folders of the path are created.
 //! - Files that are not regular or are read-only are rejected; so are films, unless [`Replace`] allows them.
 //! - The temporary file is locked while it is written. One left by a killed process is not, and the next writer of the
 //!   same output reuses it.
@@ -84,7 +85,12 @@ pub fn give_up() {
 /// # Errors
 /// If the file cannot be written or may not be replaced.
 pub fn check_writable(path: &Path, replace: Replace) -> Result<(), WriteError> {
-    WholeFile::begin(path, replace).map(drop)
+    let target = absolute(path);
+    let missing: Vec<&Path> = target.ancestors().skip(1).take_while(|folder| !folder.exists()).collect();
+    let result = WholeFile::begin(path, replace).map(drop);
+    // Those that another process has used meanwhile are not empty, and stay.
+    missing.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+    result
 }
 
 /// Like [`check_writable`], but checks only the file itself if it exists, not its folder.
@@ -320,6 +326,10 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
             Ok(file) => file,
             // Another user's, in a shared folder.
             Err(error) if error.kind() == ErrorKind::PermissionDenied && name.exists() => return Ok(None),
+            Err(error) if error.kind() == ErrorKind::NotFound && !folder.exists() => {
+                std::fs::create_dir_all(&folder)?;
+                continue;
+            }
             Err(error) => return Err(error),
         };
         match file.try_lock() {
@@ -384,7 +394,7 @@ fn cannot_begin(path: &Path, target: &Path, error: io::Error) -> WriteError {
     let lies_in = target.parent().unwrap_or(folder);
     let reason = match error.kind() {
         _ if folder.exists() && !folder.is_dir() => format!("{} is not a folder", folder.display()),
-        ErrorKind::NotFound if !lies_in.is_dir() => format!("there is no folder {}", folder.display()),
+        _ if !lies_in.is_dir() => format!("the folder {} cannot be created", folder.display()),
         ErrorKind::StorageFull => "the disk is full".to_owned(),
         ErrorKind::ReadOnlyFilesystem => format!("{} is on a read-only file system", folder.display()),
         // Some virtual folders report `not found` for writing.

@@ -186,8 +186,8 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
     let materials = SceneInputs::of(driver.session.world_mut()).materials;
     assert!(format!("{materials:?}").contains("0.75"), "{materials:?}");
 
-    driver.session.send(Command::SaveScene { path: path.join("nowhere/room.ron") });
-    driver.run_until_said(MessageKind::Error, "there is no folder");
+    driver.session.send(Command::SaveScene { path: path.join("room.ron/other.ron") });
+    driver.run_until_said(MessageKind::Error, "is not a folder");
 }
 
 /// A mesh that undo brings back gets its kd-tree beside the picture; a replay waits for it.
