@@ -1,13 +1,13 @@
 //! `firstlight explain SCENE --pixel X,Y`: explains the value of a pixel, without a window.
 
 use super::args::SceneArgs;
-use super::console::{print, remark};
+use super::console::{print, tell};
 use super::failure::Failure;
-use super::number::{between, parse_size};
+use super::number::{between, parse_size, three_digits};
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
 use firstlight::printable;
-use firstlight::render::{Integrator, RenderSettings, explain, light_traced};
+use firstlight::render::{Integrator, RenderSettings, explain, light_traced, seen_surface};
 use firstlight::scene::{Extraction, Files, FilmSize, Rendering, SceneInputs};
 use glam::{DVec3, UVec2};
 
@@ -55,9 +55,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     check_pixel(args.pixel, size)?;
     let inputs = SceneInputs::of(&mut world);
     let extraction = Extraction::of_world(&mut world, &inputs, &scene.trees);
-    for problem in &extraction.problems {
-        remark(format_args!("warning: {problem}"));
-    }
+    tell(&extraction.problems.iter().cloned().collect());
     let of_scene = world.resource::<Rendering>().0;
     // The Phong integrator has no paths; the explanation shows the light transport of the scene in any case.
     let settings =
@@ -65,7 +63,8 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let prepared = &extraction.prepared;
     let explanation = explain(prepared, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
     let light_traced = light_traced(prepared, &settings, size, args.pixel, 0..args.spp, &|| false);
-    let story = PixelStory::new(&explanation, light_traced, &SnapshotNames::of(&extraction, &inputs));
+    let seen = seen_surface(prepared, size, args.pixel);
+    let story = PixelStory::new(&explanation, light_traced, seen, &SnapshotNames::of(&extraction, &inputs));
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
 }
 
@@ -93,6 +92,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     if story.n_bad > 0 {
         line(format!("{} of them are not finite and were discarded", story.n_bad));
     }
+    surface_lines(story).into_iter().for_each(&mut line);
     let light_traced = story.light_traced.unwrap_or_default();
     let all = brightness(story.total());
     let share = |part: f64| if all > 0.0 { format!("{:.1} %", 100.0 * part / all) } else { "–".to_owned() };
@@ -132,6 +132,27 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     let DVec3 { x: r, y: g, z: b } = story.total();
     line(format!("  radiance     {r:.5} {g:.5} {b:.5}, ± {:.5} in luminance", brightness(story.deviation)));
     out
+}
+
+/// What the pixel shows, and whether it gets any light.
+fn surface_lines(story: &PixelStory) -> Vec<String> {
+    let vector = |v: DVec3| format!("({}, {}, {})", three_digits(v.x), three_digits(v.y), three_digits(v.z));
+    let is_black = story.n_bad == 0 && story.total() == DVec3::ZERO;
+    let Some(seen) = &story.seen else {
+        let what = if is_black { "the environment, which is black here" } else { "the environment" };
+        return vec![format!("  shows        {what}")];
+    };
+    let [object, material] = [&seen.object, &seen.material].map(|name| printable::name(name));
+    let side = if seen.front { "front" } else { "back" };
+    let (distance, point, normal) = (three_digits(seen.distance), vector(seen.point), vector(seen.normal));
+    let mut lines = vec![
+        format!("  shows        `{object}`, material `{material}`, {side}"),
+        format!("  at           {distance} m, {point}, normal {normal}"),
+    ];
+    if is_black {
+        lines.push(format!("  no light reaches it: none of {} samples found any", story.samples.len()));
+    }
+    lines
 }
 
 /// As JSON.
@@ -174,6 +195,10 @@ fn json(title: &str, story: &PixelStory) -> serde_json::Value {
         "size": story.film_size.to_array(),
         "samples": [story.samples.start, story.samples.end],
         "bad_samples": story.n_bad,
+        "surface": story.seen.as_ref().map(|seen| serde_json::json!({
+            "object": seen.object, "material": seen.material, "front": seen.front, "distance": seen.distance,
+            "point": seen.point.to_array(), "normal": seen.normal.to_array(),
+        })),
         "radiance": rgb(&story.total()),
         "deviation": rgb(&story.deviation),
         "lights": lights,

@@ -5,7 +5,7 @@
 use super::resources::{Clock, RenderState, Renderer};
 use super::status::{MessageKind, Status};
 use super::worker::{Answer, Question};
-use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place};
+use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place, SeenSurface};
 use crate::scene::{Extraction, SceneInputs};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use glam::{DVec3, UVec2};
@@ -41,6 +41,25 @@ pub struct PixelStory {
     pub light_traced: Option<DVec3>,
     /// The path of each sample.
     pub ways: Vec<PathRecord>,
+    /// The surface in the middle of the pixel; `None` for the environment.
+    pub seen: Option<SeenObject>,
+}
+
+/// The surface that a pixel shows, in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenObject {
+    /// Name of the object.
+    pub object: String,
+    /// Name of its material at this point.
+    pub material: String,
+    /// Whether its front is seen.
+    pub front: bool,
+    /// World position, metres.
+    pub point: DVec3,
+    /// Shading normal on the side that is seen, unit.
+    pub normal: DVec3,
+    /// From the camera, metres.
+    pub distance: f64,
 }
 
 /// Contribution of one light.
@@ -118,6 +137,7 @@ fn parts(by_bounces: &[DVec3]) -> [DVec3; 3] {
 pub struct SnapshotNames {
     origin: DVec3,
     names: Vec<String>,
+    materials: Vec<String>,
     /// Names of delta lights.
     lights: Vec<String>,
 }
@@ -136,12 +156,28 @@ impl SnapshotNames {
         let n_objects = extraction.entities.len();
         let lights =
             extraction.delta_lights.iter().enumerate().map(|(i, entity)| name((n_objects + i, entity))).collect();
-        Self { origin: extraction.origin, names, lights }
+        Self { origin: extraction.origin, names, materials: material_names(extraction, inputs), lights }
     }
 
     /// Names of all objects by index.
     pub fn objects(&self) -> &[String] {
         &self.names
+    }
+
+    /// Names of all materials by index.
+    pub fn materials(&self) -> &[String] {
+        &self.materials
+    }
+
+    fn seen(&self, seen: &SeenSurface) -> SeenObject {
+        SeenObject {
+            object: self.object(seen.object),
+            material: self.materials.get(seen.material as usize).cloned().unwrap_or_default(),
+            front: seen.front,
+            point: self.origin + seen.position.as_dvec3(),
+            normal: seen.normal.as_dvec3(),
+            distance: f64::from(seen.distance),
+        }
     }
 
     fn object(&self, object: u32) -> String {
@@ -176,7 +212,14 @@ impl SnapshotNames {
 
 impl PixelStory {
     /// Converts an explanation to world space, with the names of its objects.
-    pub fn new(explanation: &Explanation, light_traced: Option<DVec3>, names: &SnapshotNames) -> Self {
+    ///
+    /// - `seen`: the surface in the middle of the pixel.
+    pub fn new(
+        explanation: &Explanation,
+        light_traced: Option<DVec3>,
+        seen: Option<SeenSurface>,
+        names: &SnapshotNames,
+    ) -> Self {
         let contributions = explanation.contributions();
         let mut by_light: BTreeMap<LightSource, Vec<DVec3>> = BTreeMap::new();
         let (mut by_bounces, mut by_itself, mut by_asking) = (Vec::new(), DVec3::ZERO, DVec3::ZERO);
@@ -223,6 +266,7 @@ impl PixelStory {
             deviation: explanation.deviation(),
             light_traced,
             ways: ways.collect(),
+            seen: seen.map(|seen| names.seen(&seen)),
         }
     }
 
@@ -235,6 +279,19 @@ impl PixelStory {
     pub fn parts(&self) -> [DVec3; 3] {
         parts(&self.by_bounces)
     }
+}
+
+/// Names by material of the snapshot; unnamed materials are called by their number.
+fn material_names(extraction: &Extraction, inputs: &SceneInputs) -> Vec<String> {
+    let of_materials = inputs.materials.iter().map(|material| (material.entity, &material.name));
+    let of_lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
+    let names: BTreeMap<_, _> =
+        of_materials.chain(of_lights).filter_map(|(entity, name)| Some((entity, name.as_ref()?))).collect();
+    let name = |(i, entity): (usize, Option<_>)| match entity.and_then(|entity| names.get(&entity)) {
+        Some(name) => (*name).clone(),
+        None => format!("material {i}"),
+    };
+    extraction.material_entities().enumerate().map(name).collect()
 }
 
 /// Luminance of linear Rec. 709.
@@ -292,8 +349,8 @@ pub fn explain_pixel(
     if let Some(waiting) = &explaining.waiting {
         let answer = waiting.answer.lock().map_or(Err(TryRecvError::Disconnected), |answer| answer.try_recv());
         match answer {
-            Ok(Answer { explanation, light_traced }) => {
-                explaining.story = Some(PixelStory::new(&explanation, light_traced, &waiting.names));
+            Ok(Answer { explanation, light_traced, seen }) => {
+                explaining.story = Some(PixelStory::new(&explanation, light_traced, seen, &waiting.names));
                 explaining.waiting = None;
             }
             Err(TryRecvError::Empty) => {}

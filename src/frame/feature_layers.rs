@@ -8,7 +8,6 @@ use crate::render::{
 use crate::scene::{Extraction, SceneInputs};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Feature buffers of an image, with names.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,8 +32,9 @@ pub struct FeatureNames {
 impl FeatureNames {
     /// - `inputs`: what the extraction was made from.
     pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
-        let objects = SnapshotNames::of(extraction, inputs).objects().to_vec();
-        Self { origin: extraction.origin, objects, materials: material_names(extraction, inputs) }
+        let names = SnapshotNames::of(extraction, inputs);
+        let (objects, materials) = (names.objects().to_vec(), names.materials().to_vec());
+        Self { origin: extraction.origin, objects, materials }
     }
 }
 
@@ -72,19 +72,6 @@ impl FeatureLayers {
         let Self { buffers, objects, materials } = self;
         FeatureHeader { samples: buffers.samples, objects: objects.clone(), materials: materials.clone() }
     }
-}
-
-/// Names by material of the snapshot; unnamed materials are called by their number.
-fn material_names(extraction: &Extraction, inputs: &SceneInputs) -> Vec<String> {
-    let of_materials = inputs.materials.iter().map(|material| (material.entity, &material.name));
-    let of_lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
-    let names: BTreeMap<_, _> =
-        of_materials.chain(of_lights).filter_map(|(entity, name)| Some((entity, name.as_ref()?))).collect();
-    let name = |(i, entity): (usize, Option<_>)| match entity.and_then(|entity| names.get(&entity)) {
-        Some(name) => (*name).clone(),
-        None => format!("material {i}"),
-    };
-    extraction.material_entities().enumerate().map(name).collect()
 }
 
 /// Data of feature buffers in the header of a film.

@@ -57,7 +57,7 @@ pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use denoising::{DenoiseFilter, Denoising};
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
-pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
+pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SeenObject, SnapshotNames, Stop, brightness};
 pub use feature_layers::{FeatureLayers, FeatureNames};
 pub use film_file::{
     FilmError, FilmFile, FilmProblem, FilmSummary, check_film_source, check_replaced_film, read_film_file,

@@ -41,7 +41,8 @@ pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::guides::{GuideGatherer, SurfaceGuides, gather_guides, guide_samples};
 pub use driver::inspect::{
-    Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
+    Inspected, Inspection, Legend, SeenSurface, depths, inspect, relative_errors, scale_color, seen_surface,
+    tint_sharp_zone,
 };
 pub use driver::renderer::{advance, advance_region, compute_tables};
 pub use driver::report::{BadSample, PassReport};

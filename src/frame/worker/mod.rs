@@ -18,7 +18,7 @@ use super::denoising::{DenoiseFilter, Denoising};
 use super::{LatencyHistogram, Picture, Target};
 use crate::render::{
     BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
-    worker_threads,
+    SeenSurface, worker_threads,
 };
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -82,6 +82,8 @@ pub struct Answer {
     pub explanation: Explanation,
     /// Radiance from light paths at the pixel so far; `None` if the film is not at full resolution.
     pub light_traced: Option<DVec3>,
+    /// The surface in the middle of the pixel.
+    pub seen: Option<SeenSurface>,
 }
 
 /// Progress of the current job.

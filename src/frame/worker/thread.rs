@@ -7,7 +7,7 @@ use super::{Answer, BESIDE, Denoising, Job, NICENESS, Question, Shared, Stats, V
 use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
 use crate::render::{
-    Display, Film, MovingFilter, Region, SampleAllocation, advance_region, explain, known_caustic_choice,
+    Display, Film, MovingFilter, Region, SampleAllocation, advance_region, explain, known_caustic_choice, seen_surface,
 };
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -212,13 +212,14 @@ impl<'a> Loop<'a> {
         let samples = first..first.saturating_add(question.n_samples);
         let pool = lock(&self.shared.pool).clone();
         let result = catch_unwind(AssertUnwindSafe(|| {
-            pool.install(|| explain(&job.prepared, &job.settings, size, pixel, samples))
+            let explanation = pool.install(|| explain(&job.prepared, &job.settings, size, pixel, samples))?;
+            Some((explanation, seen_surface(&job.prepared, size, pixel)))
         }));
         let sender = self.question.take().map(|(_, sender)| sender);
         match (result, sender) {
-            (Ok(Some(explanation)), Some(sender)) => {
+            (Ok(Some((explanation, seen))), Some(sender)) => {
                 // The receiver may have been dropped.
-                let _ = sender.send(Answer { explanation, light_traced });
+                let _ = sender.send(Answer { explanation, light_traced, seen });
             }
             (Err(panic), _) => self.fail(panic.as_ref()),
             _ => {}

@@ -24,6 +24,14 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut PathFilter) {
             Frame::NONE.fill(GLASS).corner_radius(4.0).inner_margin(Margin::symmetric(10, 7)).show(ui, |ui| {
                 let (x, y, n) = (story.pixel.x, story.pixel.y, story.samples.len());
                 text(ui, format!("pixel {x}, {y}: {n} samples, luminance {all:.4}"), true);
+                if let Some(seen) = &story.seen {
+                    let [object, material] = [&seen.object, &seen.material].map(|name| crate::printable::name(name));
+                    let side = if seen.front { "front" } else { "back" };
+                    text(ui, format!("{object}, material {material}, {side}"), false);
+                    if all == 0.0 {
+                        text(ui, "no light reaches it".to_owned(), true);
+                    }
+                }
                 ui.add_space(3.0);
                 egui::Grid::new("story").num_columns(6).spacing([14.0, 2.0]).show(ui, |ui| {
                     for title in ["light", "visible", "direct", "indirect", "total", "share"] {

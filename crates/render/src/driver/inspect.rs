@@ -199,6 +199,36 @@ pub fn depths(snapshot: &Prepared, size: UVec2, stop: &(dyn Fn() -> bool + Sync)
     hits_by_row(snapshot, size, stop, |ray, hit| hit.map_or(f32::INFINITY, |hit| hit.t * ray.dir.dot(forward)))
 }
 
+/// A surface as a pixel shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenSurface {
+    /// Index of the object in the snapshot.
+    pub object: u32,
+    /// Its material at this point.
+    pub material: MaterialId,
+    /// Whether its front is seen: the outside of a closed surface.
+    pub front: bool,
+    /// In the snapshot's frame, metres.
+    pub position: Vec3,
+    /// Shading normal on the side that is seen, unit.
+    pub normal: Vec3,
+    /// From the camera, metres.
+    pub distance: f32,
+}
+
+/// Returns the surface in the middle of a pixel, seen from the middle of the lens; `None` for the environment.
+pub fn seen_surface(snapshot: &Prepared, size: UVec2, pixel: UVec2) -> Option<SeenSurface> {
+    let (mut rays, mut hits) = (RayBatch::default(), HitBatch::default());
+    rays.push(&middle_ray(snapshot, pixel.x, pixel.y, size));
+    snapshot.closest_hits(&rays, RayClass::Coherent, &mut hits);
+    let (ray, hit) = (rays.get(0), hits.get(0)?);
+    let material = material_of(snapshot, &hit);
+    let vertex = Vertex::new(snapshot, &ray, &hit, material);
+    let distance = (vertex.position - ray.origin).length();
+    let Vertex { front, position, normal, .. } = vertex;
+    Some(SeenSurface { object: hit.object, material, front, position, normal, distance })
+}
+
 fn first_hits<T: Send>(
     snapshot: &Prepared,
     size: UVec2,
