@@ -10,7 +10,8 @@ use firstlight::render::{DenoiseSource, Denoised, Film, SurfaceGuides, denoise_s
 pub struct DenoiseArgs {
     /// Save the image denoised: raw and filtered combined, so that it converges to the raw image
     ///
-    /// The film stays raw, and --error counts for the raw image unless --error-of denoised is given.
+    /// With --layers, the denoised image is the layer `denoised`, and the others stay raw. The film stays raw, and --error
+    /// counts for the raw image unless --error-of denoised is given.
     #[arg(help_heading = "Output", long, conflicts_with = "region")]
     pub denoise: bool,
     /// The filter of --denoise and --layers denoised [default: own].
@@ -38,12 +39,10 @@ pub enum ErrorOf {
 }
 
 impl DenoiseArgs {
-    /// Checks that what is asked for belongs to an image that is denoised, and that the image is not denoised itself if
-    /// it has layers.
+    /// Checks that what is asked for belongs to an image that is denoised.
     ///
     /// - `wanted`: whether an image or a layer is denoised.
-    pub fn check(&self, wanted: bool, has_layers: bool) -> Result<(), Failure> {
-        check_layered(self.denoise, has_layers)?;
+    pub fn check(&self, wanted: bool) -> Result<(), Failure> {
         let option = match self {
             _ if wanted => return Ok(()),
             Self { denoiser: Some(_), .. } => "--denoiser",
@@ -58,15 +57,6 @@ impl DenoiseArgs {
         let filter = if self.denoiser == Some(DenoiserArg::Oidn) { DenoiseFilter::Oidn } else { DenoiseFilter::Own };
         filter.name().to_owned()
     }
-}
-
-/// An image with layers has raw light.
-pub fn check_layered(denoise: bool, has_layers: bool) -> Result<(), Failure> {
-    if denoise && has_layers {
-        let message = "an image with layers stays raw: use --layers denoised,… in place of --denoise";
-        return Err(Failure::Usage(message.to_owned()));
-    }
-    Ok(())
 }
 
 /// A denoiser that is ready.

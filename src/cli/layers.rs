@@ -65,6 +65,13 @@ impl LayerArg {
 }
 
 impl LayerArgs {
+    /// Turns `--denoise` into the layer `denoised`, if there are layers: the light of an image with layers stays raw.
+    pub fn denoise(&mut self, denoise: &mut bool) {
+        if !self.is_empty() && std::mem::take(denoise) {
+            self.layers.push(LayerArg::Denoised);
+        }
+    }
+
     /// Whether no layer is requested.
     pub fn is_empty(&self) -> bool {
         self.layers.is_empty()

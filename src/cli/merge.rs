@@ -5,7 +5,7 @@
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
-use super::denoising::{DenoiserArg, check_layered};
+use super::denoising::DenoiserArg;
 use super::failure::Failure;
 use super::film_denoiser::FilmDenoiser;
 use super::layers::LayerArgs;
@@ -65,6 +65,8 @@ pub struct MergeArgs {
 }
 
 pub fn run(args: &MergeArgs, stop: &Stop) -> Result<(), Failure> {
+    let args = &mut args.clone();
+    args.layers.denoise(&mut args.denoise);
     let part = match &args.part {
         None => None,
         Some(text) => {
@@ -99,7 +101,6 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         return Err(Failure::Usage("--layers belong to an image: name it with --image FILE.exr".to_owned()));
     }
     args.layers.check()?;
-    check_layered(args.denoise, !args.layers.is_empty())?;
     let is_denoised = args.denoise || args.layers.has_denoised();
     if args.denoiser.is_some() && !is_denoised {
         let message = "--denoiser needs an image that is denoised: add --denoise or --layers denoised";

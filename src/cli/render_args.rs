@@ -25,7 +25,7 @@ Examples:
   firstlight render scene.ron -o scene.exr --layers albedo,normal,depth,object
   firstlight render image.png -o larger.png --scale 2
 
-`firstlight --help` lists the built-in scenes.";
+`firstlight scenes` lists the built-in scenes.";
 
 /// What is to be rendered, and where to.
 #[derive(Args, Clone, Debug)]
@@ -34,8 +34,8 @@ pub struct RenderCommand {
     scenes: ScenesArgs,
     /// Image file, replaced if it exists; a folder for several scenes; - for standard output.
     ///
-    /// .png is tone-mapped, .exr holds linear light (HDR). By default a new file firstlight-NAME.png in the current
-    /// folder.
+    /// .png and .jpg are tone-mapped, .exr holds linear light (HDR). Missing folders are created. By default a new file
+    /// firstlight-NAME.png in the current folder.
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -169,6 +169,9 @@ pub const STDOUT: &str = "-";
 pub enum FormatArg {
     /// 8 bits, tone-mapped.
     Png,
+    /// As png, smaller and with loss; firstlight cannot open a scene from it.
+    #[value(alias = "jpeg")]
+    Jpg,
     /// Linear light (HDR).
     Exr,
 }
@@ -219,7 +222,12 @@ impl RenderCommand {
             (None, _) => PathBuf::from("part.png"),
             (Some(output), PartBy::Frames) => output.clone(),
         };
-        Ok(Some(RenderArgs { scene, output, ..render.clone() }))
+        // The film of a part is never denoised, and says so.
+        let render = match render.part_by() {
+            PartBy::Frames => render.with_denoised_layer(),
+            PartBy::Samples | PartBy::Tiles => render.clone(),
+        };
+        Ok(Some(RenderArgs { scene, output, ..render }))
     }
 
     /// One job per scene.
@@ -247,16 +255,17 @@ impl RenderCommand {
                 let name = output.display();
                 return Err(Failure::Usage(format!("{name}: two scenes would be rendered to the same file")));
             }
-            jobs.push(RenderArgs { scene, output, has_next: i + 1 < n, ..self.render.clone() });
+            jobs.push(RenderArgs { scene, output, has_next: i + 1 < n, ..self.render.with_denoised_layer() });
         }
         Ok(jobs)
     }
 
     /// Image file of one of several scenes.
     fn in_folder(&self, folder: &Path, scene: &SceneArgs) -> Result<PathBuf, Failure> {
-        if !folder.is_dir() {
+        // The name of an image for several scenes is a mistake; any other name is a new folder.
+        if folder.is_file() || PictureFormat::of(folder).is_ok() && !folder.is_dir() {
             let (name, n) = (folder.display(), self.scenes.scenes.len());
-            let message = format!("{name}: no such folder: for {n} scenes, -o is the folder of their images");
+            let message = format!("{name}: is not a folder: for {n} scenes, -o is the folder of their images");
             return Err(Failure::Usage(message));
         }
         let mut name = file_stem(&scene.scene);
@@ -267,6 +276,13 @@ impl RenderCommand {
 }
 
 impl RenderArgs {
+    /// These, where `--denoise` adds a layer to an image with layers.
+    fn with_denoised_layer(&self) -> Self {
+        let mut args = self.clone();
+        args.layers.denoise(&mut args.denoise.denoise);
+        args
+    }
+
     /// Whether the image, or a layer of it, is denoised.
     pub fn wants_denoised(&self) -> bool {
         self.denoise.denoise || self.layers.has_denoised()
@@ -308,9 +324,9 @@ impl RenderArgs {
     /// Checks that the format supports the requested layers.
     fn check_layers(&self, format: PictureFormat) -> Result<PictureFormat, Failure> {
         self.layers.check()?;
-        self.denoise.check(self.wants_denoised(), !self.layers.is_empty())?;
+        self.denoise.check(self.wants_denoised())?;
         if !self.layers.is_empty() && format != PictureFormat::Exr {
-            let message = "a .png has no layers: with --layers, choose a name that ends in .exr";
+            let message = "only an .exr has layers: with --layers, choose a name that ends in .exr";
             return Err(Failure::Usage(format!("{}: {message}", self.output_name())));
         }
         Ok(format)
@@ -320,6 +336,7 @@ impl RenderArgs {
     fn default_format(&self) -> PictureFormat {
         match self.format {
             Some(FormatArg::Exr) => PictureFormat::Exr,
+            Some(FormatArg::Jpg) => PictureFormat::Jpeg,
             None if !self.layers.is_empty() => PictureFormat::Exr,
             _ => PictureFormat::Png,
         }

@@ -19,7 +19,7 @@ pub struct StatusArgs {
     /// The folder of the job.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Save an image of all samples that are there, .png or .exr.
+    /// Save an image of all samples that are there, .png, .jpg or .exr.
     #[arg(long, value_name = "FILE", alias = "picture")]
     image: Option<PathBuf>,
     /// Print one JSON object.

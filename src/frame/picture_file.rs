@@ -1,6 +1,7 @@
-//! Image files: developed as PNG, linear as EXR; written atomically.
+//! Image files: developed as PNG or JPEG, linear as EXR; written atomically.
 //!
-//! Both may carry metadata ([`NOTE_KEY`]): a text chunk (iTXt) in a PNG, an attribute in an EXR.
+//! A PNG and an EXR may carry metadata ([`NOTE_KEY`]): a text chunk (iTXt), an attribute. A JPEG has none, so no scene
+//! can be opened from it.
 
 use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, develop_colors, relative_errors};
 use crate::scene::WriteError;
@@ -18,9 +19,14 @@ use std::path::{Path, PathBuf};
 pub enum PictureFormat {
     /// 8 bits, sRGB, exposed and tone-mapped.
     Png,
+    /// As a PNG, compressed with loss ([`JPEG_QUALITY`]), without metadata.
+    Jpeg,
     /// 32-bit floats, linear Rec. 709 radiance.
     Exr,
 }
+
+/// Quality of a JPEG, 1 to 100: artefacts are rarely visible.
+const JPEG_QUALITY: u8 = 92;
 
 impl PictureFormat {
     /// Returns the format of a file name's extension.
@@ -30,6 +36,7 @@ impl PictureFormat {
     pub fn of(path: &Path) -> Result<Self, WriteError> {
         match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
             Some("png") => Ok(Self::Png),
+            Some("jpg" | "jpeg") => Ok(Self::Jpeg),
             Some("exr") => Ok(Self::Exr),
             Some(other) => Err(WriteError::Format { path: path.to_path_buf(), extension: other.to_owned() }),
             None => Err(WriteError::NoExtension(path.to_path_buf())),
@@ -40,6 +47,7 @@ impl PictureFormat {
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
+            Self::Jpeg => "jpg",
             Self::Exr => "exr",
         }
     }
@@ -50,11 +58,11 @@ impl PictureFormat {
 pub struct Print<'a> {
     /// The film, linear radiance.
     pub film: &'a Film,
-    /// Exposure and tone curve of a PNG.
+    /// Exposure and tone curve of a PNG or JPEG.
     pub display: &'a Display,
-    /// Size of a PNG in pixels, to which a coarser film is scaled; an EXR keeps the size of the film.
+    /// Size of a PNG or JPEG in pixels, to which a coarser film is scaled; an EXR keeps the size of the film.
     pub size: (u32, u32),
-    /// Metadata of the image.
+    /// Metadata of the image, which a JPEG does not keep.
     pub note: Option<&'a str>,
     /// Radiance to write in place of the film's, one entry per pixel, row by row from the top.
     pub denoised: Option<&'a [Vec3]>,
@@ -113,6 +121,7 @@ impl Print<'_> {
         let mut bytes = Vec::new();
         match format {
             PictureFormat::Png => self.png(&mut bytes).map_err(|error| WriteError::Encode(Box::new(error)))?,
+            PictureFormat::Jpeg => self.jpeg(&mut bytes).map_err(|error| WriteError::Encode(Box::new(error)))?,
             PictureFormat::Exr => bytes = self.exr().map_err(|error| WriteError::Encode(Box::new(error)))?,
         }
         Ok(bytes)
@@ -121,7 +130,7 @@ impl Print<'_> {
     /// Reserves the memory for encoding: the encoders do not check for it.
     fn room(&self, format: PictureFormat) -> Result<Room, NoRoom> {
         match format {
-            PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
+            PictureFormat::Png | PictureFormat::Jpeg => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
             PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
         }
     }
@@ -132,6 +141,7 @@ impl Print<'_> {
         let mut out = WholeFile::begin(path, replace)?;
         match format {
             PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, error))?,
+            PictureFormat::Jpeg => self.jpeg(&mut out).map_err(|error| unwritable(path, error))?,
             PictureFormat::Exr => {
                 let bytes = self.exr().map_err(|error| unwritable(path, error))?;
                 out.write_all(&bytes).map_err(|error| unwritable(path, error))?;
@@ -140,7 +150,8 @@ impl Print<'_> {
         Ok(out)
     }
 
-    fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
+    /// The developed image, 3 bytes per pixel.
+    fn rgb(&self) -> Vec<u8> {
         let (width, height) = self.size;
         let mut rgb = Vec::new();
         match self.denoised {
@@ -154,6 +165,18 @@ impl Print<'_> {
         let n_pixels = rgb.len() / 4;
         (0..n_pixels).for_each(|i| rgb.copy_within(4 * i..4 * i + 3, 3 * i));
         rgb.truncate(3 * n_pixels);
+        rgb
+    }
+
+    fn jpeg(&self, out: &mut impl Write) -> image::ImageResult<()> {
+        let (width, height) = self.size;
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(out, JPEG_QUALITY);
+        encoder.encode(&self.rgb(), width, height, image::ExtendedColorType::Rgb8)
+    }
+
+    fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
+        let (width, height) = self.size;
+        let rgb = self.rgb();
         let mut encoder = png::Encoder::new(out, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);

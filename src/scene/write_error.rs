@@ -45,7 +45,7 @@ pub enum WriteError {
     #[error("{}: exists and is not a recording: choose another name", .0.display())]
     NotRecording(PathBuf),
     /// The extension is not that of a supported format.
-    #[error("{}: unsupported output format .{extension}: use .png or .exr", path.display())]
+    #[error("{}: unsupported output format .{extension}: use .png, .jpg or .exr", path.display())]
     Format {
         /// The file.
         path: PathBuf,
@@ -53,7 +53,7 @@ pub enum WriteError {
         extension: String,
     },
     /// The name has no extension.
-    #[error("{}: missing file extension: use .png or .exr", .0.display())]
+    #[error("{}: missing file extension: use .png, .jpg or .exr", .0.display())]
     NoExtension(PathBuf),
     /// All numbers for new files of this name are used.
     #[error("{}: all numbers are in use: move some of the images", .0.display())]

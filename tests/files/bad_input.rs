@@ -353,8 +353,8 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     for (args, expected) in [
         (&["render", "cornel", "-o", "a.png"][..], "did you mean `cornell`?"),
         (&["info", "cornel"], "did you mean `cornell`?"),
-        (&["render", "cornell", "-o", "a.jpg"], "use .png or .exr"),
-        (&["render", "cornell", "-o", "a"], "missing file extension: use .png or .exr"),
+        (&["render", "cornell", "-o", "a.gif"], "use .png, .jpg or .exr"),
+        (&["render", "cornell", "-o", "a"], "missing file extension: use .png, .jpg or .exr"),
         (&["render", "cornell", "-o", "a.png", "--spp", "-3"], "must be between 1 and 2147483648"),
         (&["render", "cornell", "-o", "a.png", "--error", "-0.1"], "must be a positive number"),
         (&["simplify", "none.obj", "-o", "a.txt", "--ratio", "0.5"], "must end in .obj"),
@@ -367,10 +367,10 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
         (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
         (&["render", "none.obj", "-o", "a.png"], "no such file"),
         (&["render", "notes.txt", "-o", "a.png"], "expected a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf)"),
-        (&["render", "cornell", "-o", "nowhere/a.png"], "there is no folder nowhere"),
+        (&["render", "cornell", "-o", "notes.txt/a.png"], "notes.txt is not a folder"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),
-        (&["simplify", "none.obj", "-o", "nowhere/a.obj", "--ratio", "0.5"], "there is no folder nowhere"),
+        (&["simplify", "none.obj", "-o", "nowhere/a.obj", "--ratio", "0.5"], "no such file"),
         (&["simplify", "none.obj", "-o", "a.obj", "--ratio", "0.5"], "no such file"),
     ] {
         let said = fails(path, args, 1);
