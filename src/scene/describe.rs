@@ -23,7 +23,7 @@ use super::placement::Placement;
 use super::relative::path_to_text;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::units::radians;
-use super::value::{ColorValue, Rgb, ScalarValue};
+use super::value::{ColorValue, Rgb, ScalarValue, hex_color};
 use crate::mesh::Mesh;
 use crate::render::{Environment, MapParams};
 use bevy_ecs::name::Name;
@@ -240,7 +240,12 @@ impl<'a> Writer<'a> {
         if self.loaded_textures.get(&*texture.name).is_some_and(|part| **part != texture.part) {
             self.taken_by_textures.take(&texture.name);
         }
-        let name = self.taken_by_textures.free(if texture.name.is_empty() { "texture" } else { &texture.name });
+        let name = match &*texture.name {
+            "" => self.taken_by_textures.free("texture"),
+            // A scene file would read a colour.
+            name if hex_color(name).is_some() => self.taken_by_textures.free(&format!("texture {name}")),
+            name => self.taken_by_textures.free(name),
+        };
         self.textures.push((texture.clone(), name.clone()));
         self.texture_names.insert(address(texture), name.clone());
         name

@@ -1,5 +1,6 @@
 //! Values of a scene file with more than one notation.
 
+use crate::render::decode_srgb;
 use glam::Vec3;
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::ser::{SerializeMap, SerializeTuple};
@@ -7,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// A colour, linear Rec. 709: `0.5` for grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
+/// A colour, linear Rec. 709: `0.5` for grey, `(0.8, 0.2, 0.1)`, `"#ccbbaa"` in sRGB, or the name of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ColorValue {
     /// A colour, linear Rec. 709.
@@ -25,7 +26,7 @@ pub enum ScalarValue {
     Texture(String),
 }
 
-/// A colour that cannot be a texture: `0.5` or `(0.8, 0.2, 0.1)`.
+/// A colour that cannot be a texture: `0.5`, `(0.8, 0.2, 0.1)` or `"#ccbbaa"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rgb(pub Vec3);
 
@@ -80,6 +81,20 @@ fn narrow<E: Error>(value: f64) -> Result<f32, E> {
     Ok(narrow)
 }
 
+/// The colour that `#rgb` or `#rrggbb` is in sRGB, as linear Rec. 709; `None` for any other text.
+pub(super) fn hex_color(text: &str) -> Option<Vec3> {
+    let digits = text.strip_prefix('#').filter(|digits| digits.bytes().all(|byte| byte.is_ascii_hexdigit()))?;
+    let channel = |i: usize| {
+        let byte = match digits.len() {
+            3 => u8::from_str_radix(&digits[i..=i], 16).ok()? * 0x11,
+            6 => u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok()?,
+            _ => return None,
+        };
+        Some(decode_srgb(f64::from(byte) / 255.0) as f32)
+    };
+    Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
+}
+
 enum Found {
     Number(f32),
     Rgb(Vec3),
@@ -91,8 +106,8 @@ impl<'de> Visitor<'de> for AnyValue {
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match (self.colours, self.textures) {
-            (true, true) => "a colour: a number, (red, green, blue) or the \"name\" of a texture",
-            (true, false) => "a colour: a number or (red, green, blue)",
+            (true, true) => "a colour: a number, (red, green, blue), \"#rrggbb\" or the \"name\" of a texture",
+            (true, false) => "a colour: a number, (red, green, blue) or \"#rrggbb\"",
             (false, _) => "a number or the \"name\" of a texture",
         })
     }
@@ -110,7 +125,9 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_str<E: Error>(self, value: &str) -> Result<Found, E> {
-        if self.textures {
+        if let Some(color) = hex_color(value).filter(|_| self.colours) {
+            Ok(Found::Rgb(color))
+        } else if self.textures {
             Ok(Found::Name(value.to_owned()))
         } else {
             Err(E::invalid_type(serde::de::Unexpected::Str(value), &self))
@@ -260,5 +277,32 @@ impl<T: Serialize> Serialize for Named<T> {
             map.serialize_entry(name, value)?;
         }
         map.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hexadecimal_colours_are_srgb() {
+        let color = hex_color("#ccbbaa").unwrap();
+        // IEC 61966-2-1: ((c + 0.055) / 1.055)^2.4.
+        assert!((color - Vec3::new(0.603_827, 0.496_933, 0.401_978)).abs().max_element() < 1e-6, "{color}");
+        assert_eq!(hex_color("#fff"), Some(Vec3::ONE));
+        assert_eq!(hex_color("#cba"), hex_color("#CCBBAA"));
+        for other in ["#cccc", "#ggg", "ccbbaa", "#", "#12345é", "#ccbbaa80"] {
+            assert_eq!(hex_color(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn colours_are_read_from_hexadecimal_and_saved_as_numbers() {
+        let color: ColorValue = ron::from_str("\"#f00\"").unwrap();
+        assert_eq!(color, ColorValue::rgb(1.0, 0.0, 0.0));
+        assert_eq!(ron::to_string(&color).unwrap(), "(1.0,0.0,0.0)");
+        assert_eq!(ron::from_str::<Rgb>("\"#0f0\"").unwrap(), Rgb(Vec3::Y));
+        assert!(ron::from_str::<Rgb>("\"red\"").unwrap_err().to_string().contains("#rrggbb"));
+        assert_eq!(ron::from_str::<ColorValue>("\"#tiles\"").unwrap(), ColorValue::Texture("#tiles".to_owned()));
     }
 }

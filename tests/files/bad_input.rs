@@ -247,7 +247,8 @@ fn what_is_wrong_around_values_is_told_where_it_is() {
             scene(&format!("{clay},\n    objects: [point(intensity: 1)],")),
             "unknown object `point`: it belongs in `lights`",
         ),
-        (scene("materials: { \"clay\": diffuse(albedo: \"#ff8800\") },"), "numbers and colours have no quotes"),
+        (scene("materials: { \"clay\": diffuse(albedo: \"#ff88\") },"), "is `\"#rgb\"` or `\"#rrggbb\"`"),
+        (scene("materials: { \"clay\": diffuse(albedo: \"0.5\") },"), "numbers have no quotes"),
     ] {
         assert_says(&message(&text), &["scene.ron:", expected]);
     }

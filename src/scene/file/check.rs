@@ -419,11 +419,19 @@ impl Check<'_> {
 
     fn texture_name(&mut self, path: &str, name: &str) {
         if !self.textures.contains(name) {
-            if name.starts_with('#') || name.trim().parse::<f64>().is_ok() {
-                let message = "is not defined; numbers and colours have no quotes, such as `0.2` or `(1, 0.25, 0)`";
-                return self.wrong(path, format!("texture `{name}` {message}"));
-            }
-            self.misnamed(path, format!("texture `{name}` is not defined"), name, self.file.textures.names());
+            let hint = match name {
+                _ if name.starts_with('#') => "a colour, where one is expected, is `\"#rgb\"` or `\"#rrggbb\"`",
+                _ if name.trim().parse::<f64>().is_ok() => "numbers have no quotes, such as `0.2`",
+                _ => {
+                    return self.misnamed(
+                        path,
+                        format!("texture `{name}` is not defined"),
+                        name,
+                        self.file.textures.names(),
+                    );
+                }
+            };
+            self.wrong(path, format!("texture `{name}` is not defined; {hint}"));
         }
     }
 
