@@ -24,6 +24,8 @@ pub struct Toasts {
 }
 
 impl Toasts {
+    /// More warnings at once are one message, so that they do not cover a model that has just been opened.
+    pub const MOST_WARNINGS: usize = 2;
     /// Maximum number of messages; more would cover the image. The oldest is removed.
     const MAX_SHOWN: usize = 5;
 

@@ -406,7 +406,13 @@ impl App {
         for text in &status.withdrawn {
             self.toasts.withdraw(text);
         }
-        for message in status.messages.iter().filter(|message| message.at == clock) {
+        let new = status.messages.iter().filter(|message| message.at == clock);
+        let n_warnings = new.clone().filter(|message| message.kind == MessageKind::Warning).count();
+        let is_flood = n_warnings > Toasts::MOST_WARNINGS;
+        if is_flood {
+            self.toasts.add(Tone::Problem, format!("{n_warnings} warnings: see Messages in the panel (N)"), now);
+        }
+        for message in new.filter(|message| !is_flood || message.kind != MessageKind::Warning) {
             let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
             self.toasts.add(tone, message.text.clone(), now);
         }

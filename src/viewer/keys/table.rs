@@ -415,6 +415,10 @@ pub static BINDINGS: &[KeyGroup] = &[
                 triggers: &[Trigger::Mouse("Panel: Statistics")],
                 effect: "samples, rays, error, discarded samples, latency, triangles, memory, undo, last restart",
             },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Messages")],
+                effect: "warnings, errors and notes, the latest first",
+            },
         ],
     },
     KeyGroup {

@@ -12,7 +12,7 @@
 //! | `scene` | the list of objects, adding, opening |
 //! | `materials`, `lights` | the lists of materials and of lights; the environment |
 //! | `material`, `texture` | the editor of a material |
-//! | `statistics` | figures |
+//! | `statistics`, `messages` | figures; what was said |
 //! | `list`, `swatch`, `widgets` | building blocks |
 
 mod animation;
@@ -22,6 +22,7 @@ mod list;
 mod material;
 mod materials;
 mod mesh;
+mod messages;
 mod picture;
 mod scene;
 mod selected;
@@ -145,7 +146,7 @@ impl Asked {
 }
 
 /// The sections of the panel, from the top; the list of keys mentions each.
-pub const SECTIONS: [&str; 15] = [
+pub const SECTIONS: [&str; 16] = [
     "Render",
     "Animation",
     "Camera",
@@ -161,6 +162,7 @@ pub const SECTIONS: [&str; 15] = [
     "Environment",
     "Open",
     "Statistics",
+    "Messages",
 ];
 
 const WIDTH: f32 = 288.0;
@@ -195,13 +197,14 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
             section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
             section(ui, mesh, true, |ui| mesh::mesh(ui, state, session, asked));
-            let [.., objects, materials, lights, sky, open, statistics] = SECTIONS;
+            let [.., objects, materials, lights, sky, open, statistics, messages] = SECTIONS;
             section(ui, objects, true, |ui| scene::objects(ui, state, session, asked));
             section(ui, materials, false, |ui| materials::materials(ui, state, session, asked));
             section(ui, lights, false, |ui| lights::lights(ui, state, session, asked));
             section(ui, sky, false, |ui| lights::sky(ui, session, asked));
             section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
             section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
+            section(ui, messages, true, |ui| messages::messages(ui, session));
         });
     });
     // All edits between pressing and releasing a mouse button are one undo step, also if a colour picker or a menu
