@@ -60,22 +60,22 @@ impl ScenesArgs {
 #[derive(Args, Clone, Debug, Default)]
 pub struct OpenArgs {
     /// Up axis of a model [default: detected from its shape].
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Scene")]
     pub up: Option<UpArg>,
     /// Camera of a glTF model or of `cameras` in a scene file, by name [default: the first, or `camera`].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
     pub camera: Option<String>,
     /// Moment of the animation, in seconds [default: that of the scene file; the stored pose of a glTF model].
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Scene")]
     pub at: Option<f64>,
     /// Exposure time as a share of the time of a frame, 0 to 1: what moves in it is blurred [default: that of the scene file]
-    #[arg(long, value_name = "SHARE", value_parser = parse_shutter, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", value_parser = parse_shutter, allow_negative_numbers = true, help_heading = "Scene")]
     pub shutter: Option<f64>,
     /// Variant of a glTF model's materials, by name.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
     pub variant: Option<String>,
     /// Allow a glTF model to read files outside of its own folder.
-    #[arg(long)]
+    #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
     /// Environment image (.hdr, .exr, .png, .jpg) that lights the scene instead of its own environment.
     #[arg(long, value_name = "FILE", visible_alias = "environment")]
@@ -236,7 +236,7 @@ fn unpacked(archive: &Path) -> Result<Unpacked, Failure> {
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct OverwriteArgs {
     /// Allow an output to replace an existing film, whose samples are lost.
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 }
 

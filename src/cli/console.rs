@@ -4,7 +4,7 @@
 use super::failure::Failure;
 use firstlight::console::is_verbose;
 pub use firstlight::console::{Bar, Message, inform, lines, prints_to_terminal, remark};
-use firstlight::scene::{Severity, Warnings};
+use firstlight::scene::{Severity, Warning, Warnings};
 
 /// Prints what there is to say about a scene: a line per kind, or all with `--verbose`.
 pub fn tell(warnings: &Warnings) {
@@ -15,10 +15,12 @@ pub fn tell(warnings: &Warnings) {
             Severity::Warning => remark(format_args!("warning: {line}")),
         }
     }
-    let total = warnings.total();
-    if total > lines.len() {
+    let is_warning = |line: &&Warning| line.severity == Severity::Warning;
+    let shown = lines.iter().filter(is_warning).count();
+    let total = warnings.total() - warnings.iter().filter(|line| !is_warning(line)).count();
+    if total > shown {
         inform(match is_verbose() {
-            true => format!("{} of {total} warnings are listed", lines.len()),
+            true => format!("{shown} of {total} warnings are listed"),
             false => format!("{total} warnings, which -v lists"),
         });
     }

@@ -12,13 +12,13 @@ pub struct DenoiseArgs {
     ///
     /// With --layers, the denoised image is the layer `denoised`, and the others stay raw. The film stays raw, and --error
     /// counts for the raw image unless --error-of denoised is given.
-    #[arg(help_heading = "Output", long, conflicts_with = "region")]
+    #[arg(long, conflicts_with = "region")]
     pub denoise: bool,
     /// The filter of --denoise and --layers denoised [default: own].
     #[arg(help_heading = "Output", long, value_enum, value_name = "FILTER")]
     pub denoiser: Option<DenoiserArg>,
     /// The image whose error --error counts [default: raw].
-    #[arg(help_heading = "When to stop", long, value_enum, value_name = "IMAGE", requires = "error")]
+    #[arg(help_heading = "Rendering", long, value_enum, value_name = "IMAGE", requires = "error")]
     pub error_of: Option<ErrorOf>,
 }
 

@@ -93,6 +93,9 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
         line(format!("{} of them are not finite and were discarded", story.n_bad));
     }
     surface_lines(story).into_iter().for_each(&mut line);
+    if is_black(story) {
+        return out;
+    }
     let light_traced = story.light_traced.unwrap_or_default();
     let all = brightness(story.total());
     let share = |part: f64| if all > 0.0 { format!("{:.1} %", 100.0 * part / all) } else { "–".to_owned() };
@@ -134,10 +137,15 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     out
 }
 
+/// Whether no sample found any light.
+fn is_black(story: &PixelStory) -> bool {
+    story.n_bad == 0 && story.total() == DVec3::ZERO
+}
+
 /// What the pixel shows, and whether it gets any light.
 fn surface_lines(story: &PixelStory) -> Vec<String> {
     let vector = |v: DVec3| format!("({}, {}, {})", three_digits(v.x), three_digits(v.y), three_digits(v.z));
-    let is_black = story.n_bad == 0 && story.total() == DVec3::ZERO;
+    let is_black = is_black(story);
     let Some(seen) = &story.seen else {
         let what = if is_black { "the environment, which is black here" } else { "the environment" };
         return vec![format!("  shows        {what}")];

@@ -92,7 +92,6 @@ impl Told<'_> {
             if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
         };
         row("objects", counts(self.objects()));
-        self.list.lines().into_iter().for_each(|line| row("", line));
         row("size", self.list.size());
         let shading = &extraction.prepared.shading;
         row("materials", counts(self.materials()));
@@ -138,6 +137,13 @@ impl Told<'_> {
         }
         for (i, what) in not_modelled.into_iter().enumerate() {
             row(if i == 0 { "not modelled" } else { "" }, what);
+        }
+        // Last, since they may be long.
+        if self.animation.is_some() {
+            track_rows(&scene.file.animation, &mut row);
+        }
+        for (i, line) in self.list.lines().into_iter().enumerate() {
+            row(if i == 0 { "parts" } else { "" }, line);
         }
         out
     }
@@ -307,13 +313,23 @@ fn animation_rows(part: &AnimationPart, animation: &Animation, row: &mut impl Fn
         Shutter::Seconds(seconds) => format!("open for {} ms: motion blur", number(1e3 * seconds)),
     };
     row("shutter", exposure);
-    for (what, track) in part.tracks.iter().map(|track| (moved(track), track)) {
+}
+
+/// The tracks of an animation as text.
+fn track_rows(part: &AnimationPart, row: &mut impl FnMut(&str, String)) {
+    /// Further ones are counted; `--json` has all.
+    const MOST: usize = 60;
+    for (i, track) in part.tracks.iter().take(MOST).enumerate() {
+        let what = moved(track);
         let keys = counted(track.keys().len(), "key");
         let span = match track.keys() {
             [(start, _), .., (end, _)] => format!(", {} to {} s", number(*start), number(*end)),
             _ => String::new(),
         };
-        row("", format!("{what}: {keys}, {}{span}", track.interpolation().name()));
+        row(if i == 0 { "tracks" } else { "" }, format!("{what}: {keys}, {}{span}", track.interpolation().name()));
+    }
+    if part.tracks.len() > MOST {
+        row("", format!("… and {} more (--json lists all)", part.tracks.len() - MOST));
     }
 }
 

@@ -27,12 +27,15 @@ pub struct ObjectList<'a> {
     faults: BTreeMap<*const Mesh, Faults>,
 }
 
+/// More named quads, spheres or planes than these are one line.
+const MOST_NAMED: usize = 6;
+
 /// Objects with equal keys form one line of the list.
 #[derive(PartialEq, Eq, Hash)]
 enum Key {
     /// Address of the mesh or group of spheres.
     Shared(usize),
-    /// Unnamed objects of one kind.
+    /// Unnamed objects of one kind, or many named ones.
     Kind(&'static str),
     /// Index of a named object.
     Own(usize),
@@ -41,12 +44,16 @@ enum Key {
 impl<'a> ObjectList<'a> {
     pub fn of(inputs: &'a SceneInputs) -> Self {
         let (mut boxes, mut places) = (ExtentCache::default(), HashMap::new());
+        let mut named: HashMap<&str, usize> = HashMap::new();
+        for object in inputs.objects.iter().filter(|object| object.name.is_some()) {
+            *named.entry(object.shape.kind()).or_default() += 1;
+        }
         let mut list = Self { groups: Vec::new(), bounds: None, faults: BTreeMap::new() };
         for (i, object) in inputs.objects.iter().enumerate() {
             let key = match &object.shape {
                 Shape::Mesh(mesh) => Key::Shared(Arc::as_ptr(mesh) as usize),
                 Shape::Spheres(cloud) => Key::Shared(Arc::as_ptr(cloud) as usize),
-                shape if object.name.is_none() => Key::Kind(shape.kind()),
+                shape if object.name.is_none() || named[shape.kind()] > MOST_NAMED => Key::Kind(shape.kind()),
                 _ => Key::Own(i),
             };
             if let Shape::Mesh(mesh) = &object.shape {
@@ -130,7 +137,10 @@ impl ObjectGroup<'_> {
         match (self.count, self.has_other_names) {
             (1, _) => name.into_owned(),
             (n, false) => format!("{n} × {name}"),
-            (n, true) => format!("{name} and {} more of the same mesh", n - 1),
+            (n, true) => {
+                let same = if matches!(self.first.shape, Shape::Mesh(_)) { " of the same mesh" } else { "" };
+                format!("{name} and {} more{same}", n - 1)
+            }
         }
     }
 

@@ -37,6 +37,8 @@ pub(super) struct RenderJob {
     pub draft: MetadataDraft,
     /// `None` if nothing is denoised.
     denoiser: Option<Denoiser>,
+    /// Problems of the extraction that were printed.
+    told: Vec<String>,
 }
 
 impl RenderJob {
@@ -97,7 +99,8 @@ impl RenderJob {
         let size = scaled(size, args.scale)?;
         world.insert_resource(Rendering(settings));
         let draft = MetadataDraft::of(&mut world, Some(&scene));
-        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft, denoiser })
+        let told = extraction.problems.clone();
+        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft, denoiser, told })
     }
 
     /// The current camera.
@@ -157,7 +160,11 @@ impl RenderJob {
         }
         self.extraction = Extraction::of_world(&mut self.world, &inputs, &self.scene.trees);
         for problem in &self.extraction.problems {
-            remark(format_args!("warning: at {seconds} s {problem}"));
+            // Of a sequence, only the first frame with this problem.
+            if !self.told.contains(problem) {
+                remark(format_args!("warning: at {seconds} s {problem}"));
+                self.told.push(problem.clone());
+            }
         }
         self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene));
         Ok(())

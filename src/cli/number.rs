@@ -90,8 +90,9 @@ pub fn two_digits(value: f64) -> String {
 
 /// A number with three significant digits, without zeros at the end.
 pub fn three_digits(value: f64) -> String {
+    // Without the sign of -0.
     if value == 0.0 || !value.is_finite() {
-        return value.to_string();
+        return (value + 0.0).to_string();
     }
     let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
     let text = format!("{value:.digits$}");
@@ -188,6 +189,7 @@ mod tests {
     fn lengths_have_three_digits() {
         for (value, text) in [
             (0.0, "0"),
+            (-0.0, "0"),
             (1.0, "1"),
             (-0.5, "-0.5"),
             (1.6694, "1.67"),

@@ -36,7 +36,7 @@ pub struct RenderCommand {
     ///
     /// .png and .jpg are tone-mapped, .exr holds linear light (HDR). Missing folders are created. By default a new file
     /// firstlight-NAME.png in the current folder.
-    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
     render: RenderArgs,
@@ -54,20 +54,20 @@ pub struct RenderArgs {
     #[arg(long, value_enum, help_heading = "Output")]
     pub format: Option<FormatArg>,
     /// Width and height in pixels [default: from the scene].
-    #[arg(help_heading = "Output", long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
     /// Scale width and height.
     #[arg(help_heading = "Output", long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
     /// Samples per pixel, the mean over the image [default: 256, unless --time or --error is given].
-    #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, Film::MAX_SAMPLES))]
     pub spp: Option<u32>,
-    /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
-    #[arg(help_heading = "Films and parts", long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
-    pub samples: Option<Range<u32>>,
-    /// Save the render state (film) as well, for --resume and `firstlight merge`.
-    #[arg(help_heading = "Films and parts", long, value_name = "FILE.exr")]
-    pub film: Option<PathBuf>,
+    /// Stop after this many seconds of rendering.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
+    pub time: Option<f64>,
+    /// Stop when the estimated relative error of the image is at most this: 1% or 0.01.
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
+    pub error: Option<f64>,
     /// Save the estimated relative error of each pixel as an .exr in which 0.05 is 5 %
     ///
     /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole image.
@@ -83,11 +83,6 @@ pub struct RenderArgs {
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = between::<u32>(1, 100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
-    /// Render only a rectangle: left, top, width and height in pixels, enlarged to whole tiles of 32 pixels
-    ///
-    /// Pixels outside of it get one sample, or keep their samples with --resume.
-    #[arg(help_heading = "Films and parts", long, value_name = "X,Y,W,H", value_parser = parse_region, conflicts_with_all = ["turntable", "bookmarks", "samples"])]
-    pub region: Option<[u32; 4]>,
     /// Move the camera through bookmarks of the scene, such as 1,2,3.
     #[arg(help_heading = "Animation", long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
     pub bookmarks: Option<Vec<u8>>,
@@ -102,6 +97,17 @@ pub struct RenderArgs {
     /// Make a video of the frames with ffmpeg, where it is installed; the extension selects the format.
     #[arg(help_heading = "Animation", long, value_name = "FILE.mp4", conflicts_with = "part")]
     pub video: Option<PathBuf>,
+    /// Save the render state (film) as well, for --resume and `firstlight merge`.
+    #[arg(help_heading = "Films and parts", long, value_name = "FILE.exr")]
+    pub film: Option<PathBuf>,
+    /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
+    #[arg(help_heading = "Films and parts", long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
+    pub samples: Option<Range<u32>>,
+    /// Render only a rectangle: left, top, width and height in pixels, enlarged to whole tiles of 32 pixels
+    ///
+    /// Pixels outside of it get one sample, or keep their samples with --resume.
+    #[arg(help_heading = "Films and parts", long, value_name = "X,Y,W,H", value_parser = parse_region, conflicts_with_all = ["turntable", "bookmarks", "samples"])]
+    pub region: Option<[u32; 4]>,
     /// Render one of N equal parts into --film: I/N, such as 3/64, or auto for the task of an array job
     ///
     /// A complete part is skipped, an interrupted one is resumed. {part} in --film is replaced by the number of the part.
@@ -119,40 +125,34 @@ pub struct RenderArgs {
     pub resume: bool,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Stop after this many seconds of rendering.
-    #[arg(help_heading = "When to stop", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
-    pub time: Option<f64>,
-    /// Stop when the estimated relative error of the image is at most this: 1% or 0.01.
-    #[arg(help_heading = "When to stop", long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
-    pub error: Option<f64>,
     /// Take the same number of samples in every pixel [default: more where the error is larger, except with --samples]
     ///
     /// Without this option --spp is the mean over the image.
-    #[arg(help_heading = "Allocation of samples", long, conflicts_with = "error_metric")]
+    #[arg(help_heading = "Rendering", long, conflicts_with = "error_metric")]
     pub uniform: bool,
     /// The error that the allocation of samples minimises [default: relmse].
-    #[arg(help_heading = "Allocation of samples", long, value_enum, value_name = "METRIC", conflicts_with = "samples")]
+    #[arg(help_heading = "Rendering", long, value_enum, value_name = "METRIC", conflicts_with = "samples")]
     pub error_metric: Option<MetricArg>,
     /// Number of worker threads [default: all cores]; the image does not depend on it.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
+    #[arg(help_heading = "Rendering", long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
     pub threads: Option<u16>,
     /// Random seed [default: from the scene, else 0].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
+    #[arg(help_heading = "Rendering", long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
     pub seed: Option<u32>,
     /// Light transport [default: from the scene].
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Rendering", long, value_enum)]
     pub integrator: Option<IntegratorArg>,
     /// Pixel reconstruction filter [default: from the scene].
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Rendering", long, value_enum)]
     pub filter: Option<FilterArg>,
     /// Maximum path length in segments; 1 shows only emitters.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
+    #[arg(help_heading = "Rendering", long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
     pub max_depth: Option<u32>,
     /// Exposure in stops, added to that of the scene; does not affect .exr.
     #[arg(help_heading = "Output", long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]
     pub exposure: f32,
     /// Print times and counts as one line of JSON.
-    #[arg(long, help_heading = "Output")]
+    #[arg(long)]
     pub json: bool,
     /// Printed once the scene has been read.
     #[arg(skip)]

@@ -221,6 +221,9 @@ fn the_program_explains_a_pixel() {
     {
         assert!(text.contains(word), "{word}: {text}");
     }
+    let (_, text, _) = run(&["cornell", "--size", "64x48", "--pixel", "20,45", "--spp", "4"]);
+    assert!(text.contains("shows        `floor`, material `") && text.contains(", front\n"), "{text}");
+    assert!(text.contains(", normal (0, 1, 0)") && !text.contains("no light"), "{text}");
     let (_, text, _) = run(&[&scene[..], &["--json"]].concat());
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     let numbers = |value: &serde_json::Value| -> Vec<f64> {
@@ -238,4 +241,27 @@ fn the_program_explains_a_pixel() {
     assert!(code == Some(2) && errors.contains("the last pixel is 63,47"), "{code:?} {errors}");
     let (code, _, errors) = run(&["cornell", "--pixel", "middle"]);
     assert!(code == Some(2) && errors.contains("X,Y"), "{code:?} {errors}");
+}
+
+/// A closed box that is seen from within, as a model of a room whose lamps are missing.
+#[test]
+fn a_black_pixel_is_named_and_told_to_be_unlit() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = r#"(
+        camera: (eye: (0, 0, 3), look_at: (0, 0, 0), vfov: 40), film: (width: 16, height: 16), environment: constant(1),
+        materials: { "paint": diffuse(albedo: 0.8) },
+        objects: [sphere(name: "shell", center: (0, 0, 0), radius: 4, material: "paint")],
+    )"#;
+    std::fs::write(folder.path().join("closed.ron"), scene).unwrap();
+    let explain = |pixel: &str| {
+        let mut command = Command::cargo_bin("firstlight").unwrap();
+        let args = ["explain", "closed.ron", "--pixel", pixel, "--spp", "8"];
+        String::from_utf8(command.current_dir(folder.path()).args(args).output().unwrap().stdout).unwrap()
+    };
+    let text = explain("8,8");
+    for expected in
+        ["`shell`, material `paint`, back", "at           7 m, ", "no light reaches it: none of 8 samples found any"]
+    {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
 }

@@ -16,3 +16,4 @@ mod report;
 mod said;
 mod terminal;
 mod usage;
+mod warnings;

@@ -41,6 +41,8 @@ fn every_shell_gets_completions_and_every_command_a_manual_page() {
     let (help, _) = does(path, "help");
     let help = String::from_utf8(help).unwrap();
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    // Further lines of a description stand further to the right.
+    let commands = commands.filter(|line| !line.starts_with("   "));
     for command in commands.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help") {
         let page = std::fs::read_to_string(path.join(format!("pages/firstlight-{command}.1")));
         assert!(page.is_ok_and(|page| page.contains(".SH SYNOPSIS")), "{command}");
@@ -55,6 +57,77 @@ fn a_mistyped_command_is_named() {
         assert_eq!(said, "error: unknown command `rendr` (did you mean `render`?)\n", "{line}");
     }
     assert!(refused(folder.path(), "galery").contains("did you mean `gallery`?"));
+}
+
+#[test]
+fn a_second_scene_is_told_and_all_scenes_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let said = refused(path, "cornell gallery");
+    assert!(said.starts_with("error: a window shows one scene, and `gallery` follows `cornell`"), "{said}");
+    assert!(said.contains("firstlight render cornell gallery -o FOLDER"), "{said}");
+    assert_eq!(refused(path, "cornell info"), "error: the command comes first: firstlight info cornell\n");
+    let list = String::from_utf8(does(path, "scenes").0).unwrap();
+    assert!(list.lines().any(|line| line.starts_with("veach-mis ")), "{list}");
+    let json: serde_json::Value = serde_json::from_slice(&does(path, "scenes --json").0).unwrap();
+    assert_eq!(json.as_array().unwrap().len(), list.lines().count());
+}
+
+#[test]
+fn missing_folders_of_an_output_are_created_once_there_is_something_to_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let options = "--size 8x6 --spp 1";
+    does(path, &format!("render cornell {options} -o a/b/one.png --film c/one.exr"));
+    assert!(path.join("a/b/one.png").is_file() && path.join("c/one.exr").is_file());
+    does(path, &format!("render cornell ball {options} -o several/"));
+    assert!(path.join("several/ball.png").is_file());
+    does(path, "save cornell -o scenes/cornell.ron");
+    assert!(path.join("scenes/cornell.ron").is_file());
+    assert!(!run(path, &format!("render none.obj {options} -o nowhere/deep/a.png")).status.success());
+    assert!(!path.join("nowhere").exists());
+}
+
+#[test]
+fn an_image_can_be_a_jpeg() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let line = "render cornell --size 32x24 --spp 4 --exposure 2 -o";
+    does(path, &format!("{line} a.jpg"));
+    does(path, &format!("{line} a.png"));
+    assert!(std::fs::read(path.join("a.jpg")).unwrap().starts_with(&[0xff, 0xd8, 0xff]));
+    let [jpeg, png] = ["a.jpg", "a.png"].map(|name| image::open(path.join(name)).unwrap().into_rgb8());
+    let difference: f64 = jpeg.iter().zip(png.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    assert!(jpeg.dimensions() == (32, 24) && difference / (jpeg.len() as f64) < 10.0, "{difference}");
+    let (bytes, _) = does(path, &format!("{line} - --format jpg"));
+    assert!(bytes == std::fs::read(path.join("a.jpg")).unwrap());
+    let said = String::from_utf8(run(path, "info a.jpg").stderr).unwrap();
+    assert!(said.starts_with("error: a.jpg: "), "{said}");
+}
+
+#[test]
+fn a_colour_of_a_scene_can_be_hexadecimal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = r##"(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), environment: constant("#fff"),
+        materials: { "clay": diffuse(albedo: "#ccbbaa") }, objects: [sphere(center: (0, 0, 0), radius: 1, material: "clay")])"##;
+    std::fs::write(path.join("hex.ron"), scene).unwrap();
+    does(path, "save hex.ron -o numbers.ron");
+    let saved = std::fs::read_to_string(path.join("numbers.ron")).unwrap();
+    assert!(saved.contains("0.6038") && !saved.contains('#'), "{saved}");
+    std::fs::write(path.join("short.ron"), scene.replace("#ccbbaa", "#ccbb")).unwrap();
+    let said = String::from_utf8(run(path, "info short.ron").stderr).unwrap();
+    assert!(said.contains("`#ccbb` is not defined; a colour, where one is expected, is `\"#rgb\"`"), "{said}");
+}
+
+#[test]
+fn the_options_that_most_people_need_come_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = String::from_utf8(does(folder.path(), "render -h").0).unwrap();
+    let at = |word: &str| help.find(word).unwrap_or_else(|| panic!("{word}: {help}"));
+    let common = ["\nOptions:", "--output", "--size", "--spp", "--time", "--error ", "--denoise "].map(at);
+    let others = ["\nScene:", "\nOutput:", "\nRendering:", "\nAnimation:", "\nFilms and parts:"].map(at);
+    assert!(common.is_sorted() && others.is_sorted() && common[common.len() - 1] < others[0], "{help}");
 }
 
 #[test]
@@ -93,7 +166,8 @@ fn several_scenes_in_one_call() {
     }
     let before = std::fs::read_dir(path.join("out")).unwrap().count();
     for (line, why) in [
-        ("render cornell ball -o one.png", "no such folder"),
+        ("render cornell ball -o one.png", "is not a folder"),
+        ("render cornell ball -o new.png", "is not a folder"),
         ("render cornell ball -o out --film out/a.exr", "--film works with one scene only"),
         ("render cornell cornell -o out", "same file"),
         ("render cornell bal -o out", "did you mean `ball`?"),

@@ -51,6 +51,10 @@ fn the_denoised_layer_is_the_denoised_image() {
     let scene = "render cornell --size 24x16 --spp 4";
     does(path, &format!("{scene} -o both.exr --layers denoised --film film.exr"));
     does(path, &format!("{scene} -o denoised.exr --denoise"));
+    // The option adds the layer to others.
+    does(path, &format!("{scene} -o option.exr --layers albedo --denoise"));
+    does(path, &format!("{scene} -o layer.exr --layers albedo,denoised"));
+    assert!(layers_of(&path.join("option.exr")).0 == layers_of(&path.join("layer.exr")).0);
     does(path, &format!("{scene} -o raw.exr"));
     let [both, denoised, raw] = ["both.exr", "denoised.exr", "raw.exr"].map(|name| layers_of(&path.join(name)).0);
     for channel in ["R", "G", "B"] {

@@ -92,6 +92,7 @@ fn every_option_is_described() {
         "work",
         "save",
         "explain",
+        "scenes",
         "simplify",
         "stability",
         "report",
