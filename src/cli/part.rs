@@ -72,6 +72,12 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
         return Err(Failure::Usage(message.to_owned()));
     }
     let path = film_path(args, part)?;
+    // It would be created, but not where the other machines look if a shared file system is not mounted.
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty() && !parent.is_dir());
+    if let Some(parent) = parent {
+        let message = format!("{}: there is no folder {}: create it for all parts", path.display(), parent.display());
+        return Err(Failure::Failed(message).of_part());
+    }
     let mut files = args.overwrite.files();
     let claim = files.go_on(&path).map_err(|error| Failure::from(error).of_part())?;
     let progress = Progress::new();

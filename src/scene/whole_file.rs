@@ -508,7 +508,6 @@ mod tests {
         let plain = folder.path().join("plain");
         std::fs::write(&plain, "").unwrap();
         for (path, expected) in [
-            (folder.path().join("gone/a.txt"), "there is no folder"),
             (plain.join("a.txt"), "is not a folder"),
             (folder.path().to_path_buf(), "is a folder: expected a file name"),
         ] {
@@ -520,6 +519,12 @@ mod tests {
             let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err().to_string();
             assert!(error.contains("no permission to create files in /proc"), "{error}");
         }
+        // Missing folders are created, but not for a check.
+        let new = folder.path().join("new/deep/a.txt");
+        check_writable(&new, Replace::AllButFilms).unwrap();
+        assert!(!folder.path().join("new").exists());
+        write_whole(&new, b"text").unwrap();
+        assert_eq!(std::fs::read(&new).unwrap(), b"text");
         // However deeply a library has wrapped it.
         #[derive(Debug, thiserror::Error)]
         #[error("wrapped")]

@@ -117,7 +117,7 @@ fn a_part_is_told_by_engines_and_wrong_input_is_not_tried_again() {
         (format!("render {film} --part 1/9"), "9 parts of 8 samples"),
         (format!("render {film} --part 1/2 -o a.png"), "omit -o"),
         (format!("render cornell {SMALL} --spp 8 --part 1/2 --film other.exr"), "is not a firstlight film"),
-        (format!("render cornell {SMALL} --spp 8 --part 1/2 --film gone/p.exr"), "no folder"),
+        (format!("render cornell {SMALL} --spp 8 --part 1/2 --film gone/p.exr"), "there is no folder gone"),
         // A film of other samples, of another seed and of another scene.
         (format!("render cornell {SMALL} --spp 8 --part 1/4 --film auto-0002.exr"), "samples 2 to 3 of other parts"),
         (format!("render cornell {SMALL} --spp 8 --seed 7 --part 2/4 --film auto-0002.exr"), "a different seed"),

@@ -229,7 +229,7 @@ fn layers_that_cannot_be_had_are_refused_before_anything_is_rendered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     for (line, expected) in [
-        ("render cornell -o a.png --layers albedo", "a .png has no layers"),
+        ("render cornell -o a.png --layers albedo", "only an .exr has layers"),
         ("render cornell -o a.exr --layers variance,samples", "add albedo, normal, depth or position"),
         ("render cornell -o a.exr --spp 1 --layers error", "at least two samples"),
         ("render cornell -o a.exr --layers colour", "albedo"),
