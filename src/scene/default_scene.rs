@@ -1,26 +1,26 @@
-//! A default scene for a model: ground, environment, key light, and a camera that frames it.
+//! What a model gets that is opened by itself: a camera that frames it, ground, environment, key light.
 
-use super::file::{CameraPart, DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
+use super::file::{DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
+use super::framing::Framing;
 use super::meshes::LoadedMesh;
 use super::orientation::faces_away;
 use super::source::UpAxis;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource};
 use super::up_axis::guess_up;
 use super::value::{ColorValue, Rgb};
-use crate::mesh::Mesh;
 use crate::render::Integrator;
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Names of the parts in a saved scene.
 const CLAY: &str = "clay";
 const KEY_LIGHT: &str = "key light";
 const GROUND: &str = "ground";
 
-fn sky() -> EnvironmentSource {
+fn sky(share: f32) -> EnvironmentSource {
     EnvironmentSource::Gradient {
-        zenith: Rgb(Vec3::new(0.35, 0.5, 0.8)),
-        horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
-        ground: Rgb(Vec3::splat(0.3)),
+        zenith: Rgb(share * Vec3::new(0.35, 0.5, 0.8)),
+        horizon: Rgb(share * Vec3::new(0.85, 0.9, 0.95)),
+        ground: Rgb(share * Vec3::splat(0.3)),
     }
 }
 
@@ -29,8 +29,8 @@ fn ground_material() -> MaterialPart {
 }
 
 /// For a light of the size of the model, five radii away: about three times the irradiance of the sky.
-fn key_material() -> MaterialPart {
-    MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }
+fn key_material(share: f32) -> MaterialPart {
+    MaterialPart::Emissive { radiance: ColorValue::Rgb(share * Vec3::new(26.0, 24.0, 21.0)) }
 }
 
 fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
@@ -58,10 +58,12 @@ fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> Objec
 }
 
 /// Adds an environment and a key light to a scene.
-pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
-    let name = new_material(file, KEY_LIGHT, key_material());
-    file.objects.push(key_light(name, bounds, DVec3::ONE));
-    file.environment = sky();
+///
+/// - `side`: signs of the direction of the front; `share`: of the usual light.
+pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3), side: DVec3, share: f32) {
+    let name = new_material(file, KEY_LIGHT, key_material(share));
+    file.objects.push(key_light(name, bounds, side));
+    file.environment = sky(share);
 }
 
 /// Adds a ground plane below a scene.
@@ -79,91 +81,55 @@ fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> S
     name
 }
 
-/// The scene of a model that is opened by itself.
+/// The scene of a model that is opened by itself, still without light and ground, and the signs of the direction of its
+/// front.
 ///
 /// All sizes derive from the bounding box of the model, so that the unit of the model does not matter. The camera
-/// stands in front of it, with the key light to its side.
-pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspect: f64) -> SceneFile {
+/// stands in front of it.
+pub fn around(
+    loaded: &LoadedMesh,
+    source: &MeshSource,
+    up: Option<UpAxis>,
+    aspect: f64,
+) -> (SceneFile, Framing, DVec3) {
     let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
-    let (min, max) = bounds(&loaded.mesh, up);
-    let transform = match up {
-        UpAxis::Y => TransformPart::default(),
-        UpAxis::Z => TransformPart { rotate: Some(DVec3::new(-90.0, 0.0, 0.0)), ..TransformPart::default() },
+    let (transform, world) = match up {
+        UpAxis::Y => (TransformPart::default(), DAffine3::IDENTITY),
+        UpAxis::Z => {
+            let transform = TransformPart { rotate: Some(DVec3::new(-90.0, 0.0, 0.0)), ..TransformPart::default() };
+            // Exact: (x, y, z) becomes (x, z, -y).
+            (transform, DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)))
+        }
     };
-    let material = |albedo| MaterialPart::Diffuse { albedo };
-    let mut materials = vec![(GROUND.to_owned(), ground_material()), (KEY_LIGHT.to_owned(), key_material())];
-    if loaded.slots.is_empty() {
-        materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
-    }
+    let clay = MaterialPart::Diffuse { albedo: ColorValue::rgb(0.72, 0.56, 0.45) };
+    let has_materials = !loaded.slots.is_empty();
     // Rotated half a turn about the vertical axis if the model faces the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
-    SceneFile {
-        camera: camera(min, max, side, aspect),
+    let mut framing = Framing::new(side, aspect);
+    framing.add(&loaded.mesh, &world);
+    let model = ObjectPart::Mesh {
+        name: Some("model".to_owned()),
+        source: source.clone(),
+        shading: MeshShading::Auto,
+        simplify: None,
+        material: (!has_materials).then(|| CLAY.to_owned()),
+        materials: None,
+        transform,
+    };
+    let file = SceneFile {
+        camera: framing.camera(),
         cameras: Named::default(),
         film: FilmPart::default(),
         integrator: Integrator::default(),
         max_depth: None,
         display: DisplayPart::default(),
-        environment: sky(),
+        environment: EnvironmentSource::Black,
         air: Rgb::default(),
         textures: Named::default(),
-        materials: Named(materials),
-        objects: vec![
-            ObjectPart::Mesh {
-                name: Some("model".to_owned()),
-                source: source.clone(),
-                shading: MeshShading::Auto,
-                simplify: None,
-                material: loaded.slots.is_empty().then(|| CLAY.to_owned()),
-                materials: None,
-                transform,
-            },
-            ground(GROUND.to_owned(), (min, max)),
-            key_light(KEY_LIGHT.to_owned(), (min, max), side),
-        ],
+        materials: Named(if has_materials { Vec::new() } else { vec![(CLAY.to_owned(), clay)] }),
+        objects: vec![model],
         lights: Vec::new(),
         animation: Default::default(),
-    }
-}
-
-/// Removes the key light: the environment lights the model alone.
-pub fn remove_key_light(file: &mut SceneFile) {
-    file.objects.retain(|object| !matches!(object, ObjectPart::Sphere { name: Some(name), .. } if name == KEY_LIGHT));
-    file.materials.0.retain(|(name, _)| name != KEY_LIGHT);
-}
-
-/// A three-quarter view from slightly above, as close as the box allows; `side`: signs of the direction of the front.
-pub fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
-    const VFOV_DEG: f64 = 35.0;
-    /// Margin around the box.
-    const MARGIN: f64 = 1.12;
-    let center = 0.5 * (min + max);
-    let back = side * DVec3::new(0.6, 0.38, 1.0).normalize();
-    let right = DVec3::Y.cross(back).normalize();
-    let up = back.cross(right);
-    let tan_v = (0.5 * VFOV_DEG).to_radians().tan() / MARGIN;
-    let tan_h = tan_v * aspect;
-    // The least distance at which a corner is inside the image; the maximum over all corners.
-    let distance = (0..8)
-        .map(|i| {
-            let corner = DVec3::new(
-                if i & 1 == 0 { min.x } else { max.x },
-                if i & 2 == 0 { min.y } else { max.y },
-                if i & 4 == 0 { min.z } else { max.z },
-            ) - center;
-            corner.dot(back) + (corner.dot(right).abs() / tan_h).max(corner.dot(up).abs() / tan_v)
-        })
-        .fold(SceneFile::MIN_SIZE, f64::max);
-    CameraPart { vfov: VFOV_DEG, ..CameraPart::looking_at(center + distance * back, center) }
-}
-
-/// The bounding box of the model, metres, rotated so that `up` points along +Y.
-fn bounds(mesh: &Mesh, up: UpAxis) -> (DVec3, DVec3) {
-    let used = mesh.triangles.iter().flatten().map(|&v| mesh.positions[v as usize].as_dvec3() + mesh.center);
-    let (min, max) =
-        used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), point| (min.min(point), max.max(point)));
-    match up {
-        UpAxis::Y => (min, max),
-        UpAxis::Z => (DVec3::new(min.x, min.z, -max.y), DVec3::new(max.x, max.z, -min.y)),
-    }
+    };
+    (file, framing, side)
 }

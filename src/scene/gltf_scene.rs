@@ -1,20 +1,20 @@
 //! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file.
 //!
-//! What the file lacks is added as for other models ([`super::default_scene`]): an environment and a key light if it has no
-//! light, a camera if it has none, and a ground if it has neither.
+//! A camera that the file lacks is added as for other models ([`super::framing`]); light and ground are added later
+//! ([`super::model_light`]).
 
 use super::choice::ModelChoice;
-use super::default_scene;
 use super::documents::{Documents, Opened};
 use super::error::{SceneError, suggestion};
 use super::file::{CameraPart, FilmPart, LightPart, Named, ObjectPart, SceneFile};
+use super::framing::Framing;
 use super::gltf::{BuiltMesh, GltfFacts, GltfProblem, Located, PlacedLight};
 use super::gltf_motion::GltfMotion;
-use super::gltf_parts::{camera_of, corners_of, extend, is_placement, light_of, transform};
+use super::gltf_parts::{camera_of, corners_of, is_placement, light_of, transform};
 use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
-use super::warnings::{Warning, Warnings};
+use super::warnings::Warnings;
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -28,6 +28,12 @@ pub(super) struct Generated {
     pub warnings: Warnings,
     /// Where a moment was asked for.
     pub motion: Option<GltfMotion>,
+    /// Of all objects.
+    pub framing: Framing,
+    /// Whether a material emits light.
+    pub emits: bool,
+    /// Whether the camera is one of the file.
+    pub has_camera: bool,
 }
 
 /// Options of the scene.
@@ -37,8 +43,6 @@ pub(super) struct Wish<'a> {
     pub choice: &'a ModelChoice,
     /// Width over height of the image.
     pub aspect: f64,
-    /// Whether an image replaces the environment.
-    pub is_lit: bool,
 }
 
 /// Makes the scene of the file at `path`.
@@ -81,7 +85,7 @@ impl Maker<'_> {
 
         let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
         let mut shown = Vec::new();
-        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut framing = Framing::new(DVec3::ONE, self.wish.aspect);
         let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
             let at = placed.key.node.and(choice.at);
@@ -104,9 +108,8 @@ impl Maker<'_> {
                 warnings.push(self.told(&format!("`{name}` is flattened or too far away, and is left out")));
                 continue;
             }
-            let corners = corners_of(mesh);
-            extend(&mut bounds, corners, &placed.world);
-            shown.push((i, corners));
+            framing.add(&mesh.mesh, &placed.world);
+            shown.push((i, corners_of(mesh)));
             let names: Vec<String> = (mesh.keys.iter())
                 .map(|key| {
                     let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
@@ -145,15 +148,13 @@ impl Maker<'_> {
             warnings.push(self.told(&format!("extensions that are not modelled: {}", unknown.join(", "))));
         }
 
-        let center = 0.5 * (bounds.0 + bounds.1);
+        let (min, max) = framing.bounds();
+        let center = 0.5 * (min + max);
         let of_file = assembly.cameras.iter();
         let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), camera_of(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;
-        let has_light = !assembly.lights.is_empty() || emits;
-        let mut file = SceneFile {
-            camera: chosen
-                .cloned()
-                .unwrap_or_else(|| default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)),
+        let file = SceneFile {
+            camera: chosen.cloned().unwrap_or_else(|| framing.camera()),
             cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
             film: FilmPart::default(),
             integrator: crate::render::Integrator::default(),
@@ -167,13 +168,6 @@ impl Maker<'_> {
             lights: self.lights(&assembly.lights, &mut warnings),
             animation: Default::default(),
         };
-        if !has_light && !self.wish.is_lit {
-            warnings.push(Warning::notice(self.told("has no light: an environment and a key light are added")));
-            default_scene::light(&mut file, bounds);
-        }
-        if !has_light && chosen.is_none() {
-            default_scene::stand_on_ground(&mut file, bounds);
-        }
         file.check().map_err(|error| SceneError::in_file(self.path, error.to_string()))?;
         let motion = match facts.animation_length.filter(|_| choice.at.is_some()) {
             None => None,
@@ -187,7 +181,8 @@ impl Maker<'_> {
                 Some(GltfMotion { opened: self.opened.clone(), objects, boxes, lights, camera, moved, length })
             }
         };
-        Ok(Generated { file, facts, warnings, motion })
+        let has_camera = chosen.is_some();
+        Ok(Generated { file, facts, warnings, motion, framing, emits, has_camera })
     }
 
     fn told(&self, what: &str) -> String {

@@ -15,6 +15,8 @@ use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::model::ModelFormat;
+use super::model_light::{Model, light_model};
+use super::own_materials::emits;
 use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -53,6 +55,10 @@ impl LoadOptions<'_> {
         self.choice.unwrap_or(&ModelChoice::DEFAULT)
     }
 
+    fn aspect(&self) -> f64 {
+        self.aspect.unwrap_or(16.0 / 9.0)
+    }
+
     fn say(&self, text: &str) {
         if let Some(progress) = self.progress {
             progress(text);
@@ -71,6 +77,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     options.say(&format!("loading {}", source.title()));
     let start = Instant::now();
     let documents = Documents::new(options.choice().allow_outside);
+    let mut model = None;
     let mut scene = match source {
         SceneSource::Builtin(name) => {
             let text = builtin_text(name).ok_or_else(|| {
@@ -87,18 +94,15 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
         SceneSource::Model(path) if ModelFormat::of(path) == Some(ModelFormat::Gltf) => {
             let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-            let wish = gltf_scene::Wish {
-                file: &file,
-                choice: options.choice(),
-                aspect: options.aspect.unwrap_or(16.0 / 9.0),
-                is_lit: options.environment.is_some(),
-            };
+            let wish = gltf_scene::Wish { file: &file, choice: options.choice(), aspect: options.aspect() };
             let made = gltf_scene::generate(&documents, path, &wish)?;
             let mut scene = resolve(source, made.file, None, folder, options, &documents)?;
             let of_objects = std::mem::replace(&mut scene.warnings, made.warnings);
             scene.warnings.append(&of_objects);
             scene.facts = Some(made.facts);
             scene.motion = made.motion.map(Arc::new);
+            let (bounds, has_camera) = (made.framing.bounds(), made.has_camera);
+            model = Some(Model { bounds, side: DVec3::ONE, emits: made.emits, has_camera, aspect: options.aspect() });
             scene
         }
         SceneSource::Model(path) => {
@@ -108,11 +112,10 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
             let mesh =
                 kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
-            let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
-            if options.environment.is_some() {
-                // The image contains its own light sources.
-                default_scene::remove_key_light(&mut file);
-            }
+            let (file, framing, side) = default_scene::around(&mesh, &mesh_source, options.up, options.aspect());
+            let emits = mesh.slots.iter().any(|(_, part)| emits(part));
+            let bounds = framing.bounds();
+            model = Some(Model { bounds, side, emits, has_camera: false, aspect: options.aspect() });
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();
@@ -137,6 +140,9 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     let start = Instant::now();
     scene.build_trees(options)?;
     scene.build_seconds = start.elapsed().as_secs_f64();
+    if let Some(model) = model {
+        light_model(&mut scene, &model);
+    }
     Ok(scene)
 }
 

@@ -6,6 +6,7 @@ use super::sources::TextureSource;
 use super::value::{ColorValue, ScalarValue};
 use crate::render::{MapParams, Material, Param};
 use bevy_ecs::prelude::Entity;
+use glam::Vec3;
 use std::collections::HashMap;
 
 /// The material with a plain value for each missing texture; a warning has been given for those.
@@ -44,6 +45,12 @@ pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str)
         }
     }
     part
+}
+
+/// Whether a material is a light.
+pub(super) fn emits(part: &MaterialPart) -> bool {
+    let params = part.params();
+    params.iter().any(|(_, param)| matches!(param, Param::Radiance(color) if **color != ColorValue::Rgb(Vec3::ZERO)))
 }
 
 /// Names of the textures of a material.

@@ -499,13 +499,9 @@ fn cameras_are_chosen_by_name() {
 }
 
 #[test]
-fn light_is_added_only_where_there_is_none() {
+fn lights_of_the_file_are_those_of_the_scene() {
     let mut writer = Writer::default();
     quad(&mut writer);
-    let bare = opened(&writer.glb());
-    assert!(matches!(bare.file.environment, EnvironmentSource::Gradient { .. }));
-    assert!(bare.file.objects.iter().any(|object| matches!(object, ObjectPart::Plane { .. })));
-    assert!(bare.warnings.iter().any(|warning| warning.contains("has no light")));
     let punctual = json!({ "lights": [
         { "type": "spot", "intensity": 3.0, "color": [1, 0.5, 0], "spot": { "innerConeAngle": 0.2, "outerConeAngle": 0.4 } },
         { "type": "directional", "intensity": 2.0, "name": "sun" },
@@ -533,7 +529,7 @@ fn light_is_added_only_where_there_is_none() {
     assert!((inner_angle - 0.2_f64.to_degrees()).abs() < 1e-12 && (outer_angle - 0.4_f64.to_degrees()).abs() < 1e-12);
     assert_eq!((name.as_deref(), *sun, irradiance.0), (Some("sun"), DVec3::NEG_Z, Vec3::splat(2.0)));
     assert_eq!((*radius, bulb.0), (0.0, Vec3::splat(4.0)));
-    // Something that glows is a light as well.
+    // What emits is a part of the material.
     let mut writer = Writer::default();
     quad(&mut writer);
     writer.json["materials"] = json!([{ "emissiveFactor": [1, 1, 1], "extensions": {
@@ -541,7 +537,6 @@ fn light_is_added_only_where_there_is_none() {
     } }]);
     writer.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     let glowing = opened(&writer.glb());
-    assert_eq!(glowing.file.environment, EnvironmentSource::Black);
     let Some((_, MaterialPart::Principled { emission, .. })) = glowing.file.materials.iter().next() else {
         panic!("a principled material")
     };

@@ -32,6 +32,7 @@ pub(in crate::scene) struct Surface {
     pub part: MaterialPart,
     /// Unsupported features.
     pub notes: Vec<String>,
+    /// Whether it is a light; an unlit material shows its color alone.
     pub emits: bool,
     /// Whether it has an occlusion map, which path tracing does not need.
     pub has_occlusion: bool,
@@ -219,7 +220,7 @@ impl Document {
                 name: names.free(&wanted),
                 part,
                 notes,
-                emits: material.emission != Vec3::ZERO || material.unlit,
+                emits: material.emission != Vec3::ZERO && !material.unlit,
                 has_occlusion: material.has_occlusion,
             });
         }

@@ -1,0 +1,174 @@
+//! Light for a model that is opened by itself: that of its file where it is enough to see the model by, and generated
+//! light where it is not.
+//!
+//! What the file brings is measured, not guessed: a small image is rendered in its light alone, and divided by the albedo
+//! of what it shows. That is how bright a white surface would be there, so dark models are not taken for unlit ones. The
+//! result is a function of model and camera.
+
+use super::default_scene;
+use super::extract::Extraction;
+use super::file::DisplayPart;
+use super::inputs::SceneInputs;
+use super::loaded::LoadedScene;
+use super::sources::EnvironmentSource;
+use super::warnings::Warning;
+use crate::render::{Film, RenderSettings, Techniques, advance, gather_features};
+use bevy_ecs::world::World;
+use glam::{DVec3, UVec2, Vec3};
+
+/// What the model brings.
+pub(super) struct Model {
+    /// Corners of its box, metres.
+    pub bounds: (DVec3, DVec3),
+    /// Signs of the direction of its front.
+    pub side: DVec3,
+    /// Whether it has emissive materials; unlit ones, which show a color without light, do not count.
+    pub emits: bool,
+    /// Whether the camera is that of the file: then the file is a scene, which stands on a ground of its own.
+    pub has_camera: bool,
+    /// Width over height of the image.
+    pub aspect: f64,
+}
+
+/// The light on the surfaces that the camera sees: radiance of a white surface in their place, W·m⁻²·sr⁻¹, 1 being the
+/// white of the display; ascending, not empty.
+#[derive(Clone, Debug)]
+struct Light(Vec<f32>);
+
+impl Light {
+    /// Medians outside of this range call for another exposure.
+    const USUAL: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+    /// The median after it.
+    const EXPOSED: f64 = 1.0;
+    /// Lights that would need a longer exposure, in stops, do not matter.
+    const LONGEST: f64 = 6.0;
+    /// Share of the surfaces below which light does not reach the model.
+    const REACHED: f64 = 0.05;
+    /// Mean brightness of a model that can be seen by emitters alone, and by lights, of which shadows are expected.
+    const BRIGHT: f64 = 0.35;
+    const SHADED: f64 = 0.15;
+
+    /// Those that get any light.
+    fn lit(&self) -> &[f32] {
+        &self.0[self.0.partition_point(|level| *level == 0.0)..]
+    }
+
+    fn reaches(&self) -> bool {
+        self.lit().len() as f64 >= Self::REACHED * self.0.len() as f64
+    }
+
+    /// Mean of what the display shows of a white surface, at an exposure in stops.
+    fn mean(&self, stops: f64) -> f64 {
+        let shown = |level: &f32| (f64::from(*level) * stops.exp2()).min(1.0);
+        self.0.iter().map(shown).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// Exposure that shows this light, in half stops; 0 where the usual one does.
+    fn exposure(&self) -> f64 {
+        let lit = self.lit();
+        let median = lit.get(lit.len() / 2).map_or(0.0, |level| f64::from(*level));
+        if !self.reaches() || Self::USUAL.contains(&median) {
+            return 0.0;
+        }
+        let stops = (2.0 * (Self::EXPOSED / median).log2()).round() / 2.0;
+        stops.min(Self::LONGEST)
+    }
+
+    /// Whether the model can be seen by it: by lights at their exposure, by emitters as they are.
+    fn is_enough(&self, has_lights: bool) -> bool {
+        (has_lights && self.mean(self.exposure()) >= Self::SHADED) || self.mean(0.0) >= Self::BRIGHT
+    }
+
+    /// Share of the generated light beside emitters of this light, so that they still glow.
+    fn dimming(&self) -> f32 {
+        /// In this light and more, it is a third.
+        const BRIGHT: f64 = 0.1;
+        (1.0 - 2.0 / 3.0 * (self.mean(0.0) / BRIGHT).min(1.0)) as f32
+    }
+}
+
+/// Adds what the scene of a model lacks: environment, key light and ground, and sets the exposure of physical lights.
+/// An environment that was chosen stays as it is.
+pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
+    let has_lights = !scene.file.lights.is_empty();
+    let brings_light = has_lights || model.emits;
+    let own = if brings_light {
+        let chosen = std::mem::replace(&mut scene.file.environment, EnvironmentSource::Black);
+        let own = measure(scene, model.aspect);
+        scene.file.environment = chosen;
+        own
+    } else {
+        None
+    };
+    let title = scene.source.title();
+    let is_enough = own.as_ref().is_some_and(|own| own.is_enough(has_lights));
+    if !is_enough {
+        if !model.has_camera {
+            default_scene::stand_on_ground(&mut scene.file, model.bounds);
+        }
+        if scene.environment.is_none() {
+            let reason = if brings_light { "its own light is too weak or does not reach it" } else { "has no light" };
+            let text = format!("{title}: {reason}: an environment and a key light are added");
+            scene.warnings.push(Warning::notice(text));
+            let share = own.as_ref().filter(|_| model.emits).map_or(1.0, Light::dimming);
+            default_scene::light(&mut scene.file, model.bounds, model.side, share);
+        }
+        scene.meshes.resize(scene.file.objects.len(), None);
+        scene.balls.resize(scene.file.objects.len(), None);
+    }
+    if !brings_light && !model.has_camera {
+        return;
+    }
+    let Some(light) = own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
+    else {
+        return;
+    };
+    if !light.reaches() {
+        scene.warnings.push(format!(
+            "{title}: hardly any light reaches what the camera sees, which is enclosed or faces away: choose another view, \
+             or add a light"
+        ));
+    }
+    let exposure = light.exposure();
+    if exposure != 0.0 {
+        let text = format!("{title}: the exposure is set to {exposure:+} stops, for the level of its light");
+        scene.warnings.push(Warning::notice(text));
+        scene.file.display = DisplayPart { exposure: exposure as f32, ..scene.file.display };
+    }
+}
+
+/// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
+fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
+    /// Pixels of the image.
+    const PIXELS: f64 = 2304.0;
+    const SAMPLES: u32 = 8;
+    /// Segments of paths: light that was reflected three times.
+    const DEPTH: u32 = 5;
+    /// What is darker may be noise of its texture.
+    const LEAST_ALBEDO: f32 = 0.05;
+
+    let mut world = World::new();
+    scene.spawn(&mut world);
+    let scene = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
+    let width = (PIXELS * aspect).sqrt().clamp(8.0, PIXELS / 8.0).round();
+    let size = UVec2::new(width as u32, (PIXELS / width).round() as u32);
+    let settings = |max_depth| {
+        let techniques = Techniques { caustics: false, ..Techniques::ALL };
+        RenderSettings { max_depth, techniques, ..RenderSettings::default() }
+    };
+    let image = |max_depth| {
+        let mut film = Film::new(size.x, size.y);
+        advance(&scene, &settings(max_depth), &mut film, SAMPLES, &|| false);
+        film.means()
+    };
+    let (all, emitted) = (image(DEPTH), image(1));
+    let surfaces = gather_features(&scene, &settings(DEPTH), size, SAMPLES, &|| false)?;
+    let level = |color: Vec3| color.element_sum() / 3.0;
+    let reflects = |&i: &usize| surfaces.coverage[i] == 1.0 && level(emitted[i]) == 0.0;
+    let mut levels: Vec<f32> = (0..all.len())
+        .filter(reflects)
+        .map(|i| level(all[i] - emitted[i]).max(0.0) / level(surfaces.albedo[i]).max(LEAST_ALBEDO))
+        .collect();
+    levels.sort_by(f32::total_cmp);
+    (!levels.is_empty()).then_some(Light(levels))
+}
