@@ -6,7 +6,7 @@ use super::limits::Limits;
 use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub enum PictureError {
     #[error("{0}")]
     Model(String),
     /// Not a supported image format.
-    #[error("unsupported image format: use PNG, JPEG, WebP, HDR or EXR")]
+    #[error("unsupported image format: use PNG, JPEG, WebP, BMP, TGA, TIFF, GIF, DDS, PNM, HDR or EXR")]
     Format,
     /// The image has more pixels than the limits allow.
     #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
@@ -49,8 +49,8 @@ impl From<PictureError> for String {
     }
 }
 
-/// Reads PNG, JPEG, WebP, HDR or EXR, each in its own bit depth. Also returns a warning if invalid values were
-/// replaced.
+/// Reads PNG, JPEG, WebP, BMP, TGA, TIFF, GIF (its first image), DDS (DXT1 to DXT5), PNM, HDR or EXR, each in its own bit
+/// depth. Also returns a warning if invalid values were replaced.
 ///
 /// # Errors
 /// Like [`read_picture_within`].
@@ -114,7 +114,40 @@ pub(crate) fn texels_of(picture: DynamicImage) -> (Texels, usize) {
     (texels, 0)
 }
 
-/// A reader for an image whose format is detected from its first bytes; nothing is decoded yet.
+/// Alpha of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Alpha {
+    /// The image has none.
+    Missing,
+    /// The same everywhere: it says nothing.
+    Uniform,
+    /// It differs from pixel to pixel.
+    Varies,
+}
+
+/// Whether alpha of an image says anything, for maps that do not tell their channel. Decodes images with alpha.
+///
+/// # Errors
+/// Like [`read_picture`].
+pub(super) fn alpha_of(path: &Path) -> Result<Alpha, PictureError> {
+    let limits = Limits::of_this_process();
+    let reader = picture_reader(path, &limits)?;
+    if matches!(reader.format(), None | Some(ImageFormat::Hdr)) {
+        return Ok(Alpha::Missing);
+    }
+    let decoder = reader.into_decoder()?;
+    if !decoder.color_type().has_alpha() {
+        return Ok(Alpha::Missing);
+    }
+    let picture = decode_within(decoder, &limits)?;
+    let pixels = picture.into_luma_alpha16();
+    let mut alphas = pixels.pixels().map(|pixel| pixel.0[1]);
+    let first = alphas.next();
+    Ok(if alphas.all(|alpha| Some(alpha) == first) { Alpha::Uniform } else { Alpha::Varies })
+}
+
+/// A reader for an image whose format is detected from its first bytes, or from the extension for TGA, which has no
+/// signature; nothing is decoded yet.
 pub(crate) fn picture_reader(
     path: &Path,
     limits: &Limits,
@@ -122,6 +155,9 @@ pub(crate) fn picture_reader(
     let file = InputFile::open_within(path, FileKind::Image, FileKind::Image.limit(limits));
     let mut reader =
         file.and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(ReadError::from))?;
+    if reader.format().is_none() && path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tga")) {
+        reader.set_format(ImageFormat::Tga);
+    }
     reader.limits(limits_of_decoder(limits));
     Ok(reader)
 }
@@ -142,7 +178,7 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<DynamicImage, PictureError> {
-    if reader.format().is_some_and(|format| format != image::ImageFormat::Hdr) {
+    if reader.format().is_some_and(|format| format != ImageFormat::Hdr) {
         return decode_within(reader.into_decoder()?, limits);
     }
     let mut bytes = reader.into_inner();
@@ -207,6 +243,45 @@ mod tests {
         assert!(read_picture_within(&path, &Limits { picture_pixels: 4000, ..limits }).is_ok());
         #[cfg(unix)]
         assert!(read_picture(Path::new("/dev/zero")).unwrap_err().to_string().contains("not a regular file"));
+    }
+
+    #[test]
+    fn formats_of_models_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let pixels = image::RgbImage::from_raw(2, 1, vec![255, 0, 0, 0, 0, 255]).unwrap();
+        for name in ["a.bmp", "a.tga", "A.TGA", "a.tiff", "a.gif", "a.ppm"] {
+            let path = dir.path().join(name);
+            DynamicImage::from(pixels.clone()).save(&path).unwrap();
+            let (picture, warning) = read_picture(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!([picture.linear(0), picture.linear(1)], [Vec3::X, Vec3::Z], "{name}");
+            assert_eq!((picture.width, picture.height, warning), (2, 1, None));
+            let limits = Limits { picture_pixels: 1, ..Limits::USUAL };
+            let error = read_picture_within(&path, &limits).unwrap_err().to_string();
+            assert!(error.contains("2 x 1") || error.contains("limit"), "{name}: {error}");
+        }
+        // 4 x 4 pixels of DXT1: one block of two colours of 16 bits, and two bits per pixel.
+        let mut dds = [0_u32; 32];
+        (dds[0], dds[1], dds[2], dds[3], dds[4]) = (u32::from_le_bytes(*b"DDS "), 124, 0x1007, 4, 4);
+        (dds[19], dds[20], dds[21], dds[27]) = (32, 4, u32::from_le_bytes(*b"DXT1"), 0x1000);
+        let mut bytes: Vec<u8> = dds.iter().flat_map(|word| word.to_le_bytes()).collect();
+        bytes.extend([0x00, 0xf8, 0x1f, 0x00, 0, 0, 0, 0]);
+        std::fs::write(dir.path().join("a.dds"), bytes).unwrap();
+        let (picture, _) = read_picture(&dir.path().join("a.dds")).unwrap();
+        assert_eq!((picture.width, picture.linear(15)), (4, Vec3::X));
+    }
+
+    #[test]
+    fn alpha_counts_where_it_varies() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let alpha = |pixels: Vec<u8>| {
+            image::GrayAlphaImage::from_raw(2, 1, pixels).unwrap().save(&path).unwrap();
+            alpha_of(&path).unwrap()
+        };
+        assert_eq!([alpha(vec![9, 255, 7, 255]), alpha(vec![9, 0, 9, 255])], [Alpha::Uniform, Alpha::Varies]);
+        image::GrayImage::new(2, 1).save(&path).unwrap();
+        assert_eq!(alpha_of(&path).unwrap(), Alpha::Missing);
+        assert!(alpha_of(&dir.path().join("none.png")).is_err());
     }
 
     #[test]
