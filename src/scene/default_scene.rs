@@ -6,7 +6,7 @@ use super::meshes::LoadedMesh;
 use super::orientation::faces_away;
 use super::source::UpAxis;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource};
-use super::up_axis::guess_up;
+use super::up_axis::{guess_up, guess_up_of_obj};
 use super::value::{ColorValue, Rgb};
 use crate::render::Integrator;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -92,7 +92,10 @@ pub fn around(
     up: Option<UpAxis>,
     aspect: f64,
 ) -> (SceneFile, Framing, DVec3) {
-    let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
+    let up = up.unwrap_or_else(|| match source {
+        MeshSource::Obj(_) => guess_up_of_obj(&loaded.mesh),
+        _ => guess_up(&loaded.mesh),
+    });
     let (transform, world) = match up {
         UpAxis::Y => (TransformPart::default(), DAffine3::IDENTITY),
         UpAxis::Z => {

@@ -4,25 +4,48 @@ use super::source::UpAxis;
 use crate::mesh::Mesh;
 use glam::{DVec2, DVec3};
 
-/// Y, as in most OBJ files, unless the model would tip over that way and stands on its lower Z side.
+/// For formats of either axis (PLY, STL): Y, unless the model would tip over that way and stands on its lower Z side.
 ///
 /// A model stands if the centroid of its surface is above the convex hull of its lowest 2 %. For Z, this hull must also
 /// have more than twice the relative area of that of Y.
 pub fn guess_up(mesh: &Mesh) -> UpAxis {
-    let corners: Vec<DVec3> =
-        mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
-    let Some(center) = surface_center(&corners) else { return UpAxis::Y };
-    let (min, max) = corners.iter().fold((center, center), |(min, max), &corner| (min.min(corner), max.max(corner)));
-    let stand = |axis: usize| {
-        let seen_from_below = |point: DVec3| DVec2::new(point[(axis + 1) % 3], point[(axis + 2) % 3]);
-        let level = min[axis] + 0.02 * (max[axis] - min[axis]);
-        let lowest = corners.iter().filter(|corner| corner[axis] <= level);
-        let hull = convex_hull(lowest.map(|&corner| seen_from_below(corner)).collect());
-        let size = seen_from_below(max - min);
-        Stand { stable: contains(&hull, seen_from_below(center)), support: area(&hull) / (size.x * size.y) }
-    };
-    let (on_y, on_z) = (stand(1), stand(2));
+    let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
+    let (on_y, on_z) = (model.stand(1, Side::Lower), model.stand(2, Side::Lower));
     if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// For OBJ, a format of Y up: Z only for a tall model with a broad base, such as a bust, that would tip over on all other
+/// sides along Y and Z.
+pub fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
+    const BROAD: f64 = 0.25;
+    const POINTED: f64 = 0.02;
+    let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
+    let size = model.max - model.min;
+    let has_no_base = |stand: Stand| !stand.stable && stand.support < POINTED;
+    let base = model.stand(2, Side::Lower);
+    let is_sure = size.z >= size.x.max(size.y)
+        && base.stable
+        && base.support >= BROAD
+        && !model.stand(2, Side::Upper).stable
+        && has_no_base(model.stand(1, Side::Lower))
+        && has_no_base(model.stand(1, Side::Upper));
+    if is_sure { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// What is needed to stand a model on its sides.
+struct Stands {
+    corners: Vec<DVec3>,
+    /// Centroid of the surface.
+    center: DVec3,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// The end of an axis that is below.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Lower,
+    Upper,
 }
 
 /// Stability of a model on one of its sides.
@@ -30,6 +53,31 @@ struct Stand {
     stable: bool,
     /// Area of the hull of the lowest points over the area of the floor of the bounding box.
     support: f64,
+}
+
+impl Stands {
+    /// `None` if the surface has no area.
+    fn of(mesh: &Mesh) -> Option<Self> {
+        let corners: Vec<DVec3> =
+            mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
+        let center = surface_center(&corners)?;
+        let (min, max) =
+            corners.iter().fold((center, center), |(min, max), &corner| (min.min(corner), max.max(corner)));
+        Some(Self { corners, center, min, max })
+    }
+
+    fn stand(&self, axis: usize, side: Side) -> Stand {
+        let seen_from_below = |point: DVec3| DVec2::new(point[(axis + 1) % 3], point[(axis + 2) % 3]);
+        let margin = 0.02 * (self.max[axis] - self.min[axis]);
+        let is_lowest = |corner: &&DVec3| match side {
+            Side::Lower => corner[axis] <= self.min[axis] + margin,
+            Side::Upper => corner[axis] >= self.max[axis] - margin,
+        };
+        let lowest = self.corners.iter().filter(is_lowest);
+        let hull = convex_hull(lowest.map(|&corner| seen_from_below(corner)).collect());
+        let size = seen_from_below(self.max - self.min);
+        Stand { stable: contains(&hull, seen_from_below(self.center)), support: area(&hull) / (size.x * size.y) }
+    }
 }
 
 /// The centroid of the surface; `None` if its area is 0.
@@ -107,6 +155,23 @@ mod tests {
     fn a_table_stands_on_its_legs() {
         assert_eq!(guess_up(&table(UpAxis::Y)), UpAxis::Y);
         assert_eq!(guess_up(&table(UpAxis::Z)), UpAxis::Z);
+    }
+
+    /// A cone on a base along +Z, with a tip that leans towards +Y.
+    fn bust(height: f64) -> Mesh {
+        let ring = (0..16).map(|i| DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 16.0).extend(0.0));
+        let positions: Vec<DVec3> = ring.chain([DVec3::new(0.0, 1.2, height), DVec3::ZERO]).collect();
+        let sides = (0..16).flat_map(|i| [[i, (i + 1) % 16, 16], [(i + 1) % 16, i, 17]]);
+        Mesh::from_f64(&positions, sides.collect()).unwrap()
+    }
+
+    #[test]
+    fn obj_is_y_up_unless_the_model_can_stand_on_nothing_else() {
+        assert_eq!(guess_up_of_obj(&bust(3.0)), UpAxis::Z);
+        assert_eq!(guess_up_of_obj(&bust(1.0)), UpAxis::Y, "a relief with a flat back");
+        for mesh in [table(UpAxis::Y), table(UpAxis::Z), crate::mesh::procedural::cuboid(DVec3::new(1.0, 1.0, 3.0))] {
+            assert_eq!(guess_up_of_obj(&mesh), UpAxis::Y);
+        }
     }
 
     #[test]
