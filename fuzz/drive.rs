@@ -78,8 +78,11 @@ pub fn gltf(bytes: &[u8]) {
     let path = write(if bytes.starts_with(b"glTF") { "fuzz.glb" } else { "fuzz.gltf" }, bytes);
     read_model(&path, ModelFormat::Gltf);
     let choice = ModelChoice { at: Some(0.4), ..ModelChoice::default() };
-    let options = LoadOptions { choice: Some(&choice), hasty: true, ..LoadOptions::default() };
-    match load(&SceneSource::Model(path), &options) {
+    open_model(path, Some(&choice));
+}
+
+fn open_model(path: PathBuf, choice: Option<&ModelChoice>) {
+    match load(&SceneSource::Model(path), &LoadOptions { choice, hasty: true, ..LoadOptions::default() }) {
         Ok(scene) => {
             scene.file.check().expect("a scene that was made is sound");
             scene.spawn(&mut World::new());
@@ -88,10 +91,13 @@ pub fn gltf(bytes: &[u8]) {
     }
 }
 
+/// The library, and the materials that are made of it.
 pub fn mtl(bytes: &[u8]) {
     write("fuzz.mtl", bytes);
     let text = b"mtllib fuzz.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 2\n";
-    read_model(&write("with-fuzz.obj", text), ModelFormat::Obj);
+    let path = write("with-fuzz.obj", text);
+    read_model(&path, ModelFormat::Obj);
+    open_model(path, None);
 }
 
 pub fn scene(bytes: &[u8]) {

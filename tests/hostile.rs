@@ -175,7 +175,7 @@ fn gltf_models() {
 
 #[test]
 fn material_libraries() {
-    assault("mtl", drive::mtl, 2000, MIB, 64);
+    assault("mtl", drive::mtl, 2000, 16 * MIB, 64);
 }
 
 #[test]

@@ -55,6 +55,9 @@ pub enum ReadError {
         /// The first invalid line, counted from 1.
         line: usize,
     },
+    /// The file stands for one in Git Large File Storage that was not downloaded.
+    #[error("is a Git LFS pointer, not the file itself: run `git lfs pull`")]
+    LfsPointer,
     /// Reading took longer than the deadline.
     #[error("cannot be read: reading took longer than {} s", DEADLINE.as_secs())]
     TooSlow,
@@ -95,6 +98,9 @@ pub(super) fn may_pass(kind: ErrorKind) -> bool {
 
 /// Longer reads mean a hanging file system or device.
 const DEADLINE: Duration = Duration::from_secs(600);
+
+/// First bytes of Git LFS pointers of all versions of their specification.
+const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
 
 /// Bytes between two checks of the deadline and of `stop`.
 const PORTION: usize = 1 << 20;
@@ -164,12 +170,21 @@ impl InputFile<'static> {
             // If it has become a pipe, opening does not wait for a writer.
             options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
         }
-        let file = options.open(path).map_err(ReadError::Io)?;
+        let mut file = options.open(path).map_err(ReadError::Io)?;
         let info = file.metadata().map_err(ReadError::Io)?;
         check_regular(&info)?;
         let length = info.len();
         if length > limit {
             return Err(ReadError::TooLong { kind, limit });
+        }
+        // Pointers are short, so that other files are not read twice.
+        if (1..1024).contains(&length) {
+            let mut start = Vec::new();
+            (&mut file).take(LFS_POINTER.len() as u64).read_to_end(&mut start).map_err(ReadError::Io)?;
+            file.rewind().map_err(ReadError::Io)?;
+            if start == LFS_POINTER {
+                return Err(ReadError::LfsPointer);
+            }
         }
         Ok(Self { file, kind, limit, length, position: 0, until: Instant::now() + DEADLINE, stop: None })
     }
@@ -344,6 +359,16 @@ mod tests {
             opened.seek(SeekFrom::Start(0)).unwrap();
             assert_eq!(opened.read_to_end(&mut Vec::new()).unwrap(), 101);
         }
+    }
+
+    #[test]
+    fn pointers_of_git_lfs_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12\n").unwrap();
+        assert!(says(InputFile::open(&path, FileKind::Model)).contains("run `git lfs pull`"));
+        std::fs::write(&path, "version https://git-lfs.git").unwrap();
+        assert_eq!(InputFile::open(&path, FileKind::Model).unwrap().bytes().unwrap().len(), 27);
     }
 
     #[test]

@@ -6,16 +6,14 @@ use super::file::MaterialPart;
 use super::gltf::MeshKey;
 use super::gltf_mesh::GltfMesh;
 use super::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
-use super::obj::{ImportedMaterial, PbrMaterial};
+use super::mtl_material::MtlMaterials;
+use super::obj::ImportedMaterial;
 use super::relative::text_to_path;
 use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
-use super::value::{ColorValue, Rgb, ScalarValue};
 use super::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
-use crate::render::Encoding;
-use glam::{DVec3, Vec3};
-use std::collections::HashSet;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -209,13 +207,10 @@ fn read_file(
     let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files };
     // If the file has no materials, the slots stay empty.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
-        for material in &imported.materials {
-            let part = loaded.material(material);
-            loaded.slots.push((material.name.clone(), part));
-        }
-        // Materials may share an image.
-        let mut known = HashSet::new();
-        loaded.textures.retain(|(name, ..)| known.insert(name.clone()));
+        let mut converted = MtlMaterials::default();
+        let slot = |material: &ImportedMaterial| (material.name.clone(), converted.part(material));
+        loaded.slots = imported.materials.iter().map(slot).collect();
+        loaded.textures = converted.textures;
     }
     Ok(loaded)
 }
@@ -270,140 +265,6 @@ impl LoadedMesh {
     pub fn is_fresh(&self) -> bool {
         self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)
     }
-
-    /// Converts an MTL material: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are diffuse,
-    /// and all others have a highlight if the file gives its strength.
-    fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
-        let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
-        if let Some(pbr) = &material.pbr {
-            return self.pbr_material(material, pbr);
-        }
-        let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
-        if glows || material.emission_texture.is_some() {
-            let radiance = material.emission.unwrap_or(Vec3::ONE).max(Vec3::ZERO);
-            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(ColorValue::Rgb(radiance));
-            return MaterialPart::Emissive { radiance };
-        }
-        match material.illumination_model {
-            Some(3 | 5) => MaterialPart::Mirror { reflectance: share(material.specular.unwrap_or(Vec3::splat(0.9))) },
-            Some(4 | 6 | 7 | 9) => MaterialPart::Glass {
-                ior: material.ior.filter(|ior| *ior > 0.0).unwrap_or(1.5),
-                absorption: Rgb::default(),
-                dispersion: 0.0,
-            },
-            _ => {
-                let plain = share(material.diffuse.unwrap_or(Vec3::splat(0.6)));
-                let albedo = match material.vertex_colors {
-                    true => self.vertex_colors(),
-                    false => self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain),
-                };
-                match highlight_of(material) {
-                    Some((share, shininess)) => MaterialPart::Phong {
-                        diffuse: albedo,
-                        ambient: 1.0,
-                        specular: ScalarValue::Number(share),
-                        shininess,
-                        transparency: 0.0,
-                        ior: 1.5,
-                        absorption: Rgb::default(),
-                    },
-                    None => MaterialPart::Diffuse { albedo },
-                }
-            }
-        }
-    }
-
-    /// Converts a material of the PBR extension of MTL.
-    fn pbr_material(&mut self, material: &ImportedMaterial, pbr: &PbrMaterial) -> MaterialPart {
-        let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
-        let color = share(material.diffuse.unwrap_or(Vec3::splat(0.8)));
-        let color = self.texture(material.diffuse_texture.as_ref()).unwrap_or(color);
-        let mut layers = MaterialPart::principled(color);
-        let MaterialPart::Principled {
-            metallic,
-            roughness,
-            ior,
-            transmission,
-            anisotropy,
-            anisotropy_rotation,
-            sheen_color,
-            clearcoat,
-            clearcoat_roughness,
-            emission,
-            opacity,
-            normal_map,
-            normal_scale,
-            ..
-        } = &mut layers
-        else {
-            unreachable!("a principled material is one")
-        };
-        let number = |number: Option<f32>, usual: f32| ScalarValue::Number(number.unwrap_or(usual));
-        *roughness = self.data(pbr.roughness_texture.as_ref()).map_or(number(pbr.roughness, 0.5), ScalarValue::Texture);
-        *metallic = self.data(pbr.metallic_texture.as_ref()).map_or(number(pbr.metallic, 0.0), ScalarValue::Texture);
-        *ior = material.ior.filter(|ior| *ior > 0.0).unwrap_or(1.5);
-        if matches!(material.illumination_model, Some(4 | 6 | 7 | 9)) {
-            *transmission = ScalarValue::Number(1.0);
-        } else {
-            *opacity = self
-                .data(material.opacity_texture.as_ref())
-                .map_or(number(material.opacity, 1.0), ScalarValue::Texture);
-        }
-        *anisotropy = number(pbr.anisotropy, 0.0);
-        *anisotropy_rotation = 360.0 * pbr.anisotropy_rotation.unwrap_or(0.0);
-        *sheen_color = ColorValue::grey(pbr.sheen.unwrap_or(0.0));
-        *clearcoat = number(pbr.clearcoat.map(|strength| strength.min(1.0)), 0.0);
-        *clearcoat_roughness = number(pbr.clearcoat_roughness, 0.0);
-        let glow = ColorValue::Rgb(material.emission.unwrap_or(Vec3::ZERO));
-        *emission = self.texture(material.emission_texture.as_ref()).unwrap_or(glow);
-        if let Some(name) = self.data(pbr.normal_texture.as_ref()) {
-            (*normal_map, *normal_scale) = (ColorValue::Texture(name), pbr.normal_scale.unwrap_or(1.0));
-        }
-        layers
-    }
-
-    /// Adds a texture that holds data instead of colours, and returns its name.
-    fn data(&mut self, file: Option<&PathBuf>) -> Option<String> {
-        let file = file?;
-        let path = file.display().to_string();
-        let name = format!("{path} (data)");
-        let mut part = TextureSource::image(path);
-        if let TextureSource::Image { encoding, .. } = &mut part {
-            *encoding = Encoding::Linear;
-        }
-        self.textures.push((name.clone(), part, file.clone()));
-        Some(name)
-    }
-
-    fn vertex_colors(&mut self) -> ColorValue {
-        let name = "vertex colors".to_owned();
-        let part = TextureSource::VertexColors { channel: None, tint: Rgb(Vec3::ONE) };
-        self.textures.push((name.clone(), part, PathBuf::new()));
-        ColorValue::Texture(name)
-    }
-
-    fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorValue> {
-        let file = file?;
-        let name = file.display().to_string();
-        let part = TextureSource::image(name.clone());
-        self.textures.push((name.clone(), part, file.clone()));
-        Some(ColorValue::Texture(name))
-    }
-}
-
-/// Albedo and exponent of the highlight of an MTL material; `None` if it would be invisible.
-///
-/// MTL gives the strength of the peak: Kd cos + Ks cosⁿ. Here the strength is the albedo of the highlight; its peak is
-/// (n + 1) / 2 times the albedo, in the same units.
-fn highlight_of(material: &ImportedMaterial) -> Option<(f32, f32)> {
-    const LEAST: f32 = 1.0 / 256.0;
-    if matches!(material.illumination_model, Some(0 | 1)) {
-        return None;
-    }
-    let (strength, shininess) = (material.specular?, material.shininess?);
-    let strength = strength.clamp(Vec3::ZERO, Vec3::ONE).element_sum() / 3.0;
-    let share = (2.0 * strength / (shininess + 1.0)).min(1.0);
-    (share >= LEAST).then_some((share, shininess.max(1.0)))
 }
 
 #[cfg(test)]
@@ -418,23 +279,5 @@ mod tests {
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());
-    }
-
-    #[test]
-    fn highlights_of_material_files_keep_their_peak() {
-        let material = |specular: f32, shininess: f32, illumination_model: Option<u8>| ImportedMaterial {
-            specular: Some(Vec3::splat(specular)),
-            shininess: Some(shininess),
-            illumination_model,
-            ..ImportedMaterial::default()
-        };
-        for (strength, exponent) in [(0.3, 9.0), (0.8, 30.0), (1.0, 100.0)] {
-            let (share, shininess) = highlight_of(&material(strength, exponent, Some(2))).unwrap();
-            // The peak of `render::phong`, relative to a Lambertian surface of the same strength.
-            assert!((share * (shininess + 1.0) / 2.0 - strength).abs() < 1e-6, "{strength} {exponent}");
-        }
-        assert_eq!(highlight_of(&material(0.8, 30.0, Some(1))), None, "matte by its illumination model");
-        assert_eq!(highlight_of(&material(0.5, 1000.0, None)), None, "nobody would see it");
-        assert_eq!(highlight_of(&ImportedMaterial::default()), None);
     }
 }

@@ -37,6 +37,7 @@ mod meshes;
 mod metadata_draft;
 pub mod model;
 mod model_light;
+mod mtl_material;
 mod names;
 pub mod obj;
 mod open_shutter;

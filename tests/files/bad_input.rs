@@ -288,9 +288,12 @@ fn files_that_a_scene_points_at_are_named_together_with_the_line_that_does() {
     write("empty.obj", "v 0 0 0\n");
     assert_says(&open(r#"objects: [mesh(source: obj("empty.obj"))]"#), &["scene.ron:3:", "empty.obj", "no faces"]);
     write("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
-    assert_says(&open(r#"objects: [mesh(source: obj("range.obj"))]"#), &["range.obj:4", "vertex 4"]);
+    assert_says(
+        &open(r#"objects: [mesh(source: obj("range.obj"))]"#),
+        &["range.obj: has no faces", "no vertex", "line 4"],
+    );
     write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
-    assert_says(&open(r#"objects: [mesh(source: obj("nan.obj"))]"#), &["nan.obj:2", "finite"]);
+    assert_says(&open(r#"objects: [mesh(source: obj("nan.obj"))]"#), &["nan.obj: has no faces", "finite", "line 2"]);
     assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr", "no such file"]);
     write("sky.hdr", "#?RADIANCE\nnonsense");
     assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr"]);

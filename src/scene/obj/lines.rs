@@ -35,6 +35,21 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)
     })
 }
 
+/// The text in UTF-8, without a byte order mark; UTF-16 with one is converted.
+pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let utf16 = |unit: fn([u8; 2]) -> u16| -> Cow<'_, [u8]> {
+        let (units, _) = bytes[2..].as_chunks();
+        let chars = char::decode_utf16(units.iter().map(|&bytes| unit(bytes)));
+        let text: String = chars.map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+        Cow::Owned(text.into_bytes())
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => utf16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf16(u16::from_be_bytes),
+        _ => Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
+    }
+}
+
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
@@ -54,7 +69,7 @@ pub(super) fn rest_bytes(line: &[u8]) -> &[u8] {
     line[end..].trim_ascii()
 }
 
-pub(super) fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+fn text_of(bytes: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(bytes)
 }
 

@@ -1,17 +1,21 @@
-//! Wavefront OBJ and MTL: reads a file as one mesh with material slots, or gives an error with the line.
+//! Wavefront OBJ and MTL: reads a file as one mesh with material slots, and leaves out what it cannot use.
 //!
 //! The file is parsed in `f64` (`parse`; materials by tobj). Then polygons are triangulated, corners with the same
 //! position, texture coordinate and normal share a vertex (across groups too), and missing normals are computed. Start
 //! reading at [`load_obj`]; [`save_obj`] is the inverse.
 
+mod colors;
 mod error;
 mod lines;
 mod mtl;
 mod parse;
+mod repair;
+mod texture_map;
 mod write;
 
-pub use error::{LineProblem, ObjError};
+pub use error::ObjError;
 pub use mtl::{ImportedMaterial, PbrMaterial};
+pub use texture_map::TextureMap;
 pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 
@@ -21,7 +25,7 @@ use super::model::polygon;
 use super::warnings::Warnings;
 use crate::mesh::Mesh;
 use crate::scene::{FileKind, InputFile, text_to_path};
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -38,23 +42,25 @@ pub fn load_obj(path: &Path) -> Result<ImportedModel, ObjError> {
 
 /// Loads a model and its material libraries.
 ///
-/// The fourth coordinate of vertices, vertex colours, lines and points are ignored. Normals of length zero count as
-/// missing. A missing library or material gives a warning.
+/// The fourth coordinate of vertices, lines and points are ignored. Normals of length zero count as missing. What a face
+/// can do without is repaired with a warning, and so are a missing library or material.
 ///
 /// # Errors
-/// If the file cannot be read, a line is invalid, or it has no mesh.
+/// If the file cannot be read or has no mesh.
 pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ObjError> {
     let bytes = read(path, options.max_bytes)?;
-    let mut parsed =
-        parse::parse(&bytes).map_err(|(line, problem)| ObjError::Line { path: path.into(), line, problem })?;
-    drop(bytes);
+    let mut parsed = parse::parse(&bytes);
     if parsed.face_materials.is_empty() {
-        return Err(ObjError::NoFaces { path: path.into() });
+        return Err(ObjError::NoFaces { path: path.into(), reason: reason_of_no_faces(&bytes, &parsed) });
     }
+    drop(bytes);
     if parsed.materials.len() > usize::from(u16::MAX) + 1 {
         return Err(ObjError::TooManyMaterials { path: path.into() });
     }
     let mut warnings = Warnings::default();
+    for sentence in parsed.repairs.sentences() {
+        warnings.push(format!("{}: {sentence}", path.display()));
+    }
     if parsed.lines_and_points > 0 {
         warnings.push(format!("{}: {} line or point elements were ignored", path.display(), parsed.lines_and_points));
     }
@@ -81,8 +87,8 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     }
     // An empty list means slot 0 everywhere.
     mesh.slots = if parsed.materials.len() > 1 { slots } else { Vec::new() };
-    mesh.uvs = corners.uvs;
-    let (mesh, normals_from_file) = match options.normals {
+    (mesh.uvs, mesh.colors) = (corners.uvs, corners.colors);
+    let (mut mesh, normals_from_file) = match options.normals {
         ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &corners.normals, crease_angle),
         ModelNormals::OfPositions if corners.origins.is_empty() => (mesh.with_vertex_normals(), false),
         ModelNormals::OfPositions => (mesh.with_normals_of_vertices(|vertex| corners.origins[vertex as usize]), false),
@@ -90,7 +96,10 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     };
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
-    let (materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
+    let (mut materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
+    if !mesh.colors.is_empty() && !use_vertex_colors(&mut materials, &mesh) {
+        mesh.colors = Vec::new();
+    }
     Ok(ImportedModel {
         mesh,
         materials,
@@ -108,6 +117,36 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
         .map_err(|source| ObjError::Read { path: path.into(), source })
 }
 
+/// What a file without usable faces has instead, and what to do.
+fn reason_of_no_faces(bytes: &[u8], parsed: &ParsedObj) -> String {
+    let problems: Vec<String> = parsed.repairs.sentences().collect();
+    if !problems.is_empty() {
+        return format!(" that can be used: {}", problems.join("; "));
+    }
+    if parsed.lines_and_points > 0 {
+        return format!(": its {} line or point elements have no surface", parsed.lines_and_points);
+    }
+    if bytes.iter().take(16).filter(|&&byte| byte == 0).count() > 4 {
+        return ": it looks like UTF-16 without a byte order mark; save it as UTF-8".to_owned();
+    }
+    ": is it a Wavefront OBJ file?".to_owned()
+}
+
+/// Lets vertex colours replace the diffuse colours of materials without a texture; returns whether there are any.
+///
+/// With a texture they would darken it: photogrammetry writes the same colours in both.
+fn use_vertex_colors(materials: &mut [ImportedMaterial], mesh: &Mesh) -> bool {
+    let mean = mesh.colors.iter().map(|color| color.as_dvec4()).sum::<DVec4>() / mesh.colors.len() as f64;
+    let mut used = false;
+    for material in materials.iter_mut().filter(|material| material.diffuse_texture.is_none()) {
+        (used, material.vertex_colors, material.diffuse) = (true, true, Some(mean.truncate().as_vec3()));
+        if material.name.is_empty() {
+            material.name = "vertex colors".to_owned();
+        }
+    }
+    used
+}
+
 /// One vertex for each distinct (position, texture coordinate, normal) of the corners.
 struct MeshCorners {
     /// The vertex of each corner, in file order.
@@ -116,6 +155,8 @@ struct MeshCorners {
     /// Index of the position in the file for each vertex; empty if they are the same.
     origins: Vec<u32>,
     uvs: Vec<Vec2>,
+    /// Linear Rec. 709; empty if the file has none.
+    colors: Vec<Vec4>,
     /// As in the file: any length, zero if missing.
     normals: Vec<Vec3>,
 }
@@ -129,8 +170,10 @@ impl MeshCorners {
             positions: Vec::new(),
             origins: Vec::new(),
             uvs: Vec::new(),
+            colors: Vec::new(),
             normals: Vec::new(),
         };
+        let colors = colors::vertex_colors(parsed);
         // By index in the file: its index among the used positions.
         let mut used = vec![u32::MAX; parsed.positions.len()];
         let mut n_used = 0;
@@ -146,6 +189,7 @@ impl MeshCorners {
                 corners.vertices.push(*number);
                 if is_new {
                     corners.positions.push(parsed.positions[position as usize - 1]);
+                    corners.colors.extend(colors.get(position as usize - 1));
                 }
                 continue;
             }
@@ -155,6 +199,7 @@ impl MeshCorners {
             if vertex == next {
                 corners.positions.push(parsed.positions[position as usize - 1]);
                 corners.origins.push(*number);
+                corners.colors.extend(colors.get(position as usize - 1));
                 if has_uvs {
                     let uv = (uv as usize).checked_sub(1).map_or(DVec2::ZERO, |i| parsed.uvs[i]);
                     corners.uvs.push(uv.as_vec2());

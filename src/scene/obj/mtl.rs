@@ -1,9 +1,15 @@
-//! Materials of an OBJ file (MTL) as numbers and paths.
+//! Materials of an OBJ file (MTL) as numbers and maps.
+//!
+//! `clean` checks each line, so that a bad one costs only itself; tobj splits the rest into materials.
 
+use super::lines::decoded;
+use super::texture_map::{TextureMap, ignored_options};
 use crate::scene::warnings::Warnings;
 use crate::scene::{FileKind, InputFile};
 use glam::Vec3;
+use std::collections::BTreeSet;
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// A material as in its file; missing values are `None`. It is interpreted elsewhere.
@@ -11,6 +17,8 @@ use std::path::{Path, PathBuf};
 pub struct ImportedMaterial {
     /// Empty for faces without `usemtl`.
     pub name: String,
+    /// `Ka`, ambient colour; Blender writes the share of metal.
+    pub ambient: Option<Vec3>,
     /// `Kd`, diffuse colour; treated as linear.
     pub diffuse: Option<Vec3>,
     /// Whether vertex colours replace the diffuse colour, which is their mean.
@@ -21,23 +29,33 @@ pub struct ImportedMaterial {
     pub shininess: Option<f32>,
     /// `Ke`, emitted radiance.
     pub emission: Option<Vec3>,
+    /// `Tf`, transmission filter; Maya writes the opacity.
+    pub transmission: Option<Vec3>,
     /// `Ni`, index of refraction.
     pub ior: Option<f32>,
     /// `d`, or 1 − `Tr`: 1 is opaque.
     pub opacity: Option<f32>,
-    /// `illum`, the illumination model: 3 and 5 mirror, 4, 6, 7 and 9 glass.
+    /// `illum`, the illumination model.
     pub illumination_model: Option<u8>,
-    /// `map_Kd`, relative to the folder of the MTL file.
-    pub diffuse_texture: Option<PathBuf>,
-    /// `map_Ke`, likewise.
-    pub emission_texture: Option<PathBuf>,
-    /// `map_d`, likewise.
-    pub opacity_texture: Option<PathBuf>,
+    /// `map_Kd`.
+    pub diffuse_texture: Option<TextureMap>,
+    /// `map_Ke`.
+    pub emission_texture: Option<TextureMap>,
+    /// `map_d`.
+    pub opacity_texture: Option<TextureMap>,
+    /// `map_Ns`; Blender writes roughness.
+    pub shininess_texture: Option<TextureMap>,
+    /// `map_refl`; Blender writes the share of metal.
+    pub reflection_texture: Option<TextureMap>,
+    /// `norm`, a normal map.
+    pub normal_texture: Option<TextureMap>,
+    /// `map_Bump` or `bump`: heights, or a normal map ([`Self::normal_map`]).
+    pub bump_texture: Option<TextureMap>,
     /// Parameters of the PBR extension; `None` if none of them is present.
     pub pbr: Option<PbrMaterial>,
 }
 
-/// The PBR extension of MTL (Clara.io 2013): `Pr`, `Pm`, `Ps`, `Pc`, `Pcr`, `aniso`, `anisor`, `norm` and their maps.
+/// The PBR extension of MTL (Clara.io 2013): `Pr`, `Pm`, `Ps`, `Pc`, `Pcr`, `aniso`, `anisor` and their maps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PbrMaterial {
     /// `Pr`, 0..1.
@@ -54,15 +72,94 @@ pub struct PbrMaterial {
     pub anisotropy: Option<f32>,
     /// `anisor`, turns.
     pub anisotropy_rotation: Option<f32>,
-    /// `map_Pr`, relative to the folder of the MTL file.
-    pub roughness_texture: Option<PathBuf>,
-    /// `map_Pm`, likewise.
-    pub metallic_texture: Option<PathBuf>,
-    /// `norm`, else `map_Bump`, likewise.
-    pub normal_texture: Option<PathBuf>,
-    /// The option `-bm` of that map.
-    pub normal_scale: Option<f32>,
+    /// `map_Pr`.
+    pub roughness_texture: Option<TextureMap>,
+    /// `map_Pm`.
+    pub metallic_texture: Option<TextureMap>,
 }
+
+impl ImportedMaterial {
+    /// Whether the values are a set that Blender writes: all of them, greys, and the `illum` that follows from them.
+    pub fn is_of_blender(&self) -> bool {
+        let is_grey = |color: Vec3| color.x == color.y && color.y == color.z;
+        let opaque = self.opacity.is_none_or(|opacity| opacity == 1.0);
+        let is_complete = (self.shininess.is_some_and(|ns| ns <= 1000.0) || self.shininess_texture.is_some())
+            && self.ambient.is_some_and(|ambient| is_grey(ambient) && ambient.x > 0.0)
+            && self.specular.is_none_or(is_grey)
+            && self.ior.is_some()
+            && (self.opacity.is_some() || self.opacity_texture.is_some())
+            && self.transmission.is_none();
+        let is_consistent = match self.illumination_model {
+            Some(1) => self.specular == Some(Vec3::ZERO),
+            Some(2 | 3) => opaque,
+            Some(6 | 9) => !opaque,
+            _ => false,
+        };
+        is_complete && is_consistent
+    }
+
+    /// The normal map. `map_Bump` is one if the material is of Blender or has keywords of the PBR extension; otherwise
+    /// it holds heights, which are not modelled.
+    pub fn normal_map(&self) -> Option<&TextureMap> {
+        let has_normals = self.pbr.is_some() || self.is_of_blender();
+        self.normal_texture.as_ref().or(self.bump_texture.as_ref().filter(|_| has_normals))
+    }
+}
+
+/// What follows a keyword.
+enum Value {
+    Name,
+    /// Three numbers, none negative, or one for all three.
+    Color,
+    Number(RangeInclusive<f32>),
+    Whole,
+    /// Options and the name of an image.
+    Map,
+    /// The same, which no material uses.
+    UnusedMap,
+}
+
+const SHARE: Value = Value::Number(0.0..=1.0);
+
+/// The keywords, in the spelling of tobj.
+const KEYWORDS: &[(&str, Value)] = &[
+    ("newmtl", Value::Name),
+    ("Ka", Value::Color),
+    ("Kd", Value::Color),
+    ("Ks", Value::Color),
+    ("Ke", Value::Color),
+    ("Tf", Value::Color),
+    ("Ns", Value::Number(0.0..=1e6)),
+    ("Ni", Value::Number(1e-3..=10.0)),
+    ("d", SHARE),
+    ("Tr", SHARE),
+    ("illum", Value::Whole),
+    ("Pr", SHARE),
+    ("Pm", SHARE),
+    ("Ps", SHARE),
+    ("Pc", Value::Number(0.0..=1e3)),
+    ("Pcr", SHARE),
+    ("aniso", SHARE),
+    ("anisor", Value::Number(0.0..=1e3)),
+    ("map_Kd", Value::Map),
+    ("map_Ke", Value::Map),
+    ("map_d", Value::Map),
+    ("map_Ns", Value::Map),
+    ("map_refl", Value::Map),
+    ("map_Pr", Value::Map),
+    ("map_Pm", Value::Map),
+    ("norm", Value::Map),
+    ("map_Bump", Value::Map),
+    ("bump", Value::Map),
+    ("map_Ks", Value::UnusedMap),
+    ("refl", Value::UnusedMap),
+    ("disp", Value::UnusedMap),
+    ("map_disp", Value::UnusedMap),
+    ("decal", Value::UnusedMap),
+    ("map_Ps", Value::UnusedMap),
+    ("map_Pc", Value::UnusedMap),
+    ("map_Pcr", Value::UnusedMap),
+];
 
 /// Reads a library; invalid lines give warnings, and all other lines are used.
 pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings) -> Vec<ImportedMaterial> {
@@ -74,175 +171,142 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
             return Vec::new();
         }
     };
-    let text = clean(&String::from_utf8_lossy(&bytes), &mut warn);
-    match tobj::load_mtl_buf(&mut Cursor::new(text)) {
-        Ok((materials, _)) => {
-            let folder = path.parent().unwrap_or(Path::new(""));
-            materials.iter().map(|material| imported(material, folder, &mut warn)).collect()
-        }
+    let text = String::from_utf8_lossy(&decoded(&bytes)).into_owned();
+    let mut unused = BTreeSet::new();
+    let cleaned = clean(&text, &mut unused, &mut warn);
+    let materials = match tobj::load_mtl_buf(&mut Cursor::new(cleaned)) {
+        Ok((materials, _)) => materials,
         Err(error) => {
             warn(format!("cannot be parsed: {error}; its materials use default values"));
-            Vec::new()
+            return Vec::new();
         }
+    };
+    // MeshLab writes the opacity as `Tr`.
+    let is_of_meshlab = text.lines().take(8).any(|line| line.to_ascii_lowercase().contains("converted by meshlab"));
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let materials: Vec<_> = materials.iter().map(|material| imported(material, folder, is_of_meshlab)).collect();
+    for material in &materials {
+        let mut is_unused = |keyword: &str, is: bool| is.then(|| unused.insert(format!("`{keyword}`")));
+        is_unused("map_Bump (heights)", material.bump_texture.is_some() && material.normal_map().is_none());
+        is_unused("map_Ns", material.shininess_texture.is_some() && !material.is_of_blender());
+        is_unused("map_refl", material.reflection_texture.is_some() && !material.is_of_blender());
     }
+    if !unused.is_empty() {
+        warn(format!("not modelled and ignored: {}", unused.into_iter().collect::<Vec<_>>().join(", ")));
+    }
+    materials
 }
 
-/// Keeps only lines that tobj can read, since an error would lose the whole file.
-fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
+/// Only the lines that are valid, as tobj reads them: one that it cannot read would lose the whole file.
+///
+/// - `unused`: keywords and options that are valid and ignored.
+fn clean(text: &str, unused: &mut BTreeSet<String>, warn: &mut impl FnMut(String)) -> String {
     let mut out = String::with_capacity(text.len());
     let mut named = false;
     for (number, line) in text.lines().enumerate() {
         // Byte order marks and spaces in any order: the keyword must come first.
         let line = line.trim_end().trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
-        let Some(keyword) = line.split_whitespace().next() else { continue };
-        let value = line[keyword.len()..].trim();
-        let numbers = || -> Vec<f64> {
-            value.split_whitespace().map_while(|word| word.parse().ok().filter(|v: &f64| v.is_finite())).collect()
+        let word = line.split_whitespace().next().unwrap_or_default();
+        let Some((keyword, kind)) = KEYWORDS.iter().find(|(keyword, _)| keyword.eq_ignore_ascii_case(word)) else {
+            continue;
         };
-        let rewritten = match keyword {
-            "newmtl" => {
+        let value = line[word.len()..].trim();
+        let numbers: Vec<f32> =
+            value.split_whitespace().map_while(|word| word.parse().ok().filter(|v: &f32| v.is_finite())).collect();
+        let valid = match kind {
+            Value::Name => {
                 // A missing name still begins a new material.
                 named = true;
-                Some(if value.is_empty() { "newmtl (unnamed)".into() } else { line.to_owned() })
+                Ok(if value.is_empty() { "(unnamed)".to_owned() } else { value.to_owned() })
             }
-            "Ka" | "Kd" | "Ks" | "Ke" => match numbers()[..] {
-                [r, g, b, ..] => Some(format!("{keyword} {r} {g} {b}")),
-                // According to the format, a single number stands for all three.
-                [grey] if value.split_whitespace().count() == 1 => Some(format!("{keyword} {grey} {grey} {grey}")),
-                _ => None,
+            Value::Color => match numbers[..] {
+                [r, g, b, ..] if r.min(g).min(b) >= 0.0 => Ok(format!("{r} {g} {b}")),
+                [grey] if grey >= 0.0 && value.split_whitespace().count() == 1 => Ok(format!("{grey} {grey} {grey}")),
+                [_, _, _, ..] => Err("must not be negative"),
+                _ => Err("cannot be parsed"),
             },
-            "Ns" | "Ni" | "d" | "Tr" => numbers().first().map(|number| format!("{keyword} {number}")),
-            "illum" => value.split_whitespace().next().and_then(|v| v.parse::<u8>().ok()).map(|v| format!("illum {v}")),
-            "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" | "aniso" | "anisor" => {
-                numbers().first().map(|number| format!("{keyword} {number}"))
+            Value::Number(range) => match numbers.first() {
+                Some(number) if range.contains(number) => Ok(number.to_string()),
+                Some(_) => Err("is out of range"),
+                None => Err("cannot be parsed"),
+            },
+            Value::Whole => match value.split_whitespace().next().and_then(|word| word.parse::<u8>().ok()) {
+                Some(whole) => Ok(whole.to_string()),
+                None => Err("cannot be parsed"),
+            },
+            Value::Map | Value::UnusedMap if value.is_empty() => Err("has no image"),
+            Value::Map => {
+                unused.extend(ignored_options(value).map(|option| format!("`{option}`")));
+                Ok(value.to_owned())
             }
-            "map_Kd" | "map_Ke" | "map_d" | "map_Pr" | "map_Pm" | "norm" | "map_Bump" | "map_bump" | "bump" => {
-                let keyword =
-                    if keyword.eq_ignore_ascii_case("map_bump") || keyword == "bump" { "map_Bump" } else { keyword };
-                (!value.is_empty()).then(|| format!("{keyword} {value}"))
+            Value::UnusedMap => {
+                unused.insert(format!("`{keyword}`"));
+                continue;
             }
-            _ => continue,
         };
-        match rewritten {
-            Some(line) if named => {
-                out.push_str(&line);
-                out.push('\n');
-            }
-            Some(_) => warn(format!("line {}: `{keyword}` before any `newmtl` was ignored", number + 1)),
-            None => warn(format!("line {}: `{line}` cannot be parsed and was ignored", number + 1)),
+        match valid {
+            Ok(value) if named => out.extend([keyword, " ", &value, "\n"]),
+            Ok(_) => warn(format!("line {}: `{keyword}` before any `newmtl` was ignored", number + 1)),
+            Err(problem) => warn(format!("line {}: `{line}` {problem} and was ignored", number + 1)),
         }
     }
     out
 }
 
-fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(String)) -> ImportedMaterial {
-    let name = &material.name;
+/// - `is_of_meshlab`: whether `Tr` is the opacity.
+fn imported(material: &tobj::Material, folder: &Path, is_of_meshlab: bool) -> ImportedMaterial {
     // Either of the two number types of tobj, which a feature of another crate may select.
     let single = |number| f64::from(number) as f32;
-    let mut color = |keyword: &str, value: Option<[_; 3]>| {
-        let value = Vec3::from_array(value?.map(single));
-        let valid = value.is_finite() && value.min_element() >= 0.0;
-        if !valid {
-            warn(format!("material `{name}`: `{keyword}` must not be negative and was ignored"));
-        }
-        valid.then_some(value)
-    };
-    let diffuse = color("Kd", material.diffuse);
-    let specular = color("Ks", material.specular);
-    let emission = color("Ke", material.emissive);
-    let mut number = |keyword: &str, value: Option<f32>, range: std::ops::RangeInclusive<f32>| {
-        let value = value?;
-        if !range.contains(&value) {
-            warn(format!("material `{name}`: `{keyword}` {value} is out of range and was ignored"));
-        }
-        range.contains(&value).then_some(value)
-    };
-    let stated = |keyword: &str| material.unknown_param.get(keyword).map(String::as_str);
-    let path = |keyword: &str| {
-        // tobj parses some maps itself.
-        let known = match keyword {
-            "map_d" => material.dissolve_texture.as_deref(),
-            "map_Bump" | "norm" => material.normal_texture.as_deref().filter(|_| keyword == "map_Bump"),
-            _ => None,
-        };
-        stated(keyword).or(known).and_then(|value| texture_path(value, folder))
-    };
-    let mut share =
-        |keyword: &str, most: f32| number(keyword, stated(keyword).and_then(|value| value.parse().ok()), 0.0..=most);
+    let color = |color: Option<[_; 3]>| color.map(|color| Vec3::from_array(color.map(single)));
+    let other = |keyword: &str| material.unknown_param.get(keyword).map(String::as_str);
+    let number = |keyword: &str| other(keyword).and_then(|value| value.parse::<f32>().ok());
+    let map = |value: Option<&str>| value.and_then(|value| TextureMap::parse(value, |name| file_of(name, folder)));
     let pbr = PbrMaterial {
-        roughness: share("Pr", 1.0),
-        metallic: share("Pm", 1.0),
-        sheen: share("Ps", 1.0),
-        clearcoat: share("Pc", 1e3),
-        clearcoat_roughness: share("Pcr", 1.0),
-        anisotropy: share("aniso", 1.0),
-        anisotropy_rotation: share("anisor", 1e3),
-        roughness_texture: path("map_Pr"),
-        metallic_texture: path("map_Pm"),
-        normal_texture: path("norm"),
-        normal_scale: None,
+        roughness: number("Pr"),
+        metallic: number("Pm"),
+        sheen: number("Ps"),
+        clearcoat: number("Pc"),
+        clearcoat_roughness: number("Pcr"),
+        anisotropy: number("aniso"),
+        anisotropy_rotation: number("anisor"),
+        roughness_texture: map(other("map_Pr")),
+        metallic_texture: map(other("map_Pm")),
     };
-    // Bump maps are height maps, but programs that write this extension store normal maps in them.
-    let pbr = (pbr != PbrMaterial::default()).then(|| PbrMaterial {
-        normal_scale: stated("map_Bump").or(material.normal_texture.as_deref()).and_then(bump_scale),
-        normal_texture: pbr.normal_texture.clone().or_else(|| path("map_Bump")),
-        ..pbr
-    });
-    let opacity_texture = path("map_d");
-    let transparency = material.unknown_param.get("Tr").and_then(|v| v.parse::<f32>().ok());
+    // Nobody stores a surface that is not there: `Tr` alone at its end means opaque, on either scale.
+    let of_tr = |tr: f32| if is_of_meshlab && tr > 0.0 || tr == 1.0 { tr } else { 1.0 - tr };
+    let filter = other("Tf").map(|value| value.split_whitespace().filter_map(|word| word.parse().ok()));
     ImportedMaterial {
-        name: name.clone(),
-        diffuse,
+        name: material.name.clone(),
+        ambient: color(material.ambient),
+        diffuse: color(material.diffuse),
         vertex_colors: false,
-        specular,
-        shininess: number("Ns", material.shininess.map(single), 0.0..=1e6),
-        emission,
-        ior: number("Ni", material.optical_density.map(single), 1e-3..=10.0),
-        opacity: number("d", material.dissolve.map(single), 0.0..=1.0)
-            .or_else(|| number("Tr", transparency, 0.0..=1.0).map(|tr| 1.0 - tr)),
+        specular: color(material.specular),
+        shininess: material.shininess.map(single),
+        emission: color(material.emissive),
+        transmission: filter.map(|mut numbers| Vec3::from_array([(); 3].map(|()| numbers.next().unwrap_or(0.0)))),
+        ior: material.optical_density.map(single),
+        opacity: material.dissolve.map(single).or_else(|| number("Tr").map(of_tr)),
         illumination_model: material.illumination_model,
-        diffuse_texture: material.diffuse_texture.as_deref().and_then(|value| texture_path(value, folder)),
-        emission_texture: material.unknown_param.get("map_Ke").and_then(|value| texture_path(value, folder)),
-        opacity_texture,
-        pbr,
+        diffuse_texture: map(material.diffuse_texture.as_deref()),
+        emission_texture: map(other("map_Ke")),
+        opacity_texture: map(material.dissolve_texture.as_deref()),
+        shininess_texture: map(material.shininess_texture.as_deref()),
+        reflection_texture: map(other("map_refl")),
+        normal_texture: map(other("norm")),
+        bump_texture: map(material.normal_texture.as_deref()),
+        pbr: (pbr != PbrMaterial::default()).then_some(pbr),
     }
 }
 
-/// The value of the option `-bm` of a map.
-fn bump_scale(value: &str) -> Option<f32> {
-    let mut words = value.split_whitespace().skip_while(|word| *word != "-bm").skip(1);
-    words.next()?.parse().ok().filter(|scale: &f32| scale.is_finite())
-}
-
-/// The file name after the options of a `map_` line; `\` counts as `/`.
+/// The image of this name; `\` counts as `/`.
 ///
 /// A path from another computer (with a drive, or absolute and missing) is replaced by the file of that name in the
 /// folder of the MTL file.
-fn texture_path(value: &str, folder: &Path) -> Option<PathBuf> {
-    let mut left = value.trim();
-    while left.starts_with('-') {
-        let mut words = left.split_whitespace();
-        let option = words.next().unwrap_or_default();
-        let (least, most) = match option {
-            "-o" | "-s" | "-t" => (1, 3),
-            "-mm" => (2, 2),
-            "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-imfchan" | "-texres" | "-type" => (1, 1),
-            // Not an option: a file name that starts with a dash.
-            _ => break,
-        };
-        left = left[option.len()..].trim_start();
-        for i in 0..most {
-            let word = left.split_whitespace().next().unwrap_or_default();
-            if i >= least && word.parse::<f64>().is_err() {
-                break;
-            }
-            left = left[word.len()..].trim_start();
-        }
-    }
-    let name = left.trim_matches('"').replace('\\', "/");
+fn file_of(name: &str, folder: &Path) -> Option<PathBuf> {
+    let name = name.replace('\\', "/");
     let drive = name.as_bytes().get(1) == Some(&b':');
     let last = name.rsplit('/').next().unwrap_or_default();
-    if name.is_empty() || last.is_empty() {
+    if last.is_empty() {
         return None;
     }
     let path = folder.join(&name);
@@ -252,6 +316,8 @@ fn texture_path(value: &str, folder: &Path) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Channel;
+    use glam::DVec2;
 
     fn parse(text: &str) -> (Vec<ImportedMaterial>, Warnings) {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -260,29 +326,44 @@ mod tests {
         (load_library(file.path(), 1 << 20, &mut warnings), warnings)
     }
 
+    fn image(name: &str) -> TextureMap {
+        TextureMap::of(std::env::temp_dir().join(name))
+    }
+
     #[test]
     fn every_field_is_read() {
         let (materials, warnings) = parse(
-            "newmtl red one\r\n\tKd 0.8 0.1 0.1\r\nKs 0.5\nNs 96\nKe 1 2 3\nNi 1.5\nTr 0.25\nillum 7\n\
-             map_Kd -s 2 2 1 -clamp on tex\\my wood.png\nmap_Ke C:\\art\\glow.png\nnewmtl b\nd 0.5\n",
+            "newmtl red one\r\n\tKd 0.8 0.1 0.1\r\nKs 0.5\nNs 96\nKe 1 2 3\nNi 1.5\nTr 0.25\nillum 7\nTf 1 .5 0\n\
+             map_kd -s 2 3 1 -clamp on -o .5 tex\\my wood.png\nmap_Ke C:\\art\\glow.png\nnorm n.png -bm 2\nnewmtl b\n\
+             d 0.5\nmap_d -imfchan m \"a b.png\"\n",
         );
         assert!(warnings.is_empty(), "{warnings:?}");
-        let folder = std::env::temp_dir();
+        let wood = TextureMap {
+            repeat: DVec2::new(2.0, 3.0),
+            offset: DVec2::new(0.5, 0.0),
+            clamp: true,
+            ..image("tex/my wood.png")
+        };
         let expected = ImportedMaterial {
             name: "red one".into(),
             diffuse: Some(Vec3::new(0.8, 0.1, 0.1)),
             specular: Some(Vec3::splat(0.5)),
             shininess: Some(96.0),
             emission: Some(Vec3::new(1.0, 2.0, 3.0)),
+            transmission: Some(Vec3::new(1.0, 0.5, 0.0)),
             ior: Some(1.5),
             opacity: Some(0.75),
             illumination_model: Some(7),
-            diffuse_texture: Some(folder.join("tex/my wood.png")),
-            emission_texture: Some(folder.join("glow.png")),
+            diffuse_texture: Some(wood),
+            emission_texture: Some(image("glow.png")),
+            normal_texture: Some(TextureMap { bump_scale: Some(2.0), ..image("n.png") }),
             ..ImportedMaterial::default()
         };
         assert_eq!(materials[0], expected);
-        assert_eq!(materials[1], ImportedMaterial { name: "b".into(), opacity: Some(0.5), ..Default::default() });
+        let mask = Some(TextureMap { channel: Some(Channel::A), ..image("a b.png") });
+        let expected =
+            ImportedMaterial { name: "b".into(), opacity: Some(0.5), opacity_texture: mask, ..Default::default() };
+        assert_eq!(materials[1], expected);
     }
 
     #[test]
@@ -292,8 +373,7 @@ mod tests {
              map_Pm m.png\nmap_d d.png\nmap_Bump -bm 0.5 my normals.png\nnewmtl b\nPr 0.5\nnorm n.png\nmap_Bump h.png\n\
              newmtl c\nKd 1 1 1\nmap_Bump h.png\nnewmtl d\nPr 7\n",
         );
-        assert_eq!(warnings.len(), 1, "{warnings:?}");
-        let folder = std::env::temp_dir();
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
         let expected = PbrMaterial {
             roughness: Some(0.25),
             metallic: Some(1.0),
@@ -302,15 +382,16 @@ mod tests {
             clearcoat_roughness: Some(0.03),
             anisotropy: Some(0.7),
             anisotropy_rotation: Some(0.1),
-            roughness_texture: Some(folder.join("größe 纹理/rauh.png")),
-            metallic_texture: Some(folder.join("m.png")),
-            normal_texture: Some(folder.join("my normals.png")),
-            normal_scale: Some(0.5),
+            roughness_texture: Some(image("größe 纹理/rauh.png")),
+            metallic_texture: Some(image("m.png")),
         };
         assert_eq!(materials[0].pbr, Some(expected));
-        assert_eq!(materials[0].opacity_texture, Some(folder.join("d.png")));
-        assert_eq!(materials[1].pbr.as_ref().unwrap().normal_texture, Some(folder.join("n.png")));
+        assert_eq!(materials[0].opacity_texture, Some(image("d.png")));
+        let normals = TextureMap { bump_scale: Some(0.5), ..image("my normals.png") };
+        assert_eq!(materials[0].normal_map(), Some(&normals));
+        assert_eq!(materials[1].normal_map(), Some(&image("n.png")));
         assert_eq!((&materials[2].pbr, &materials[3].pbr), (&None, &None), "heights alone, and nothing usable");
+        assert_eq!(materials[2].normal_map(), None);
     }
 
     #[test]
@@ -320,7 +401,45 @@ mod tests {
         );
         assert_eq!(warnings.len(), 9, "{warnings:#?}");
         assert_eq!(materials.last().unwrap().diffuse, Some(Vec3::X));
-        assert_eq!(materials[0], ImportedMaterial { name: "a".into(), ..Default::default() });
+        let expected = ImportedMaterial { name: "a".into(), ambient: Some(Vec3::ONE), ..Default::default() };
+        assert_eq!(materials[0], expected);
+    }
+
+    #[test]
+    fn what_is_not_modelled_is_told_once() {
+        let (_, warnings) = parse(
+            "newmtl a\nmap_Ks k.png\nmap_bump -bm 1 -t 1 1 b.png\nmap_Kd -mm 0 1 -blendu on -cc off c.png\nnewmtl b\n\
+             map_Ks k.png\nmap_Kd -texres 512 -t 0 d.png\n",
+        );
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(warnings[0].ends_with("ignored: `-t`, `map_Bump (heights)`, `map_Ks`"), "{warnings:?}");
+    }
+
+    #[test]
+    fn tr_is_transparency_but_for_meshlab_and_opaque_at_its_ends() {
+        let opacity = |text: &str| parse(&format!("{text}newmtl a\n")).0.len();
+        assert_eq!(opacity(""), 1);
+        let of = |comment: &str, lines: &str| parse(&format!("{comment}\nnewmtl a\n{lines}")).0[0].opacity.unwrap();
+        let meshlab = "#\n# Wavefront material file\n# Converted by Meshlab Group\n#";
+        assert_eq!(of("", "Tr 0.25"), 0.75);
+        assert_eq!(of(meshlab, "Tr 0.25"), 0.25);
+        assert_eq!(["Tr 1", "Tr 0", "Tr 1\nd 1", "Tr 0.7\nd 1"].map(|lines| of("", lines)), [1.0; 4]);
+        assert_eq!(["Tr 1", "Tr 0"].map(|lines| of(meshlab, lines)), [1.0; 2]);
+    }
+
+    #[test]
+    fn materials_of_blender_are_known_by_their_set_of_values() {
+        let is = |lines: &str| parse(&format!("newmtl a\n{lines}")).0[0].is_of_blender();
+        let colors = "Ns 250\nKa 1 1 1\nKs 0.5 0.5 0.5\nKe 0 0 0\nNi 1.45\n";
+        for lines in ["d 1\nillum 2", "d 1\nillum 3", "d 0.5\nillum 9", "d 0.5\nillum 6", "map_d a.png\nillum 2"] {
+            assert!(is(&format!("{colors}{lines}")), "{lines}");
+        }
+        for lines in
+            ["d 1\nillum 7", "d 1\nillum 9", "d 0.2\nillum 4", "illum 2", "d 1\nillum 2\nTf 1 1 1", "d 0.1\nillum 3"]
+        {
+            assert!(!is(&format!("{colors}{lines}")), "{lines}");
+        }
+        assert!(!is("Ns 1000\nKa 0 0 0\nKd 0 0 0\nKs 1 1 1\nNi 1.5\nd 1\nillum 3"), "a mirror of a textbook");
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 use super::ObjError;
 use crate::mesh::Mesh;
+use crate::render::encode_srgb;
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use crate::scene::{FileKind, InputFile};
+use glam::Vec3;
 use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::io::{Read, Write};
@@ -20,7 +22,7 @@ pub struct ObjExtras<'a> {
     pub comment: &'a str,
 }
 
-/// Writes a mesh in the coordinates of its original file; all numbers read back exactly.
+/// Writes a mesh in the coordinates of its original file; all numbers read back exactly, colours with 8 bits.
 ///
 /// Writes atomically: under a temporary name first, so that an existing file stays until the new one is complete.
 ///
@@ -73,11 +75,7 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
     }
     // Vertices that differ only in texture coordinate or normal share a position, so that a closed surface stays closed
     // in terms of position indices.
-    let places = Distinct::of(&mesh.positions);
-    for place in &places.values {
-        let [x, y, z] = (place.as_dvec3() + mesh.center).to_array();
-        writeln!(out, "v {x} {y} {z}")?;
-    }
+    let places = write_positions(out, mesh)?;
     let uvs = Distinct::of(&mesh.uvs);
     for [u, v] in uvs.values.iter().map(|uv| uv.to_array()) {
         writeln!(out, "vt {u} {v}")?;
@@ -97,7 +95,7 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
         }
         write!(out, "f")?;
         for vertex in triangle.map(|vertex| vertex as usize) {
-            let numbers = [&places.numbers, &uvs.numbers, &normals.numbers].map(|numbers| numbers.get(vertex));
+            let numbers = [&places, &uvs.numbers, &normals.numbers].map(|numbers| numbers.get(vertex));
             match numbers {
                 [Some(v), None, None] => write!(out, " {v}")?,
                 [Some(v), Some(vt), None] => write!(out, " {v}/{vt}")?,
@@ -109,6 +107,28 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
         writeln!(out)?;
     }
     Ok(())
+}
+
+/// Returns the number of each vertex's position, from 1.
+fn write_positions(out: &mut impl Write, mesh: &Mesh) -> std::io::Result<Vec<u32>> {
+    let in_file = |position: Vec3| (position.as_dvec3() + mesh.center).to_array();
+    if mesh.colors.is_empty() {
+        let places = Distinct::of(&mesh.positions);
+        for [x, y, z] in places.values.iter().map(|&position| in_file(position)) {
+            writeln!(out, "v {x} {y} {z}")?;
+        }
+        return Ok(places.numbers);
+    }
+    let byte = |linear: f32| f32::from(encode_srgb(linear)) / 255.0;
+    let points: Vec<[f32; 6]> = (mesh.positions.iter().zip(&mesh.colors))
+        .map(|(position, color)| [position.x, position.y, position.z, byte(color.x), byte(color.y), byte(color.z)])
+        .collect();
+    let places = Distinct::of(&points);
+    for &[x, y, z, r, g, b] in &places.values {
+        let [x, y, z] = in_file(Vec3::new(x, y, z));
+        writeln!(out, "v {x} {y} {z} {r} {g} {b}")?;
+    }
+    Ok(places.numbers)
 }
 
 /// Writes the bytes of the name, whatever their encoding.
