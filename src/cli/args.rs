@@ -9,7 +9,7 @@ use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::model::ModelFormat;
 use firstlight::scene::whole_file::Replace;
-use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSource, UpAxis, load};
+use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSource, UpAxis, archive_cache, load};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -220,14 +220,12 @@ fn unpacked(archive: &Path) -> Result<Unpacked, Failure> {
     if let Some(unpacked) = known.get(archive) {
         return Ok(unpacked.clone());
     }
-    let folders = directories::ProjectDirs::from("", "", "firstlight");
-    let cache = folders.map_or_else(|| std::env::temp_dir().join("firstlight"), |it| it.cache_dir().to_path_buf());
     let failed = |error: UnpackError| match error {
         UnpackError::Write(error) => error.into(),
         UnpackError::Read(error) if error.may_pass() => Failure::Passing(format!("{}: {error}", archive.display())),
         error => Failure::Failed(format!("{}: {error}", archive.display())),
     };
-    let unpacked = unpack(archive, &cache.join("packed")).map_err(failed)?;
+    let unpacked = unpack(archive, &archive_cache()).map_err(failed)?;
     known.insert(archive.to_path_buf(), unpacked.clone());
     Ok(unpacked)
 }

@@ -10,7 +10,10 @@ use super::saving::SavedAs;
 use super::scene_bounds::SceneBounds;
 use super::status::{MessageKind, Status};
 use super::views::ViewTrail;
-use crate::scene::{DisplaySettings, Lens, LoadedScene, Projection, Rendering, SceneInputs, Severity, View};
+use crate::scene::{
+    Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
+    camera_follows,
+};
 use bevy_ecs::prelude::World;
 use std::sync::Arc;
 use std::time::Duration;
@@ -47,9 +50,21 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
 
 /// Replaces a scene by another state of it. User settings stay, unless the file has changed them.
 ///
+/// - `moment`: time of the animation to show, seconds; that of the scene if not given.
 /// - `cause`: of the restart, for messages.
-pub fn adopt_again(world: &mut World, old: &LoadedScene, mut scene: LoadedScene, cause: String, now: Duration) {
-    let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
+pub fn adopt_again(
+    world: &mut World,
+    old: &LoadedScene,
+    mut scene: LoadedScene,
+    moment: Option<f64>,
+    cause: String,
+    now: Duration,
+) {
+    let same_camera =
+        scene.file.camera == old.file.camera && scene.file.animation.edited.camera == old.file.animation.edited.camera;
+    // One that follows its tracks follows the new ones.
+    let is_kept = same_camera && !camera_follows(world);
+    let camera = SceneInputs::of(world).camera.filter(|_| is_kept);
     let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
     let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
         == (old.file.integrator, old.file.max_depth, old.file.film.filter);
@@ -60,6 +75,9 @@ pub fn adopt_again(world: &mut World, old: &LoadedScene, mut scene: LoadedScene,
     let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(trees);
     shown.adopted = Some(cause);
+    if let Some(seconds) = moment.filter(|_| world.contains_resource::<Animation>()) {
+        set_moment(world, seconds);
+    }
     if let Some(camera) = camera
         && let Some(new) = SceneInputs::of(world).camera
     {
@@ -80,5 +98,20 @@ pub fn adopt_moment(world: &mut World, mut scene: LoadedScene, now: Duration) {
     };
     scene.warnings = scene.warnings.iter().filter(|warning| !old.warnings.contains(warning)).cloned().collect();
     let at = scene.choice.at.map_or_else(|| "stored pose".to_owned(), |at| format!("moment {at:.3} s"));
-    adopt_again(world, &old, scene, at, now);
+    adopt_again(world, &old, scene, None, at, now);
+}
+
+/// Shows another time of an animation whose scene is in the world. That is no change of the scene, though it can be undone.
+pub(super) fn set_moment(world: &mut World, seconds: f64) {
+    if world.get_resource::<Moment>().copied().unwrap_or_default().0 == seconds {
+        return;
+    }
+    // Edits of this frame count.
+    History::content(world);
+    let was_saved = !world.resource::<History>().is_unsaved();
+    crate::scene::show_moment(world, seconds);
+    let content = History::content(world);
+    if was_saved {
+        world.resource_mut::<History>().mark_clean(content);
+    }
 }

@@ -63,7 +63,7 @@ impl Recovery {
         let title = title.to_owned();
         let work = move || -> Result<(), String> {
             crate::scene::whole_file::write_whole(&scene.with_extension(TITLE), title.as_bytes())?;
-            description.save(&scene)?;
+            description.save_draft(&scene)?;
             Ok(())
         };
         match std::thread::Builder::new().name("firstlight recovery".to_owned()).spawn(work) {

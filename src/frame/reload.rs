@@ -4,7 +4,7 @@
 //! animations is loaded in the same way.
 
 use super::Waker;
-use super::adopt::adopt_again;
+use super::adopt::{adopt_again, set_moment};
 use super::background::BackgroundTasks;
 use super::history::History;
 use super::input::ModelUp;
@@ -172,21 +172,6 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);
 }
 
-/// Shows another time of an animation whose scene is in the world. That is no change of the scene, though it can be undone.
-fn set_moment(world: &mut World, seconds: f64) {
-    if world.get_resource::<Moment>().copied().unwrap_or_default().0 == seconds {
-        return;
-    }
-    // Edits of this frame count.
-    History::content(world);
-    let was_saved = !world.resource::<History>().is_unsaved();
-    crate::scene::show_moment(world, seconds);
-    let content = History::content(world);
-    if was_saved {
-        world.resource_mut::<History>().mark_clean(content);
-    }
-}
-
 /// Watches the files of the open scene, if it has changed.
 fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<PathBuf>) {
     let mut reload = world.resource_mut::<HotReload>();
@@ -213,9 +198,10 @@ fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<Pa
         }
     }
     if let Some(watch) = &reload.watch {
-        watch.set(files);
+        watch.set(files.clone());
     }
-    lock(&reload.changed).clear();
+    // A file may have changed again while it was read.
+    lock(&reload.changed).retain(|path| files.contains(path));
     reload.watched = Some((current.clone(), saved_as));
 }
 
@@ -260,12 +246,9 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         }
     };
     let names = names_of(&world.resource::<HotReload>().reading);
-    let shown = world.get_resource::<Moment>().copied();
-    let keeps_moment = scene.file.animation.at == old.file.animation.at;
-    adopt_again(world, old, scene, format!("{names} reloaded"), now);
-    if let Some(Moment(seconds)) = shown.filter(|_| keeps_moment && world.contains_resource::<Animation>()) {
-        set_moment(world, seconds);
-    }
+    let shown = world.get_resource::<Moment>().map(|shown| shown.0);
+    let moment = shown.filter(|_| scene.file.animation.at == old.file.animation.at);
+    adopt_again(world, old, scene, moment, format!("{names} reloaded"), now);
     world.resource_mut::<Status>().say(now, MessageKind::Note, format!("reloaded {names} (changed on disk)"));
 }
 

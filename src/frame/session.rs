@@ -26,7 +26,7 @@ use super::{Command, LatencyHistogram, Target};
 use crate::render::{Film, Prepared, RenderSettings, SampleAllocation};
 use crate::scene::{
     BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
-    SceneInputs, SceneSource, UpAxis, check_film_size,
+    SceneInputs, SceneSource, UpAxis, check_film_size, unpacked_folder,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -292,11 +292,12 @@ impl Session {
         self.world.resource::<SceneGeneration>().0
     }
 
-    /// Where the open scene is saved: the last saved file, or else the scene file that was opened.
+    /// Where the open scene is saved: the last saved file, or else the scene file that was opened. None for a scene of an
+    /// archive, whose files may be deleted at any time.
     pub fn scene_file(&self) -> Option<PathBuf> {
         let saved = self.world.resource::<SavedAs>().path.clone();
         saved.or_else(|| match &self.world.get_resource::<CurrentScene>()?.0.source {
-            SceneSource::Scene(path) => Some(path.clone()),
+            SceneSource::Scene(path) => Some(path.clone()).filter(|path| unpacked_folder(path).is_none()),
             _ => None,
         })
     }

@@ -7,7 +7,7 @@ use crate::scene::file::DisplayPart;
 use crate::scene::whole_file::write_whole;
 use crate::scene::{
     BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, WriteError, absolute, check_film_size,
-    path_to_text,
+    path_to_text, unpacked_folder,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -79,6 +79,10 @@ impl Settings {
 
     /// Puts a scene first in the list of recent ones.
     pub fn remember(&mut self, source: &SceneSource) {
+        // What was unpacked may be gone when it is chosen.
+        if source.path().is_some_and(|path| unpacked_folder(path).is_some()) {
+            return;
+        }
         let name = name_of(source);
         self.recent.retain(|other| *other != name);
         self.recent.insert(0, name);

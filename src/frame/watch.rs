@@ -37,7 +37,11 @@ impl Watch {
                 };
                 match news {
                     Ok(paths) => {
-                        files = paths.into_iter().map(|(path, now)| (path, (now, now))).collect();
+                        let with_stamps = |(path, now): (PathBuf, Stamp)| {
+                            let known = files.get(&path).copied().unwrap_or((now, now));
+                            (path, known)
+                        };
+                        files = paths.into_iter().map(with_stamps).collect();
                         continue;
                     }
                     Err(RecvTimeoutError::Timeout) => {}
@@ -67,7 +71,8 @@ impl Watch {
         Ok(Self { sender: Some(sender), thread: Some(thread) })
     }
 
-    /// Replaces the watched files; their present state is the reference.
+    /// Replaces the watched files. The present state of those that are new is the reference; the others may have changed
+    /// since it was reported, while they were read.
     pub fn set(&self, paths: Vec<PathBuf>) {
         if let Some(sender) = &self.sender {
             // Stamped here: the thread of a busy machine would take a change of the next moment for the present state.
@@ -87,6 +92,31 @@ impl Drop for Watch {
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been reported already.
             let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    #[test]
+    fn a_change_while_the_file_is_read_is_reported_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.ron");
+        let write = |text: &str| std::fs::write(&path, text).unwrap();
+        write("1");
+        let (sender, receiver) = channel();
+        let watch = Watch::start(move |paths| sender.send(paths).unwrap()).unwrap();
+        watch.set(vec![path.clone()]);
+        let patience = Duration::from_secs(60);
+        for text in ["12", "123"] {
+            write(text);
+            // The scene that was read is watched from now on.
+            watch.set(vec![path.clone()]);
+            let start = Instant::now();
+            assert_eq!(receiver.recv_timeout(patience), Ok(vec![path.clone()]), "{:?}", start.elapsed());
         }
     }
 }

@@ -5,7 +5,7 @@
 //! program are listed sphere by sphere; surfaces without a material get a grey one. Comments and formatting of the
 //! original file are lost.
 
-use super::animation::{Animation, Moment, Moved, rest_camera};
+use super::animation::{Animation, Moment, Moved};
 use super::camera::camera_part;
 use super::components::{
     Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
@@ -59,7 +59,7 @@ impl Description {
         let materials = writer.materials();
         let at = world.get_resource::<Moment>().copied().unwrap_or_default().0;
         let animation_part = animation.as_ref().map_or_else(Default::default, |animation| {
-            moved.part((animation, at), &inputs, &writer.names, &mut writer.losses)
+            moved.part((animation, at), (world, &inputs), &writer.names, &mut writer.losses)
         });
         let environment = writer.environment(&inputs.environment);
         let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
@@ -73,7 +73,9 @@ impl Description {
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
             camera: match &animation {
-                Some(animation) => rest_camera(animation, at, &view, &projection, &lens),
+                // The one that the tracks move; the one that is shown is in `animation`.
+                Some(animation) if animation_part.edited.camera.is_some() => animation.camera.clone(),
+                Some(animation) => camera_part(&view, &projection, &lens, Some(&animation.camera_at(at))),
                 None => camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
             },
             cameras: loaded.map(|loaded| loaded.file.cameras.clone()).unwrap_or_default(),

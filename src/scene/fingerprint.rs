@@ -114,7 +114,7 @@ impl SceneContent {
     pub fn of(world: &mut World, description: &Description) -> Self {
         let mut file = description.file.clone();
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
-        file.cameras = Default::default();
+        (file.cameras, file.animation.edited.camera) = Default::default();
         (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
         (file.integrator, file.max_depth) = (Integrator::default(), None);
         for object in &mut file.objects {

@@ -4,6 +4,7 @@
 //! relative to the image. It also holds a fingerprint of the scene, so that later changes of the scene are noticed; a
 //! scene with unsaved changes is stored in the metadata as a whole.
 
+use super::archive_cache::unpacked_folder;
 use super::bounds::{check_film_size, check_max_depth};
 use super::camera::camera;
 use super::file::{CameraPart, DisplayPart, FilmPart, SceneFile};
@@ -59,6 +60,9 @@ pub enum MetadataError {
     /// The scene file is neither at its path nor in the folder of the image.
     #[error("its scene {} was not found: put it next to the image", .0.display())]
     NoScene(PathBuf),
+    /// The scene was unpacked from an archive, and has been deleted since.
+    #[error("its scene {} was in an archive, whose unpacked files are gone: open the archive again", .0.display())]
+    NoArchive(PathBuf),
 }
 
 impl From<MetadataError> for String {
@@ -127,6 +131,9 @@ pub enum ImageScene {
         /// `y` or `z`, if it was given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         up: Option<char>,
+        /// Name of the camera of the model, if one was chosen.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera: Option<String>,
     },
     /// Not from a file: see `text`.
     None,
@@ -231,7 +238,10 @@ impl ImageMetadata {
             let from_picture = text_to_path(relative);
             let beside = from_picture.file_name().map(|name| folder.join(name));
             let found = [Some(folder.join(&from_picture)), beside].into_iter().flatten().find(|path| path.is_file());
-            found.ok_or(MetadataError::NoScene(from_picture))
+            found.ok_or_else(|| match unpacked_folder(&folder.join(&from_picture)) {
+                Some(_) => MetadataError::NoArchive(from_picture),
+                None => MetadataError::NoScene(from_picture),
+            })
         };
         Ok(match &self.scene {
             ImageScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
@@ -246,6 +256,14 @@ impl ImageMetadata {
         match self.scene {
             ImageScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),
             ImageScene::Model { up: Some(_), .. } => Some(UpAxis::Y),
+            _ => None,
+        }
+    }
+
+    /// The camera that was chosen for a model, by name.
+    pub(super) fn model_camera(&self) -> Option<&str> {
+        match &self.scene {
+            ImageScene::Model { camera, .. } => camera.as_deref(),
             _ => None,
         }
     }
@@ -277,9 +295,10 @@ impl ImageMetadata {
         checks.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
     }
 
-    /// Sets camera, film, integrator, depth and display of a scene file to those of the image.
+    /// Sets camera, film, integrator, depth and display of a scene file to those of the image. Its camera is the one that
+    /// was rendered, whatever the tracks of the scene say.
     pub fn apply(&self, file: &mut SceneFile) {
-        file.camera = self.camera.clone();
+        file.show_camera(self.camera.clone());
         file.film = self.film;
         file.integrator = self.integrator;
         file.max_depth = self.max_depth;

@@ -7,7 +7,7 @@ use super::components::{Balls, Shape};
 use super::default_scene;
 use super::documents::Documents;
 use super::error::{Problem, SceneError, suggestion};
-use super::file::{ObjectPart, RadiiPart, SceneFile, ball_grid, locate};
+use super::file::{ObjectPart, RadiiPart, SceneFile, TrackPart, ball_grid, locate};
 use super::gltf::images::part_of_model;
 use super::gltf_scene;
 use super::image_metadata::{ImageMetadata, MetadataError};
@@ -165,7 +165,10 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
             };
             let mut scene = {
                 let documents = Documents::new(options.choice().allow_outside);
-                resolve(&source, SceneFile::parse(text, path)?, Some(text), folder, &options, &documents)?
+                let file = SceneFile::parse(text, path)?;
+                let mut scene = resolve(&source, file, Some(text), folder, &options, &documents)?;
+                scene.move_as_model(shot.model_camera(), &documents)?;
+                scene
             };
             scene.load_seconds = start.elapsed().as_secs_f64();
             let start = Instant::now();
@@ -185,6 +188,9 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
         scene.choose(options.choice())?;
     }
     scene.expose(options.choice())?;
+    if scene.choice.camera.is_none() {
+        scene.choice.camera = shot.model_camera().map(str::to_owned);
+    }
     scene.shot = Some(shot);
     Ok(scene)
 }
@@ -285,6 +291,38 @@ fn resolve(
 }
 
 impl LoadedScene {
+    /// Moves a glTF model from an image with motion blur as its file does.
+    ///
+    /// - `camera`: name of the camera of the model that the image was opened with.
+    fn move_as_model(&mut self, camera: Option<&str>, documents: &Documents) -> Result<(), SceneError> {
+        let animation = &self.file.animation;
+        let is_exposed = animation.shutter.is_some() || animation.shutter_seconds.is_some();
+        let SceneSource::Model(path) = &self.source else { return Ok(()) };
+        if !is_exposed || !animation.tracks.is_empty() || ModelFormat::of(path) != Some(ModelFormat::Gltf) {
+            return Ok(());
+        }
+        let meshes = |file: &SceneFile| -> Vec<MeshSource> {
+            let sources = file.objects.iter().filter_map(|object| match object {
+                ObjectPart::Mesh { source, .. } => Some(source.clone()),
+                _ => None,
+            });
+            sources.filter(|source| matches!(source, MeshSource::Gltf { .. })).collect()
+        };
+        let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+        let choice = ModelChoice { at: Some(animation.at), camera: camera.map(str::to_owned), ..self.choice.clone() };
+        let wish = gltf_scene::Wish { file: &file, choice: &choice, aspect: 1.0 };
+        let made = gltf_scene::generate(documents, path, &wish)?;
+        let is_same = meshes(&made.file) == meshes(&self.file) && made.file.lights.len() <= self.file.lights.len();
+        if is_same {
+            self.choice.at = choice.at;
+            self.motion = made.motion.map(Arc::new);
+        } else {
+            let title = self.source.title();
+            self.warnings.push(format!("{title}: the image has edited objects, and is shown without motion blur"));
+        }
+        Ok(())
+    }
+
     /// Sets the chosen exposure time; warns if nothing can move.
     fn expose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
         let Some(share) = choice.shutter else { return Ok(()) };
@@ -321,7 +359,7 @@ impl LoadedScene {
                 if let Some(ignored) = gltf_scene::beyond_animation(at.max(0.0), Some(end)) {
                     self.warnings.push(format!("{}: {ignored}", self.source.title()));
                 }
-                self.file.animation.at = at;
+                self.file.show_moment(at);
             }
             None => {}
         }
@@ -332,6 +370,14 @@ impl LoadedScene {
             return Err(SceneError::in_file(self.source.title(), format!("there is no camera `{wanted}`{hint}")));
         };
         self.file.camera = camera.clone();
+        let tracks = &mut self.file.animation.tracks;
+        let n_tracks = tracks.len();
+        tracks.retain(|track| !matches!(track, TrackPart::Camera { .. }));
+        if tracks.len() < n_tracks {
+            let title = self.source.title();
+            self.warnings.push(format!("{title}: camera `{wanted}` stands still: the tracks move `camera`"));
+        }
+        self.file.animation.edited.camera = None;
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! The metadata of an image that is not finished yet.
 
 use super::describe::Description;
-use super::file::{DisplayPart, FilmPart};
+use super::file::{DisplayPart, FilmPart, SceneFile};
 use super::fingerprint::{Fingerprint, SceneContent};
 use super::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
 use super::loaded::LoadedScene;
@@ -71,19 +71,21 @@ impl MetadataDraft {
             Some(SceneSource::Scene(path)) => ImageScene::Scene(relative(path)),
             Some(SceneSource::Model(path)) => {
                 let up = self.up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' });
-                ImageScene::Model { path: relative(path), up }
+                let camera = self.loaded.as_ref().and_then(|loaded| loaded.choice.camera.clone());
+                ImageScene::Model { path: relative(path), up, camera }
             }
             Some(SceneSource::Picture(_)) | None => ImageScene::None,
         };
         let file = &self.description.file;
         let Prints { content, has_changed } = self.prints();
+        let film = FilmPart { width: size.0, height: size.1, filter: file.film.filter };
         let shot = ImageMetadata {
             format: FORMAT,
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
             fingerprint: content.to_string(),
-            camera: file.camera.clone(),
-            film: FilmPart { width: size.0, height: size.1, filter: file.film.filter },
+            camera: file.shown_camera().clone(),
+            film,
             integrator: file.integrator,
             max_depth: file.max_depth,
             display,
@@ -94,7 +96,8 @@ impl MetadataDraft {
             uneven: samples.uneven,
             denoised: None,
             denoised_layer: None,
-            text: has_changed.then(|| file.to_ron()),
+            // An image of the image has the same text.
+            text: has_changed.then(|| SceneFile { film, display, ..file.clone() }.to_ron()),
         };
         shot.to_note()
     }
@@ -105,13 +108,14 @@ impl MetadataDraft {
         *self.prints.get_or_init(|| {
             let content = self.content.fingerprint();
             let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
-            // The file does not name a replaced environment, nor the time or variant of a model; and a scene that was
-            // stored in an image has no file.
+            // The file does not name a replaced environment, nor the camera, time or variant of a model; and a scene that
+            // was stored in an image has no file.
             let is_own = |it: &LoadedScene| {
                 it.environment.is_some()
                     || it.choice.at.is_some()
                     || it.choice.shutter.is_some()
                     || it.choice.variant.is_some()
+                    || it.choice.camera.is_some()
                     || it.shot.as_ref().is_some_and(|shot| shot.text.is_some())
             };
             let is_another = opened != Some(content) || self.loaded.as_ref().is_some_and(is_own);

@@ -5,6 +5,7 @@
 //! (entities) → [`Extraction`] (a [`crate::render::Prepared`] relative to an origin near the camera).
 
 pub mod animation;
+mod archive_cache;
 mod bad_value;
 pub(crate) mod bounds;
 mod builtin;
@@ -44,6 +45,7 @@ mod open_shutter;
 mod orientation;
 mod outputs;
 mod own_materials;
+mod paths;
 mod picture;
 mod placement;
 pub mod ply;
@@ -56,6 +58,7 @@ mod stamp;
 pub mod stl;
 mod trees;
 pub(crate) mod units;
+mod unpacked_files;
 mod up_axis;
 mod value;
 mod view;
@@ -63,7 +66,8 @@ mod warnings;
 pub mod whole_file;
 mod write_error;
 
-pub use animation::{Animation, Moment, show_moment};
+pub use animation::{Animation, Moment, camera_follows, show_moment};
+pub use archive_cache::{archive_cache, unpacked_folder};
 pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_fps, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
@@ -89,12 +93,13 @@ pub use loaded::LoadedScene;
 pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase};
 pub use metadata_draft::MetadataDraft;
 pub use outputs::{Files, FilesError};
+pub use paths::each_path;
 pub use picture::{PictureError, read_picture, read_picture_within};
 #[cfg(feature = "cli")]
 pub(crate) use picture::{decode_picture, picture_reader};
 pub use placement::{Linear, Placement};
 pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
-pub use save::{SavedScene, each_path, save_scene};
+pub use save::{SavedScene, save_scene};
 pub use source::{SceneSource, UpAxis};
 pub use sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 pub(crate) use spawn::texture_of;

@@ -2,13 +2,12 @@
 //!
 //! Nothing is computed in advance: the renderer asks for the snapshot at the time of each sample ([`Extraction::at`]).
 
-use super::animation::{Animation, Channel, Moment};
+use super::animation::{Animation, Moment};
 use super::extract::Extraction;
 use super::inputs::SceneInputs;
 use super::trees::Trees;
 use crate::render::{Moments, Prepared};
-use bevy_ecs::prelude::{Entity, World};
-use std::collections::HashSet;
+use bevy_ecs::prelude::World;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -47,30 +46,12 @@ impl Extraction {
     pub fn expose(&mut self, animation: Option<&Animation>, seconds: f64, inputs: &SceneInputs, trees: &Trees) {
         self.prepared = self.prepared.with_moments(None);
         let Some(animation) = animation.filter(|animation| animation.open_shutter(seconds).is_some()) else { return };
-        let animation = unedited(animation, seconds, inputs);
+        let animation = animation.without(&animation.edited(inputs, seconds));
         let Some(open) = animation.open_shutter(seconds) else { return };
         let (extraction, inputs, trees) = (self.clone(), inputs.clone(), trees.clone());
         let moments = OpenShutter { extraction, animation, inputs, trees, open };
         self.prepared = self.prepared.with_moments(Some(Arc::new(moments)));
     }
-}
-
-/// The animation without the tracks of entities that are not as it says.
-fn unedited(animation: &Animation, seconds: f64, inputs: &SceneInputs) -> Animation {
-    let mut animation = animation.clone();
-    let then = animation.inputs_at(inputs, seconds);
-    let objects = inputs.objects.iter().zip(&then.objects).filter(|(a, b)| a != b).map(|(a, _)| a.entity);
-    let lights = inputs.lights.iter().zip(&then.lights).filter(|(a, b)| a != b).map(|(a, _)| a.entity);
-    let materials = inputs.materials.iter().zip(&then.materials).filter(|(a, b)| a != b).map(|(a, _)| a.entity);
-    let edited: HashSet<Entity> = objects.chain(lights).chain(materials).collect();
-    let same_camera = inputs.camera == then.camera;
-    animation.tracks.retain(|track| match track.channel {
-        Channel::Camera(_) => same_camera,
-        Channel::Object(entity, _) | Channel::Light(entity, _) | Channel::Material(entity, _) => {
-            !edited.contains(&entity)
-        }
-    });
-    animation
 }
 
 #[cfg(test)]

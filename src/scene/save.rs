@@ -5,8 +5,10 @@ use super::file::{ObjectPart, SceneFile};
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::obj::{NewObj, ObjExtras, save_new_obj};
-use super::relative::{absolute, path_to_text, relative_path, text_to_path};
-use super::sources::{EnvironmentSource, MeshSource, TextureSource};
+use super::paths::move_paths;
+use super::relative::{path_to_text, text_to_path};
+use super::sources::MeshSource;
+use super::unpacked_files::keep_unpacked;
 use super::whole_file::write_whole;
 use super::write_error::WriteError;
 use bevy_ecs::prelude::World;
@@ -24,7 +26,7 @@ pub struct SavedScene {
 /// Writes the contents of `world` as a scene file; `loaded`: the scene that was opened into it, if any.
 ///
 /// Writes atomically. Paths of meshes and images are relative to the new file; meshes that came from no file are
-/// written beside it. The text is parsed and compared before it replaces an older file.
+/// written beside it, and so are copies of the files of an archive. The text is parsed and compared before it replaces an older file.
 ///
 /// # Errors
 /// If the world holds values that a scene file must not have, or the file cannot be written.
@@ -38,16 +40,27 @@ impl Description {
     /// # Errors
     /// Like [`save_scene`].
     pub fn save(self, path: &Path) -> Result<SavedScene, WriteError> {
-        save(self, path)
+        save(self, path, true)
+    }
+
+    /// Like [`Self::save`], for a scene that is saved again later: refers to the files of an archive where they are.
+    ///
+    /// # Errors
+    /// Like [`save_scene`].
+    pub fn save_draft(self, path: &Path) -> Result<SavedScene, WriteError> {
+        save(self, path, false)
     }
 }
 
-fn save(mut description: Description, path: &Path) -> Result<SavedScene, WriteError> {
+fn save(mut description: Description, path: &Path, keeps_files: bool) -> Result<SavedScene, WriteError> {
     let failed = |source| WriteError::Scene { path: path.to_path_buf(), source };
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);
     let stem = path.file_stem().map_or_else(|| "scene".to_owned(), |stem| path_to_text(stem.as_ref()));
+    if keeps_files {
+        notes.extend(keep_unpacked(&mut description.file, &folder, &stem)?);
+    }
     let mut number = 0;
     for (object, mesh) in &description.loose_meshes {
         let comment = format!("a mesh of {}", path.display());
@@ -80,38 +93,6 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, WriteEr
     }
     write_whole(path, text.as_bytes())?;
     Ok(SavedScene { text, notes })
-}
-
-/// Makes all paths in `file` that are relative to the folder `from` relative to `to`.
-fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
-    let here = Path::new(".");
-    let or_here = |folder: &Path| if folder.as_os_str().is_empty() { here.to_path_buf() } else { folder.to_path_buf() };
-    let (from, to) = (or_here(from), or_here(to));
-    let same = absolute(&from) == absolute(&to);
-    let moved = |path: &mut String| {
-        // Relative paths stay unchanged if the folder is the same.
-        if !(path.is_empty() || same && Path::new(path.as_str()).is_relative()) {
-            *path = relative_path(&to, &from.join(text_to_path(path)));
-        }
-    };
-    each_path(file, moved);
-}
-
-/// Calls `change` for each path in a scene file.
-pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
-    for object in &mut file.objects {
-        if let ObjectPart::Mesh { source, .. } = object {
-            source.file_mut().into_iter().for_each(&mut change);
-        }
-    }
-    for (_, texture) in &mut file.textures.0 {
-        if let TextureSource::Image { file, .. } = texture {
-            change(file);
-        }
-    }
-    if let EnvironmentSource::Image { file, .. } = &mut file.environment {
-        change(file);
-    }
 }
 
 /// Whether a scene file has comments outside of strings.

@@ -1,6 +1,6 @@
 //! From a loaded scene to entities.
 
-use super::animation::{Animation, Entities, ModelMotion, Moment, of_part, place};
+use super::animation::{Animation, Edited, Entities, ModelMotion, Moment, of_part, show_first};
 use super::camera::{camera, unit};
 use super::components::{
     ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
@@ -100,7 +100,7 @@ impl LoadedScene {
             entities.lights.extend(part.name().map(|name| (name, entity)));
             entities.all_lights.push(entity);
         }
-        let (view, projection, lens) = camera(&self.file.camera);
+        let (view, projection, lens) = camera(self.file.shown_camera());
         world.spawn((view, projection, lens, Name::new("camera"), next()));
         self.insert_resources(world);
         self.animate(world, &entities);
@@ -111,7 +111,7 @@ impl LoadedScene {
         let part = &self.file.animation;
         if let Some(motion) = &self.motion {
             let (objects, lights) = (entities.meshes.clone(), entities.all_lights.clone());
-            let model = ModelMotion { motion: motion.clone(), objects, lights };
+            let model = ModelMotion { motion: motion.clone(), objects, lights, holds_camera: false };
             let animation = of_part(part, &self.file.camera, entities);
             world.insert_resource(Animation { model: Some(model), ..animation });
             // It is loaded at this moment.
@@ -123,9 +123,10 @@ impl LoadedScene {
             world.insert_resource(Moment::default());
             return;
         }
-        world.insert_resource(of_part(part, &self.file.camera, entities));
-        world.insert_resource(Moment(part.at));
-        place(world, part.at);
+        let edited = Edited::of_part(&part.edited, entities);
+        let animation = of_part(part, &self.file.camera, entities);
+        let shown = animation.without(&edited);
+        show_first(world, animation, &shown, part.at);
     }
 
     fn insert_resources(&self, world: &mut World) {

@@ -12,6 +12,7 @@ mod frames;
 mod motion_blur;
 mod pack;
 mod parts;
+mod reopening;
 mod report;
 mod said;
 mod terminal;

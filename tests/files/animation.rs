@@ -275,6 +275,9 @@ fn mistakes_have_a_place_and_a_name() {
         ("fps: 10, shutter_seconds: 0.1", "`shutter` and `shutter_seconds` exclude each other"),
         ("fps: 10, duration: 0", "`duration` is 0"),
         ("fps: 10, at: inf", "`at` is inf"),
+        ("fps: 10, edited: (objects: [\"plane\"])", "object `plane` has no track"),
+        ("fps: 10, edited: (lights: [\"lam\"])", "light `lam` has no track (did you mean `lamp`?)"),
+        ("fps: 10, edited: (camera: (eye: (0, 0, 1), look_at: (0, 0, 1)))", "are the same point"),
         ("fp: 10", "unknown field `fp` of `animation` (did you mean `fps`?)"),
     ];
     for (field, told) in fields {
@@ -284,6 +287,56 @@ fn mistakes_have_a_place_and_a_name() {
     assert!(errors(&MOVING.replace("shutter: 0.5", "shutter: 1.5")).contains("`shutter` is 1.5"));
     let twice = MOVING.replace("plane(material", "sphere(name: \"ball\", radius: 1, material");
     assert!(errors(&twice).contains("2 objects are called `ball`"));
+}
+
+/// The keys of a material that no object uses are checked like all others.
+#[test]
+fn keys_of_a_lost_property_are_left_out_and_told() {
+    let (mut world, _) = open_at(MOVING, Some(1.0));
+    let (ball, red) = (called(&mut world, "ball"), called(&mut world, "red"));
+    world.despawn(ball);
+    let mirror = firstlight::scene::Material::Mirror { reflectance: Vec3::splat(0.5).into() };
+    *world.get_mut::<SurfaceMaterial>(red).unwrap() = SurfaceMaterial(mirror);
+    let part = Description::of(&mut world, None);
+    part.file.check().unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(part.losses, ["the keys of `albedo` are left out: `red` has no `albedo` any more"]);
+    assert_eq!(part.file.animation.edited, Default::default());
+}
+
+/// What was changed without a key is shown until another time is.
+#[test]
+fn edits_of_what_has_tracks_are_saved_beside_them() {
+    let (mut world, _) = open_at(MOVING, Some(1.0));
+    let (ball, lamp, red) = (called(&mut world, "ball"), called(&mut world, "lamp"), called(&mut world, "red"));
+    world.get_mut::<Placement>(ball).unwrap().translation.y = 2.0;
+    world.get_mut::<firstlight::scene::PointLight>(lamp).unwrap().intensity = Vec3::splat(3.0);
+    let green = firstlight::scene::Material::Diffuse { albedo: Vec3::new(0.1, 0.7, 0.1).into() };
+    *world.get_mut::<SurfaceMaterial>(red).unwrap() = SurfaceMaterial(green);
+    for mut view in world.query::<&mut View>().iter_mut(&mut world) {
+        view.eye.y = 3.0;
+    }
+    let part = Description::of(&mut world, None);
+    let edited = &part.file.animation.edited;
+    assert_eq!((&edited.objects[..], &edited.lights[..]), (&["ball".to_owned()][..], &["lamp".to_owned()][..]));
+    assert_eq!(edited.materials, ["red"]);
+    let text = part.file.to_ron();
+    let inputs = |world: &mut World| {
+        let SceneInputs { objects, lights, materials, camera, .. } = SceneInputs::of(world);
+        let placements: Vec<_> = objects.iter().map(|object| object.placement).collect();
+        let lights: Vec<_> = lights.iter().map(|light| (light.light, light.placement)).collect();
+        let materials: Vec<_> = materials.into_iter().map(|material| material.material).collect();
+        let camera = camera.unwrap();
+        (placements, lights, materials, (camera.view, camera.projection, camera.lens))
+    };
+    let (mut again, _) = open_at(&text, None);
+    assert_eq!(inputs(&mut again), inputs(&mut world));
+    // At another time both are the same, too, and so is what is opened there.
+    show_moment(&mut again, 2.0);
+    show_moment(&mut world, 2.0);
+    let there = inputs(&mut world);
+    assert_eq!(inputs(&mut again), there);
+    assert_eq!(inputs(&mut open_at(&text, Some(2.0)).0), there);
+    assert_eq!(there.0, inputs(&mut open_at(MOVING, Some(2.0)).0).0);
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod denoise;
 mod determinism;
 mod dispersion;
 mod features;
+mod few_samples;
 mod filters;
 mod lanes;
 mod light_transport;

@@ -5,5 +5,8 @@ mod edit;
 mod keys;
 mod lists;
 mod living_files;
+#[path = "../common/random.rs"]
+mod random;
+mod reopening;
 mod reset;
 mod session;

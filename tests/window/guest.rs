@@ -19,7 +19,7 @@ fn differ(a: &image::RgbImage, b: &image::RgbImage) -> bool {
     20 * a.pixels().zip(b.pixels()).filter(|pair| far(*pair)).count() > a.pixels().len()
 }
 
-fn seen(program: &Program) {
+pub fn seen(program: &Program) {
     until("a picture to be seen", || has_content(program).then_some(()));
 }
 

@@ -6,5 +6,6 @@ mod desktop;
 mod guest;
 mod navigation;
 mod noise;
+mod saving;
 mod tools;
 mod window;

@@ -2,10 +2,12 @@
 
 use super::written::to_part;
 use super::{Animation, Channel};
-use crate::scene::file::AnimationPart;
+use crate::scene::camera::camera_part;
+use crate::scene::components::SurfaceMaterial;
+use crate::scene::file::{AnimationPart, EditedPart};
 use crate::scene::inputs::SceneInputs;
 use crate::scene::placement::{Linear, Placement};
-use bevy_ecs::prelude::Entity;
+use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
@@ -71,24 +73,26 @@ impl Moved {
         self.materials.contains(&entity)
     }
 
-    /// The animation as in a scene file. Tracks whose entity has lost the property are added to `losses`.
+    /// The animation as in a scene file, with what differs from it. Tracks whose entity has lost the property are added to
+    /// `losses`.
     ///
     /// - `at`: the current time of the world, seconds.
     /// - `materials`: their names in the file.
     pub(in crate::scene) fn part(
         &self,
         (animation, at): (&Animation, f64),
-        inputs: &SceneInputs,
+        (world, inputs): (&World, &SceneInputs),
         materials: &HashMap<Entity, String>,
         losses: &mut Vec<String>,
     ) -> AnimationPart {
-        to_part(animation, at, |channel| {
+        let edited = self.edited_part(animation, at, (world, inputs), materials);
+        let part = to_part(animation, at, |channel| {
             let name = match channel {
                 Channel::Camera(_) => return None,
                 Channel::Object(entity, _) | Channel::Light(entity, _) => self.names.get(&entity)?.clone(),
                 Channel::Material(entity, _) => materials.get(&entity)?.clone(),
             };
-            match has_property(channel, inputs) {
+            match has_property(channel, world, inputs) {
                 Some(false) => {
                     let property = channel.property();
                     losses
@@ -97,12 +101,46 @@ impl Moved {
                 }
                 _ => Some(name),
             }
-        })
+        });
+        AnimationPart { edited, ..part }
+    }
+
+    /// What differs from its tracks.
+    fn edited_part(
+        &self,
+        animation: &Animation,
+        at: f64,
+        (world, inputs): (&World, &SceneInputs),
+        materials: &HashMap<Entity, String>,
+    ) -> EditedPart {
+        let edited = animation.edited(inputs, at);
+        let named = |entities: &mut dyn Iterator<Item = Entity>| -> Vec<String> {
+            entities.filter(|entity| edited.entities.contains(entity)).filter_map(|it| self.name(it).cloned()).collect()
+        };
+        // Those that no object uses are not among the inputs.
+        let mut of_materials: Vec<String> = (animation.tracks.iter())
+            .filter_map(|track| {
+                let Channel::Material(entity, property) = track.channel else { return None };
+                let now = &world.get::<SurfaceMaterial>(entity)?.0;
+                let mut then = now.clone();
+                property.set(&mut then, track.at(at));
+                (then != *now).then(|| materials.get(&entity).cloned())?
+            })
+            .collect();
+        of_materials.sort();
+        of_materials.dedup();
+        let seen = inputs.camera.as_ref().filter(|_| edited.camera && animation.has_camera_track());
+        EditedPart {
+            camera: seen.map(|seen| camera_part(&seen.view, &seen.projection, &seen.lens, None)),
+            objects: named(&mut inputs.objects.iter().map(|object| object.entity)),
+            lights: named(&mut inputs.lights.iter().map(|light| light.entity)),
+            materials: of_materials,
+        }
     }
 }
 
-/// Whether the property of the channel can be set; `None` if its entity is not in `inputs`.
-fn has_property(channel: Channel, inputs: &SceneInputs) -> Option<bool> {
+/// Whether the property of the channel can be set; `None` if its entity does not exist.
+fn has_property(channel: Channel, world: &World, inputs: &SceneInputs) -> Option<bool> {
     use super::ObjectProperty::{Rotate, Scale};
     Some(match channel {
         Channel::Camera(_) => true,
@@ -116,8 +154,7 @@ fn has_property(channel: Channel, inputs: &SceneInputs) -> Option<bool> {
             property.set(&mut light.light.clone(), &mut light.placement.clone(), DVec3::ONE).is_some()
         }
         Channel::Material(entity, property) => {
-            let material = inputs.materials.iter().find(|material| material.entity == entity)?;
-            property.set(&mut material.material.clone(), DVec3::ONE).is_some()
+            property.set(&mut world.get::<SurfaceMaterial>(entity)?.0.clone(), DVec3::ONE).is_some()
         }
     })
 }

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 
 /// Keys this near to each other are one, seconds: frames are at least 1e-4 s apart.
 const SAME_TIME: f64 = 1e-6;
-/// Tolerance for a camera that is upright but for rounding.
+/// Tolerance of a focus distance that is that of `look_at` but for rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// What new keys are of.
@@ -232,17 +232,9 @@ fn keys_of_camera(animation: &mut Animation, now: &CameraInput, seconds: f64) ->
     let (old_view, old_projection, old_lens) = camera(&old);
     let has_track =
         |animation: &Animation, property: CameraProperty| animation.track(Channel::Camera(property)).is_some();
-    let at_a_point = old.look_at.is_some() || old.forward.is_none();
     let mut part = rest_camera(animation, seconds, view, projection, lens);
-    (part.look_at, part.forward, part.pivot_distance) = match at_a_point {
-        true => (Some(view.pivot()), None, None),
-        false => (None, Some(view.forward), Some(view.pivot_distance)),
-    };
-    // The same `up` as before, if that gives this view, and a focus that follows `look_at`, if it still does.
-    let upright = camera(&CameraPart { up: old.up, ..part.clone() }).0;
-    if upright.up.is_finite() && upright.up.distance(view.up) < ROUNDING {
-        part.up = old.up;
-    }
+    let at_a_point = part.look_at.is_some();
+    // A focus that follows `look_at`, if it still does.
     let follows = old.focus_distance.is_none() && lens.focus_distance == old_lens.focus_distance;
     if follows && (lens.focus_distance - view.pivot_distance).abs() <= ROUNDING * view.pivot_distance {
         part.focus_distance = None;

@@ -8,6 +8,7 @@
 //! the state of a world into keys.
 
 mod described;
+mod edited;
 mod get;
 mod key;
 mod keying;
@@ -18,11 +19,12 @@ mod set;
 mod written;
 
 pub(super) use described::Moved;
+pub(super) use edited::Edited;
 pub use key::{Curve, Interpolation, Key, KeyValue};
 pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys};
 pub(super) use model::ModelMotion;
-pub use moment::{Moment, show_moment};
-pub(super) use moment::{place, rest_camera};
+pub(super) use moment::show_first;
+pub use moment::{Moment, camera_follows, show_moment};
 pub use property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty, Quantity};
 pub(super) use written::{Entities, of_part};
 

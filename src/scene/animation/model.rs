@@ -8,7 +8,7 @@ use crate::scene::inputs::SceneInputs;
 use crate::scene::light::LightKind;
 use crate::scene::sources::{MeshSource, Seconds};
 use bevy_ecs::prelude::{Entity, World};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -20,11 +20,16 @@ pub(in crate::scene) struct ModelMotion {
     pub objects: Vec<Entity>,
     /// Those that are lights of the file, in the order of the scene.
     pub lights: Vec<Entity>,
+    /// Whether the camera stands still, even if that of the file moves.
+    pub holds_camera: bool,
 }
 
 impl PartialEq for ModelMotion {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.motion, &other.motion) && self.objects == other.objects && self.lights == other.lights
+        Arc::ptr_eq(&self.motion, &other.motion)
+            && self.objects == other.objects
+            && self.lights == other.lights
+            && self.holds_camera == other.holds_camera
     }
 }
 
@@ -39,7 +44,17 @@ impl ModelMotion {
     }
 
     pub(super) fn moves_camera(&self) -> bool {
-        self.motion.camera.is_some()
+        self.motion.camera.is_some() && !self.holds_camera
+    }
+
+    /// Leaves these entities, and perhaps the camera, where they are from now on.
+    pub(super) fn hold(&mut self, camera: bool, entities: &HashSet<Entity>) {
+        self.holds_camera |= camera;
+        for entity in self.objects.iter_mut().chain(&mut self.lights) {
+            if entities.contains(entity) {
+                *entity = Entity::PLACEHOLDER;
+            }
+        }
     }
 
     /// `part` where the camera of the file is at a time; the lens stays.

@@ -12,6 +12,9 @@ use crate::scene::view::{Lens, Projection, View};
 use bevy_ecs::prelude::{Entity, Mut, Resource, World};
 use std::collections::HashMap;
 
+/// Tolerance for a camera that is upright but for rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Current time of a world, seconds.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment(pub f64);
@@ -54,8 +57,7 @@ impl Animation {
     }
 
     pub(super) fn moves_camera(&self) -> bool {
-        self.model.as_ref().is_some_and(ModelMotion::moves_camera)
-            || self.tracks.iter().any(|track| matches!(track.channel, Channel::Camera(_)))
+        self.model.as_ref().is_some_and(ModelMotion::moves_camera) || self.has_camera_track()
     }
 
     /// The camera at a time, as in a scene file.
@@ -83,13 +85,22 @@ pub fn show_moment(world: &mut World, seconds: f64) {
     place(world, seconds);
 }
 
-/// Sets the time without first storing changes of the camera, as needed for a new scene.
-pub(in crate::scene) fn place(world: &mut World, seconds: f64) {
+/// Sets the time without first storing changes of the camera.
+pub(super) fn place(world: &mut World, seconds: f64) {
     if !world.contains_resource::<Animation>() {
         return world.insert_resource(Moment(seconds));
     }
     // The animation itself does not change.
     world.resource_scope(|world, animation: Mut<Animation>| place_as(world, &animation, seconds));
+    world.insert_resource(Moment(seconds));
+}
+
+/// Sets the animation and the time of a new scene.
+///
+/// - `shown`: the animation of what was not edited.
+pub(in crate::scene) fn show_first(world: &mut World, animation: Animation, shown: &Animation, seconds: f64) {
+    place_as(world, shown, seconds);
+    world.insert_resource(animation);
     world.insert_resource(Moment(seconds));
 }
 
@@ -135,19 +146,27 @@ fn place_as(world: &mut World, animation: &Animation, seconds: f64) {
 
 /// Stores changes of the camera since the time was set, for its properties without tracks.
 fn keep_changes(world: &mut World) {
-    let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves_camera()) else {
-        return;
-    };
-    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
-    let (written, expected) = (animation.clone(), camera(&animation.camera_at(shown)));
     let Some(CameraInput { view, projection, lens, .. }) = SceneInputs::of(world).camera else { return };
-    if expected != (view, projection, lens) {
-        world.resource_mut::<Animation>().camera = rest_camera(&written, shown, &view, &projection, &lens);
+    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    let is_kept = world.get_resource::<Animation>().is_none_or(|animation| !animation.moves_camera());
+    if !is_kept && !camera_follows(world) {
+        let mut animation = world.resource_mut::<Animation>();
+        animation.camera = rest_camera(&animation, shown, &view, &projection, &lens);
     }
 }
 
+/// Whether the animation moves the camera, and it is where that has it at the present time.
+pub fn camera_follows(world: &mut World) -> bool {
+    let seen = SceneInputs::of(world).camera;
+    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    let animation = world.get_resource::<Animation>().filter(|animation| animation.moves_camera());
+    animation.zip(seen).is_some_and(|(animation, CameraInput { view, projection, lens, .. })| {
+        camera(&animation.camera_at(shown)) == (view, projection, lens)
+    })
+}
+
 /// The camera for the properties without tracks: the one from the file, updated by what has changed.
-pub(in crate::scene) fn rest_camera(
+pub(super) fn rest_camera(
     animation: &Animation,
     seconds: f64,
     view: &View,
@@ -159,15 +178,15 @@ pub(in crate::scene) fn rest_camera(
     if animation.tracks.iter().any(|track| track.channel == Channel::Camera(CameraProperty::FStop)) {
         (part.lens_radius, part.f_stop) = (None, written.f_stop);
     }
-    let aims = |part: &CameraPart| (part.look_at.is_some(), part.forward.is_some());
-    if !animation.moves_camera() || aims(&part) == aims(&written) {
-        return part;
-    }
     // The tracks need the same form (`look_at` or `forward`) as in the file.
-    match written.look_at {
-        Some(_) => CameraPart { look_at: Some(view.pivot()), forward: None, pivot_distance: None, ..part },
-        None => {
-            CameraPart { look_at: None, forward: Some(view.forward), pivot_distance: Some(view.pivot_distance), ..part }
-        }
+    (part.look_at, part.forward, part.pivot_distance) = match written.look_at.is_some() || written.forward.is_none() {
+        true => (Some(view.pivot()), None, None),
+        false => (None, Some(view.forward), Some(view.pivot_distance)),
+    };
+    // A camera that is upright stays so on its way.
+    let upright = camera(&CameraPart { up: written.up, ..part.clone() }).0;
+    if upright.up.is_finite() && upright.up.distance(view.up) < ROUNDING {
+        part.up = written.up;
     }
+    part
 }

@@ -72,5 +72,13 @@ pub(in crate::scene) fn to_part(
         })
     };
     let tracks = animation.tracks.iter().filter_map(track).collect();
-    AnimationPart { at, fps: animation.fps, duration: animation.duration, shutter, shutter_seconds, tracks }
+    AnimationPart {
+        at,
+        fps: animation.fps,
+        duration: animation.duration,
+        shutter,
+        shutter_seconds,
+        tracks,
+        ..AnimationPart::default()
+    }
 }

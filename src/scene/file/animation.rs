@@ -1,5 +1,6 @@
 //! The section `animation` of a scene file.
 
+use super::camera::CameraPart;
 use crate::scene::animation::{
     CameraProperty, Interpolation, Key, KeyValue, LightProperty, MaterialProperty, ObjectProperty,
 };
@@ -30,12 +31,41 @@ pub struct AnimationPart {
     /// One per animated property.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackPart>,
+    /// What is not as its tracks say at `at`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub edited: EditedPart,
 }
 
 impl Default for AnimationPart {
     fn default() -> Self {
-        Self { at: 0.0, fps: default_fps(), duration: None, shutter: None, shutter_seconds: None, tracks: Vec::new() }
+        Self {
+            at: 0.0,
+            fps: default_fps(),
+            duration: None,
+            shutter: None,
+            shutter_seconds: None,
+            tracks: Vec::new(),
+            edited: EditedPart::default(),
+        }
     }
+}
+
+/// What is shown as it is stated, not as its tracks say, until another time is shown. It stands still during the exposure.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EditedPart {
+    /// The camera that is shown; the tracks move the one of the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraPart>,
+    /// Names of objects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<String>,
+    /// Names of lights.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lights: Vec<String>,
+    /// Names of materials.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<String>,
 }
 
 /// A property over time.

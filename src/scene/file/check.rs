@@ -1,6 +1,7 @@
 //! Checks the values of a scene file before anything is built from them.
 
-use super::parts::{CameraPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
+use super::camera::CameraPart;
+use super::parts::{InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
 use crate::render::{MAX_LOBES, Param, ParamRef};
 use crate::scene::bounds::{
     check_cone, check_film_size, check_light_radius, check_max_depth, coordinate_rule, is_coordinate, is_size, number,
@@ -74,7 +75,7 @@ impl Check<'_> {
         self.wrong(path, what + &hint);
     }
 
-    fn camera(&mut self, at: &str, camera: &CameraPart) {
+    pub(super) fn camera(&mut self, at: &str, camera: &CameraPart) {
         for bad in camera.components().err().into_iter().flatten() {
             let path = if bad.field() == "camera" { at.to_owned() } else { format!("{at}/{}", bad.field()) };
             self.wrong(&path, bad);

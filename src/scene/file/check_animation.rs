@@ -13,7 +13,7 @@ use crate::scene::bounds::{
 use crate::scene::file::{ObjectPart, SceneFile};
 use crate::scene::light::LightKind;
 use crate::scene::view::unit_direction;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Paths, properties and curves of the tracks of one entity.
 type Moved<'a, P> = Vec<(String, P, Curve)>;
@@ -44,6 +44,45 @@ impl Check<'_> {
             return self.wrong("animation/tracks", format!("there are {keys} keys: use at most {MOST_KEYS}"));
         }
         self.tracks();
+        self.edited();
+    }
+
+    /// What was edited has a track, which the edit overrides.
+    fn edited(&mut self) {
+        let tracks = &self.file.animation.tracks;
+        let edited = &self.file.animation.edited;
+        if let Some(camera) = &edited.camera {
+            let path = "animation/edited/camera";
+            if !tracks.iter().any(|track| matches!(track, TrackPart::Camera { .. })) {
+                self.wrong(path, "the camera has no track: this one belongs into `camera` of the scene");
+            }
+            self.camera(path, camera);
+        }
+        type NameOf = fn(&TrackPart) -> Option<&str>;
+        let of_object: NameOf = |track| match track {
+            TrackPart::Object { name, .. } => Some(name),
+            _ => None,
+        };
+        let of_light: NameOf = |track| match track {
+            TrackPart::Light { name, .. } => Some(name),
+            _ => None,
+        };
+        let of_material: NameOf = |track| match track {
+            TrackPart::Material { name, .. } => Some(name),
+            _ => None,
+        };
+        let kinds = [
+            ("object", &edited.objects, of_object),
+            ("light", &edited.lights, of_light),
+            ("material", &edited.materials, of_material),
+        ];
+        for (what, names, name_of) in kinds {
+            let known: HashSet<&str> = tracks.iter().filter_map(name_of).collect();
+            for (i, name) in names.iter().enumerate().filter(|(_, name)| !known.contains(name.as_str())) {
+                let message = format!("{what} `{name}` has no track");
+                self.misnamed(&format!("animation/edited/{what}s/{i}"), message, name, known.iter().copied());
+            }
+        }
     }
 
     fn tracks(&mut self) {

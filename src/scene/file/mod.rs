@@ -5,6 +5,7 @@
 //! linear Rec. 709 colours, degrees for angles; paths relative to the scene file.
 
 mod animation;
+mod camera;
 mod check;
 mod check_animation;
 mod expected;
@@ -14,11 +15,12 @@ mod syntax;
 
 pub use super::bounds::check_film_size;
 pub use super::value::Named;
-pub use animation::{AnimationPart, TrackPart};
+pub use animation::{AnimationPart, EditedPart, TrackPart};
+pub use camera::CameraPart;
 pub use locate::locate;
 pub use parts::{
-    CameraPart, DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, SceneFile,
-    TransformPart, ball_grid,
+    DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, SceneFile, TransformPart,
+    ball_grid,
 };
 
 use super::error::{Problem, SceneError};

@@ -5,9 +5,10 @@ use super::page::{expect_none, files, read};
 use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
-const GRAMMAR: [(&str, &[&str]); 11] = [
+const GRAMMAR: [(&str, &[&str]); 12] = [
     ("src/scene/file/parts.rs", &[]),
-    ("src/scene/file/animation.rs", &["AnimationPart", "TrackPart"]),
+    ("src/scene/file/camera.rs", &[]),
+    ("src/scene/file/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
     ("src/scene/animation/key.rs", &["Interpolation"]),
     ("src/scene/animation/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
     ("src/scene/sources.rs", &[]),
