@@ -93,6 +93,9 @@ pub enum TextureSource {
         /// Factor of the colours.
         #[serde(default = "white", skip_serializing_if = "is_white")]
         tint: Rgb,
+        /// Whether the colours, with their factor, are subtracted from 1.
+        #[serde(default, skip_serializing_if = "is_default")]
+        invert: bool,
         /// Set of texture coordinates of the mesh: 0 or 1.
         #[serde(default, skip_serializing_if = "is_default")]
         uv_set: u8,
@@ -126,6 +129,7 @@ impl TextureSource {
             encoding: Encoding::Auto,
             channel: None,
             tint: white(),
+            invert: false,
             uv_set: 0,
             vertex_colors: false,
         }

@@ -34,7 +34,7 @@ impl FieldAt<'_> {
             }
             "f_stop" | "ior" | "simplify" | "exposure" => ("a number", "1.5"),
             "width" | "height" | "max_depth" | "blades" => ("a whole number", "8"),
-            "depth_of_field" | "smooth" | "two_sided" | "thin_walled" => ("true or false", "true"),
+            "depth_of_field" | "smooth" | "invert" | "two_sided" | "thin_walled" => ("true or false", "true"),
             "stretch" | "repeat" | "offset" | "squares" => ("two numbers in round brackets", "(2, 2)"),
             "vertices" => ("three points", "((0, 0, 0), (1, 0, 0), (0, 1, 0))"),
             "centers" => ("a list of points", "[(0, 0, 0), (1, 0, 0)]"),

@@ -54,6 +54,8 @@ pub struct Texture {
     pub channel: Option<Channel>,
     /// Factor of the colours.
     pub tint: Vec3,
+    /// Whether the colours, with their factor, are subtracted from 1: glossiness as roughness.
+    pub invert: bool,
     /// Whether colours are multiplied by the vertex colours of a mesh.
     pub vertex_colors: bool,
 }
@@ -117,6 +119,7 @@ impl Texture {
             uv_offset: Vec2::ZERO,
             channel: None,
             tint: Vec3::ONE,
+            invert: false,
             vertex_colors: false,
         }
     }
@@ -124,7 +127,7 @@ impl Texture {
     /// Evaluates the colour at a point.
     #[inline]
     pub fn eval(&self, point: impl Into<TexturePoint>) -> Vec3 {
-        self.chosen(self.texel(&point.into())) * self.tint
+        self.shown(self.texel(&point.into()))
     }
 
     /// What the texture shows at a place, before a channel is chosen and tinted.
@@ -181,7 +184,7 @@ impl Texture {
 
     /// Whether the colours are those of the pattern at the first surface coordinates.
     pub(crate) fn is_plain(&self) -> bool {
-        !self.asks_for_more_than_uv() && self.channel.is_none() && self.tint == Vec3::ONE
+        !self.asks_for_more_than_uv() && self.channel.is_none() && self.tint == Vec3::ONE && !self.invert
     }
 
     /// Whether it needs data that only meshes have: second texture coordinates or vertex colours.
@@ -189,15 +192,18 @@ impl Texture {
         self.uv_set != 0 || self.vertex_colors
     }
 
+    /// The colour that a texel gives: its channel, tinted, and perhaps inverted.
     #[inline]
-    pub(crate) fn chosen(&self, texel: Vec4) -> Vec3 {
-        match self.channel {
+    pub(crate) fn shown(&self, texel: Vec4) -> Vec3 {
+        let chosen = match self.channel {
             None => texel.truncate(),
             Some(Channel::R) => Vec3::splat(texel.x),
             Some(Channel::G) => Vec3::splat(texel.y),
             Some(Channel::B) => Vec3::splat(texel.z),
             Some(Channel::A) => Vec3::splat(texel.w),
-        }
+        };
+        let tinted = chosen * self.tint;
+        if self.invert { (Vec3::ONE - tinted).max(Vec3::ZERO) } else { tinted }
     }
 
     /// Converts surface coordinates to pattern coordinates.
@@ -217,7 +223,7 @@ impl Texture {
                 (texels.sum::<glam::DVec4>() / image.len().max(1) as f64).as_vec4()
             }
         };
-        self.chosen(mean) * self.tint
+        self.shown(mean)
     }
 }
 
@@ -329,7 +335,9 @@ mod tests {
         assert_eq!(texture.eval(point), Vec3::new(1.0, 0.2, 0.0));
         let alpha = Texture { channel: Some(Channel::A), ..texture.clone() };
         assert_eq!(alpha.eval(point), Vec3::splat(0.4));
-        assert_eq!(Texture { vertex_colors: true, ..alpha }.eval(point), Vec3::splat(0.2));
+        assert_eq!(Texture { vertex_colors: true, ..alpha.clone() }.eval(point), Vec3::splat(0.2));
+        let inverted = Texture { tint: Vec3::splat(0.5), invert: true, ..alpha.clone() };
+        assert_eq!(inverted.eval(point), Vec3::ONE - 0.5 * alpha.eval(point));
         let tinted = Texture { tint: Vec3::new(0.5, 1.0, 2.0), vertex_colors: true, ..texture };
         assert_eq!(tinted.eval(point), Vec3::new(0.25, 0.2, 0.0));
         assert_eq!(tinted.mean(), Vec3::new(0.5, 0.2, 0.0));

@@ -45,6 +45,6 @@ impl<'a> Lookups<'a> {
             _ => texture.texel(&self.point),
         };
         self.last.set(Some((id, texel)));
-        texture.chosen(texel) * texture.tint
+        texture.shown(texel)
     }
 }
