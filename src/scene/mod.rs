@@ -30,6 +30,7 @@ pub mod image_metadata;
 pub mod input_file;
 mod inputs;
 mod inventory;
+mod ktx2;
 mod light;
 pub(crate) mod limits;
 mod load;

@@ -2,6 +2,7 @@
 
 use super::gltf::images::{part_of_model, picture_of};
 use super::input_file::{FileKind, InputFile, ReadError};
+use super::ktx2;
 use super::limits::Limits;
 use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
@@ -26,8 +27,11 @@ pub enum PictureError {
     #[error("{0}")]
     Model(String),
     /// Not a supported image format.
-    #[error("unsupported image format: use PNG, JPEG, WebP, BMP, TGA, TIFF, GIF, DDS, PNM, HDR or EXR")]
+    #[error("unsupported image format: use PNG, JPEG, WebP, BMP, TGA, TIFF, GIF, DDS, PNM, KTX2, HDR or EXR")]
     Format,
+    /// A KTX2 file that is damaged, or that is no texture of Basis Universal.
+    #[error("cannot be decoded: {0}")]
+    Ktx2(String),
     /// The image has more pixels than the limits allow.
     #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
     TooLarge {
@@ -49,8 +53,8 @@ impl From<PictureError> for String {
     }
 }
 
-/// Reads PNG, JPEG, WebP, BMP, TGA, TIFF, GIF (its first image), DDS (DXT1 to DXT5), PNM, HDR or EXR, each in its own bit
-/// depth. Also returns a warning if invalid values were replaced.
+/// Reads PNG, JPEG, WebP, BMP, TGA, TIFF, GIF (its first image), DDS (DXT1 to DXT5), PNM, KTX2 (ETC1S, UASTC), HDR or EXR,
+/// each in its own bit depth. Also returns a warning if invalid values were replaced.
 ///
 /// # Errors
 /// Like [`read_picture_within`].
@@ -182,6 +186,16 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
         return decode_within(reader.into_decoder()?, limits);
     }
     let mut bytes = reader.into_inner();
+    if bytes.fill_buf().map_err(ReadError::from)?.starts_with(ktx2::SIGNATURE) {
+        let mut whole = Vec::new();
+        bytes.read_to_end(&mut whole).map_err(ReadError::from)?;
+        let (width, height) = ktx2::size(&whole).map_err(PictureError::Ktx2)?;
+        let is_large = width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) > limits.picture_pixels;
+        if is_large {
+            return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
+        }
+        return ktx2::decode(&whole).map_err(PictureError::Ktx2);
+    }
     if !bytes.fill_buf().map_err(ReadError::from)?.starts_with(HDR) {
         return Err(PictureError::Format);
     }
