@@ -76,7 +76,7 @@ impl Documents {
         if let Some(mesh) = lock(&opened.meshes).get(&known) {
             return Ok(mesh.clone());
         }
-        let posed = opened.posed(at)?;
+        let posed = opened.posed(at);
         let mesh =
             Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
         let limit = opened.document.most_numbers();
@@ -119,21 +119,21 @@ impl Documents {
 }
 
 impl Opened {
-    pub(super) fn posed(&self, at: Option<f64>) -> Result<Arc<Posed>, Located> {
+    pub(super) fn posed(&self, at: Option<f64>) -> Arc<Posed> {
         let key = at.map(f64::to_bits);
         if let Some(posed) = lock(&self.posed).get(&key) {
-            return Ok(posed.clone());
+            return posed.clone();
         }
-        let posed = Arc::new(self.document.posed(at)?);
-        Ok(lock(&self.posed).entry(key).or_insert(posed).clone())
+        let posed = Arc::new(self.document.posed(at));
+        lock(&self.posed).entry(key).or_insert(posed).clone()
     }
 
     /// - `file`: path of the model in texture paths.
-    pub(super) fn surfaces(&self, file: &str) -> Result<Arc<Surfaces>, Located> {
+    pub(super) fn surfaces(&self, file: &str) -> Arc<Surfaces> {
         if let Some(surfaces) = lock(&self.surfaces).get(file) {
-            return Ok(surfaces.clone());
+            return surfaces.clone();
         }
-        let surfaces = Arc::new(self.document.surfaces(file)?);
-        Ok(lock(&self.surfaces).entry(file.to_owned()).or_insert(surfaces).clone())
+        let surfaces = Arc::new(self.document.surfaces(file));
+        lock(&self.surfaces).entry(file.to_owned()).or_insert(surfaces).clone()
     }
 }

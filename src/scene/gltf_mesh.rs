@@ -46,7 +46,7 @@ impl GltfMesh<'_> {
         let wrong = |located: Located| document.error(located);
         // The images of the file's own materials have paths relative to the working directory.
         let file = path_to_text(self.path);
-        let surfaces = opened.surfaces(&file).map_err(wrong)?;
+        let surfaces = opened.surfaces(&file);
         let computed = ModelOptions::default().normals;
         let normals = match self.shading {
             MeshShading::Auto => computed,
@@ -59,7 +59,7 @@ impl GltfMesh<'_> {
                     let built = documents.mesh(&opened, key, self.at).map_err(wrong)?;
                     (built.mesh.clone(), built.keys.clone(), built.warnings.clone())
                 } else {
-                    let posed = opened.posed(self.at).map_err(wrong)?;
+                    let posed = opened.posed(self.at);
                     let built = document.mesh_of(key, &posed, &normals).map_err(wrong)?;
                     (built.mesh, built.keys, built.warnings)
                 };

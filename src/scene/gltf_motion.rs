@@ -45,7 +45,7 @@ impl GltfMotion {
     /// Where everything that moves is at a moment; seconds. `None` for a moment that cannot be had.
     pub(super) fn at(&self, seconds: f64) -> Option<GltfMoment> {
         let document = &self.opened.document;
-        let posed = document.posed(Some(seconds)).ok()?;
+        let posed = document.posed(Some(seconds));
         let assembly = document.assembly(&posed).ok()?;
         let mut moment = GltfMoment::default();
         let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -72,7 +72,7 @@ impl GltfMotion {
     /// The meshes of skins and morph targets at a moment, by the index of their object.
     pub(super) fn meshes_at(&self, seconds: f64) -> Vec<(usize, Arc<Mesh>)> {
         let document = &self.opened.document;
-        let Ok(posed) = document.posed(Some(seconds)) else { return Vec::new() };
+        let posed = document.posed(Some(seconds));
         let Ok(assembly) = document.assembly(&posed) else { return Vec::new() };
         let mut built: HashMap<MeshKey, Option<Arc<Mesh>>> = HashMap::new();
         let deformed = self.objects.iter().enumerate().filter_map(|(i, &index)| {

@@ -65,13 +65,12 @@ impl Maker<'_> {
 
     fn scene(&self) -> Result<Generated, SceneError> {
         let (choice, document) = (self.wish.choice, &self.opened.document);
-        let wrong = |located: Located| self.wrong(located);
-        let posed = self.opened.posed(choice.at).map_err(wrong)?;
-        let assembly = document.assembly(&posed).map_err(wrong)?;
-        let surfaces = self.opened.surfaces(self.wish.file).map_err(wrong)?;
+        let posed = self.opened.posed(choice.at);
+        let assembly = document.assembly(&posed).map_err(|located| self.wrong(located))?;
+        let surfaces = self.opened.surfaces(self.wish.file);
         let facts = document.facts(&assembly, &surfaces);
         let variant = self.variant(&facts)?;
-        let mut warnings: Warnings = assembly.warnings.iter().map(|warning| self.told(warning)).collect();
+        let mut warnings = Warnings::default();
         if let Some(ignored) = choice.at.and_then(|at| beyond_animation(at, facts.animation_length)) {
             warnings.push(self.told(&ignored));
         }
@@ -91,13 +90,9 @@ impl Maker<'_> {
             let at = placed.key.node.and(choice.at);
             if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let mesh = match self.documents.mesh(self.opened, placed.key, at) {
+                    Err(located @ (_, GltfProblem::TooLarge { .. })) => return Err(self.wrong(located)),
                     // Its warnings are told when the object is loaded.
-                    Ok(mesh) => Some(mesh),
-                    Err((place, problem @ GltfProblem::NoTriangles)) => {
-                        warnings.push(self.told(&format!("{place} {problem} and is left out")));
-                        None
-                    }
-                    Err(located) => return Err(self.wrong(located)),
+                    mesh => document.omissions.kept(&format!("meshes[{}]", placed.key.mesh), mesh),
                 };
                 entry.insert(mesh);
             }
@@ -105,7 +100,8 @@ impl Maker<'_> {
             let name = placed.name.clone().unwrap_or_else(|| format!("mesh {}", i + 1));
             if !is_placement(&placed.world) {
                 let name = crate::printable::name(&name);
-                warnings.push(self.told(&format!("`{name}` is flattened or too far away, and is left out")));
+                let sentence = format!("`{name}` is flattened or too far away, and is left out");
+                document.omissions.tell(&format!("meshes {i}"), sentence);
                 continue;
             }
             framing.add(&mesh.mesh, &placed.world);
@@ -135,7 +131,7 @@ impl Maker<'_> {
             });
         }
         if objects.is_empty() {
-            return Err(self.wrong((String::new(), GltfProblem::NoTriangles)));
+            return Err(self.wrong(document.omissions.nothing_left()));
         }
         let materials: Vec<_> = used.keys().map(|&index| &surfaces.materials[index]).collect();
         let emits = materials.iter().any(|surface| surface.emits);
@@ -143,7 +139,8 @@ impl Maker<'_> {
             Named(materials.iter().map(|surface| (surface.name.clone(), surface.part.clone())).collect());
         let textures = textures_of(&named, &surfaces.textures);
         warnings.extend(self.notes(&materials.iter().map(|s| (&*s.name, &*s.notes)).collect::<Vec<_>>()));
-        let unknown: Vec<_> = facts.unknown_extensions.iter().map(|name| format!("`{name}`")).collect();
+        let optional = facts.unknown_extensions.iter().filter(|name| !document.requires(name));
+        let unknown: Vec<_> = optional.map(|name| format!("`{name}`")).collect();
         if !unknown.is_empty() {
             warnings.push(self.told(&format!("extensions that are not modelled: {}", unknown.join(", "))));
         }
@@ -168,11 +165,13 @@ impl Maker<'_> {
             lights: self.lights(&assembly.lights, &mut warnings),
             animation: Default::default(),
         };
+        let mut all: Warnings = document.omissions.sentences().iter().map(|sentence| self.told(sentence)).collect();
+        all.append(&warnings);
         file.check().map_err(|error| SceneError::in_file(self.path, error.to_string()))?;
         let motion = match facts.animation_length.filter(|_| choice.at.is_some()) {
             None => None,
             Some(length) => {
-                let moved = document.moved_nodes().map_err(wrong)?;
+                let moved = document.moved_nodes();
                 let (objects, boxes) = shown.into_iter().unzip();
                 let is_seen = |(i, light): (usize, &PlacedLight)| (light.light.intensity != Vec3::ZERO).then_some(i);
                 let lights = assembly.lights.iter().enumerate().filter_map(is_seen).collect();
@@ -182,7 +181,7 @@ impl Maker<'_> {
             }
         };
         let has_camera = chosen.is_some();
-        Ok(Generated { file, facts, warnings, motion, framing, emits, has_camera })
+        Ok(Generated { file, facts, warnings: all, motion, framing, emits, has_camera })
     }
 
     fn told(&self, what: &str) -> String {

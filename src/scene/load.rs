@@ -16,7 +16,7 @@ use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::model::ModelFormat;
 use super::model_light::{Model, light_model};
-use super::own_materials::emits;
+use super::own_materials::{emits, without_lost_textures};
 use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -273,16 +273,24 @@ fn resolve(
         wanted.push(("environment/file".to_owned(), file.clone()));
     }
     scene.decode_ahead(wanted.iter().map(|(_, file)| file.as_str()), options, documents);
+    let mut lost = HashSet::new();
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
+        if lost.contains(&file) {
+            continue;
+        }
         if let Err(error) = scene.add_picture(&file, &path, options, documents) {
             // A model is still useful if an image is missing.
             match text {
                 Some(_) => note(place, &error),
-                None => scene.warnings.push(format!("{error}; the texture is omitted")),
+                None => {
+                    scene.warnings.push(format!("{error}; the texture is omitted"));
+                    lost.insert(file);
+                }
             }
         }
     }
+    leave_out_textures(&mut scene.file, &lost);
     scene.add_mesh_pictures(options, documents);
     let mut of_materials = Warnings::default();
     scene.meshes_with_own_materials().for_each(|mesh| of_materials.append(&mesh.material_warnings));
@@ -440,8 +448,13 @@ impl LoadedScene {
             _ => None,
         };
         let files: Vec<(String, PathBuf)> = textures.filter_map(named).collect();
+        let mut lost = HashSet::new();
         for (name, path) in files {
+            if lost.contains(&name) {
+                continue;
+            }
             if let Err(error) = self.add_picture(&name, &path, options, documents) {
+                lost.insert(name);
                 self.warnings.push(format!("{error}; the texture is omitted"));
             }
         }
@@ -486,6 +499,20 @@ impl LoadedScene {
             added.map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
         }
         Ok(())
+    }
+}
+
+/// Removes the textures of images that cannot be read. Materials get what is shown instead, so that the scene can be
+/// saved and opened again.
+fn leave_out_textures(file: &mut SceneFile, lost: &HashSet<String>) {
+    let is_lost = |source: &TextureSource| matches!(source, TextureSource::Image { file, .. } if lost.contains(file));
+    if !file.textures.iter().any(|(_, source)| is_lost(source)) {
+        return;
+    }
+    file.textures.0.retain(|(_, source)| !is_lost(source));
+    let names: HashSet<&str> = file.textures.names().collect();
+    for (_, part) in &mut file.materials.0 {
+        *part = without_lost_textures(part, |name| names.contains(name));
     }
 }
 

@@ -570,9 +570,6 @@ fn variants_and_what_is_not_modelled_are_told() {
         "{told}"
     );
     assert!(with("dusk").err().unwrap().contains("there is no variant `dusk`"));
-    writer.json["extensionsRequired"] = json!(["EXT_from_the_future"]);
-    let error = refusal(&writer.glb());
-    assert!(error.contains("extensionsRequired") && error.contains("`EXT_from_the_future`"), "{error}");
 }
 
 #[test]
@@ -637,7 +634,7 @@ fn files_outside_of_the_folder_are_read_only_when_that_is_allowed() {
 }
 
 #[test]
-fn files_that_lie_are_refused_with_what_and_where() {
+fn files_whose_only_mesh_lies_are_refused_with_what_and_where() {
     let broken = |change: &dyn Fn(&mut Value)| {
         let mut writer = Writer::default();
         quad(&mut writer);
@@ -657,16 +654,14 @@ fn files_that_lie_are_refused_with_what_and_where() {
             &|json| json["accessors"][0] = json!({ "componentType": 5126, "count": u32::MAX, "type": "VEC4" }),
             "accessors[0]",
         ),
-        (&|json| json["bufferViews"][0]["byteStride"] = json!(0), "byteStride"),
+        (&|json| json["bufferViews"][0]["byteStride"] = json!(4), "byteStride"),
         (&|json| json["bufferViews"][0]["byteLength"] = json!(u64::MAX), "bufferViews[0]: needs"),
         (&|json| json["meshes"][0]["primitives"][0]["attributes"] = json!({}), "POSITION is missing"),
         (&|json| json["meshes"][0]["primitives"][0]["mode"] = json!(9), "mode is `9`"),
         (&|json| json["meshes"][0]["primitives"] = json!([]), "has no triangles"),
-        (&|json| json["nodes"][0]["children"] = json!([0]), "nodes[0]"),
         (&|json| json["nodes"][0]["mesh"] = json!(4), "meshes[4]"),
-        (&|json| json["nodes"] = json!([{ "children": [1, 1] }, { "mesh": 0 }]), "nodes[1]: is named as a child"),
         (&|json| json["asset"]["version"] = json!("1.0"), "glTF version 1.0"),
-        (&|json| json["buffers"][0]["byteLength"] = json!(1_u64 << 40), "buffers[0]: needs 1099511627776 bytes"),
+        (&|json| json["buffers"] = json!([]), "buffers[0]"),
     ] {
         let error = if expected.is_empty() { continue } else { broken(change) };
         assert!(error.contains(expected), "{error} for {expected}");
@@ -713,9 +708,6 @@ fn files_that_mean_harm_are_refused_with_their_place() {
         ("accessor_out_of_bounds.glb", "accessors[0]: needs 12000000 bytes"),
         ("index_out_of_range.glb", "index 65000 is out of range"),
         ("offset_overflow.glb", "bufferViews[0]: needs 4294967316 bytes"),
-        ("cyclic_nodes.glb", "nodes[0]: is named as a child more than once"),
-        ("node_dag_doubling.glb", "nodes[1]: is named as a child more than once"),
-        ("base64_bomb.gltf", "buffers[0]: needs 1099511627776 bytes"),
         ("path_traversal.gltf", "is a path out of the folder"),
         ("nan_positions.glb", "accessors[0]: element 1 has a number that is NaN"),
     ] {
@@ -723,9 +715,11 @@ fn files_that_mean_harm_are_refused_with_their_place() {
         let error = open(&path, &ModelChoice::default()).err().unwrap_or_else(|| panic!("{name} opens"));
         assert!(error.contains(expected), "{name}: {error}");
     }
-    // Ten thousand nodes within each other are allowed.
-    if let Some(path) = kept_beside("hostile/deep_nodes.glb") {
-        assert_eq!(meshes(&open(&path, &ModelChoice::default()).unwrap()).len(), 1);
+    // Ten thousand nodes within each other are allowed; a node is shown once, however often it is named; colours that
+    // would need terabytes are left out.
+    for name in ["deep_nodes.glb", "cyclic_nodes.glb", "node_dag_doubling.glb", "base64_bomb.gltf"] {
+        let Some(path) = kept_beside(&format!("hostile/{name}")) else { continue };
+        assert_eq!(meshes(&open(&path, &ModelChoice::default()).unwrap()).len(), 1, "{name}");
     }
 }
 

@@ -16,3 +16,4 @@ mod pictures;
 mod ply_stl;
 mod save;
 mod scene;
+mod strangers;

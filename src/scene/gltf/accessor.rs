@@ -146,7 +146,8 @@ impl Document {
         Ok((values, wrong))
     }
 
-    fn raw_floats<const N: usize>(&self, index: u32) -> Result<Vec<[f32; N]>, Located> {
+    /// Like [`Self::floats`], but also elements that are not finite, as they are.
+    pub(super) fn raw_floats<const N: usize>(&self, index: u32) -> Result<Vec<[f32; N]>, Located> {
         let accessor = self.accessor(index)?;
         let here = |problem| (place("accessors", index), problem);
         let found = self.n_components(index)?;

@@ -6,6 +6,7 @@
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
+use super::json;
 use glam::{DQuat, DVec3};
 use std::collections::HashMap;
 
@@ -50,73 +51,79 @@ impl Document {
         ends.map(|[end]| f64::from(end)).reduce(f64::max)
     }
 
-    /// The pose of all nodes; without a time, the stored one.
+    /// The pose of all nodes; without a time, the stored one. Broken channels are left out.
     ///
     /// - `at`: seconds; clamped to the range of the keys.
-    pub(super) fn pose(&self, at: Option<f64>) -> Result<Pose, Located> {
+    pub(super) fn pose(&self, at: Option<f64>) -> Pose {
         let mut pose = Pose::default();
-        let Some(at) = at else { return Ok(pose) };
+        let Some(at) = at else { return pose };
         for (i, animation) in self.root.animations.iter().enumerate() {
             for (k, channel) in animation.channels.iter().enumerate() {
-                let Some(node) = channel.target.node else { continue };
-                let here = || format!("{}.{}", place("animations", i), place("channels", k));
-                let index = channel.sampler;
-                let count = animation.samplers.len();
-                let problem = GltfProblem::Index { list: "samplers", index, count };
-                let sampler = animation.samplers.get(index as usize).ok_or_else(|| (here(), problem))?;
-                self.node(node)?;
-                let posed = pose.nodes.entry(node).or_default();
-                let interpolation = match sampler.interpolation.as_deref() {
-                    None | Some("LINEAR") => Interpolation::Linear,
-                    Some("STEP") => Interpolation::Step,
-                    Some("CUBICSPLINE") => Interpolation::CubicSpline,
-                    Some(other) => {
-                        let expected = "STEP, LINEAR or CUBICSPLINE";
-                        let found = other.to_owned();
-                        return Err((here(), GltfProblem::Value { what: "interpolation", found, expected }));
-                    }
-                };
-                let times: Vec<f64> = self.floats::<1>(sampler.input)?.iter().map(|[t]| f64::from(*t)).collect();
-                if times.is_empty() {
-                    continue;
-                }
-                let output = sampler.output;
-                match channel.target.path.as_str() {
-                    "translation" if posed.translation.is_none() => {
-                        let value = self.three(output, &times, interpolation, at).map_err(|e| e.or(&here))?;
-                        posed.translation = Some(value);
-                    }
-                    "scale" if posed.scale.is_none() => {
-                        let value = self.three(output, &times, interpolation, at).map_err(|e| e.or(&here))?;
-                        posed.scale = Some(value);
-                    }
-                    "rotation" if posed.rotation.is_none() => {
-                        let values: Vec<[f64; 4]> = widened(&self.floats::<4>(output)?);
-                        let value = sampled(&times, &values, 1, interpolation, at, true).map_err(|e| e.or(&here))?;
-                        posed.rotation = value.first().map(|&v| DQuat::from_array(v));
-                    }
-                    "weights" if !pose.weights.contains_key(&node) => {
-                        let values: Vec<[f64; 1]> = widened(&self.floats::<1>(output)?);
-                        let keys = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-                        let group = values.len() / keys;
-                        let value = sampled(&times, &values, group, interpolation, at, false);
-                        let value = value.map_err(|e| e.or(&here))?;
-                        pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
-                    }
-                    // A later animation of the same property, or a path that belongs to an extension.
-                    _ => {}
-                }
+                let part = format!("{}.{}", place("animations", i), place("channels", k));
+                self.omissions.kept(&part, self.add_channel(&mut pose, animation, channel, at));
             }
         }
-        Ok(pose)
+        pose
+    }
+
+    fn add_channel(
+        &self,
+        pose: &mut Pose,
+        animation: &json::Animation,
+        channel: &json::Channel,
+        at: f64,
+    ) -> Result<(), Located> {
+        let Some(node) = channel.target.node else { return Ok(()) };
+        let here = |problem| (String::new(), problem);
+        let index = channel.sampler;
+        let count = animation.samplers.len();
+        let problem = GltfProblem::Index { list: "samplers", index, count };
+        let sampler = animation.samplers.get(index as usize).ok_or_else(|| here(problem))?;
+        self.node(node)?;
+        let interpolation = match sampler.interpolation.as_deref() {
+            None | Some("LINEAR") => Interpolation::Linear,
+            Some("STEP") => Interpolation::Step,
+            Some("CUBICSPLINE") => Interpolation::CubicSpline,
+            Some(other) => {
+                let (found, expected) = (other.to_owned(), "STEP, LINEAR or CUBICSPLINE");
+                return Err(here(GltfProblem::Value { what: "interpolation", found, expected }));
+            }
+        };
+        let times: Vec<f64> = self.floats::<1>(sampler.input)?.iter().map(|[t]| f64::from(*t)).collect();
+        if times.is_empty() {
+            return Ok(());
+        }
+        let output = sampler.output;
+        let posed = pose.nodes.get(&node).copied().unwrap_or_default();
+        match channel.target.path.as_str() {
+            "translation" if posed.translation.is_none() => {
+                let value = self.three(output, &times, interpolation, at)?;
+                pose.nodes.entry(node).or_default().translation = Some(value);
+            }
+            "scale" if posed.scale.is_none() => {
+                let value = self.three(output, &times, interpolation, at)?;
+                pose.nodes.entry(node).or_default().scale = Some(value);
+            }
+            "rotation" if posed.rotation.is_none() => {
+                let values: Vec<[f64; 4]> = widened(&self.floats::<4>(output)?);
+                let value = sampled(&times, &values, 1, interpolation, at, true).map_err(here)?;
+                pose.nodes.entry(node).or_default().rotation = value.first().map(|&v| DQuat::from_array(v));
+            }
+            "weights" if !pose.weights.contains_key(&node) => {
+                let values: Vec<[f64; 1]> = widened(&self.floats::<1>(output)?);
+                let keys = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+                let value = sampled(&times, &values, values.len() / keys, interpolation, at, false).map_err(here)?;
+                pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
+            }
+            // A later animation of the same property, or a path that belongs to an extension.
+            _ => {}
+        }
+        Ok(())
     }
 
     /// Whether animations move each node, or one that it hangs from. Joints of skins are not looked at.
-    ///
-    /// # Errors
-    /// If an animation is invalid.
-    pub(in crate::scene) fn moved_nodes(&self) -> Result<Vec<bool>, Located> {
-        let pose = self.pose(Some(0.0))?;
+    pub(in crate::scene) fn moved_nodes(&self) -> Vec<bool> {
+        let pose = self.pose(Some(0.0));
         let nodes = &self.root.nodes;
         let mut moved: Vec<bool> = (0..nodes.len() as u32).map(|node| pose.of(node).is_some()).collect();
         let mut todo: Vec<u32> = (0..nodes.len() as u32).filter(|&node| moved[node as usize]).collect();
@@ -128,31 +135,13 @@ impl Document {
                 }
             }
         }
-        Ok(moved)
+        moved
     }
 
-    fn three(&self, output: u32, times: &[f64], how: Interpolation, at: f64) -> Result<DVec3, Wrong> {
-        let values: Vec<[f64; 3]> = widened(&self.floats::<3>(output).map_err(Wrong::Located)?);
-        let value = sampled(times, &values, 1, how, at, false)?;
+    fn three(&self, output: u32, times: &[f64], how: Interpolation, at: f64) -> Result<DVec3, Located> {
+        let values: Vec<[f64; 3]> = widened(&self.floats::<3>(output)?);
+        let value = sampled(times, &values, 1, how, at, false).map_err(|problem| (String::new(), problem))?;
         Ok(value.first().map_or(DVec3::ZERO, |&v| DVec3::from(v)))
-    }
-}
-
-/// A problem, with its location if known.
-enum Wrong {
-    Located(Located),
-    Length { found: usize, expected: usize },
-}
-
-impl Wrong {
-    fn or(self, place: &dyn Fn() -> String) -> Located {
-        match self {
-            Self::Located(located) => located,
-            Self::Length { found, expected } => {
-                let what = "the output of its sampler".to_owned();
-                (place(), GltfProblem::Length { what, found: found as u64, expected: expected as u64 })
-            }
-        }
     }
 }
 
@@ -170,11 +159,12 @@ fn sampled<const N: usize>(
     how: Interpolation,
     at: f64,
     turns: bool,
-) -> Result<Vec<[f64; N]>, Wrong> {
+) -> Result<Vec<[f64; N]>, GltfProblem> {
     let parts = if how == Interpolation::CubicSpline { 3 } else { 1 };
     let expected = times.len() * group * parts;
     if values.len() != expected || group == 0 {
-        return Err(Wrong::Length { found: values.len(), expected: expected.max(times.len() * parts) });
+        let (what, found) = ("the output of its sampler".to_owned(), values.len() as u64);
+        return Err(GltfProblem::Length { what, found, expected: expected.max(times.len() * parts) as u64 });
     }
     // Parts of a spline key: 0 incoming tangent, 1 value, 2 outgoing tangent.
     let value = |key: usize, part: usize, i: usize| values[(key * parts + part) * group + i];

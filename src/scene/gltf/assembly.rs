@@ -6,6 +6,7 @@ use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use super::lights::GltfLight;
 use super::nodes::Tree;
+use crate::scene::file::SceneFile;
 use glam::DAffine3;
 
 /// A mesh of a file in the pose of a node.
@@ -42,8 +43,6 @@ pub(in crate::scene) struct Assembly {
     pub meshes: Vec<PlacedMesh>,
     pub lights: Vec<PlacedLight>,
     pub cameras: Vec<GltfCamera>,
-    /// Omissions, one sentence each.
-    pub warnings: Vec<String>,
 }
 
 /// The nodes of a file at a given time.
@@ -57,38 +56,42 @@ impl Document {
     /// The posed nodes of the file.
     ///
     /// - `at`: seconds; `None`: as stored in the file.
-    ///
-    /// # Errors
-    /// If the nodes do not form trees, or an animation is invalid.
-    pub(in crate::scene) fn posed(&self, at: Option<f64>) -> Result<Posed, Located> {
-        let pose = self.pose(at)?;
-        let tree = self.placed_nodes(&pose)?;
-        Ok(Posed { pose, tree })
+    pub(in crate::scene) fn posed(&self, at: Option<f64>) -> Posed {
+        let pose = self.pose(at);
+        let tree = self.placed_nodes(&pose);
+        Posed { pose, tree }
     }
 
-    /// All contents of the scene of the file.
+    /// All contents of the scene of the file. What refers to something that does not exist is left out.
     ///
     /// # Errors
-    /// If a node refers to something that does not exist.
+    /// If there are more instances than a file of this size can have.
     pub(in crate::scene) fn assembly(&self, posed: &Posed) -> Result<Assembly, Located> {
-        let mut found = Assembly { cameras: self.cameras(&posed.tree)?, ..Assembly::default() };
+        let mut found = Assembly { cameras: self.cameras(&posed.tree), ..Assembly::default() };
         for &node in &posed.tree.scene {
-            let json = self.node(node)?;
+            let json = &self.root.nodes[node as usize];
+            let part = |what: &str| format!("{}.{what}", place("nodes", node));
             let world = posed.tree.worlds[node as usize];
             let named = |name: &Option<String>| name.clone().filter(|name| !name.is_empty());
-            if let Some(light) = self.light_of(node)? {
+            let light = self.light_of(node).and_then(|light| match world.translation.abs().max_element() {
+                far if far > SceneFile::MAX_COORDINATE && light.is_some() => Err((String::new(), GltfProblem::TooFar)),
+                _ => Ok(light),
+            });
+            if let Some(Some(light)) = self.omissions.kept(&part("light"), light) {
                 let name = named(&json.name).or_else(|| light.name.clone());
                 found.lights.push(PlacedLight { name, light, world, node });
             }
             let Some(mesh) = json.mesh else { continue };
-            let name = named(&json.name).or_else(|| self.root.meshes.get(mesh as usize).and_then(|m| named(&m.name)));
-            let has_targets = self.mesh(mesh)?.primitives.iter().any(|primitive| !primitive.targets.is_empty());
+            let Some(json_mesh) = self.omissions.kept(&part("mesh"), self.mesh(mesh)) else { continue };
+            let name = named(&json.name).or_else(|| named(&json_mesh.name));
+            let has_targets = json_mesh.primitives.iter().any(|primitive| !primitive.targets.is_empty());
             let is_weighed = json.weights.is_some() || posed.pose.weights(node).is_some();
             let moves = json.skin.is_some() || (has_targets && is_weighed);
             let key = MeshKey { mesh, node: moves.then_some(node) };
             // The joints of a skin transform to the world already.
             let world = if json.skin.is_some() { DAffine3::IDENTITY } else { world };
-            for instance in self.instances(node)? {
+            let instances = self.omissions.kept(&part("instances"), self.instances(node));
+            for instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 if found.meshes.len() as u64 >= self.most_elements() {
                     let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
                     return Err((place("nodes", node), problem));

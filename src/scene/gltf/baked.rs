@@ -2,7 +2,7 @@
 
 use super::assembly::MeshKey;
 use super::document::{Document, ReadOptions};
-use super::error::{GltfError, GltfProblem, Located};
+use super::error::{GltfError, GltfProblem, Located, place};
 use super::mesh::BuiltMesh;
 use crate::mesh::Mesh;
 use crate::scene::model::imported::{ImportedModel, ModelOptions};
@@ -27,27 +27,20 @@ impl Document {
     /// See [`load_gltf_with`].
     pub(in crate::scene) fn baked(&self, options: &ModelOptions) -> Result<ImportedModel, Located> {
         let whole = |problem| (String::new(), problem);
-        let posed = self.posed(None)?;
+        let posed = self.posed(None);
         let assembly = self.assembly(&posed)?;
         let mut built: HashMap<MeshKey, Option<BuiltMesh>> = HashMap::new();
         let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = (Vec::new(), Vec::new());
         let mut joined = Mesh::default();
         let mut materials: Vec<Option<u32>> = Vec::new();
-        let mut warnings = assembly.warnings.clone();
+        let mut warnings = Vec::new();
         let mut normals_from_file = true;
         let limit = self.most_numbers();
         for placed in &assembly.meshes {
             if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
-                let mesh = match self.built_mesh(placed.key.mesh, node, &options.normals) {
-                    Ok(mesh) => Some(mesh),
-                    // Only points and lines.
-                    Err((place, problem @ GltfProblem::NoTriangles)) => {
-                        warnings.push(format!("{place}: {problem}, and is left out"));
-                        None
-                    }
-                    Err(error) => return Err(error),
-                };
+                let mesh = self.built_mesh(placed.key.mesh, node, &options.normals);
+                let mesh = self.omissions.kept(&place("meshes", placed.key.mesh), mesh);
                 warnings.extend(mesh.iter().flat_map(|mesh| mesh.warnings.iter().cloned()));
                 entry.insert(mesh);
             }
@@ -57,8 +50,8 @@ impl Document {
             if total > limit || u32::try_from(first + mesh.positions.len()).is_err() {
                 return Err(whole(GltfProblem::TooLarge { limit }));
             }
-            let place = |p: &Vec3| placed.world.transform_point3(p.as_dvec3() + mesh.center);
-            positions.extend(mesh.positions.iter().map(place));
+            let point = |p: &Vec3| placed.world.transform_point3(p.as_dvec3() + mesh.center);
+            positions.extend(mesh.positions.iter().map(point));
             // Normals are transformed by the cofactor matrix: the inverse transpose up to a factor.
             let m = placed.world.matrix3;
             let is_mirrored = m.determinant() < 0.0;
@@ -88,7 +81,7 @@ impl Document {
             }));
         }
         if triangles.is_empty() {
-            return Err(whole(GltfProblem::NoTriangles));
+            return Err(self.omissions.nothing_left());
         }
         let mut mesh = Mesh::from_f64(&positions, triangles).map_err(|error| whole(error.into()))?;
         mesh.slots = if materials.len() > 1 { joined.slots } else { Vec::new() };
@@ -99,19 +92,19 @@ impl Document {
             mesh.normals = joined.normals;
         }
         mesh.validate().map_err(|error| whole(error.into()))?;
-        let surfaces = self.surfaces("")?;
-        let names = |material: &Option<u32>| -> Result<ImportedMaterial, Located> {
-            let [r, g, b, _] = self.material(*material)?.base_color;
+        let surfaces = self.surfaces("");
+        let names = |material: &Option<u32>| {
+            let [r, g, b, _] = self.material(*material).base_color;
             let name = surfaces.materials[surfaces.index(*material)].name.clone();
-            Ok(ImportedMaterial { name, diffuse: Some(Vec3::new(r, g, b)), ..ImportedMaterial::default() })
+            ImportedMaterial { name, diffuse: Some(Vec3::new(r, g, b)), ..ImportedMaterial::default() }
         };
         Ok(ImportedModel {
             mesh,
-            materials: materials.iter().map(names).collect::<Result<_, _>>()?,
+            materials: materials.iter().map(names).collect(),
             libraries: self.files[1..].to_vec(),
             normals_from_file,
             polygons: 0,
-            warnings: warnings.into_iter().collect(),
+            warnings: self.omissions.sentences().into_iter().chain(warnings).collect(),
             material_warnings: Warnings::default(),
         })
     }

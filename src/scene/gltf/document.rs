@@ -1,23 +1,25 @@
 //! A glTF file with its data: JSON text, buffers, and views into them.
 //!
-//! Reading opens only the file and its buffers; meshes, materials and nodes are read on request, by the modules beside
-//! this one. Start reading at [`Document::read`].
+//! Reading opens only the file and those of its buffers that views refer to; meshes, materials and nodes are read on
+//! request, by the modules beside this one. Broken parts are left out ([`super::omissions`]). Start reading at
+//! [`Document::read`].
 
 use super::container::chunks;
 use super::error::{GltfError, GltfProblem, Located, place};
 use super::json::{BufferView, Root};
+use super::lenient;
 use super::meshopt;
+use super::omissions::Omissions;
 use super::uri::{Uri, resolve};
 use crate::scene::input_file::{FileKind, InputFile};
 use crate::scene::limits::Limits;
 use crate::scene::relative::path_to_text;
-use serde::Deserialize;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Extensions that are supported, or that may be ignored even if the file requires them.
+/// Extensions that are supported, or that change nothing that is shown.
 pub(super) const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -30,6 +32,7 @@ pub(super) const SUPPORTED: &[&str] = &[
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
@@ -37,6 +40,8 @@ pub(super) const SUPPORTED: &[&str] = &[
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
 ];
@@ -75,7 +80,9 @@ pub struct Document {
     pub(super) path: PathBuf,
     pub(super) options: ReadOptions,
     pub(super) root: Root,
-    /// `None` for the fallback buffer of a compression extension, which has no bytes.
+    /// What is left out of it.
+    pub(in crate::scene) omissions: Omissions,
+    /// `None` for those that nothing reads, and those that cannot be read.
     buffers: Vec<Option<Bytes>>,
     /// Decompressed views, by index.
     pub(super) decoded: HashMap<u32, Vec<u8>>,
@@ -89,7 +96,7 @@ impl Document {
     /// Reads a file and its buffers.
     ///
     /// # Errors
-    /// If it is not a glTF 2.0 file, or one of its buffers cannot be read.
+    /// If it is not a glTF 2.0 file.
     pub fn read(path: &Path, options: ReadOptions) -> Result<Self, GltfError> {
         let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes).and_then(InputFile::bytes);
         let bytes = bytes.map_err(|error| GltfError::at(path, (String::new(), error.into())))?;
@@ -103,31 +110,41 @@ impl Document {
     pub fn of_bytes(path: &Path, bytes: Vec<u8>, options: ReadOptions) -> Result<Self, GltfError> {
         let whole = |problem: GltfProblem| GltfError::at(path, (String::new(), problem));
         let found = chunks(&bytes).map_err(whole)?;
-        let root: Root = serde_json::from_slice(trimmed(&bytes[found.json]))
-            .map_err(|error| whole(GltfProblem::Json(error.to_string())))?;
+        let (root, omitted) = lenient::parse(trimmed(&bytes[found.json])).map_err(whole)?;
         let version = root.asset.min_version.as_ref().unwrap_or(&root.asset.version);
-        if !version.starts_with("2.") && version != "2" {
+        if !version.is_empty() && !version.starts_with("2.") && version != "2" {
             return Err(GltfError::at(path, ("asset".to_owned(), GltfProblem::Version(version.clone()))));
-        }
-        for extension in &root.extensions_required {
-            if !SUPPORTED.contains(&extension.as_str()) {
-                let problem = GltfProblem::Extension { extension: extension.clone(), advice: advice_for(extension) };
-                return Err(GltfError::at(path, ("extensionsRequired".to_owned(), problem)));
-            }
         }
         let binary = found.binary.map(|range| Bytes { data: Arc::new(bytes), range });
         let mut document = Self {
             path: path.to_owned(),
             options,
             root,
+            omissions: Omissions::default(),
             buffers: Vec::new(),
             decoded: HashMap::new(),
             n_bytes: 0,
             files: vec![path.to_owned()],
         };
-        let read = document.read_buffers(binary).and_then(|()| document.decode());
-        read.and_then(|()| document.decode_draco()).map_err(|located| document.error(located))?;
+        for (part, problem) in omitted {
+            document.omissions.kept::<()>(&part, Err(problem));
+        }
+        for name in document.root.extensions_required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())) {
+            let sentence = format!(
+                "needs the extension `{}`, which is not modelled: what depends on it is wrong or missing",
+                crate::printable::name(name)
+            );
+            document.omissions.tell(name, sentence);
+        }
+        document.read_buffers(binary);
+        document.decode();
+        document.decode_draco();
         Ok(document)
+    }
+
+    /// Whether the file says that it is wrong without this extension.
+    pub(in crate::scene) fn requires(&self, extension: &str) -> bool {
+        self.root.extensions_required.iter().any(|name| name == extension)
     }
 
     /// The file that was read.
@@ -157,53 +174,62 @@ impl Document {
         self.options.max_bytes / BYTES_A_NUMBER
     }
 
-    fn read_buffers(&mut self, binary: Option<Bytes>) -> Result<(), Located> {
+    /// Reads the buffers that views refer to.
+    fn read_buffers(&mut self, binary: Option<Bytes>) {
+        let mut is_read = vec![false; self.root.buffers.len()];
+        for view in &self.root.buffer_views {
+            // The buffer of a compressed view may have no bytes: it stands for the decompressed ones.
+            let buffer = match meshopt::of_view(&view.extensions) {
+                Some(Ok(compressed)) => compressed.buffer,
+                _ => view.buffer,
+            };
+            if let Some(is_read) = is_read.get_mut(buffer as usize) {
+                *is_read = true;
+            }
+        }
         let mut room = self.options.max_bytes;
-        for i in 0..self.root.buffers.len() {
-            let buffer = &self.root.buffers[i];
-            let here = |problem| (place("buffers", i), problem);
-            let needed = buffer.byte_length;
-            let bytes = match &buffer.uri {
-                Some(uri) => {
-                    let data = self.read_uri(uri, room).map_err(here)?;
-                    let (data, found) = match data {
-                        (data, None) => (data, "its data URI"),
-                        (data, Some(path)) => {
-                            self.files.push(path);
-                            (data, "its file")
-                        }
-                    };
-                    let length = data.len();
-                    room = room.saturating_sub(length as u64);
-                    Some((Bytes { data: Arc::new(data), range: 0..length }, found))
-                }
-                None if i == 0 && binary.is_some() => binary.clone().map(|bytes| (bytes, "the BIN chunk")),
-                None if buffer.extensions.contains_key(meshopt::NAME) => None,
-                None => return Err(here(GltfProblem::Missing("the uri of the buffer, or the BIN chunk of a GLB,"))),
-            };
-            let bytes = match bytes {
-                None => None,
-                Some((mut bytes, within)) => {
-                    let found = bytes.get().len() as u64;
-                    if found < needed {
-                        let within = within.to_owned();
-                        return Err(here(GltfProblem::Bounds { needed: u128::from(needed), within, found }));
-                    }
-                    bytes.range.end = bytes.range.start + needed as usize;
-                    self.n_bytes += needed;
-                    Some(bytes)
-                }
-            };
+        for (i, is_read) in is_read.into_iter().enumerate() {
+            let bytes = is_read.then(|| self.read_buffer(i, binary.as_ref(), &mut room));
+            let bytes = bytes.and_then(|read| {
+                let part = place("buffers", i);
+                self.omissions.kept(&part, read.map_err(|problem| (part.clone(), problem)))
+            });
+            self.n_bytes += bytes.as_ref().map_or(0, |bytes| bytes.get().len() as u64);
             self.buffers.push(bytes);
         }
-        Ok(())
+    }
+
+    /// - `room`: bytes that may still be read.
+    fn read_buffer(&mut self, i: usize, binary: Option<&Bytes>, room: &mut u64) -> Result<Bytes, GltfProblem> {
+        let buffer = &self.root.buffers[i];
+        let needed = buffer.byte_length;
+        let (mut bytes, within) = match (&buffer.uri, binary) {
+            (Some(uri), _) => {
+                let (data, file) = self.read_uri(uri, &place("buffers", i), *room)?;
+                let within = if file.is_some() { "its file" } else { "its data URI" };
+                self.files.extend(file);
+                let length = data.len();
+                *room = room.saturating_sub(length as u64);
+                (Bytes { data: Arc::new(data), range: 0..length }, within)
+            }
+            (None, Some(bytes)) if i == 0 => (bytes.clone(), "the BIN chunk"),
+            (None, _) => return Err(GltfProblem::Missing("the uri of the buffer, or the BIN chunk of a GLB,")),
+        };
+        let found = bytes.get().len() as u64;
+        if found < needed {
+            let part = place("buffers", i);
+            let sentence = format!("{part} has {needed} bytes, but {within} ends after {found}: the rest is missing");
+            self.omissions.tell(&part, sentence);
+        }
+        bytes.range.end = bytes.range.start + needed.min(found) as usize;
+        Ok(bytes)
     }
 
     /// The bytes of a URI, and the file that they were read from, if any.
-    fn read_uri(&self, uri: &str, room: u64) -> Result<(Vec<u8>, Option<PathBuf>), GltfProblem> {
-        match resolve(uri, self.folder(), self.options.allow_outside)? {
+    fn read_uri(&self, uri: &str, part: &str, room: u64) -> Result<(Vec<u8>, Option<PathBuf>), GltfProblem> {
+        match self.resolved(uri, part)? {
             Uri::Data(data) => Ok((data, None)),
-            Uri::File(path) => {
+            Uri::File { path, .. } => {
                 let full = self.folder().join(&path);
                 let read = InputFile::open_within(&full, FileKind::Model, room).and_then(InputFile::bytes);
                 let data = read.map_err(|error| GltfProblem::File { file: path_to_text(&path), error })?;
@@ -212,29 +238,48 @@ impl Document {
         }
     }
 
+    /// What a URI means.
+    ///
+    /// - `part`: the part that has it.
+    ///
+    /// # Errors
+    /// If it may not be read, or is no URI.
+    pub(super) fn resolved(&self, uri: &str, part: &str) -> Result<Uri, GltfProblem> {
+        let resolved = resolve(uri, self.folder(), self.options.allow_outside)?;
+        if let Uri::File { path, is_renamed: true } = &resolved {
+            let [uri, file] = [uri, &path_to_text(path)].map(|name| crate::printable::name(name).into_owned());
+            let sentence = format!("{part}: there is no `{uri}`: `{file}` is read, which differs by case");
+            self.omissions.tell(&format!("{part}.uri"), sentence);
+        }
+        Ok(resolved)
+    }
+
     /// The folder of the model.
     pub(super) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Decompresses the compressed views.
-    fn decode(&mut self) -> Result<(), Located> {
-        for i in 0..self.root.buffer_views.len() {
-            let view = &self.root.buffer_views[i];
-            let Some(extension) = view.extensions.get(meshopt::NAME) else { continue };
-            let here = |problem| (place("bufferViews", i), problem);
-            let wrong = |error: serde_json::Error| here(GltfProblem::Json(format!("{}: {error}", meshopt::NAME)));
-            let compressed = meshopt::View::deserialize(extension).map_err(wrong)?;
-            let inner = BufferView {
-                buffer: compressed.buffer,
-                byte_offset: compressed.byte_offset,
-                byte_length: compressed.byte_length,
-                ..BufferView::default()
+    /// Decompresses the compressed views. The bytes of those that are damaged may be in a buffer as well.
+    fn decode(&mut self) {
+        let mut room = self.options.max_bytes;
+        for (i, view) in self.root.buffer_views.iter().enumerate() {
+            let Some(compressed) = meshopt::of_view(&view.extensions) else { continue };
+            let decode = |compressed: meshopt::View| {
+                let inner = BufferView {
+                    buffer: compressed.buffer,
+                    byte_offset: compressed.byte_offset,
+                    byte_length: compressed.byte_length,
+                    ..BufferView::default()
+                };
+                meshopt::decode(&compressed, self.slice(&inner)?, room)
             };
-            let decoded = self.slice(&inner).and_then(|bytes| meshopt::decode(&compressed, bytes)).map_err(here)?;
-            self.decoded.insert(i as u32, decoded);
+            let part = place("bufferViews", i);
+            let decoded = compressed.and_then(decode).map_err(|problem| (part.clone(), problem));
+            if let Some(decoded) = self.omissions.kept(&part, decoded) {
+                room -= decoded.len() as u64;
+                self.decoded.insert(i as u32, decoded);
+            }
         }
-        Ok(())
     }
 
     /// The bytes of a view, and its stride if it has one.
@@ -247,7 +292,8 @@ impl Document {
             Some(bytes) => bytes,
             None => self.slice(view).map_err(here)?,
         };
-        Ok((bytes, view.byte_stride))
+        // Some programs write 0 where they mean that elements follow each other.
+        Ok((bytes, view.byte_stride.filter(|&stride| stride > 0)))
     }
 
     fn slice(&self, view: &BufferView) -> Result<&[u8], GltfProblem> {
@@ -271,11 +317,4 @@ fn trimmed(json: &[u8]) -> &[u8] {
         json = rest;
     }
     json
-}
-
-fn advice_for(extension: &str) -> &'static str {
-    match extension {
-        "KHR_texture_basisu" => "export the file again with PNG, JPEG or WebP textures",
-        _ => "export the file again without it",
-    }
 }

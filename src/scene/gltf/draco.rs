@@ -5,7 +5,7 @@
 //! memory limit.
 
 use super::document::Document;
-use super::error::{GltfProblem, Located, place};
+use super::error::{GltfProblem, place};
 use super::json::{Accessor, BufferView};
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use rayon::prelude::*;
@@ -21,13 +21,6 @@ struct Compressed {
     buffer_view: u32,
     /// Id of each attribute in the stream.
     attributes: BTreeMap<String, u32>,
-}
-
-/// A stream and the primitive that it belongs to.
-struct Job {
-    mesh: usize,
-    primitive: usize,
-    compressed: Compressed,
 }
 
 /// Packed values in the format of an accessor.
@@ -46,47 +39,56 @@ struct Decoded {
 }
 
 impl Document {
-    /// Decodes all streams and makes their primitives refer to the results.
-    pub(super) fn decode_draco(&mut self) -> Result<(), Located> {
+    /// Decodes all streams and makes their primitives refer to the results. A primitive whose stream is damaged keeps
+    /// its own accessors if it has some with data, else it loses its attributes.
+    pub(super) fn decode_draco(&mut self) {
         let mut jobs = Vec::new();
         for (mesh, json) in self.root.meshes.iter_mut().enumerate() {
             for (primitive, json) in json.primitives.iter_mut().enumerate() {
                 let Some(extension) = json.extensions.remove(NAME) else { continue };
-                let compressed = Compressed::deserialize(extension)
-                    .map_err(|error| (at(mesh, primitive), GltfProblem::Json(format!("{NAME}: {error}"))))?;
-                jobs.push(Job { mesh, primitive, compressed });
+                let compressed = Compressed::deserialize(extension);
+                jobs.push((mesh, primitive, compressed.map_err(|error| GltfProblem::Json(format!("{NAME}: {error}")))));
             }
         }
         let this = &*self;
-        let decode = |job: &Job| {
-            let bytes = this.view(job.compressed.buffer_view)?.0;
-            decoded(bytes, &job.compressed, this.options.max_bytes)
-                .map_err(|problem| (at(job.mesh, job.primitive), problem))
+        let decode = |(mesh, primitive, compressed): (usize, usize, Result<Compressed, GltfProblem>)| {
+            let part = at(mesh, primitive);
+            let decoded = compressed.map_err(|problem| (part.clone(), problem)).and_then(|compressed| {
+                let bytes = this.view(compressed.buffer_view)?.0;
+                decoded(bytes, &compressed, this.options.max_bytes).map_err(|problem| (part.clone(), problem))
+            });
+            (mesh, primitive, part, decoded)
         };
-        let all: Vec<Result<Decoded, Located>> = jobs.par_iter().map(decode).collect();
+        let all: Vec<_> = jobs.into_par_iter().map(decode).collect();
         let mut room = self.options.max_bytes;
-        for (job, decoded) in jobs.iter().zip(all) {
-            let Decoded { indices, attributes } = decoded?;
-            let bytes: u64 = attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
-            room = room.checked_sub(bytes + indices.bytes.len() as u64).ok_or_else(|| {
+        for (mesh, primitive, part, decoded) in all {
+            let fitting = decoded.and_then(|decoded| {
+                let bytes: u64 = decoded.attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
                 let limit = self.options.max_bytes;
-                (
-                    at(job.mesh, job.primitive),
-                    GltfProblem::Draco(format!("all streams together have more than {limit} bytes")),
-                )
-            })?;
+                let too_long = || GltfProblem::Draco(format!("all streams together have more than {limit} bytes"));
+                let left = room.checked_sub(bytes + decoded.indices.bytes.len() as u64);
+                room = left.ok_or_else(|| (part.clone(), too_long()))?;
+                Ok(decoded)
+            });
+            let Some(Decoded { indices, attributes }) = self.omissions.kept(&part, fitting) else {
+                let json = &self.root.meshes[mesh].primitives[primitive];
+                let position = json.attributes.get("POSITION").and_then(|&i| self.root.accessors.get(i as usize));
+                if position.is_none_or(|position| position.buffer_view.is_none()) {
+                    self.root.meshes[mesh].primitives[primitive].attributes.clear();
+                }
+                continue;
+            };
             let indices = self.add(indices, false);
-            let mut named = self.root.meshes[job.mesh].primitives[job.primitive].attributes.clone();
+            let mut named = self.root.meshes[mesh].primitives[primitive].attributes.clone();
             for (name, values) in attributes {
                 let written = named.get(&name).and_then(|&accessor| self.root.accessors.get(accessor as usize));
                 let normalized = written.is_some_and(|accessor| accessor.normalized);
                 let accessor = self.add(values, normalized);
                 named.insert(name, accessor);
             }
-            let primitive = &mut self.root.meshes[job.mesh].primitives[job.primitive];
+            let primitive = &mut self.root.meshes[mesh].primitives[primitive];
             (primitive.attributes, primitive.indices, primitive.mode) = (named, Some(indices), None);
         }
-        Ok(())
     }
 
     /// Adds a view and an accessor for the values; returns the index of the accessor.

@@ -106,6 +106,9 @@ pub enum GltfProblem {
     /// A required property is missing.
     #[error("{0} is missing")]
     Missing(&'static str),
+    /// A light or camera is outside of the coordinates that scenes can have.
+    #[error("is too far away")]
+    TooFar,
     /// A number is NaN or infinite.
     #[error("element {element} has a number that is NaN or infinite")]
     NotFinite {
@@ -133,9 +136,6 @@ pub enum GltfProblem {
         /// The required number.
         expected: u64,
     },
-    /// The nodes do not form trees.
-    #[error("is named as a child more than once, or is its own descendant: the nodes must be trees")]
-    NotTree,
     /// The model refers to a file that may not be read.
     #[error(
         "`{}` is {why}: only files in the folder of the model and below are read; \
@@ -160,20 +160,26 @@ pub enum GltfProblem {
         #[source]
         error: ReadError,
     },
-    /// A required extension is not supported.
-    #[error("needs the extension `{}`, which is not supported: {advice}", name(extension))]
-    Extension {
-        /// Its name.
-        extension: String,
-        /// What the user can do.
-        advice: &'static str,
-    },
     /// Compressed data is invalid.
     #[error("the compressed data is wrong: {0}")]
     Compressed(&'static str),
-    /// The file has no surface area.
+    /// There are no triangles.
     #[error("has no triangles")]
     NoTriangles,
+    /// Points and lines alone have no surface.
+    #[error("has only points or lines, which have no area")]
+    OnlyLines,
+    /// All triangles are points or lines.
+    #[error("has no area: all of its triangles are of zero size")]
+    NoArea,
+    /// Nothing of the file could be read.
+    #[error("nothing of it can be shown: {first}{}", more(*others))]
+    NothingLeft {
+        /// What was left out first, and why.
+        first: String,
+        /// Number of other parts that were left out.
+        others: usize,
+    },
     /// There is nothing of the given name.
     #[error("there is no {what} `{}`{}", name(asked), known(names))]
     Name {
@@ -187,6 +193,10 @@ pub enum GltfProblem {
     /// The triangles do not form a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+}
+
+fn more(others: usize) -> String {
+    if others > 0 { format!("; and {others} more") } else { String::new() }
 }
 
 fn known(names: &[String]) -> String {

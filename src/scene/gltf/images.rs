@@ -2,7 +2,7 @@
 
 use super::document::{Document, ReadOptions};
 use super::error::{GltfError, GltfProblem, Located, place};
-use super::uri::{Uri, resolve};
+use super::uri::Uri;
 use std::path::{Path, PathBuf};
 
 /// Model and image index of a path such as `model.glb#3`; `None` for other paths, and if a file of exactly that name
@@ -30,9 +30,9 @@ impl Document {
             return self.view(view).map(|(bytes, _)| bytes.to_vec());
         }
         let uri = image.uri.as_deref().ok_or_else(|| here(GltfProblem::Missing("its uri or bufferView")))?;
-        match resolve(uri, self.folder(), self.options.allow_outside).map_err(here)? {
+        match self.resolved(uri, &place("images", number)).map_err(here)? {
             Uri::Data(bytes) => Ok(bytes),
-            Uri::File(_) => Err(here(GltfProblem::Missing("its image: it is a file of its own, and"))),
+            Uri::File { .. } => Err(here(GltfProblem::Missing("its image: it is a file of its own, and"))),
         }
     }
 }

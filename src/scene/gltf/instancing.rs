@@ -10,7 +10,7 @@ const NAME: &str = "EXT_mesh_gpu_instancing";
 impl Document {
     /// One transform per instance, from mesh to node coordinates; the identity alone without the extension.
     pub(super) fn instances(&self, node: u32) -> Result<Vec<DAffine3>, Located> {
-        let json = self.node(node)?;
+        let json = &self.root.nodes[node as usize];
         let Some(extension) = json.extensions.get(NAME) else { return Ok(vec![DAffine3::IDENTITY]) };
         let accessor = |name: &str| {
             let number =

@@ -1,16 +1,56 @@
 //! The JSON of a glTF file as typed structs: the core of glTF 2.0; extensions are kept as JSON values.
 //!
-//! Only the types are checked: indices may be out of range and are checked when they are used
+//! Only the types are checked ([`super::lenient`]): indices may be out of range and are checked when they are used
 //! ([`super::document::Document`]). Unknown members are skipped, as the specification requires.
 //!
 //! Source: Khronos, "glTF 2.0 Specification", chapter 5 (properties reference).
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use std::ops::{Deref, DerefMut};
 
-/// Extensions of an object, by name.
-pub(super) type Extensions = Map<String, Value>;
+/// Extensions of an object, by name. Whole numbers in them are integers, also where the file has `4.0`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Extensions(Map<String, Value>);
+
+impl<'de> Deserialize<'de> for Extensions {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut extensions = Map::deserialize(deserializer)?;
+        extensions.values_mut().for_each(make_whole);
+        Ok(Self(extensions))
+    }
+}
+
+impl Deref for Extensions {
+    type Target = Map<String, Value>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Extensions {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
+/// Replaces numbers such as `4.0` by integers.
+pub(super) fn make_whole(value: &mut Value) {
+    /// Above, not every integer has a number of its own.
+    const MOST: f64 = 9_007_199_254_740_992.0;
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            if let Some(float) = number.as_f64().filter(|&x| x.fract() == 0.0 && (0.0..MOST).contains(&x)) {
+                *value = Value::from(float as u64);
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(make_whole),
+        Value::Object(object) => object.values_mut().for_each(make_whole),
+        _ => {}
+    }
+}
 
 /// The root object.
 #[derive(Debug, Default, Deserialize)]

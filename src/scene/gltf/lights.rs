@@ -33,7 +33,7 @@ pub(in crate::scene) struct GltfLight {
 impl Document {
     /// The light of a node, if it has one.
     pub(super) fn light_of(&self, node: u32) -> Result<Option<GltfLight>, Located> {
-        let json = self.node(node)?;
+        let json = &self.root.nodes[node as usize];
         let Some(number) = json.extensions.get(NAME).and_then(|extension| extension.get("light")) else {
             return Ok(None);
         };
@@ -70,6 +70,10 @@ impl Document {
         };
         let name = light.get("name").and_then(Value::as_str).filter(|name| !name.is_empty()).map(str::to_owned);
         let intensity = color * number(light, "intensity", 1.0).max(0.0) as f32;
+        if !intensity.is_finite() {
+            let (what, found) = ("intensity", intensity.to_string());
+            return Err((at(), GltfProblem::Value { what, found, expected: "a number of single precision" }));
+        }
         Ok(Some(GltfLight { name, kind, intensity, has_range: light.get("range").is_some() }))
     }
 }

@@ -5,9 +5,12 @@ use super::assembly::{MeshKey, Posed};
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use super::nodes::Tree;
-use super::primitives::{Deformation, SlotKey, Triangles};
+use super::omissions::omission;
+use super::primitives::{SlotKey, Triangles};
+use super::skin::Joints;
+use super::vertices::{Deformation, NO_UV};
 use crate::mesh::Mesh;
-use crate::scene::model::imported::ModelNormals;
+use crate::scene::model::imported::{ModelNormals, has_area};
 use glam::Vec4;
 
 /// A mesh of a file.
@@ -47,19 +50,33 @@ impl Document {
     ) -> Result<BuiltMesh, Located> {
         let json = self.mesh(index)?;
         let mut deformation = Deformation { weights: &json.weights, joints: None };
+        let mut warnings = Vec::new();
         if let Some((node, tree, pose)) = node {
             let json = self.node(node)?;
             if let Some(weights) = pose.weights(node).or(json.weights.as_deref()) {
                 deformation.weights = weights;
             }
-            deformation.joints = json.skin.map(|skin| self.joints(skin, &tree.worlds)).transpose()?;
+            if let Some(skin) = json.skin {
+                let joints = self.joints(skin, &tree.worlds).unwrap_or_else(|located| {
+                    warnings.push(omission(&place("skins", skin), &located));
+                    Vec::new()
+                });
+                deformation.joints = Some(Joints { joints, of_node: tree.worlds[node as usize] });
+            }
         }
         let mut triangles = self.triangles(index, &deformation)?;
         let here = |problem| (place("meshes", index), problem);
-        let mut warnings = triangles.warnings(&place("meshes", index));
         if triangles.triangles.is_empty() {
-            return Err(here(GltfProblem::NoTriangles));
+            let (lines, degenerate) = (triangles.points_or_lines > 0, triangles.degenerate > 0);
+            return Err(match triangles.omitted.into_iter().next() {
+                Some((_, located)) => located,
+                None if degenerate => here(GltfProblem::NoArea),
+                None if lines => here(GltfProblem::OnlyLines),
+                None => here(GltfProblem::NoTriangles),
+            });
         }
+        warnings.extend(triangles.omitted.iter().map(|(part, located)| omission(part, located)));
+        warnings.extend(triangles.warnings(&place("meshes", index)));
         let keys = std::mem::take(&mut triangles.keys);
         let has_tangents = std::mem::take(&mut triangles.has_tangents);
         let needs: Vec<bool> = keys
@@ -72,6 +89,9 @@ impl Document {
         let wrong = |error: crate::mesh::MeshError| here(GltfProblem::Mesh(error));
         let list = std::mem::take(&mut triangles.triangles);
         let mut mesh = Mesh::from_f64(&triangles.positions, list).map_err(wrong)?;
+        if !mesh.triangles.iter().any(|&triangle| has_area(&mesh, triangle)) {
+            return Err(here(GltfProblem::NoArea));
+        }
         mesh.uvs = triangles.uvs;
         mesh.uvs2 = triangles.uvs2;
         mesh.colors = triangles.colors.into_iter().map(Vec4::from).collect();
@@ -99,6 +119,14 @@ impl Document {
                 mesh = mesh.with_tangents();
             }
         }
+        // Otherwise the texture would be spread over each triangle.
+        let used = keys.iter().flat_map(|key| key.variants.values().copied().map(Some).chain([key.material]));
+        let sets = used.map(|material| self.uv_sets(material)).fold([false; 2], |a, b| [a[0] | b[0], a[1] | b[1]]);
+        for (is_used, uvs) in sets.into_iter().zip([&mut mesh.uvs, &mut mesh.uvs2]) {
+            if is_used && uvs.is_empty() {
+                *uvs = vec![NO_UV; mesh.positions.len()];
+            }
+        }
         mesh.validate().map_err(wrong)?;
         Ok(BuiltMesh { mesh, keys, warnings })
     }
@@ -114,6 +142,7 @@ impl Triangles {
         };
         add(self.points_or_lines, "primitives of points or lines have no area and are left out");
         add(self.degenerate, "triangles use a vertex twice and were removed");
+        add(self.torn, "triangles have a corner that does not exist, or is NaN or infinite, and were removed");
         add(self.not_finite, "normals, tangents or texture coordinates are no numbers and are 0");
         warnings
     }

@@ -1,14 +1,17 @@
-//! Decoding of `EXT_meshopt_compression`: attributes, triangles and index sequences, with their filters.
+//! Decoding of `KHR_meshopt_compression` and `EXT_meshopt_compression`: attributes, triangles and index sequences. The
+//! two differ in name only: what the later one adds is read under both.
 //!
 //! Sizes are checked against the maximum compression ratio before anything is allocated; no input causes a panic.
 //!
-//! Source: Khronos and Arseny Kapoulkine, "EXT_meshopt_compression", appendices A (bitstream) and B (filters).
+//! Source: Khronos and Arseny Kapoulkine, "KHR_meshopt_compression", appendix A (bitstream).
 
 use super::error::GltfProblem;
+use super::json::Extensions;
+use super::meshopt_filters::{color, exponential, octahedral, quaternion};
 use serde::Deserialize;
 
-/// Name of the extension.
-pub(super) const NAME: &str = "EXT_meshopt_compression";
+/// Names of the extension.
+const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
 /// The extension object of a view.
 #[derive(Debug, Default, Deserialize)]
@@ -23,16 +26,27 @@ pub(super) struct View {
     filter: Option<String>,
 }
 
+/// The extension object of a view, if it has one.
+///
+/// # Errors
+/// If the object is invalid.
+pub(super) fn of_view(extensions: &Extensions) -> Option<Result<View, GltfProblem>> {
+    let (name, object) = NAMES.iter().find_map(|name| Some((name, extensions.get(*name)?)))?;
+    Some(View::deserialize(object).map_err(|error| GltfProblem::Json(format!("{name}: {error}"))))
+}
+
 /// The decoded bytes of a view.
+///
+/// - `most_bytes`: maximum size of the result.
 ///
 /// # Errors
 /// If the data is invalid.
-pub(super) fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
+pub(super) fn decode(view: &View, data: &[u8], most_bytes: u64) -> Result<Vec<u8>, GltfProblem> {
     let wrong = GltfProblem::Compressed;
     let decoded = view.count.checked_mul(view.byte_stride).ok_or(GltfProblem::Count { count: view.count })?;
-    // A group of 16 bytes takes at least two bits, a triangle one byte.
-    const MOST: u64 = 128;
-    if decoded > (data.len() as u64).saturating_mul(MOST) {
+    // One byte says that four bytes of 256 elements stay the same.
+    const MOST: u64 = 1024;
+    if decoded > (data.len() as u64).saturating_mul(MOST).min(most_bytes) {
         return Err(GltfProblem::Count { count: view.count });
     }
     let (count, stride) = (view.count as usize, view.byte_stride as usize);
@@ -54,8 +68,9 @@ pub(super) fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
         Some("OCTAHEDRAL") if matches!(stride, 4 | 8) => octahedral(&mut bytes, stride),
         Some("QUATERNION") if stride == 8 => quaternion(&mut bytes),
         Some("EXPONENTIAL") => exponential(&mut bytes),
+        Some("COLOR") if matches!(stride, 4 | 8) => color(&mut bytes, stride),
         Some(other) => {
-            let expected = "OCTAHEDRAL (4 or 8 bytes), QUATERNION (8 bytes) or EXPONENTIAL";
+            let expected = "OCTAHEDRAL or COLOR (4 or 8 bytes), QUATERNION (8 bytes) or EXPONENTIAL";
             return Err(GltfProblem::Value { what: "filter", found: other.to_owned(), expected });
         }
     }
@@ -67,32 +82,84 @@ const GROUP: usize = 16;
 
 /// Decodes attributes: the deltas of each byte of the elements are packed in groups.
 fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
-    const HEADER: u8 = 0xa0;
-    const SHORTEST_TAIL: usize = 32;
-    if *data.first()? != HEADER {
-        return None;
-    }
-    let tail = stride.max(SHORTEST_TAIL);
+    let is_second = match *data.first()? {
+        0xa0 => false,
+        0xa1 => true,
+        _ => return None,
+    };
+    // Four bytes are a channel. Only the second version has modes of channels, and a byte of controls for each.
+    let (n_channels, shortest_tail) = if is_second { (stride / 4, 24) } else { (0, 32) };
+    let tail = (stride + n_channels).max(shortest_tail);
     let end = data.len().checked_sub(tail).filter(|&end| end >= 1)?;
-    let mut last = data[data.len() - stride..].to_vec();
+    let (mut last, modes) = {
+        let (last, modes) = data[data.len() - stride - n_channels..].split_at(stride);
+        (last.to_vec(), modes)
+    };
     let mut data = &data[1..end];
     let block = ((8192 / stride) & !(GROUP - 1)).min(256);
     let mut out = vec![0; count * stride];
     for block in out.chunks_mut(block * stride) {
         let n = block.len() / stride;
-        let groups = n.div_ceil(GROUP);
+        let controls = take(&mut data, n_channels)?;
         for k in 0..stride {
+            let widths = match controls.get(k / 4).map(|control| (control >> (2 * (k % 4))) & 3) {
+                None => [0, 2, 4, 8],
+                Some(0) => [0, 1, 2, 4],
+                Some(1) => [1, 2, 4, 8],
+                // All deltas are zero.
+                Some(2) => continue,
+                Some(_) => {
+                    let deltas = take(&mut data, n)?;
+                    deltas.iter().enumerate().for_each(|(i, &delta)| block[i * stride + k] = delta);
+                    continue;
+                }
+            };
+            let groups = n.div_ceil(GROUP);
             let header = take(&mut data, groups.div_ceil(4))?;
             for group in 0..groups {
-                let deltas = unpacked(&mut data, (header[group / 4] >> (2 * (group % 4))) & 3)?;
+                let width = widths[usize::from((header[group / 4] >> (2 * (group % 4))) & 3)];
+                let deltas = unpacked(&mut data, width)?;
                 for (i, delta) in deltas.into_iter().enumerate().take(n - group * GROUP) {
-                    last[k] = last[k].wrapping_add((delta >> 1) ^ (delta & 1).wrapping_neg());
-                    block[(group * GROUP + i) * stride + k] = last[k];
+                    block[(group * GROUP + i) * stride + k] = delta;
                 }
+            }
+        }
+        for element in block.chunks_mut(stride) {
+            for (channel, value) in element.chunks_mut(4).enumerate() {
+                let before = &mut last[4 * channel..4 * channel + 4];
+                add_deltas(value, before, modes.get(channel).copied().unwrap_or(0))?;
+                before.copy_from_slice(value);
             }
         }
     }
     data.is_empty().then_some(out)
+}
+
+/// Replaces the four deltas of a channel by its values; `None` for an unknown mode.
+fn add_deltas(value: &mut [u8], before: &[u8], mode: u8) -> Option<()> {
+    match mode {
+        0 => {
+            for (value, before) in value.iter_mut().zip(before) {
+                *value = before.wrapping_add((*value >> 1) ^ (*value & 1).wrapping_neg());
+            }
+        }
+        1 => {
+            for (value, before) in value.chunks_exact_mut(2).zip(before.chunks_exact(2)) {
+                let delta = u16::from_le_bytes([value[0], value[1]]);
+                let before = u16::from_le_bytes([before[0], before[1]]);
+                let sum = before.wrapping_add((delta >> 1) ^ (delta & 1).wrapping_neg());
+                value.copy_from_slice(&sum.to_le_bytes());
+            }
+        }
+        // The high bits tell how far the difference was rotated to the left.
+        mode if mode & 15 == 2 => {
+            let four = |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+            let changed = four(before) ^ four(value).rotate_right(u32::from(mode >> 4));
+            value.copy_from_slice(&changed.to_le_bytes());
+        }
+        _ => return None,
+    }
+    Some(())
 }
 
 fn take<'a>(data: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
@@ -101,20 +168,21 @@ fn take<'a>(data: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
     Some(head)
 }
 
-/// A group of zeros, of two or four bits each (all ones: a full byte follows), or of bytes.
-fn unpacked(data: &mut &[u8], mode: u8) -> Option<[u8; GROUP]> {
-    let bits = match mode {
-        0 => return Some([0; GROUP]),
-        1 => 2,
-        2 => 4,
-        _ => return take(data, GROUP)?.try_into().ok(),
-    };
+/// A group of 16 deltas of `bits` each: 0 (all are zero), 1, 2, 4 (all ones: a full byte follows) or 8.
+fn unpacked(data: &mut &[u8], bits: usize) -> Option<[u8; GROUP]> {
+    if bits == 0 {
+        return Some([0; GROUP]);
+    }
     let packed = take(data, GROUP * bits / 8)?;
+    if bits == 8 {
+        return packed.try_into().ok();
+    }
     let (each, mask) = (8 / bits, (1 << bits) - 1);
     let mut group = [0; GROUP];
     for (i, value) in group.iter_mut().enumerate() {
-        // The first one is in the highest bits.
-        *value = (packed[i / each] >> (8 - bits * (i % each + 1))) & mask;
+        // The first one is in the highest bits, but single bits begin with the lowest.
+        let shift = if bits == 1 { i % each } else { 8 - bits * (i % each + 1) };
+        *value = (packed[i / each] >> shift) & mask;
         if *value == mask {
             *value = take(data, 1)?[0];
         }
@@ -264,63 +332,16 @@ fn sequence(data: &[u8], count: usize) -> Option<Vec<u32>> {
     data.is_empty().then_some(out)
 }
 
-/// Decodes unit vectors in octahedral coordinates; the third component holds the encoding of 1.
-fn octahedral(bytes: &mut [u8], stride: usize) {
-    let size = stride / 4;
-    let most = if size == 1 { 127.0 } else { 32767.0 };
-    for element in bytes.chunks_exact_mut(stride) {
-        let get = |i: usize| match size {
-            1 => f32::from(element[i] as i8),
-            _ => f32::from(i16::from_le_bytes([element[2 * i], element[2 * i + 1]])),
-        };
-        let (mut x, mut y, one) = (get(0), get(1), get(2));
-        let z = one - x.abs() - y.abs();
-        let fold = z.min(0.0);
-        x += if x >= 0.0 { fold } else { -fold };
-        y += if y >= 0.0 { fold } else { -fold };
-        let length = (x * x + y * y + z * z).sqrt();
-        let scale = if length > 0.0 { most / length } else { 0.0 };
-        for (i, value) in [x, y, z].into_iter().enumerate() {
-            let rounded = (value * scale).round();
-            match size {
-                1 => element[i] = (rounded as i8) as u8,
-                _ => element[2 * i..2 * i + 2].copy_from_slice(&(rounded as i16).to_le_bytes()),
-            }
-        }
-    }
-}
-
-/// Decodes unit quaternions without their largest component, whose index is in two bits of the fourth number.
-fn quaternion(bytes: &mut [u8]) {
-    for element in bytes.chunks_exact_mut(8) {
-        let get = |i: usize| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]);
-        let (which, one) = ((get(3) & 3) as usize, f32::from(get(3) | 3));
-        let scale = std::f32::consts::FRAC_1_SQRT_2 / one;
-        let [x, y, z] = [0, 1, 2].map(|i| f32::from(get(i)) * scale);
-        let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
-        for (i, value) in [w, x, y, z].into_iter().enumerate() {
-            let at = 2 * ((which + i) & 3);
-            element[at..at + 2].copy_from_slice(&((value * 32767.0).round() as i16).to_le_bytes());
-        }
-    }
-}
-
-/// Decodes numbers with a mantissa of 24 bits and an exponent of 8 bits.
-fn exponential(bytes: &mut [u8]) {
-    for four in bytes.chunks_exact_mut(4) {
-        let value = i32::from_le_bytes([four[0], four[1], four[2], four[3]]);
-        let (exponent, mantissa) = (value >> 24, (value << 8) >> 8);
-        let number = (f64::from(mantissa) * 2_f64.powi(exponent)) as f32;
-        four.copy_from_slice(&number.to_le_bytes());
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn view(mode: &str, filter: Option<&str>, count: u64, byte_stride: u64) -> View {
         View { mode: mode.to_owned(), filter: filter.map(str::to_owned), count, byte_stride, ..View::default() }
+    }
+
+    fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
+        super::decode(view, data, 1 << 20)
     }
 
     /// Bytes of 17 elements of four bytes: constants, small steps, larger steps and noise.
@@ -378,6 +399,99 @@ mod tests {
         }
     }
 
+    /// An encoder of the second version with one channel.
+    fn encode_second(elements: &[[u8; 4]], mode: u8, controls: [u8; 4]) -> Vec<u8> {
+        let mut last = elements[0];
+        let delta = |element: &[u8; 4]| {
+            let before = std::mem::replace(&mut last, *element);
+            let words = |four: [u8; 4]| [[four[0], four[1]], [four[2], four[3]]].map(u16::from_le_bytes);
+            match mode & 15 {
+                0 => std::array::from_fn(|k| {
+                    let delta = element[k].wrapping_sub(before[k]) as i8;
+                    ((delta << 1) ^ (delta >> 7)) as u8
+                }),
+                1 => {
+                    let (now, then) = (words(*element), words(before));
+                    let delta = [0, 1].map(|i| now[i].wrapping_sub(then[i]) as i16);
+                    let [a, b] = delta.map(|delta| (((delta << 1) ^ (delta >> 15)) as u16).to_le_bytes());
+                    [a[0], a[1], b[0], b[1]]
+                }
+                _ => {
+                    let changed = u32::from_le_bytes(*element) ^ u32::from_le_bytes(before);
+                    changed.rotate_left(u32::from(mode >> 4)).to_le_bytes()
+                }
+            }
+        };
+        let deltas: Vec<[u8; 4]> = elements.iter().map(delta).collect();
+        let mut out = vec![0xa1, (0..4).map(|k| controls[k] << (2 * k)).sum()];
+        for (k, control) in controls.into_iter().enumerate() {
+            let column: Vec<u8> = deltas.iter().map(|delta| delta[k]).collect();
+            match control {
+                2 => assert!(column.iter().all(|&delta| delta == 0)),
+                3 => out.extend(column),
+                // Each group with another of the widths, but for 0.
+                _ => {
+                    let groups = column.len().div_ceil(16);
+                    let width = |group: usize| (group + usize::from(control == 0)) % 3 + usize::from(control == 0);
+                    let width = |group: usize| width(group).clamp(usize::from(control == 0), 3);
+                    out.push((0..groups).map(|group| (width(group) as u8) << (2 * group)).sum());
+                    for (group, deltas) in column.chunks(16).enumerate() {
+                        let mut deltas = deltas.to_vec();
+                        deltas.resize(16, 0);
+                        let bits = [[0, 1, 2, 4], [1, 2, 4, 8]][usize::from(control)][width(group)];
+                        if bits == 8 {
+                            out.extend(deltas);
+                            continue;
+                        }
+                        let most = (1 << bits) - 1;
+                        let small: Vec<u8> = deltas.iter().map(|&delta| delta.min(most)).collect();
+                        out.extend(small.chunks(8 / bits).map(|part| {
+                            let packed = |byte: u8, value: &u8| (byte << bits) | value;
+                            match bits {
+                                1 => part.iter().rev().fold(0, packed),
+                                _ => part.iter().fold(0, packed),
+                            }
+                        }));
+                        out.extend(deltas.iter().filter(|&&delta| delta >= most));
+                    }
+                }
+            }
+        }
+        out.extend([0; 19]);
+        out.extend(elements[0]);
+        out.push(mode);
+        out
+    }
+
+    #[test]
+    fn attributes_of_the_second_version_come_back_too() {
+        let elements: Vec<[u8; 4]> =
+            (0..50_u32).map(|i| [9, (i / 3) as u8, (i * 7) as u8, ((i * 91) ^ 0x5a) as u8]).collect();
+        for mode in [0, 1, 2, 2 | 5 << 4, 2 | 15 << 4] {
+            for controls in [[0, 0, 1, 3], [1, 1, 0, 0], [3, 0, 3, 1]] {
+                let data = encode_second(&elements, mode, controls);
+                let decoded = decode(&view("ATTRIBUTES", None, 50, 4), &data).unwrap();
+                assert_eq!(decoded, elements.concat(), "{mode} {controls:?}");
+                for length in 0..data.len() {
+                    assert!(decode(&view("ATTRIBUTES", None, 50, 4), &data[..length]).is_err(), "{length}");
+                }
+            }
+        }
+        let data = encode_second(&elements, 0, [2, 0, 1, 3]);
+        assert_eq!(decode(&view("ATTRIBUTES", None, 50, 4), &data).unwrap(), elements.concat());
+        for mode in [3, 1 | 1 << 4] {
+            let mut data = data.clone();
+            *data.last_mut().unwrap() = mode;
+            assert!(decode(&view("ATTRIBUTES", None, 50, 4), &data).is_err());
+        }
+        // A few bytes for many elements that are all the same.
+        let mut data = vec![0xa1, 0xaa];
+        data.extend([0; 19]);
+        data.extend([1, 2, 3, 4, 0]);
+        assert_eq!(decode(&view("ATTRIBUTES", None, 256, 4), &data).unwrap(), [1, 2, 3, 4].repeat(256));
+        assert!(super::decode(&view("ATTRIBUTES", None, 256, 4), &data, 1023).is_err());
+    }
+
     #[test]
     fn triangles_follow_edges_and_vertices() {
         // A new triangle by the table, one on its edge with a new vertex, and an explicit one.
@@ -400,31 +514,5 @@ mod tests {
         let data = [0xd1, 5 << 2, 0x91, 0x03, 1 << 1, 0, 0, 0, 0];
         let decoded = decode(&view("INDICES", None, 3, 2), &data).unwrap();
         assert_eq!(decoded, [5, 0, 100, 0, 4, 0]);
-    }
-
-    #[test]
-    fn filters_give_unit_vectors_turns_and_numbers() {
-        let mut bytes: Vec<u8> = [100_i8, -20, 127, 5, 60, 120, 127, -9].map(|b| b as u8).to_vec();
-        octahedral(&mut bytes, 4);
-        for (element, (x, y)) in bytes.chunks(4).zip([(100.0, -20.0), (60.0, 120.0)]) {
-            let found = [0, 1, 2].map(|i| f32::from(element[i] as i8) / 127.0);
-            let z = 127.0 - f32::abs(x) - f32::abs(y);
-            let fold = f32::min(z, 0.0);
-            let (x, y) = (x + fold * x.signum(), y + fold * y.signum());
-            let length = (x * x + y * y + z * z).sqrt();
-            for (found, expected) in found.iter().zip([x, y, z]) {
-                assert!((found - expected / length).abs() < 0.01);
-            }
-        }
-        assert_eq!((bytes[3], bytes[7]), (5, (-9_i8) as u8));
-        let mut bytes: Vec<u8> = [0_i16, 0, 1000, 1022].iter().flat_map(|v| v.to_le_bytes()).collect();
-        quaternion(&mut bytes);
-        let turn: Vec<f32> = bytes.chunks(2).map(|b| f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).collect();
-        assert!((turn.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-3);
-        // 1022 has 2 in its low bits: the third component is the largest, and the others follow cyclically.
-        assert!(turn[1] > 0.6 && turn[2] > 0.6 && turn[0] == 0.0 && turn[3] == 0.0, "{turn:?}");
-        let mut bytes = ((-3_i32 << 24) | (0x00ff_ffff & -20)).to_le_bytes().to_vec();
-        exponential(&mut bytes);
-        assert_eq!(bytes, (-2.5_f32).to_le_bytes());
     }
 }

@@ -26,95 +26,160 @@ impl Document {
 
     /// The roots of the displayed scene: those of the default scene, else of the first scene, else all nodes without a
     /// parent.
-    fn roots(&self, parents: &[Option<u32>]) -> Result<Vec<u32>, Located> {
+    fn roots(&self) -> Vec<u32> {
+        let count = self.root.nodes.len();
         let scenes = &self.root.scenes;
-        match self.root.scene.map_or(0, |scene| scene) {
-            0 if scenes.is_empty() => {
-                let is_root = |&(_, parent): &(usize, &Option<u32>)| parent.is_none();
-                Ok(parents.iter().enumerate().filter(is_root).map(|(node, _)| node as u32).collect())
-            }
-            scene => match scenes.get(scene as usize) {
-                Some(scene) => Ok(scene.nodes.clone()),
-                None => {
-                    let problem = GltfProblem::Index { list: "scenes", index: scene, count: scenes.len() };
-                    Err(("scene".to_owned(), problem))
-                }
-            },
+        let wanted = self.root.scene.unwrap_or(0);
+        let scene = scenes.get(wanted as usize).or_else(|| {
+            let problem = GltfProblem::Index { list: "scenes", index: wanted, count: scenes.len() };
+            // Without a list, the scene is the whole file.
+            scenes.first().inspect(|_| {
+                self.omissions.kept::<()>("scene", Err((String::new(), problem)));
+            })
+        });
+        let is_node = |part: String, index: u32| {
+            let problem = GltfProblem::Index { list: "nodes", index, count };
+            let node = if (index as usize) < count { Ok(index) } else { Err((String::new(), problem)) };
+            self.omissions.kept(&part, node)
+        };
+        match scene {
+            Some(scene) => scene
+                .nodes
+                .iter()
+                .enumerate()
+                .filter_map(|(i, &node)| is_node(format!("scenes[{wanted}].nodes[{i}]"), node))
+                .collect(),
+            None => self.nodes_without_parent(),
         }
     }
 
-    /// Checks that no node has two parents, and returns the parent of each.
-    fn parents(&self) -> Result<Vec<Option<u32>>, Located> {
+    fn nodes_without_parent(&self) -> Vec<u32> {
         let count = self.root.nodes.len();
-        let mut parents = vec![None; count];
-        for (node, json) in self.root.nodes.iter().enumerate() {
-            for &child in &json.children {
-                let Some(parent) = parents.get_mut(child as usize) else {
-                    let problem = GltfProblem::Index { list: "nodes", index: child, count };
-                    return Err((format!("{}.children", place("nodes", node)), problem));
-                };
-                if parent.replace(node as u32).is_some() {
-                    return Err((place("nodes", child), GltfProblem::NotTree));
-                }
+        let mut is_child = vec![false; count];
+        for &child in self.root.nodes.iter().flat_map(|node| &node.children) {
+            if let Some(is_child) = is_child.get_mut(child as usize) {
+                *is_child = true;
             }
         }
-        Ok(parents)
+        (0..count as u32).filter(|&node| !is_child[node as usize]).collect()
     }
 
     /// All nodes of the scene in traversal order, and the world transform of every node of the file, in the scene or
     /// not.
-    pub(super) fn placed_nodes(&self, pose: &Pose) -> Result<Tree, Located> {
-        let parents = self.parents()?;
-        let count = parents.len();
-        let mut worlds = vec![DAffine3::IDENTITY; count];
-        // Every node has at most one parent: nodes that cannot be reached from a root are on a cycle.
-        let mut seen = vec![false; count];
-        let mut todo: Vec<(u32, DAffine3)> = (0..count as u32)
-            .filter(|&node| parents[node as usize].is_none())
-            .map(|n| (n, DAffine3::IDENTITY))
-            .collect();
-        while let Some((index, above)) = todo.pop() {
-            let world = above * self.local(index, pose)?;
-            if !world.is_finite() {
-                return Err((place("nodes", index), GltfProblem::NotFinite { element: 0 }));
-            }
-            worlds[index as usize] = world;
-            seen[index as usize] = true;
-            todo.extend(self.root.nodes[index as usize].children.iter().map(|&child| (child, world)));
-        }
-        if let Some(node) = seen.iter().position(|seen| !seen) {
-            return Err((place("nodes", node), GltfProblem::NotTree));
-        }
-        let roots = self.roots(&parents)?;
-        let mut is_root = vec![false; count];
-        for &root in &roots {
-            self.node(root)?;
-            if std::mem::replace(&mut is_root[root as usize], true) || parents[root as usize].is_some() {
-                return Err((place("nodes", root), GltfProblem::NotTree));
+    ///
+    /// A node has one place: that below the first parent through which it is reached. Roots that hang from other nodes
+    /// of the scene are no roots; what is outside of the scene has no say in it.
+    pub(super) fn placed_nodes(&self, pose: &Pose) -> Tree {
+        let count = self.root.nodes.len();
+        let mut tree = Tree { scene: Vec::new(), worlds: vec![DAffine3::IDENTITY; count] };
+        let mut is_placed = vec![false; count];
+        let roots = self.roots();
+        let (below, top): (Vec<u32>, Vec<u32>) = {
+            let hangs = self.descendants(&roots);
+            roots.iter().partition(|&&root| hangs[root as usize])
+        };
+        for root in top {
+            // A root may be named twice.
+            if !is_placed[root as usize] {
+                self.place_below(root, pose, &mut tree, &mut is_placed, true);
             }
         }
-        let mut scene = Vec::new();
-        let mut todo: Vec<u32> = roots.into_iter().rev().collect();
+        for root in below {
+            let part = place("nodes", root);
+            let why = match is_placed[root as usize] {
+                true => "is a root of the scene and a child as well: it is placed as a child",
+                false => "is its own descendant: it is placed as a root",
+            };
+            self.omissions.tell(&part, format!("{part} {why}"));
+            if !is_placed[root as usize] {
+                self.place_below(root, pose, &mut tree, &mut is_placed, true);
+            }
+        }
+        // Joints of skins need not be in the scene.
+        let others = self.nodes_without_parent().into_iter().chain(0..count as u32);
+        for node in others {
+            if !is_placed[node as usize] {
+                self.place_below(node, pose, &mut tree, &mut is_placed, false);
+            }
+        }
+        tree
+    }
+
+    /// Whether each node is below one of these.
+    fn descendants(&self, roots: &[u32]) -> Vec<bool> {
+        let nodes = &self.root.nodes;
+        let mut is_below = vec![false; nodes.len()];
+        let mut todo: Vec<u32> = roots.to_vec();
         while let Some(node) = todo.pop() {
-            scene.push(node);
-            todo.extend(self.root.nodes[node as usize].children.iter().rev());
+            for &child in &nodes[node as usize].children {
+                if let Some(is_below) = is_below.get_mut(child as usize).filter(|is_below| !**is_below) {
+                    *is_below = true;
+                    todo.push(child);
+                }
+            }
         }
-        Ok(Tree { scene, worlds })
+        is_below
+    }
+
+    /// Places a node and all below it that have no place yet.
+    ///
+    /// - `is_shown`: whether they belong to the scene; nothing is told about others.
+    fn place_below(&self, root: u32, pose: &Pose, tree: &mut Tree, is_placed: &mut [bool], is_shown: bool) {
+        let count = is_placed.len();
+        let mut todo = vec![(root, DAffine3::IDENTITY)];
+        while let Some((index, above)) = todo.pop() {
+            let part = place("nodes", index);
+            if std::mem::replace(&mut is_placed[index as usize], true) {
+                if is_shown {
+                    let sentence = format!("{part} is a child more than once: it is placed below one parent only");
+                    self.omissions.tell(&part, sentence);
+                }
+                continue;
+            }
+            let world = above * self.local(index, pose, is_shown);
+            if !world.is_finite() {
+                if is_shown {
+                    let problem = GltfProblem::NotFinite { element: 0 };
+                    self.omissions.kept::<()>(&part, Err((String::new(), problem)));
+                }
+                continue;
+            }
+            tree.worlds[index as usize] = world;
+            if is_shown {
+                tree.scene.push(index);
+            }
+            for (i, &child) in self.root.nodes[index as usize].children.iter().enumerate().rev() {
+                if (child as usize) < count {
+                    todo.push((child, world));
+                } else if is_shown {
+                    let problem = GltfProblem::Index { list: "nodes", index: child, count };
+                    self.omissions.kept::<()>(&format!("{part}.children[{i}]"), Err((String::new(), problem)));
+                }
+            }
+        }
     }
 
     /// From the coordinates of the node to those of its parent.
-    fn local(&self, index: u32, pose: &Pose) -> Result<DAffine3, Located> {
-        let node = self.node(index)?;
-        let here =
-            |what, found: String, expected| (place("nodes", index), GltfProblem::Value { what, found, expected });
+    ///
+    /// - `is_told`: whether repairs are told.
+    fn local(&self, index: u32, pose: &Pose, is_told: bool) -> DAffine3 {
+        /// Largest rounding error of the last row of a matrix.
+        const ROUNDING: f64 = 1e-4;
+        let node = &self.root.nodes[index as usize];
+        let tell = |what: &str| {
+            let part = place("nodes", index);
+            if is_told {
+                self.omissions.tell(&part, format!("{part}: {what}"));
+            }
+        };
         let posed = pose.of(index);
         if let Some(matrix) = node.matrix.filter(|_| posed.is_none()) {
             let matrix = DMat4::from_cols_array(&matrix);
-            if matrix.row(3) != DVec4::W {
-                let found = matrix.row(3).to_string();
-                return Err(here("the last row of the matrix", found, "0, 0, 0, 1"));
+            let last = matrix.row(3);
+            if !last.abs_diff_eq(DVec4::W, ROUNDING) {
+                tell(&format!("the last row of its matrix is {last}: 0, 0, 0, 1 is used"));
             }
-            return Ok(DAffine3::from_mat4(matrix));
+            return DAffine3::from_mat4(matrix);
         }
         let posed = posed.copied().unwrap_or_default();
         let translation = posed.translation.or(node.translation.map(DVec3::from)).unwrap_or(DVec3::ZERO);
@@ -122,9 +187,12 @@ impl Document {
         let rotation = posed.rotation.or(node.rotation.map(DQuat::from_array)).unwrap_or(DQuat::IDENTITY);
         // Usually of unit length up to rounding.
         let length = rotation.length();
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(here("the rotation", rotation.to_string(), "a quaternion of length 1"));
-        }
-        Ok(DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
+        let rotation = if length > 0.0 && length.is_finite() {
+            rotation / length
+        } else {
+            tell(&format!("its rotation is {rotation}, which is no turn: it is not rotated"));
+            DQuat::IDENTITY
+        };
+        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
 }

@@ -7,12 +7,19 @@ use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 
-/// Transform from mesh coordinates to the world for each joint of a skin.
-pub(super) struct Joints(Vec<DAffine3>);
+/// The joints of a skin.
+pub(super) struct Joints {
+    /// From mesh coordinates to the world by each joint; none if the skin is broken.
+    pub joints: Vec<DAffine3>,
+    /// That of the node, which moves what follows no joint.
+    pub of_node: DAffine3,
+}
 
 impl Document {
+    /// From mesh coordinates to the world by each joint of a skin.
+    ///
     /// - `worlds`: from each node of the file to the world.
-    pub(super) fn joints(&self, skin: u32, worlds: &[DAffine3]) -> Result<Joints, Located> {
+    pub(super) fn joints(&self, skin: u32, worlds: &[DAffine3]) -> Result<Vec<DAffine3>, Located> {
         let here = |problem| (place("skins", skin), problem);
         let count = self.root.skins.len();
         let json = self.root.skins.get(skin as usize);
@@ -35,7 +42,7 @@ impl Document {
             });
             Ok(world * bind)
         };
-        json.joints.iter().enumerate().map(joint).collect::<Result<_, _>>().map(Joints)
+        json.joints.iter().enumerate().map(joint).collect()
     }
 }
 
@@ -50,7 +57,7 @@ impl Joints {
             if weight == 0.0 {
                 continue;
             }
-            let (map, weight) = (self.0.get(joint as usize)?, f64::from(weight));
+            let (map, weight) = (self.joints.get(joint as usize)?, f64::from(weight));
             mixed.matrix3 += map.matrix3 * weight;
             mixed.translation += map.translation * weight;
             total += weight;

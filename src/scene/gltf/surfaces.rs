@@ -1,15 +1,17 @@
 //! Conversion of the materials of a glTF file and their textures to those of a scene.
 //!
 //! Clear solid glass becomes `glass` or `rough_glass`, everything else `principled`. Factors become the tint of a
-//! texture; texture transforms are converted to v pointing up.
+//! texture; texture transforms are converted to v pointing up. Specular and glossiness become the colour and the
+//! roughness of a dielectric.
 
 use super::document::Document;
 use super::error::Located;
 use super::material::{Alpha, GltfMaterial, TextureUse};
-use super::uri::{Uri, resolve};
+use super::uri::{Uri, is_data};
 use crate::render::{Channel, Encoding, Material};
 use crate::scene::file::MaterialPart;
 use crate::scene::names::Names;
+use crate::scene::own_materials::without_lost_textures;
 use crate::scene::relative::path_to_text;
 use crate::scene::sources::TextureSource;
 use crate::scene::value::{ColorValue, Rgb, ScalarValue};
@@ -56,12 +58,16 @@ struct Textures<'a> {
     known: HashMap<String, String>,
 }
 
+/// Stands for a texture without an image. No texture has this name.
+const LOST: &str = "";
+
 /// How a texture is used.
 struct Role {
     what: &'static str,
     channel: Option<Channel>,
     encoding: Encoding,
     tint: Vec3,
+    invert: bool,
     vertex_colors: bool,
 }
 
@@ -77,8 +83,11 @@ impl Textures<'_> {
         name
     }
 
-    fn of(&mut self, used: &TextureUse, role: Role) -> Result<String, Located> {
-        let (image, file) = self.document.image_file(used.image, self.file)?;
+    /// The name of a texture; one whose image must not be read is not listed.
+    fn of(&mut self, used: &TextureUse, role: Role) -> String {
+        let part = super::error::place("images", used.image);
+        let found = self.document.image_file(used.image, self.file);
+        let Some((image, file)) = self.document.omissions.kept(&part, found) else { return LOST.to_owned() };
         let mut source = TextureSource::image(file);
         /// Smallest scale: with 0, an image would be stretched to a single colour, and the transform would be singular.
         const LEAST: f64 = 1e-9;
@@ -95,6 +104,7 @@ impl Textures<'_> {
             encoding,
             channel,
             tint,
+            invert,
             uv_set,
             vertex_colors,
             ..
@@ -118,10 +128,11 @@ impl Textures<'_> {
             *encoding = role.encoding;
             *channel = role.channel;
             *tint = Rgb(role.tint);
+            *invert = role.invert;
             *uv_set = used.uv_set as u8;
             *vertex_colors = role.vertex_colors;
         }
-        Ok(self.add(&format!("{image} {}", role.what), source))
+        self.add(&format!("{image} {}", role.what), source)
     }
 
     /// A factor times a channel.
@@ -131,49 +142,63 @@ impl Textures<'_> {
         texture: Option<&TextureUse>,
         channel: Channel,
         what: &'static str,
-    ) -> Result<ScalarValue, Located> {
+    ) -> ScalarValue {
         match texture {
             Some(used) if factor != 0.0 => {
                 let (encoding, tint) = (Encoding::Linear, Vec3::splat(factor));
-                let role = Role { what, channel: Some(channel), encoding, tint, vertex_colors: false };
-                Ok(ScalarValue::Texture(self.of(used, role)?))
+                let role = Role { what, channel: Some(channel), encoding, tint, invert: false, vertex_colors: false };
+                ScalarValue::Texture(self.of(used, role))
             }
-            _ => Ok(ScalarValue::Number(factor)),
+            _ => ScalarValue::Number(factor),
+        }
+    }
+
+    /// The roughness that belongs to a glossiness.
+    fn roughness_of(&mut self, (glossiness, texture): &(f32, Option<TextureUse>)) -> ScalarValue {
+        match texture {
+            Some(used) if *glossiness != 0.0 => {
+                let (channel, encoding, tint) = (Some(Channel::A), Encoding::Linear, Vec3::splat(*glossiness));
+                let role = Role { what: "roughness", channel, encoding, tint, invert: true, vertex_colors: false };
+                ScalarValue::Texture(self.of(used, role))
+            }
+            _ => ScalarValue::Number(1.0 - glossiness),
         }
     }
 
     /// A factor times an sRGB image.
-    fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> Result<ColorValue, Located> {
+    fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> ColorValue {
         match texture {
             Some(used) if factor != Vec3::ZERO => {
                 let (channel, encoding) = (None, Encoding::Auto);
-                Ok(ColorValue::Texture(
-                    self.of(used, Role { what, channel, encoding, tint: factor, vertex_colors: false })?,
-                ))
+                let role = Role { what, channel, encoding, tint: factor, invert: false, vertex_colors: false };
+                ColorValue::Texture(self.of(used, role))
             }
-            _ => Ok(ColorValue::Rgb(factor)),
+            _ => ColorValue::Rgb(factor),
         }
     }
 
     /// A map of vectors; `None` if there is none.
-    fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Result<Option<ColorValue>, Located> {
-        let Some(used) = texture else { return Ok(None) };
+    fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Option<ColorValue> {
+        let used = texture?;
         let (channel, encoding) = (None, Encoding::Linear);
-        let role = Role { what, channel, encoding, tint: Vec3::ONE, vertex_colors: false };
-        Ok(Some(ColorValue::Texture(self.of(used, role)?)))
+        let role = Role { what, channel, encoding, tint: Vec3::ONE, invert: false, vertex_colors: false };
+        Some(ColorValue::Texture(self.of(used, role)))
     }
 
     /// Base colour and coverage (alpha).
-    fn base(&mut self, material: &GltfMaterial, vertex_colors: bool) -> Result<(ColorValue, ScalarValue), Located> {
+    fn base(&mut self, material: &GltfMaterial, vertex_colors: bool) -> (ColorValue, ScalarValue) {
         let [r, g, b, alpha] = material.base_color;
         let (rgb, tint) = (Vec3::new(r, g, b), Rgb(Vec3::splat(alpha)));
         let is_cut = material.alpha != Alpha::Opaque;
-        Ok(match &material.base_color_texture {
+        match &material.base_color_texture {
             Some(used) => {
-                let role = |what, channel, tint| Role { what, channel, encoding: Encoding::Auto, tint, vertex_colors };
-                let color = ColorValue::Texture(self.of(used, role("color", None, rgb))?);
+                let role = |what, channel, tint| {
+                    let encoding = Encoding::Auto;
+                    Role { what, channel, encoding, tint, invert: false, vertex_colors }
+                };
+                let color = ColorValue::Texture(self.of(used, role("color", None, rgb)));
                 let opacity = match is_cut {
-                    true => ScalarValue::Texture(self.of(used, role("alpha", Some(Channel::A), tint.0))?),
+                    true => ScalarValue::Texture(self.of(used, role("alpha", Some(Channel::A), tint.0))),
                     false => ScalarValue::Number(1.0),
                 };
                 (color, opacity)
@@ -190,7 +215,7 @@ impl Textures<'_> {
                 (ColorValue::Texture(color), opacity)
             }
             None => (ColorValue::Rgb(rgb), ScalarValue::Number(if is_cut { alpha } else { 1.0 })),
-        })
+        }
     }
 }
 
@@ -199,9 +224,8 @@ impl Document {
     ///
     /// - `file`: path of the model in texture paths.
     ///
-    /// # Errors
-    /// If a material refers to something that does not exist, or an image may not be read.
-    pub(in crate::scene) fn surfaces(&self, file: &str) -> Result<Surfaces, Located> {
+    /// A texture whose image must not be read has a stand-in.
+    pub(in crate::scene) fn surfaces(&self, file: &str) -> Surfaces {
         let colored = self.materials_with_vertex_colors();
         let mut textures =
             Textures { document: self, file, names: Names::default(), list: Vec::new(), known: HashMap::new() };
@@ -209,13 +233,14 @@ impl Document {
         let mut materials = Vec::new();
         let numbers = (0..self.root.materials.len() as u32).map(Some).chain([None]);
         for number in numbers {
-            let material = self.material(number)?;
+            let material = self.material(number);
             let wanted = material.name.clone().unwrap_or_else(|| match number {
                 Some(number) => format!("material {number}"),
                 None => "default material".to_owned(),
             });
             let mut notes = material.notes.clone();
-            let part = surface(&mut textures, &material, colored.contains(&number), &mut notes)?;
+            let part = surface(&mut textures, &material, colored.contains(&number), &mut notes);
+            let part = without_lost_textures(&part, |texture| texture != LOST);
             materials.push(Surface {
                 name: names.free(&wanted),
                 part,
@@ -224,7 +249,7 @@ impl Document {
                 has_occlusion: material.has_occlusion,
             });
         }
-        Ok(Surfaces { materials, textures: textures.list })
+        Surfaces { materials, textures: textures.list }
     }
 
     fn materials_with_vertex_colors(&self) -> HashSet<Option<u32>> {
@@ -242,10 +267,10 @@ impl Document {
     pub(super) fn image_file(&self, image: u32, file: &str) -> Result<(String, String), Located> {
         let json = &self.root.images[image as usize];
         let named = json.name.clone().filter(|name| !name.is_empty());
-        if let Some(uri) = json.uri.as_deref().filter(|uri| !uri.starts_with("data:")) {
-            let found = resolve(uri, self.folder(), self.options.allow_outside);
-            let found = found.map_err(|problem| (super::error::place("images", image), problem))?;
-            if let Uri::File(path) = found {
+        if let Some(uri) = json.uri.as_deref().filter(|uri| !is_data(uri)) {
+            let part = super::error::place("images", image);
+            let found = self.resolved(uri, &part).map_err(|problem| (part, problem))?;
+            if let Uri::File { path, .. } = found {
                 let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
                 // Paths are relative to the scene, which may be in another folder than the model.
                 let folder = std::path::Path::new(file).parent().unwrap_or(std::path::Path::new(""));
@@ -261,13 +286,13 @@ fn surface(
     material: &GltfMaterial,
     vertex_colors: bool,
     notes: &mut Vec<String>,
-) -> Result<MaterialPart, Located> {
+) -> MaterialPart {
     if let Some(glass) = clear_glass(material) {
-        return Ok(glass);
+        return glass;
     }
-    let (base, alpha) = textures.base(material, vertex_colors)?;
+    let (base, alpha) = textures.base(material, vertex_colors);
     let usual = Material::principled(base.clone());
-    let Material::Principled { .. } = &usual else { return Ok(usual) };
+    let Material::Principled { .. } = &usual else { return usual };
     let cutoff = match material.alpha {
         Alpha::Mask(cutoff) => Some(cutoff.clamp(0.0, 1.0)),
         Alpha::Opaque | Alpha::Blend => None,
@@ -306,7 +331,7 @@ fn surface(
         ..
     } = &mut part
     else {
-        return Ok(part);
+        return part;
     };
     (*opacity, *opacity_cutoff) = (alpha, cutoff);
     *two_sided = material.double_sided;
@@ -317,17 +342,20 @@ fn surface(
         (*metallic, *roughness) = (ScalarValue::Number(0.0), ScalarValue::Number(1.0));
         *emission = base;
         notes.push("it is unlit: it emits its own color, and is a light as well".to_owned());
-        return Ok(part);
+        return part;
     }
     let metal_map = material.metallic_roughness_texture.as_ref();
-    *metallic = textures.scalar(material.metallic, metal_map, Channel::B, "metallic")?;
-    *roughness = textures.scalar(material.roughness, metal_map, Channel::G, "roughness")?;
+    *metallic = textures.scalar(material.metallic, metal_map, Channel::B, "metallic");
+    *roughness = match &material.glossiness {
+        Some(glossiness) => textures.roughness_of(glossiness),
+        None => textures.scalar(material.roughness, metal_map, Channel::G, "roughness"),
+    };
     *ior = material.ior;
-    *specular = textures.scalar(material.specular, material.specular_texture.as_ref(), Channel::A, "specular")?;
+    *specular = textures.scalar(material.specular, material.specular_texture.as_ref(), Channel::A, "specular");
     let specular_map = material.specular_color_texture.as_ref();
-    *specular_color = textures.color(material.specular_color, specular_map, "specular color")?;
+    *specular_color = textures.color(material.specular_color, specular_map, "specular color");
     let passes = material.transmission_texture.as_ref();
-    *transmission = textures.scalar(material.transmission, passes, Channel::R, "transmission")?;
+    *transmission = textures.scalar(material.transmission, passes, Channel::R, "transmission");
     *thin_walled = material.transmission > 0.0 && material.thickness == 0.0;
     if material.transmission > 0.0 && material.thickness > 0.0 {
         *absorption = Rgb(absorption_of(material));
@@ -337,30 +365,30 @@ fn surface(
     }
     *anisotropy = ScalarValue::Number(material.anisotropy);
     *anisotropy_rotation = material.anisotropy_rotation.to_degrees();
-    if let Some(map) = textures.map(material.anisotropy_texture.as_ref(), "anisotropy")? {
+    if let Some(map) = textures.map(material.anisotropy_texture.as_ref(), "anisotropy") {
         *anisotropy_map = map;
     }
-    *sheen_color = textures.color(material.sheen_color, material.sheen_color_texture.as_ref(), "sheen color")?;
+    *sheen_color = textures.color(material.sheen_color, material.sheen_color_texture.as_ref(), "sheen color");
     let sheen_map = material.sheen_roughness_texture.as_ref();
-    *sheen_roughness = textures.scalar(material.sheen_roughness, sheen_map, Channel::A, "sheen roughness")?;
-    *clearcoat = textures.scalar(material.clearcoat, material.clearcoat_texture.as_ref(), Channel::R, "coat")?;
+    *sheen_roughness = textures.scalar(material.sheen_roughness, sheen_map, Channel::A, "sheen roughness");
+    *clearcoat = textures.scalar(material.clearcoat, material.clearcoat_texture.as_ref(), Channel::R, "coat");
     let coat_map = material.clearcoat_roughness_texture.as_ref();
-    *clearcoat_roughness = textures.scalar(material.clearcoat_roughness, coat_map, Channel::G, "coat roughness")?;
-    if let Some(map) = textures.map(material.clearcoat_normal_texture.as_ref(), "coat normals")? {
+    *clearcoat_roughness = textures.scalar(material.clearcoat_roughness, coat_map, Channel::G, "coat roughness");
+    if let Some(map) = textures.map(material.clearcoat_normal_texture.as_ref(), "coat normals") {
         *clearcoat_normal_map = map;
     }
     *iridescence =
-        textures.scalar(material.iridescence, material.iridescence_texture.as_ref(), Channel::R, "iridescence")?;
+        textures.scalar(material.iridescence, material.iridescence_texture.as_ref(), Channel::R, "iridescence");
     *iridescence_ior = material.iridescence_ior;
     [*iridescence_min, *iridescence_max] = material.iridescence_thickness;
     let film_map = material.iridescence_thickness_texture.as_ref();
-    *iridescence_map = textures.scalar(1.0, film_map, Channel::G, "film thickness")?;
-    *emission = textures.color(material.emission, material.emissive_texture.as_ref(), "emission")?;
-    if let Some(map) = textures.map(material.normal_texture.as_ref(), "normals")? {
+    *iridescence_map = textures.scalar(1.0, film_map, Channel::G, "film thickness");
+    *emission = textures.color(material.emission, material.emissive_texture.as_ref(), "emission");
+    if let Some(map) = textures.map(material.normal_texture.as_ref(), "normals") {
         *normal_map = map;
         *normal_scale = material.normal_scale;
     }
-    Ok(part)
+    part
 }
 
 /// Solids that only refract and reflect have exact materials of their own.
@@ -402,5 +430,5 @@ fn absorption_of(material: &GltfMaterial) -> Vec3 {
     if !(distance > 0.0 && distance.is_finite()) {
         return Vec3::ZERO;
     }
-    material.attenuation_color.to_array().map(|c| (-c.clamp(LEAST, 1.0).ln() / distance).max(0.0)).into()
+    material.attenuation_color.to_array().map(|c| (-c.clamp(LEAST, 1.0).ln() / distance).clamp(0.0, f32::MAX)).into()
 }

@@ -2,15 +2,27 @@
 
 use super::error::GltfProblem;
 use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
 /// A resolved URI.
 pub(super) enum Uri {
     /// Embedded data.
     Data(Vec<u8>),
-    /// A file, relative to the folder of the model; absolute only if that is allowed.
-    File(PathBuf),
+    /// A file.
+    File {
+        /// Relative to the folder of the model; absolute only if that is allowed.
+        path: PathBuf,
+        /// Whether the file differs from the URI by the case of letters.
+        is_renamed: bool,
+    },
+}
+
+/// Whether a URI contains its data.
+pub(super) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
 /// - `folder`: folder of the model.
@@ -19,8 +31,8 @@ pub(super) enum Uri {
 /// # Errors
 /// If it leaves the folder, refers to the network or is not a valid URI.
 pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, GltfProblem> {
-    if let Some(data) = uri.strip_prefix("data:") {
-        return data_uri(data).map(Uri::Data);
+    if is_data(uri) {
+        return data_uri(&uri[5..]).map(Uri::Data);
     }
     let refused = |why| Err(GltfProblem::Outside { uri: uri.to_owned(), why });
     let mut text = uri;
@@ -44,7 +56,7 @@ pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, Gl
     let decoded = percent_decoded(text);
     let path = PathBuf::from(&decoded);
     if outside {
-        return Ok(Uri::File(path));
+        return Ok(existing(path, &decoded, folder));
     }
     if path.is_absolute() || decoded.starts_with(['/', '\\']) {
         return refused("an absolute path");
@@ -53,13 +65,47 @@ pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, Gl
     if leaves || decoded.split(['/', '\\']).any(|part| part == "..") {
         return refused("a path out of the folder");
     }
+    let file = existing(path, &decoded, folder);
     // A symbolic link may leave the folder too.
-    if let (Ok(real), Ok(root)) = (folder.join(&path).canonicalize(), real_folder(folder).canonicalize())
+    if let Uri::File { path, .. } = &file
+        && let (Ok(real), Ok(root)) = (folder.join(path).canonicalize(), real_folder(folder).canonicalize())
         && !real.starts_with(root)
     {
         return refused("a link out of the folder");
     }
-    Ok(Uri::File(path))
+    Ok(file)
+}
+
+/// The file that a URI means, which another system may have written: with `\` between folders, and without regard to
+/// the case of letters. If several files differ by case alone, none of them is meant.
+fn existing(path: PathBuf, decoded: &str, folder: &Path) -> Uri {
+    let is_there = |path: &Path| folder.join(path).exists();
+    let as_written = |path: PathBuf| Uri::File { path, is_renamed: false };
+    if is_there(&path) {
+        return as_written(path);
+    }
+    let slashed = PathBuf::from(decoded.replace('\\', "/"));
+    if is_there(&slashed) {
+        return as_written(slashed);
+    }
+    let mut found = PathBuf::new();
+    for part in slashed.components() {
+        let next = found.join(part);
+        if is_there(&next) {
+            found = next;
+            continue;
+        }
+        let lower = |name: &std::ffi::OsStr| name.to_string_lossy().to_lowercase();
+        let wanted = lower(part.as_os_str());
+        let entries = real_folder(&folder.join(&found)).read_dir();
+        let mut same = entries.into_iter().flatten().flatten().map(|entry| entry.file_name());
+        let mut same = same.by_ref().filter(|name| lower(name) == wanted);
+        match (same.next(), same.next()) {
+            (Some(name), None) => found.push(name),
+            _ => return as_written(path),
+        }
+    }
+    Uri::File { path: found, is_renamed: true }
 }
 
 fn real_folder(folder: &Path) -> &Path {
@@ -93,13 +139,26 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
 }
 
-/// Decodes the text after `data:`.
+/// Decodes the text after `data:`. As browsers do, without regard to white space and to missing padding.
 fn data_uri(data: &str) -> Result<Vec<u8>, GltfProblem> {
+    const BASE64: GeneralPurpose = GeneralPurpose::new(
+        &STANDARD,
+        GeneralPurposeConfig::new()
+            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+            .with_decode_allow_trailing_bits(true),
+    );
     let (head, body) = data.split_once(',').ok_or(GltfProblem::DataUri("there is no comma in it"))?;
-    if !head.ends_with(";base64") {
+    if !head.trim_end().to_ascii_lowercase().ends_with(";base64") {
         return Err(GltfProblem::DataUri("expected base64"));
     }
-    STANDARD.decode(body).map_err(|_| GltfProblem::DataUri("the text is no base64"))
+    let mut body = Cow::Borrowed(body);
+    if body.contains('%') {
+        body = Cow::Owned(percent_decoded(&body));
+    }
+    if body.contains(|c: char| c.is_ascii_whitespace()) {
+        body = Cow::Owned(body.split_ascii_whitespace().collect());
+    }
+    BASE64.decode(body.as_bytes()).map_err(|_| GltfProblem::DataUri("the text is no base64"))
 }
 
 #[cfg(test)]
@@ -108,7 +167,7 @@ mod tests {
 
     fn file(uri: &str, outside: bool) -> Option<String> {
         match resolve(uri, Path::new("nowhere"), outside) {
-            Ok(Uri::File(path)) => Some(path.to_string_lossy().into_owned()),
+            Ok(Uri::File { path, .. }) => Some(path.to_string_lossy().into_owned()),
             _ => None,
         }
     }
@@ -157,6 +216,33 @@ mod tests {
     }
 
     #[test]
+    fn files_that_another_system_named_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("Sub")).unwrap();
+        for name in ["Sub/Data.bin", "twice.png", "Twice.png"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = |uri: &str| match resolve(uri, folder.path(), false) {
+            Ok(Uri::File { path, is_renamed }) => (path.to_string_lossy().into_owned(), is_renamed),
+            _ => panic!("{uri}"),
+        };
+        for (uri, path, is_renamed) in [
+            ("Sub/Data.bin", "Sub/Data.bin", false),
+            ("Sub\\Data.bin", "Sub/Data.bin", false),
+            ("sub\\DATA.bin", "Sub/Data.bin", true),
+            ("./SUB/data.BIN", "./Sub/Data.bin", true),
+            ("twice.png", "twice.png", false),
+            ("none.png", "none.png", false),
+        ] {
+            assert_eq!(found(uri), (path.to_owned(), is_renamed), "{uri}");
+        }
+        // Where both are there, neither is meant.
+        if std::fs::read_dir(folder.path()).unwrap().count() == 3 {
+            assert_eq!(found("TWICE.png"), ("TWICE.png".to_owned(), false));
+        }
+    }
+
+    #[test]
     fn data_uris_are_decoded_or_refused() {
         let data = |uri: &str| match resolve(uri, Path::new(""), false) {
             Ok(Uri::Data(bytes)) => Some(bytes),
@@ -164,6 +250,8 @@ mod tests {
         };
         assert_eq!(data("data:application/octet-stream;base64,AAEC/w=="), Some(vec![0, 1, 2, 255]));
         assert_eq!(data("data:;base64,"), Some(vec![]));
+        assert_eq!(data("DATA:;BASE64,AAEC\n  /w"), Some(vec![0, 1, 2, 255]));
+        assert_eq!(data("data:;base64,AAEC%2Fw%3D%3D"), Some(vec![0, 1, 2, 255]));
         assert_eq!(data("data:text/plain,abc"), None);
         assert_eq!(data("data:;base64,@"), None);
     }
