@@ -48,7 +48,8 @@ fn write(name: &str, bytes: &[u8]) -> PathBuf {
 fn read_model(path: &Path, format: ModelFormat) {
     let computed = ModelOptions::default().normals;
     for normals in [computed, ModelNormals::OfPositions, ModelNormals::Ignore] {
-        let options = ModelOptions { normals, max_bytes: LIMITS.model_bytes, max_library_bytes: LIMITS.library_bytes };
+        let (max_bytes, max_library_bytes) = (LIMITS.model_bytes, LIMITS.library_bytes);
+        let options = ModelOptions { normals, max_bytes, max_library_bytes, allow_outside: false };
         match load_model(path, format, &options) {
             Ok(model) => {
                 model.mesh.validate().expect("a mesh that was read is sound");

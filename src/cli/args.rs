@@ -74,7 +74,7 @@ pub struct OpenArgs {
     /// Variant of a glTF model's materials, by name.
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     pub variant: Option<String>,
-    /// Allow a glTF model to read files outside of its own folder.
+    /// Allow models to read files outside of their own folders.
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
     /// Environment image (.hdr, .exr, .png, .jpg) that lights the scene instead of its own environment.

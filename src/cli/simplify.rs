@@ -9,6 +9,7 @@ use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};
+use firstlight::scene::absolute;
 use firstlight::scene::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::obj::{ObjExtras, save_obj};
 use std::path::PathBuf;
@@ -79,9 +80,11 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     files.write(&args.output)?;
     let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals are not written: without normals in the file, the next program computes its own.
-    let mut model = load_model(&args.input, format, &ModelOptions::default()).map_err(|error| failed(&error))?;
+    // Libraries are named again, not copied.
+    let options = ModelOptions { allow_outside: true, ..ModelOptions::default() };
+    let mut model = load_model(&args.input, format, &options).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
-        let options = ModelOptions { normals: ModelNormals::Ignore, ..ModelOptions::default() };
+        let options = ModelOptions { normals: ModelNormals::Ignore, ..options };
         model = load_model(&args.input, format, &options).map_err(|error| failed(&error))?;
     }
     files.read_all(model.libraries.iter().cloned())?;
@@ -118,6 +121,12 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
     waiting.next(format!("writing {}", args.output.display()));
+    let output = absolute(&args.output);
+    let folder = output.parent().unwrap_or(&output);
+    if let Some(library) = model.libraries.iter().find(|library| !absolute(library).starts_with(folder)) {
+        let (output, library) = (args.output.display(), library.display());
+        remark(format_args!("warning: {output} names {library}, which is not in its folder: --allow-outside reads it"));
+    }
     save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
     stop.has_saved(format!("{} is saved; its deviation from the original was not measured", args.output.display()));
     waiting.next("measuring the deviation");

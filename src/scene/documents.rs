@@ -48,6 +48,11 @@ impl Documents {
         Self { options: ReadOptions { allow_outside, ..ReadOptions::default() }, ..Self::default() }
     }
 
+    /// Whether models may refer to files outside of their folders.
+    pub(super) fn allow_outside(&self) -> bool {
+        self.options.allow_outside
+    }
+
     /// The file at `path`, read on first use.
     pub(super) fn open(&self, path: &Path) -> Result<Arc<Opened>, GltfError> {
         let mut open = lock(&self.open);

@@ -86,7 +86,10 @@ pub fn load_mesh(
         return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
     }
     match source.file() {
-        Some((_, file)) => read_file(source, &folder.join(text_to_path(file)), shading, simplify),
+        Some((_, file)) => {
+            let path = folder.join(text_to_path(file));
+            read_file(source, &path, shading, simplify, documents.allow_outside())
+        }
         None => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
             Ok(LoadedMesh {
@@ -137,7 +140,8 @@ impl MeshBase {
             }
             Some((format, file)) => {
                 let path = folder.join(text_to_path(file));
-                let (imported, crease) = read_base(&path, format, shading, simplify.is_some())?;
+                // Materials, which may lie elsewhere, are not used here.
+                let (imported, crease) = read_base(&path, format, shading, simplify.is_some(), false)?;
                 (imported.mesh, crease)
             }
             None => {
@@ -192,11 +196,12 @@ fn read_file(
     path: &Path,
     shading: MeshShading,
     simplify: Option<f64>,
+    allow_outside: bool,
 ) -> Result<LoadedMesh, SceneError> {
     // Taken before reading, so that a change in the meantime is noticed.
     let before = stamp(path);
     let format = source.file().map_or(ModelFormat::Obj, |(format, _)| format);
-    let (mut imported, crease) = read_base(path, format, shading, simplify.is_some())?;
+    let (mut imported, crease) = read_base(path, format, shading, simplify.is_some(), allow_outside)?;
     imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
     let mesh = Arc::new(imported.mesh);
     let files = std::iter::once((path.to_owned(), before))
@@ -221,9 +226,10 @@ fn read_base(
     format: ModelFormat,
     shading: MeshShading,
     simplify: bool,
+    allow_outside: bool,
 ) -> Result<(ImportedModel, Option<f32>), SceneError> {
     let read = |normals| {
-        load_model(path, format, &ModelOptions { normals, ..ModelOptions::default() })
+        load_model(path, format, &ModelOptions { normals, allow_outside, ..ModelOptions::default() })
             .map_err(|error| SceneError::new(error.to_string()))
     };
     let computed = ModelOptions::default().normals;

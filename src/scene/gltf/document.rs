@@ -13,6 +13,7 @@ use super::omissions::Omissions;
 use super::uri::{Uri, resolve};
 use crate::scene::input_file::{FileKind, InputFile};
 use crate::scene::limits::Limits;
+use crate::scene::model::reference::References;
 use crate::scene::relative::path_to_text;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -245,7 +246,8 @@ impl Document {
     /// # Errors
     /// If it may not be read, or is no URI.
     pub(super) fn resolved(&self, uri: &str, part: &str) -> Result<Uri, GltfProblem> {
-        let resolved = resolve(uri, self.folder(), self.options.allow_outside)?;
+        let files = References::of(&self.path, self.options.allow_outside);
+        let resolved = resolve(uri, files, self.folder())?;
         if let Uri::File { path, is_renamed: true } = &resolved {
             let [uri, file] = [uri, &path_to_text(path)].map(|name| crate::printable::name(name).into_owned());
             let sentence = format!("{part}: there is no `{uri}`: `{file}` is read, which differs by case");

@@ -4,6 +4,7 @@ use crate::mesh::MeshError;
 use crate::printable::name;
 use crate::scene::input_file::ReadError;
 use crate::scene::limits::Limits;
+use crate::scene::model::reference::Outside;
 use std::path::{Path, PathBuf};
 
 /// Why a glTF file could not be opened.
@@ -137,17 +138,8 @@ pub enum GltfProblem {
         expected: u64,
     },
     /// The model refers to a file that may not be read.
-    #[error(
-        "`{}` is {why}: only files in the folder of the model and below are read; \
-         --allow-outside reads others on this computer as well, never the network",
-        name(uri)
-    )]
-    Outside {
-        /// The URI in the file.
-        uri: String,
-        /// In which way it is outside.
-        why: &'static str,
-    },
+    #[error(transparent)]
+    Outside(#[from] Outside),
     /// A data URI is invalid.
     #[error("its data URI is wrong: {0}")]
     DataUri(&'static str),

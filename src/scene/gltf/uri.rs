@@ -1,11 +1,12 @@
 //! Resolves the URIs in a glTF file: data URIs, and files in its own folder and below.
 
 use super::error::GltfProblem;
+use crate::scene::model::reference::{Outside, References, Referred, percent_decoded};
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::borrow::Cow;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// A resolved URI.
 pub(super) enum Uri {
@@ -25,118 +26,35 @@ pub(super) fn is_data(uri: &str) -> bool {
     uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
+/// - `files`: what the model may refer to.
 /// - `folder`: folder of the model.
-/// - `outside`: whether local files outside of `folder` may be read.
 ///
 /// # Errors
 /// If it leaves the folder, refers to the network or is not a valid URI.
-pub(super) fn resolve(uri: &str, folder: &Path, outside: bool) -> Result<Uri, GltfProblem> {
+pub(super) fn resolve(uri: &str, files: References, folder: &Path) -> Result<Uri, GltfProblem> {
     if is_data(uri) {
         return data_uri(&uri[5..]).map(Uri::Data);
     }
-    let refused = |why| Err(GltfProblem::Outside { uri: uri.to_owned(), why });
+    let refused = |why| Err(Outside { name_in_model: uri.to_owned(), why }.into());
     let mut text = uri;
-    if let Some((scheme, rest)) = uri.split_once(':') {
-        // A single letter is a drive, which belongs to a path.
-        if scheme.eq_ignore_ascii_case("file") {
-            if !outside {
-                return refused("a file: URI");
-            }
-            text = rest.strip_prefix("//").unwrap_or(rest);
-            text = text.strip_prefix("localhost").unwrap_or(text);
-        } else if scheme.len() > 1 && is_scheme(scheme) {
+    // A single letter is a drive, which belongs to a path.
+    if let Some((scheme, rest)) = uri.split_once(':').filter(|(scheme, _)| scheme.len() > 1 && is_scheme(scheme)) {
+        if !scheme.eq_ignore_ascii_case("file") {
             return refused("an address of the network");
-        } else if scheme.len() == 1 && !outside {
-            return refused("an absolute path");
         }
-    }
-    if text.starts_with("//") || text.starts_with("\\\\") {
-        return refused("an address of the network");
-    }
-    let decoded = percent_decoded(text);
-    let path = PathBuf::from(&decoded);
-    if outside {
-        return Ok(existing(path, &decoded, folder));
-    }
-    if path.is_absolute() || decoded.starts_with(['/', '\\']) {
-        return refused("an absolute path");
-    }
-    let leaves = path.components().any(|part| !matches!(part, Component::Normal(_) | Component::CurDir));
-    if leaves || decoded.split(['/', '\\']).any(|part| part == "..") {
-        return refused("a path out of the folder");
-    }
-    let file = existing(path, &decoded, folder);
-    // A symbolic link may leave the folder too.
-    if let Uri::File { path, .. } = &file
-        && let (Ok(real), Ok(root)) = (folder.join(path).canonicalize(), real_folder(folder).canonicalize())
-        && !real.starts_with(root)
-    {
-        return refused("a link out of the folder");
-    }
-    Ok(file)
-}
-
-/// The file that a URI means, which another system may have written: with `\` between folders, and without regard to
-/// the case of letters. If several files differ by case alone, none of them is meant.
-fn existing(path: PathBuf, decoded: &str, folder: &Path) -> Uri {
-    let is_there = |path: &Path| folder.join(path).exists();
-    let as_written = |path: PathBuf| Uri::File { path, is_renamed: false };
-    if is_there(&path) {
-        return as_written(path);
-    }
-    let slashed = PathBuf::from(decoded.replace('\\', "/"));
-    if is_there(&slashed) {
-        return as_written(slashed);
-    }
-    let mut found = PathBuf::new();
-    for part in slashed.components() {
-        let next = found.join(part);
-        if is_there(&next) {
-            found = next;
-            continue;
+        if !files.allow_outside() {
+            return refused("a file: URI");
         }
-        let lower = |name: &std::ffi::OsStr| name.to_string_lossy().to_lowercase();
-        let wanted = lower(part.as_os_str());
-        let entries = real_folder(&folder.join(&found)).read_dir();
-        let mut same = entries.into_iter().flatten().flatten().map(|entry| entry.file_name());
-        let mut same = same.by_ref().filter(|name| lower(name) == wanted);
-        match (same.next(), same.next()) {
-            (Some(name), None) => found.push(name),
-            _ => return as_written(path),
-        }
+        text = rest.strip_prefix("//").unwrap_or(rest);
+        text = text.strip_prefix("localhost").unwrap_or(text);
     }
-    Uri::File { path: found, is_renamed: true }
-}
-
-fn real_folder(folder: &Path) -> &Path {
-    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+    let Referred { path, is_renamed } = files.resolve(folder, text)?;
+    Ok(Uri::File { path, is_renamed })
 }
 
 fn is_scheme(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_alphabetic())
         && word.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
-}
-
-/// Decodes `%20` and the like; sequences that are invalid, not UTF-8 or zero stay unchanged.
-fn percent_decoded(text: &str) -> String {
-    let bytes = text.as_bytes();
-    let mut out = Vec::with_capacity(bytes.len());
-    let mut i = 0;
-    while i < bytes.len() {
-        let hex = |byte: u8| char::from(byte).to_digit(16);
-        if bytes[i] == b'%'
-            && let Some(Some(high)) = bytes.get(i + 1).map(|&byte| hex(byte))
-            && let Some(Some(low)) = bytes.get(i + 2).map(|&byte| hex(byte))
-            && high * 16 + low != 0
-        {
-            out.push((high * 16 + low) as u8);
-            i += 3;
-        } else {
-            out.push(bytes[i]);
-            i += 1;
-        }
-    }
-    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
 }
 
 /// Decodes the text after `data:`. As browsers do, without regard to white space and to missing padding.
@@ -166,7 +84,7 @@ mod tests {
     use super::*;
 
     fn file(uri: &str, outside: bool) -> Option<String> {
-        match resolve(uri, Path::new("nowhere"), outside) {
+        match resolve(uri, References::of(Path::new("nowhere/a.gltf"), outside), Path::new("nowhere")) {
             Ok(Uri::File { path, .. }) => Some(path.to_string_lossy().into_owned()),
             _ => None,
         }
@@ -190,8 +108,6 @@ mod tests {
             "%2e%2e/a.bin",
             "..\\a.bin",
             "/etc/passwd",
-            "\\a.bin",
-            "C:\\a.bin",
             "file:///etc/passwd",
             "FILE:///etc/passwd",
             "http://example.com/a.bin",
@@ -200,7 +116,8 @@ mod tests {
             "//server/share/a.bin",
             "\\\\server\\a.bin",
         ] {
-            let error = resolve(uri, Path::new("nowhere"), false).err().expect(uri).to_string();
+            let found = resolve(uri, References::of(Path::new("nowhere/a.gltf"), false), Path::new("nowhere"));
+            let error = found.err().expect(uri).to_string();
             assert!(error.contains("--allow-outside"), "{uri}: {error}");
         }
     }
@@ -222,7 +139,8 @@ mod tests {
         for name in ["Sub/Data.bin", "twice.png", "Twice.png"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        let found = |uri: &str| match resolve(uri, folder.path(), false) {
+        let model = folder.path().join("a.gltf");
+        let found = |uri: &str| match resolve(uri, References::of(&model, false), folder.path()) {
             Ok(Uri::File { path, is_renamed }) => (path.to_string_lossy().into_owned(), is_renamed),
             _ => panic!("{uri}"),
         };
@@ -244,7 +162,7 @@ mod tests {
 
     #[test]
     fn data_uris_are_decoded_or_refused() {
-        let data = |uri: &str| match resolve(uri, Path::new(""), false) {
+        let data = |uri: &str| match resolve(uri, References::of(Path::new("a.gltf"), false), Path::new("")) {
             Ok(Uri::Data(bytes)) => Some(bytes),
             _ => None,
         };

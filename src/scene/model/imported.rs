@@ -50,6 +50,8 @@ pub struct ModelOptions {
     pub max_bytes: u64,
     /// Larger material libraries are ignored.
     pub max_library_bytes: u64,
+    /// Whether libraries and textures outside of the model's folder may be read.
+    pub allow_outside: bool,
 }
 
 impl Default for ModelOptions {
@@ -58,7 +60,7 @@ impl Default for ModelOptions {
     fn default() -> Self {
         let normals = ModelNormals::FileOrComputed { crease_angle: 60_f32.to_radians() };
         let limits = Limits::of_this_process();
-        Self { normals, max_bytes: limits.model_bytes, max_library_bytes: limits.library_bytes }
+        Self { normals, max_bytes: limits.model_bytes, max_library_bytes: limits.library_bytes, allow_outside: false }
     }
 }
 

@@ -9,10 +9,12 @@ pub(in crate::scene) mod error;
 mod format;
 pub(in crate::scene) mod imported;
 pub(in crate::scene) mod polygon;
+pub(in crate::scene) mod reference;
 
 pub use error::{ModelError, ModelProblem, Place};
 pub use format::ModelFormat;
 pub use imported::{ImportedModel, ModelNormals, ModelOptions};
+pub use reference::Outside;
 
 use super::gltf::baked::load_gltf_with;
 use super::obj::load_obj_with;

@@ -22,9 +22,10 @@ pub use write::{ObjExtras, save_obj};
 use self::parse::{Corner, ParsedObj};
 use super::model::imported::{ImportedModel, ModelNormals, ModelOptions, has_area, with_normals};
 use super::model::polygon;
+use super::model::reference::References;
 use super::warnings::Warnings;
 use crate::mesh::Mesh;
-use crate::scene::{FileKind, InputFile, text_to_path};
+use crate::scene::{FileKind, InputFile};
 use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     };
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
-    let (mut materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
+    let (mut materials, libraries) = find_materials(path, parsed, options, &mut of_materials);
     if !mesh.colors.is_empty() && !use_vertex_colors(&mut materials, &mesh) {
         mesh.colors = Vec::new();
     }
@@ -248,21 +249,29 @@ impl MeshCorners {
 fn find_materials(
     path: &Path,
     parsed: ParsedObj,
-    max_bytes: u64,
+    options: &ModelOptions,
     warnings: &mut Warnings,
 ) -> (Vec<ImportedMaterial>, Vec<PathBuf>) {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known: HashMap<String, ImportedMaterial> = HashMap::new();
-    let mut seen = Vec::new();
+    let files = References::of(path, options.allow_outside);
+    let (mut seen, mut has_materials) = (Vec::new(), Vec::new());
     for line in parsed.libraries.iter().take(MAX_LIBRARIES) {
         // A name may contain spaces, and a line may contain several names.
-        let whole = line.replace('\\', "/");
-        let names: Vec<&str> =
-            if folder.join(text_to_path(&whole)).exists() { vec![&whole] } else { whole.split_whitespace().collect() };
+        let is_one = files.resolve(folder, line).is_ok_and(|file| folder.join(file.path).exists());
+        let names: Vec<&str> = if is_one { vec![line] } else { line.split_whitespace().collect() };
         for name in names {
-            let library = folder.join(text_to_path(name));
+            let library = match files.resolve(folder, name) {
+                Ok(file) => folder.join(file.path),
+                Err(outside) => {
+                    warnings.push(format!("{}: {outside}; its materials use default values", path.display()));
+                    continue;
+                }
+            };
             if !seen.contains(&library) {
-                let materials = mtl::load_library(&library, max_bytes, warnings);
+                let materials = mtl::load_library(&library, files, options.max_library_bytes, warnings);
+                // Any text can be named here; only what has materials is a library.
+                has_materials.extend((!materials.is_empty()).then(|| library.clone()));
                 known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
                 seen.push(library);
             }
@@ -288,6 +297,5 @@ fn find_materials(
             missing[..missing.len().min(3)].join(", ")
         ));
     }
-    seen.retain(|library| library.is_file());
-    (materials, seen)
+    (materials, has_materials)
 }

@@ -4,6 +4,7 @@
 
 use super::lines::decoded;
 use super::texture_map::{TextureMap, ignored_options};
+use crate::scene::model::reference::References;
 use crate::scene::warnings::Warnings;
 use crate::scene::{FileKind, InputFile};
 use glam::Vec3;
@@ -162,7 +163,14 @@ const KEYWORDS: &[(&str, Value)] = &[
 ];
 
 /// Reads a library; invalid lines give warnings, and all other lines are used.
-pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings) -> Vec<ImportedMaterial> {
+///
+/// - `files`: what it may refer to.
+pub(super) fn load_library(
+    path: &Path,
+    files: References,
+    max_bytes: u64,
+    warnings: &mut Warnings,
+) -> Vec<ImportedMaterial> {
     let mut warn = |problem: String| warnings.push(format!("{}: {problem}", path.display()));
     let bytes = match InputFile::open_within(path, FileKind::Library, max_bytes).and_then(InputFile::bytes) {
         Ok(bytes) => bytes,
@@ -184,7 +192,16 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
     // MeshLab writes the opacity as `Tr`.
     let is_of_meshlab = text.lines().take(8).any(|line| line.to_ascii_lowercase().contains("converted by meshlab"));
     let folder = path.parent().unwrap_or(Path::new(""));
-    let materials: Vec<_> = materials.iter().map(|material| imported(material, folder, is_of_meshlab)).collect();
+    let mut file = |material: &str, name: &str| match files.resolve(folder, name) {
+        _ if name.is_empty() || name.ends_with(['/', '\\']) => None,
+        Ok(file) => Some(folder.join(file.path)),
+        Err(outside) => {
+            warn(format!("material `{material}`: {outside}; the texture is omitted"));
+            None
+        }
+    };
+    let materials = materials.iter().map(|material| imported(material, is_of_meshlab, &mut file));
+    let materials: Vec<_> = materials.collect();
     for material in &materials {
         let mut is_unused = |keyword: &str, is: bool| is.then(|| unused.insert(format!("`{keyword}`")));
         is_unused("map_Bump (heights)", material.bump_texture.is_some() && material.normal_map().is_none());
@@ -254,13 +271,19 @@ fn clean(text: &str, unused: &mut BTreeSet<String>, warn: &mut impl FnMut(String
 }
 
 /// - `is_of_meshlab`: whether `Tr` is the opacity.
-fn imported(material: &tobj::Material, folder: &Path, is_of_meshlab: bool) -> ImportedMaterial {
+/// - `file`: the image that a material names, by the names of both.
+fn imported(
+    material: &tobj::Material,
+    is_of_meshlab: bool,
+    file: &mut dyn FnMut(&str, &str) -> Option<PathBuf>,
+) -> ImportedMaterial {
     // Either of the two number types of tobj, which a feature of another crate may select.
     let single = |number| f64::from(number) as f32;
     let color = |color: Option<[_; 3]>| color.map(|color| Vec3::from_array(color.map(single)));
     let other = |keyword: &str| material.unknown_param.get(keyword).map(String::as_str);
     let number = |keyword: &str| other(keyword).and_then(|value| value.parse::<f32>().ok());
-    let map = |value: Option<&str>| value.and_then(|value| TextureMap::parse(value, |name| file_of(name, folder)));
+    let mut map =
+        |value: Option<&str>| value.and_then(|value| TextureMap::parse(value, |name| file(&material.name, name)));
     let pbr = PbrMaterial {
         roughness: number("Pr"),
         metallic: number("Pm"),
@@ -298,21 +321,6 @@ fn imported(material: &tobj::Material, folder: &Path, is_of_meshlab: bool) -> Im
     }
 }
 
-/// The image of this name; `\` counts as `/`.
-///
-/// A path from another computer (with a drive, or absolute and missing) is replaced by the file of that name in the
-/// folder of the MTL file.
-fn file_of(name: &str, folder: &Path) -> Option<PathBuf> {
-    let name = name.replace('\\', "/");
-    let drive = name.as_bytes().get(1) == Some(&b':');
-    let last = name.rsplit('/').next().unwrap_or_default();
-    if last.is_empty() {
-        return None;
-    }
-    let path = folder.join(&name);
-    Some(if drive || (Path::new(&name).is_absolute() && !path.exists()) { folder.join(last) } else { path })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,7 +331,8 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         let mut warnings = Warnings::default();
-        (load_library(file.path(), 1 << 20, &mut warnings), warnings)
+        let files = References::of(file.path(), false);
+        (load_library(file.path(), files, 1 << 20, &mut warnings), warnings)
     }
 
     fn image(name: &str) -> TextureMap {
@@ -445,8 +454,10 @@ mod tests {
     #[test]
     fn a_missing_library_is_a_warning() {
         let mut warnings = Warnings::default();
-        assert!(load_library(Path::new("no such.mtl"), 9, &mut warnings).is_empty());
-        assert!(load_library(&std::env::temp_dir(), 9, &mut warnings).is_empty());
+        let folder = std::env::temp_dir();
+        for missing in [Path::new("no such.mtl"), &folder] {
+            assert!(load_library(missing, References::of(missing, false), 9, &mut warnings).is_empty());
+        }
         assert_eq!(warnings.len(), 2);
     }
 }
