@@ -1,7 +1,7 @@
 //! `firstlight pack SCENE -o scene.zip`: packs a scene with all of its files, for other machines.
 
 use super::args::{OverwriteArgs, SceneArgs, replaced};
-use super::console::inform;
+use super::console::{inform, remark};
 use super::failure::Failure;
 use clap::Args;
 use firstlight::cluster::pack::{PackError, Package};
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub struct PackArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Archive, replaced if it exists: meshes, textures and images, relative to each other, with their SHA-256 sums.
+    /// Archive, replaced if it exists: the scene with its meshes, textures and images, and their SHA-256 sums.
     #[arg(short, long, value_name = "OUT.zip")]
     output: PathBuf,
 }
@@ -27,6 +27,18 @@ impl From<PackError> for Failure {
     }
 }
 
+/// Says what is taken from outside of the folder of the scene: a scene from somebody else could name any file.
+pub fn tell_outside(package: &Package) {
+    /// Nobody reads more.
+    const MOST: usize = 10;
+    for (path, name) in package.outside.iter().take(MOST) {
+        remark(format_args!("warning: {} is not in the folder of the scene, and is packed as {name}", path.display()));
+    }
+    if let Some(more) = package.outside.len().checked_sub(MOST).filter(|&more| more > 0) {
+        remark(format_args!("warning: {more} more files are not in the folder of the scene, and are packed"));
+    }
+}
+
 pub fn run(args: &PackArgs) -> Result<(), Failure> {
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip")) {
         return Err(Failure::Usage(format!("{}: the name of an archive must end in .zip", args.output.display())));
@@ -35,6 +47,7 @@ pub fn run(args: &PackArgs) -> Result<(), Failure> {
     let out = files.claim(&args.output, Replace::AllButFilms)?;
     let scene = args.scene.load(None, &mut files, &|_| ())?;
     let package = Package::of(&scene, &args.scene.source()?)?;
+    tell_outside(&package);
     package.write_zip(out)?;
     let (output, n) = (args.output.display(), package.names().count());
     let replaced = replaced(files.replaced());

@@ -1,18 +1,19 @@
 //! A scene with all of its files, for other machines: every mesh, texture and image, under names that count from one folder,
 //! with checksums.
 //!
-//! Files keep their places relative to each other, so what names them is not changed: model files name their own libraries
-//! and images. Only a scene file that names files by absolute paths is rewritten. The package of the same files has the
-//! same bytes.
+//! A package names no folder of this computer. What lies in the folder of the scene, or of the model that is opened, keeps
+//! its place there; what a scene takes from elsewhere goes to `outside/1`, `outside/2` …, a folder for each model with
+//! all that the model names, and the scene file is rewritten. Only what was read as what it is named for is packed. The
+//! package of the same files has the same bytes. Start reading at [`Package::of`].
 
 use crate::scene::file::SceneFile;
 use crate::scene::whole_file::{WholeFile, unwritable, write_whole};
 use crate::scene::{
-    FileKind, InputFile, LoadedScene, ReadError, SceneError, SceneSource, WriteError, builtin_text, each_path,
-    path_to_text, relative_path, text_to_path,
+    FileKind, InputFile, LoadedScene, ReadError, ReadFiles, SceneError, SceneSource, WriteError, builtin_text,
+    each_path, path_to_text, text_to_path,
 };
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::path::{Component, Path, PathBuf};
@@ -24,6 +25,8 @@ pub const CHECKSUMS: &str = "SHA256SUMS";
 /// First words of the comment of an archive, before the name of the scene, and before that of the environment image.
 pub(super) const SCENE: &str = "scene: ";
 pub(super) const ENVIRONMENT: &str = "environment: ";
+/// The folder of what is not in the folder of the scene.
+const OUTSIDE: &str = "outside";
 
 /// What is in a package.
 #[derive(Clone, Debug)]
@@ -34,6 +37,8 @@ pub struct Package {
     pub environment: Option<String>,
     /// By name, with `/` between the parts.
     files: BTreeMap<String, Content>,
+    /// Files from outside of the folder of the scene, with their names in the package.
+    pub outside: Vec<(PathBuf, String)>,
 }
 
 #[derive(Clone, Debug)]
@@ -64,6 +69,12 @@ pub enum PackError {
         /// What is named.
         file: PathBuf,
     },
+    /// The scene in an image names files from outside, and is not to be rewritten.
+    #[error(
+        "{}: its scene has unsaved changes and files from outside of its folder: pack what `firstlight save` makes of it",
+        .0.display()
+    )]
+    Image(PathBuf),
     /// A path is not UTF-8.
     #[error("{}: cannot be packed: its name is not UTF-8", .0.display())]
     Name(PathBuf),
@@ -78,45 +89,73 @@ impl Package {
     /// # Errors
     /// When a file cannot be read, or would not be found on another machine.
     pub fn of(scene: &LoadedScene, source: &SceneSource) -> Result<Self, PackError> {
-        let mut paths: Vec<PathBuf> = scene.files().into_iter().filter(|path| path.is_file()).collect();
-        paths.extend(source.path().map(Path::to_path_buf));
-        paths.extend(scene.environment.clone());
-        let paths: BTreeMap<PathBuf, PathBuf> = paths.into_iter().map(|path| (place(&path), path)).collect();
-        let root = common_folder(paths.keys());
-        let name_of = |place: &Path| {
-            let name = place.strip_prefix(&root).unwrap_or(place);
-            name.to_str().map(|_| path_to_text(name)).ok_or_else(|| PackError::Name(place.to_path_buf()))
-        };
-        let mut files = BTreeMap::new();
-        for (place, path) in &paths {
-            let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-            if extension == "mtl" || extension == "gltf" {
-                check_names(path, paths.keys())?;
-            }
-            files.insert(name_of(place)?, Content::File(path.clone()));
+        let mut reads = scene.read_files();
+        let opened = source.path().map(place);
+        // The scene of an image lies where the image says.
+        let scene_file = scene.source.path().map(place);
+        let own: Vec<PathBuf> = opened.iter().chain(&scene_file).cloned().collect();
+        let is_model = matches!(scene.source, SceneSource::Model(_));
+        let mut home = common_folder(own.iter());
+        if is_model {
+            // Nothing in a model is rewritten: all that it names keeps its place.
+            let of_model = reads.iter().flat_map(|read| &read.files).map(|path| place(path));
+            home = common_folder(of_model.chain(own.iter().cloned()).collect::<Vec<_>>().iter());
         }
-        let environment = scene.environment.as_deref().map(|path| name_of(&self::place(path))).transpose()?;
-        let scene = match source {
-            SceneSource::Builtin(name) => {
-                let name_of_scene = format!("{name}.ron");
-                let text = builtin_text(name).unwrap_or_default().to_owned();
-                files.insert(name_of_scene.clone(), Content::Text(text));
-                name_of_scene
+        let is_new = |path: &PathBuf| reads.iter().all(|read| read.files.first() != Some(path));
+        if let Some(path) = scene.environment.clone().filter(is_new) {
+            // Of the command line: no name in the scene stands for it.
+            reads.push(ReadFiles { name: String::new(), files: vec![path] });
+        }
+        let mut names = Names::new(home, &reads, opened.is_some());
+        let all: Vec<PathBuf> = reads.iter().flat_map(|read| &read.files).map(|path| place(path)).collect();
+        let mut files = BTreeMap::new();
+        // By the name in the scene.
+        let mut named: HashMap<String, String> = HashMap::new();
+        for read in &reads {
+            let places: Vec<PathBuf> = read.files.iter().map(|path| place(path)).collect();
+            let packed = names.of(&read.files, &places)?;
+            named.insert(scene.path_of_name(&read.name).to_owned(), packed[0].clone());
+            for (path, name) in read.files.iter().zip(packed) {
+                let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+                if extension == "mtl" || extension == "gltf" {
+                    check_names(path, all.iter())?;
+                }
+                files.insert(name, Content::File(path.clone()));
             }
-            SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
-                name_of(&self::place(path))?
-            }
+        }
+        let environment = match &scene.environment {
+            Some(path) => Some(names.of(std::slice::from_ref(path), &[place(path)])?.remove(0)),
+            None => None,
         };
-        let scene_files: Vec<(String, PathBuf)> = (paths.iter())
-            .filter(|(place, _)| place.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")))
-            .map(|(place, path)| Ok((name_of(place)?, path.clone())))
-            .collect::<Result<_, PackError>>()?;
-        for (name, path) in scene_files {
-            if let Some(text) = with_relative_paths(&path)? {
+        let mut content = |path: &Path, file: &Path| -> Result<String, PackError> {
+            let name = names.at_home(&place(path))?;
+            files.entry(name.clone()).or_insert_with(|| Content::File(file.to_path_buf()));
+            Ok(name)
+        };
+        let mut scene_name = String::new();
+        if let Some(path) = scene.source.path() {
+            scene_name = content(path, path)?;
+        }
+        if let Some(path) = source.path().filter(|_| source != &scene.source) {
+            scene_name = content(path, path)?;
+        }
+        if let SceneSource::Builtin(name) = source {
+            scene_name = format!("{name}.ron");
+            let text = builtin_text(name).unwrap_or_default().to_owned();
+            files.insert(scene_name.clone(), Content::Text(text));
+        }
+        if let SceneSource::Scene(path) = &scene.source {
+            let name = names.at_home(&place(path))?;
+            if let Some(text) = renamed(path, &name, scene, &named)? {
                 files.insert(name, Content::Text(text));
             }
         }
-        Ok(Self { scene, environment, files })
+        if let (SceneSource::Picture(path), false) = (source, names.outside.is_empty())
+            && scene.shot.as_ref().is_some_and(|shot| shot.text.is_some())
+        {
+            return Err(PackError::Image(path.clone()));
+        }
+        Ok(Self { scene: scene_name, environment, files, outside: names.outside })
     }
 
     /// Names of all files.
@@ -261,33 +300,126 @@ fn check_names<'a>(path: &Path, files: impl Iterator<Item = &'a PathBuf>) -> Res
     Ok(())
 }
 
-/// The text of a scene file in which every absolute path counts from the file; `None` where there is none.
-fn with_relative_paths(path: &Path) -> Result<Option<String>, PackError> {
+/// The text of a scene file with the names of a package; `None` where none differs.
+///
+/// - `name`: of the scene file in the package.
+/// - `named`: the name in the package of what a name in the scene stands for.
+fn renamed(
+    path: &Path,
+    name: &str,
+    scene: &LoadedScene,
+    named: &HashMap<String, String>,
+) -> Result<Option<String>, PackError> {
     let failed = |source| PackError::Read { path: path.to_path_buf(), source };
     let text = InputFile::open(path, FileKind::Scene).and_then(InputFile::text).map_err(failed)?;
     let mut file = SceneFile::parse(&text, path)?;
-    let place_of_file = place(path);
-    let folder = place_of_file.parent().unwrap_or(Path::new("/"));
+    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
     let mut has_changed = false;
     each_path(&mut file, |name| {
-        if text_to_path(name).is_absolute() {
-            *name = relative_to(folder, &place(&text_to_path(name)));
-            has_changed = true;
-        }
+        let path = scene.path_of_name(name);
+        let inside = match named.get(path) {
+            // Where it is, it is found under its own name.
+            Some(packed) if place_in(folder, path).as_deref() == Some(packed) => return,
+            Some(packed) => packed.clone(),
+            // Not read, because another image lights the scene.
+            None if place_in(folder, path).is_some() => return,
+            None => {
+                let last = text_to_path(path).file_name().map(|name| path_to_text(name.as_ref()));
+                format!("{OUTSIDE}/{}", last.unwrap_or_default())
+            }
+        };
+        let renamed = relative_to(folder, Path::new(&inside)) + &name[path.len()..];
+        *name = renamed;
+        has_changed = true;
     });
     Ok(has_changed.then(|| file.to_ron()))
 }
 
-/// How to get from one place to another; even where they share no more than the root, as they do in a package.
+/// Where a name in `folder` leads in a package; `None` out of it.
+fn place_in(folder: &Path, name: &str) -> Option<String> {
+    let mut place = PathBuf::new();
+    for part in folder.join(text_to_path(name)).components() {
+        match part {
+            Component::Normal(part) => place.push(part),
+            Component::CurDir => {}
+            Component::ParentDir if place.pop() => {}
+            _ => return None,
+        }
+    }
+    Some(path_to_text(&place))
+}
+
+/// How to get from one place in a package to another.
 fn relative_to(folder: &Path, place: &Path) -> String {
     let (from, to): (Vec<_>, Vec<_>) = (folder.components().collect(), place.components().collect());
     let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    if shared == 0 {
-        return relative_path(folder, place);
-    }
     let up = std::iter::repeat_n("..".to_owned(), from.len() - shared);
     let down = to[shared..].iter().map(|part| path_to_text(part.as_ref()));
     up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+/// Names of files in a package.
+struct Names {
+    /// What lies below keeps its place.
+    home: PathBuf,
+    /// Whether there is a folder that the scene was read from.
+    has_home: bool,
+    /// Folders elsewhere, with their names.
+    folders: HashMap<PathBuf, String>,
+    /// The number of the last such name.
+    last: usize,
+    /// Numbers that files of the home have already, as an unpacked package does.
+    taken: Vec<PathBuf>,
+    outside: Vec<(PathBuf, String)>,
+}
+
+impl Names {
+    fn new(home: PathBuf, reads: &[ReadFiles], has_home: bool) -> Self {
+        let all = reads.iter().flat_map(|read| &read.files).map(|path| place(path));
+        let taken = all.filter_map(|place| Some(place.strip_prefix(&home).ok()?.to_path_buf()));
+        let taken = taken.filter(|name| has_home && name.starts_with(OUTSIDE)).collect();
+        Self { home, has_home, folders: HashMap::new(), last: 0, taken, outside: Vec::new() }
+    }
+
+    /// - `place`: below the home.
+    fn at_home(&self, place: &Path) -> Result<String, PackError> {
+        text_of(place.strip_prefix(&self.home).unwrap_or(place), place)
+    }
+
+    /// Names for a file and those that it names, which stay in their places relative to each other.
+    fn of(&mut self, paths: &[PathBuf], places: &[PathBuf]) -> Result<Vec<String>, PackError> {
+        if self.has_home && places.iter().all(|place| place.starts_with(&self.home)) {
+            return places.iter().map(|place| self.at_home(place)).collect();
+        }
+        let root = common_folder(places.iter());
+        let folder = match self.folders.get(&root) {
+            Some(folder) => folder.clone(),
+            None => {
+                let folder = loop {
+                    self.last += 1;
+                    let folder = format!("{OUTSIDE}/{}", self.last);
+                    if !self.taken.iter().any(|name| name.starts_with(&folder)) {
+                        break folder;
+                    }
+                };
+                self.folders.insert(root.clone(), folder.clone());
+                folder
+            }
+        };
+        let mut names = Vec::new();
+        for (path, place) in paths.iter().zip(places) {
+            let name = format!("{folder}/{}", text_of(place.strip_prefix(&root).unwrap_or(place), place)?);
+            if !self.outside.iter().any(|(_, known)| *known == name) {
+                self.outside.push((path.clone(), name.clone()));
+            }
+            names.push(name);
+        }
+        Ok(names)
+    }
+}
+
+fn text_of(name: &Path, place: &Path) -> Result<String, PackError> {
+    name.to_str().map(|_| path_to_text(name)).ok_or_else(|| PackError::Name(place.to_path_buf()))
 }
 
 #[cfg(test)]
@@ -300,7 +432,9 @@ mod tests {
         let places = ["/a/b/c.ron", "/a/d/e.obj", "/a/b/f/g.png"].map(PathBuf::from);
         assert_eq!(common_folder(places.iter()), Path::new("/a"));
         assert_eq!(common_folder(places[..1].iter()), Path::new("/a/b"));
-        assert_eq!(relative_to(Path::new("/a/b"), Path::new("/a/d/e")), "../d/e");
-        assert_eq!(relative_to(Path::new("/a/b"), Path::new("/c/d")), "../../c/d");
+        assert_eq!(relative_to(Path::new("a/b"), Path::new("a/d/e")), "../d/e");
+        assert_eq!(relative_to(Path::new(""), Path::new("c/d")), "c/d");
+        assert_eq!(place_in(Path::new("a"), "../b/./c"), Some("b/c".to_owned()));
+        assert_eq!((place_in(Path::new("a"), "../../b"), place_in(Path::new("a"), "/b")), (None, None));
     }
 }

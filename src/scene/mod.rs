@@ -50,6 +50,7 @@ mod paths;
 mod picture;
 mod placement;
 pub mod ply;
+mod read_files;
 mod relative;
 mod save;
 mod source;
@@ -99,6 +100,7 @@ pub use picture::{PictureError, read_picture, read_picture_within};
 #[cfg(feature = "cli")]
 pub(crate) use picture::{decode_picture, picture_reader};
 pub use placement::{Linear, Placement};
+pub use read_files::ReadFiles;
 pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
 pub use save::{SavedScene, save_scene};
 pub use source::{SceneSource, UpAxis};

@@ -40,7 +40,7 @@ fn a_packed_scene_renders_to_the_same_bytes_elsewhere() {
     write_scene(path);
     does(path, "render scenes/s.ron -o here.exr --spp 2");
     let said = does(path, "pack scenes/s.ron -o s.zip");
-    assert!(said.contains("open scenes/s.ron"), "{said}");
+    assert!(said.contains("open s.ron") && said.contains("packed as outside/2/far.png"), "{said}");
     does(path, "pack scenes/s.ron -o again.zip");
     equal(path, "s.zip", "again.zip");
     let there = tempfile::tempdir().unwrap();
@@ -48,23 +48,29 @@ fn a_packed_scene_renders_to_the_same_bytes_elsewhere() {
     names.sort();
     let expected = [
         "SHA256SUMS",
-        "far/far.png",
-        "models/m.mtl",
-        "models/m.obj",
-        "models/maps/a b.png",
-        "scenes/near.png",
-        "scenes/s.ron",
+        "near.png",
+        "outside/1/m.mtl",
+        "outside/1/m.obj",
+        "outside/1/maps/a b.png",
+        "outside/2/far.png",
+        "s.ron",
     ];
     assert_eq!(names, expected);
-    let text = std::fs::read_to_string(there.path().join("scenes/s.ron")).unwrap();
-    assert!(text.contains("\"../far/far.png\""), "{text}");
+    let text = std::fs::read_to_string(there.path().join("s.ron")).unwrap();
+    assert!(text.contains("\"outside/2/far.png\"") && text.contains("\"outside/1/m.obj\""), "{text}");
     // The files are nowhere else any more.
     for gone in ["scenes", "models", "far"] {
         std::fs::remove_dir_all(path.join(gone)).unwrap();
     }
-    does(there.path(), "render scenes/s.ron -o there.exr --spp 2");
-    let [here, there_image] = [path.join("here.exr"), there.path().join("there.exr")].map(std::fs::read);
-    assert!(here.unwrap() == there_image.unwrap());
+    does(there.path(), "render s.ron -o there.exr --spp 2");
+    let [here, there_image] = [path.join("here.exr"), there.path().join("there.exr")].map(image::open);
+    assert!(here.unwrap().into_rgb32f() == there_image.unwrap().into_rgb32f());
+    // Packed again, everything keeps its name.
+    does(there.path(), "pack s.ron -o again.zip");
+    let twice = tempfile::tempdir().unwrap();
+    let mut again = unpack(&there.path().join("again.zip"), twice.path());
+    again.sort();
+    assert_eq!(again, expected);
     #[cfg(target_os = "linux")]
     {
         let mut command = std::process::Command::new("sha256sum");
@@ -83,11 +89,12 @@ fn models_images_and_built_in_scenes_are_packed_as_they_are() {
     let model = "models/m.obj --env far/light.hdr";
     does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
     let said = does(path, &format!("pack {model} -o m.zip"));
-    assert!(said.contains("open models/m.obj --env far/light.hdr"), "{said}");
+    assert!(said.contains("open m.obj --env outside/1/light.hdr"), "{said}");
     let there = tempfile::tempdir().unwrap();
     unpack(&path.join("m.zip"), there.path());
-    does(there.path(), &format!("render {model} -o there.png --size 24x16 --spp 2"));
-    assert!(std::fs::read(path.join("here.png")).unwrap() == std::fs::read(there.path().join("there.png")).unwrap());
+    does(there.path(), "render m.obj --env outside/1/light.hdr -o there.png --size 24x16 --spp 2");
+    let [here, there_image] = [path.join("here.png"), there.path().join("there.png")].map(image::open);
+    assert!(here.unwrap().into_rgb8() == there_image.unwrap().into_rgb8());
     // An image, for the scene that it shows.
     does(path, "render scenes/s.ron -o shot.png --spp 1");
     does(path, "pack shot.png -o shot.zip");
@@ -102,7 +109,7 @@ fn models_images_and_built_in_scenes_are_packed_as_they_are() {
     // What no other machine would find is refused.
     let texture = path.join("models/maps/a b.png").canonicalize().unwrap();
     std::fs::write(path.join("models/m.mtl"), format!("newmtl a\nmap_Kd {}\n", texture.display())).unwrap();
-    let said = fails(path, "pack models/m.obj -o wrong.zip", 1);
+    let said = fails(path, "pack models/m.obj --allow-outside -o wrong.zip", 1);
     assert!(said.contains("m.mtl") && said.contains("absolute path"), "{said}");
     assert!(!path.join("wrong.zip").exists());
     fails(path, "pack models/m.obj -o wrong.tar", 2);
@@ -152,9 +159,10 @@ fn an_archive_opens_directly_and_only_whole() {
     assert_eq!(code, Some(0), "{said}");
     assert!(pixels("here.png") == pixels("there.png"));
     // It is unpacked once; its image opens as its scene; a copy that somebody has changed is left alone.
-    let folders = || std::fs::read_dir(cache.join("firstlight/packed")).unwrap().map(|it| it.unwrap().path());
+    let entries = || std::fs::read_dir(cache.join("firstlight/packed")).unwrap().map(|it| it.unwrap().path());
+    let folders = || entries().filter(|path| path.is_dir());
     let first = folders().next().unwrap();
-    let scene = first.join("scenes/s.ron");
+    let scene = first.join("s.ron");
     assert_eq!(run("render there.png -o again.png").0, Some(0));
     assert!(pixels("again.png") == pixels("there.png"));
     let edited = std::fs::read_to_string(&scene).unwrap() + "// Edited.\n";
@@ -166,8 +174,8 @@ fn an_archive_opens_directly_and_only_whole() {
 
     let original = path.join("s.zip");
     let forgeries: [(&str, Option<&[u8]>, &str); 6] = [
-        ("scenes/s.ron", Some(b"()"), "damaged"),
-        ("far/far.png", None, "damaged"),
+        ("s.ron", Some(b"()"), "damaged"),
+        ("outside/2/far.png", None, "damaged"),
         ("SHA256SUMS", None, "no valid list"),
         ("more.txt", Some(b"!"), "not in SHA256SUMS"),
         ("../out.txt", Some(b"!"), "does not stay"),
@@ -183,6 +191,25 @@ fn an_archive_opens_directly_and_only_whole() {
     let (code, said) = run("info cut.zip");
     assert!(code == Some(1) && said.contains("not a readable archive"), "{code:?} {said}");
     assert_eq!(folders().count(), 2, "nothing is left of what was refused");
+    // The list of checksums names only what is in the archive: neither is a file of this computer opened, nor is its
+    // absence found at every opening anew.
+    let outer = path.join("outer.ron");
+    std::fs::write(&outer, "()").unwrap();
+    let mut sums = String::new();
+    let mut archive = zip::ZipArchive::new(std::fs::File::open(&original).unwrap()).unwrap();
+    std::io::Read::read_to_string(&mut archive.by_name("SHA256SUMS").unwrap(), &mut sums).unwrap();
+    for name in [outer.to_str().unwrap(), "../../../outer.ron", "SHA256SUMS"] {
+        let listed = format!("{sums}{}  {name}\n", "0".repeat(64));
+        forged(&original, &path.join("forged.zip"), "SHA256SUMS", Some(listed.as_bytes()));
+        let (code, said) = run("render forged.zip -o no.png --spp 1");
+        assert!(code == Some(1) && said.contains("damaged or not in"), "{name}: {code:?} {said}");
+    }
+    // What an interrupted process has left is removed.
+    let left = cache.join("firstlight/packed/.part-abcdef");
+    std::fs::create_dir(&left).unwrap();
+    does(path, "pack cornell -o other.zip");
+    assert_eq!(run("info other.zip").0, Some(0));
+    assert!(!left.exists());
 }
 
 #[test]
@@ -200,4 +227,79 @@ fn the_environment_image_of_an_archive_counts() {
     command.args(line.split(' ')).current_dir(path).env("XDG_CACHE_HOME", path).assert().success();
     let [here, there] = ["here.png", "there.png"].map(|name| image::open(path.join(name)).unwrap().to_rgb8());
     assert!(here == there);
+}
+
+#[test]
+fn files_that_a_foreign_model_names_are_neither_read_nor_packed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for name in ["home/.ssh", "home/down"] {
+        std::fs::create_dir_all(path.join(name)).unwrap();
+    }
+    std::fs::write(path.join("home/.ssh/id_rsa"), "newmtl a\nPRIVATE\n").unwrap();
+    std::fs::write(path.join("home/notes.txt"), "private").unwrap();
+    std::fs::write(path.join("home/down/notes.txt"), "private").unwrap();
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
+    let texture = "newmtl a\nKd 1 1 1\nmap_Kd notes.txt\nnewmtl b\nmap_Kd ../notes.txt\n";
+    std::fs::write(path.join("home/down/m.mtl"), texture).unwrap();
+    let absolute = path.join("home/.ssh/id_rsa").canonicalize().unwrap();
+    for library in ["../.ssh/id_rsa", absolute.to_str().unwrap(), "..\\.ssh\\id_rsa", "notes.txt", "m.mtl"] {
+        std::fs::write(path.join("home/down/chair.obj"), format!("mtllib {library}\n{mesh}")).unwrap();
+        let said = does(path, "pack home/down/chair.obj -o c.zip");
+        let is_outside = library.contains("id_rsa");
+        assert_eq!(said.contains("--allow-outside"), is_outside || library == "m.mtl", "{library}: {said}");
+        let there = tempfile::tempdir().unwrap();
+        let mut names = unpack(&path.join("c.zip"), there.path());
+        names.retain(|name| name != "m.mtl");
+        names.sort();
+        assert_eq!(names, ["SHA256SUMS", "chair.obj"], "{library}");
+        does(path, "submit slurm home/down/chair.obj --parts 2 --spp 4 --dry-run -o job");
+        let private = ["id_rsa", "notes.txt"].map(|name| path.join("job/scene").join(name).exists());
+        assert_eq!(private, [false, false], "{library}");
+        std::fs::remove_dir_all(path.join("job")).unwrap();
+    }
+    // A user who means it, means it.
+    std::fs::write(path.join("home/look.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
+    std::fs::write(path.join("home/down/chair.obj"), format!("mtllib ../look.mtl\n{mesh}")).unwrap();
+    does(path, "pack home/down/chair.obj --allow-outside -o c.zip");
+    let there = tempfile::tempdir().unwrap();
+    let mut names = unpack(&path.join("c.zip"), there.path());
+    names.sort();
+    assert_eq!(names, ["SHA256SUMS", "down/chair.obj", "look.mtl"]);
+}
+
+/// An archive that a few bytes make large.
+#[test]
+fn archives_have_limits_for_all_files_together() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut out = zip::ZipWriter::new(std::fs::File::create(path.join("bomb.zip")).unwrap());
+    let options = zip::write::SimpleFileOptions::default();
+    let zeros = vec![0; 1 << 20];
+    let sums: String = (0..3).map(|i| format!("{}  {i}.bin\n", "0".repeat(64))).collect();
+    for i in 0..3 {
+        out.start_file(format!("{i}.bin"), options).unwrap();
+        for _ in 0..100 {
+            out.write_all(&zeros).unwrap();
+        }
+    }
+    out.start_file("SHA256SUMS", options).unwrap();
+    out.write_all(sums.as_bytes()).unwrap();
+    out.finish().unwrap();
+    let said = || {
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        let output = command.args(["info", "bomb.zip"]).current_dir(path).env("XDG_CACHE_HOME", path).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(said().contains("would take 314573") && said().contains("268435456 bytes"), "{}", said());
+    // Two files of the directory that share their data: the second one points to the first.
+    let mut bytes = std::fs::read(path.join("bomb.zip")).unwrap();
+    let entries: Vec<usize> = (0..bytes.len() - 4).filter(|&i| bytes[i..].starts_with(b"PK\x01\x02")).collect();
+    assert_eq!(entries.len(), 4);
+    let first = bytes[entries[0] + 42..entries[0] + 46].to_vec();
+    bytes[entries[1] + 42..entries[1] + 46].copy_from_slice(&first);
+    std::fs::write(path.join("bomb.zip"), bytes).unwrap();
+    assert!(said().contains("damaged"), "{}", said());
 }

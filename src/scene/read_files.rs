@@ -1,0 +1,78 @@
+//! The files that a scene was read from, by the name that the scene has for each.
+//!
+//! Only what was read as the kind of file that its name stands for: a texture that could not be decoded, or a library
+//! without a material, may be any file of the computer.
+
+use super::file::ObjectPart;
+use super::gltf::images::part_of_model;
+use super::loaded::LoadedScene;
+use super::relative::text_to_path;
+use super::sources::{EnvironmentSource, TextureSource};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// What a name in a scene stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadFiles {
+    /// As in the scene: a path from the folder of the scene.
+    pub name: String,
+    /// The file that is named, then those that it names itself.
+    pub files: Vec<PathBuf>,
+}
+
+impl LoadedScene {
+    /// The files of each name in the scene, in the order of the scene: models, textures, environment.
+    pub fn read_files(&self) -> Vec<ReadFiles> {
+        let mut found: Vec<ReadFiles> = Vec::new();
+        let mut known: HashMap<&str, usize> = HashMap::new();
+        for (object, mesh) in self.file.objects.iter().zip(&self.meshes) {
+            let (ObjectPart::Mesh { source, .. }, Some(mesh)) = (object, mesh) else { continue };
+            let Some((_, name)) = source.file() else { continue };
+            let of_textures = mesh.textures.iter().filter_map(|(_, source, _)| match source {
+                TextureSource::Image { file, .. } => self.picture_file(file),
+                _ => None,
+            });
+            let files = mesh.files.iter().map(|(path, _)| path.as_path()).chain(of_textures).map(Path::to_path_buf);
+            let first = *known.entry(name).or_insert_with(|| {
+                found.push(ReadFiles { name: name.to_owned(), files: Vec::new() });
+                found.len() - 1
+            });
+            found[first].files.extend(files);
+        }
+        let of_textures = self.file.textures.iter().filter_map(|(_, texture)| match texture {
+            TextureSource::Image { file, .. } => Some(file),
+            _ => None,
+        });
+        let of_environment = match &self.file.environment {
+            EnvironmentSource::Image { file, .. } if self.environment.is_none() => Some(file),
+            _ => None,
+        };
+        for name in of_textures.chain(of_environment) {
+            if let Some(path) = self.picture_file(name)
+                && !known.contains_key(&**name)
+            {
+                known.insert(name, found.len());
+                found.push(ReadFiles { name: name.clone(), files: vec![path.to_path_buf()] });
+            }
+        }
+        for read in &mut found {
+            // The order of the first, which is the one that is named, stays.
+            let mut seen = std::collections::HashSet::new();
+            read.files.retain(|path| seen.insert(path.clone()));
+        }
+        found
+    }
+
+    /// The file of an image that was decoded; of one inside a model, the model.
+    fn picture_file(&self, name: &str) -> Option<&Path> {
+        self.pictures.contains_key(name).then(|| self.picture_files.get(name).map(|(path, _)| path.as_path()))?
+    }
+
+    /// The part of a name that is a path: of an image inside a model, the path of the model.
+    pub fn path_of_name<'a>(&self, name: &'a str) -> &'a str {
+        match part_of_model(&self.folder.join(text_to_path(name))) {
+            Some(_) => name.rsplit_once('#').map_or(name, |(path, _)| path),
+            None => name,
+        }
+    }
+}
