@@ -25,9 +25,11 @@ pub const LIMITS: Limits = Limits {
     library_bytes: 1 << 18,
     scene_bytes: 1 << 20,
     picture_pixels: 1 << 18,
+    scene_pixels: 1 << 21,
     film_pixels: 1 << 12,
     note_bytes: 1 << 18,
     recording_bytes: 1 << 18,
+    archive_bytes: 1 << 20,
     settings_bytes: 1 << 16,
 };
 

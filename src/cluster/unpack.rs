@@ -6,10 +6,10 @@
 use super::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
 use crate::printable;
 use crate::scene::model::ModelFormat;
-use crate::scene::whole_file::{Replace, WholeFile};
-use crate::scene::{FileKind, InputFile, ReadError, WriteError, text_to_path};
+use crate::scene::whole_file::lock_file;
+use crate::scene::{FileKind, InputFile, Limits, ReadError, WriteError, text_to_path};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::io::{Read, Write};
 use std::path::{Component, Path, PathBuf};
 use zip::ZipArchive;
@@ -18,8 +18,16 @@ use zip::ZipArchive;
 const MOST_FOLDERS: u32 = 1000;
 /// Bytes of the list of checksums.
 const MOST_SUMS: u64 = 64 << 20;
-/// Compression ratio above which an archive is refused; Deflate reaches 1032.
+/// Compression ratio above which a file is refused; Deflate reaches 1032.
 const MOST_RATIO: u64 = 1100;
+/// Bytes of all files for each byte of the archive, above [`SMALL`].
+const MOST_RATIO_OF_ALL: u64 = 200;
+/// Bytes of all files that any archive may have.
+const SMALL: u64 = 256 << 20;
+/// Files of an archive.
+const MOST_FILES: usize = 100_000;
+/// Beginning of the names of folders that are being written.
+const PART: &str = ".part-";
 
 /// A scene from an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,6 +56,20 @@ pub enum UnpackError {
     /// A file is damaged, or in one of archive and list only.
     #[error("`{}` in the archive is damaged or not in {CHECKSUMS}: copy the archive again", printable::name(.0))]
     Damaged(String),
+    /// There are too many files.
+    #[error("has {0} files, more than the {MOST_FILES} of the largest scenes")]
+    TooMany(usize),
+    /// All files together are too large.
+    #[error(
+        "would take {size} bytes on the disk, above the limit of {limit} bytes for an archive of this size: {}",
+        Limits::advice()
+    )]
+    TooLargeTogether {
+        /// Bytes of all files.
+        size: u64,
+        /// Bytes that they may have.
+        limit: u64,
+    },
     /// A file is too large to be true.
     #[error("`{}` in the archive is implausibly large: it was not made by `firstlight pack`", printable::name(.0))]
     TooLarge(String),
@@ -73,6 +95,7 @@ pub fn unpack(archive: &Path, cache: &Path) -> Result<Unpacked, UnpackError> {
     let sum = sum_of(&mut open()?)?;
     let mut zip = ZipArchive::new(open()?)?;
     let sums = sums_of(&mut zip)?;
+    check_entries(&mut zip, &sums, std::fs::metadata(archive).map_or(0, |info| info.len()))?;
     let scene = scene_in(zip.comment(), &sums)?;
     for number in 1..MOST_FOLDERS {
         let name = &sum[..32];
@@ -102,7 +125,10 @@ fn extract(
         move |source| WriteError::NoFolder { folder, source }
     };
     std::fs::create_dir_all(cache).map_err(no_folder(cache))?;
-    let part = tempfile::Builder::new().prefix(".part-").tempdir_in(cache).map_err(no_folder(cache))?;
+    let _lock = lock(cache);
+    let part = tempfile::Builder::new().prefix(PART).tempdir_in(cache).map_err(no_folder(cache))?;
+    // A message names where the file would have been, which is what the user can look up.
+    let told = |path: &Path| folder.join(path.strip_prefix(part.path()).unwrap_or(path));
     for i in 0..zip.len() {
         let mut file = zip.by_index(i)?;
         let name = name_of(&file)?;
@@ -116,8 +142,9 @@ fn extract(
         }
         let path = part.path().join(text_to_path(&name));
         let parent = path.parent().unwrap_or(part.path());
-        std::fs::create_dir_all(parent).map_err(no_folder(parent))?;
-        let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;
+        std::fs::create_dir_all(parent).map_err(no_folder(&told(parent)))?;
+        let failed = |error| crate::scene::whole_file::unwritable(&told(&path), error);
+        let mut out = std::fs::File::create_new(&path).map_err(failed)?;
         // No more than what the archive says is written.
         let size = file.size();
         let mut sum = Sha256::new();
@@ -129,14 +156,14 @@ fn extract(
                 0 => break,
                 n => {
                     sum.update(&buffer[..n]);
-                    out.write_all(&buffer[..n]).map_err(|error| crate::scene::whole_file::unwritable(&path, error))?;
+                    out.write_all(&buffer[..n]).map_err(failed)?;
                 }
             }
         }
         if hexadecimal(sum) != *expected {
             return Err(UnpackError::Damaged(name));
         }
-        out.finish()?;
+        out.sync_all().map_err(failed)?;
     }
     if let Some(missing) = sums.keys().find(|name| !part.path().join(text_to_path(name)).is_file()) {
         return Err(UnpackError::Damaged(missing.clone()));
@@ -150,6 +177,51 @@ fn extract(
         }
     }
     Ok(())
+}
+
+/// Checks names, number and sizes of all files before the first is written.
+///
+/// - `length`: of the archive, bytes.
+fn check_entries(
+    zip: &mut ZipArchive<InputFile>,
+    sums: &BTreeMap<String, String>,
+    length: u64,
+) -> Result<(), UnpackError> {
+    if zip.len() > MOST_FILES {
+        return Err(UnpackError::TooMany(zip.len()));
+    }
+    let (mut names, mut places) = (HashSet::new(), HashSet::new());
+    let mut size = 0_u64;
+    for i in 0..zip.len() {
+        let file = zip.by_index_raw(i)?;
+        let name = name_of(&file)?;
+        // The same bytes under several names, or a name twice.
+        if !places.insert(file.header_start()) || !names.insert(name.clone()) {
+            return Err(UnpackError::Damaged(name));
+        }
+        size = size.saturating_add(file.size());
+    }
+    // In the list there may be any path of this computer.
+    if let Some(missing) = sums.keys().find(|name| !names.contains(*name) || *name == CHECKSUMS) {
+        return Err(UnpackError::Damaged(missing.clone()));
+    }
+    let limit = Limits::of_this_process().archive_bytes.min(length.saturating_mul(MOST_RATIO_OF_ALL).max(SMALL));
+    if size > limit { Err(UnpackError::TooLargeTogether { size, limit }) } else { Ok(()) }
+}
+
+/// Locks the cache for writing, shared with other processes that unpack. Where there are none, what interrupted ones have
+/// left is removed first. Without a lock, as on file systems that have none, nothing is removed.
+fn lock(cache: &Path) -> Option<std::fs::File> {
+    let file = lock_file(&cache.join(".lock")).ok()?;
+    if file.try_lock().is_ok() {
+        for entry in std::fs::read_dir(cache).into_iter().flatten().flatten() {
+            if entry.file_name().as_encoded_bytes().starts_with(PART.as_bytes()) {
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
+        }
+        file.unlock().ok()?;
+    }
+    file.lock_shared().ok().map(|()| file)
 }
 
 /// Whether a folder has exactly these contents in these files.

@@ -16,12 +16,16 @@ pub struct Limits {
     pub scene_bytes: u64,
     /// Pixels of an image; decoding takes up to 32 bytes of memory per pixel.
     pub picture_pixels: u64,
+    /// Pixels of all images of a scene together, which stay in memory.
+    pub scene_pixels: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
     /// Bytes of the metadata in an image.
     pub note_bytes: u64,
     /// Bytes of a recording; reading takes up to about 10 bytes of memory per byte.
     pub recording_bytes: u64,
+    /// Bytes of all files of an archive.
+    pub archive_bytes: u64,
     /// Bytes of settings, saved views and other small files of the program.
     pub settings_bytes: u64,
 }
@@ -36,9 +40,11 @@ impl Limits {
         library_bytes: 16 << 20,
         scene_bytes: 256 << 20,
         picture_pixels: 1 << 27,
+        scene_pixels: 1 << 30,
         film_pixels: 1 << 26,
         note_bytes: 64 << 20,
         recording_bytes: 256 << 20,
+        archive_bytes: 16 << 30,
         settings_bytes: 1 << 20,
     };
 
@@ -68,9 +74,11 @@ impl Limits {
             library_bytes: scaled(self.library_bytes),
             scene_bytes: scaled(self.scene_bytes),
             picture_pixels: scaled(self.picture_pixels),
+            scene_pixels: scaled(self.scene_pixels),
             film_pixels: scaled(self.film_pixels),
             note_bytes: scaled(self.note_bytes),
             recording_bytes: scaled(self.recording_bytes),
+            archive_bytes: scaled(self.archive_bytes),
             settings_bytes: scaled(self.settings_bytes),
         }
     }

@@ -111,6 +111,27 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     file.finish()
 }
 
+/// Lets a pipe be opened without another end.
+fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
+    #[cfg(unix)]
+    {
+        use rustix::fs::OFlags;
+        use std::os::unix::fs::OpenOptionsExt;
+        options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
+    }
+    options
+}
+
+/// Opens a file that only serves to be locked, and creates it where it is missing; never blocks.
+///
+/// # Errors
+/// If it cannot be opened, or is not a regular file: opening a pipe would wait for a reader.
+pub fn lock_file(path: &Path) -> io::Result<File> {
+    let file = without_waiting(OpenOptions::new().create(true).truncate(false).write(true)).open(path)?;
+    let is_regular = file.metadata()?.is_file();
+    if is_regular { Ok(file) } else { Err(io::Error::other("is not a regular file")) }
+}
+
 /// Whether a file is marked as a film, complete or damaged.
 pub fn is_film(path: &Path) -> bool {
     /// The attribute follows soon after those of every EXR image.
@@ -144,7 +165,7 @@ impl WholeFile {
         check_target(path, &target, replace)?;
         // It may be claimed.
         let claimed = part_name(&target, None);
-        if let Ok(file) = OpenOptions::new().read(true).open(&claimed) {
+        if let Ok(file) = without_waiting(OpenOptions::new().read(true)).open(&claimed) {
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => return Err(busy(path)),
                 // Left by a killed process.
@@ -281,7 +302,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Writ
         return Err(read_only());
     }
     // Opened only to check the permissions; nothing is written.
-    match OpenOptions::new().write(true).open(target) {
+    match without_waiting(OpenOptions::new().write(true)).open(target) {
         Ok(file) if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) => return Err(busy(path)),
         Err(error) if error.kind() == ErrorKind::PermissionDenied => return Err(read_only()),
         _ => {}
