@@ -1,7 +1,7 @@
 #!/bin/bash
 # Runs rounds of parts until the image is good enough. Stopped in the middle, it continues where the job is.
 set -euo pipefail
-cd @FOLDER@
+cd -- @FOLDER@
 while true; do
     parts=$(kubectl create -f parts.yaml -o name)
     kubectl wait --for=condition=complete --timeout=-1s "$parts"

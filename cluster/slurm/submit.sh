@@ -1,7 +1,7 @@
 #!/bin/bash
 # Submits a round: all of its parts, and the merge once they are done. The argument is the number of the round.
 set -euo pipefail
-cd @FOLDER@
+cd -- @FOLDER@
 round=${1:-1}
 parts=$(sbatch --parsable --array=1-@PARTS@ part.sbatch "$round")
 merge=$(sbatch --parsable --dependency="afterok:$parts" --kill-on-invalid-dep=yes merge.sbatch "$round")

@@ -1,9 +1,7 @@
 //! Numbers of frames on the command line.
 
+use firstlight::cluster::job::Job;
 use std::ops::Range;
-
-/// Frames of a sequence at most.
-const MOST_FRAMES: u32 = 100_000;
 
 /// Numbers of frames, as in the names of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +37,7 @@ pub fn parse_frames(text: &str) -> Result<FramesArg, String> {
     };
     match n {
         0 => Err(format!("`{text}` has no frames: expected N or A..B, such as 0..60 for frames 0 to 59")),
-        n if n > MOST_FRAMES => Err(format!("{n} frames: use at most {MOST_FRAMES}")),
+        n if n > Job::MOST_FRAMES => Err(format!("{n} frames: use at most {}", Job::MOST_FRAMES)),
         _ => Ok(frames),
     }
 }

@@ -8,7 +8,7 @@ use super::work::ALL;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::job::{Job, Round, Rounds};
-use firstlight::cluster::part::Part;
+use firstlight::cluster::part::sample_ranges;
 use firstlight::frame::{FilmFile, PictureFormat, Print, read_film_summary};
 use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
@@ -42,11 +42,10 @@ impl Parts {
     fn of(folder: &Path, job: &Job, number: usize, round: &Round) -> Self {
         let count = job.parts_of(&round.range());
         let mut parts = Self { count, ..Self::default() };
-        for index in 0..count {
-            let part = Part { index, count };
-            let path = folder.join(job.film_of(number, &part.padded()));
+        let ranges = sample_ranges(round.range(), count);
+        for (part, path) in job.films_there(folder, number, &round.range()) {
             let Ok(summary) = read_film_summary(&path) else { continue };
-            let wanted = part.samples(round.range()).map_or(0, |samples| samples.len() as u32);
+            let wanted = ranges[part.index as usize].len() as u32;
             let there = summary.shot.spp.min(wanted);
             parts.samples += u64::from(there);
             parts.done += u32::from(there == wanted);

@@ -10,7 +10,7 @@ use super::render::Command;
 use super::render_args::file_stem;
 use super::work::render_words;
 use clap::{Args, ValueEnum};
-use firstlight::cluster::engine::{EngineOptions, files, job_name};
+use firstlight::cluster::engine::{EngineOptions, SlurmOption, files, job_name, shell_word};
 use firstlight::cluster::job::{Engine, Job};
 use firstlight::cluster::pack::Package;
 use firstlight::render::Film;
@@ -36,7 +36,7 @@ pub struct SubmitArgs {
     #[command(flatten)]
     look: LookArgs,
     /// Number of parts of each round.
-    #[arg(long, value_name = "N", value_parser = between::<u32>(1, 1_000_000))]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(1, Job::MOST_PARTS))]
     parts: u32,
     /// Folder of the job, which all machines see [default: firstlight-job-SCENE].
     #[arg(short, long, value_name = "FOLDER")]
@@ -65,7 +65,7 @@ pub struct SubmitArgs {
     program: Option<String>,
     /// Option for Slurm, such as --slurm=--partition=long; may be given several times.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
-    slurm: Vec<String>,
+    slurm: Vec<SlurmOption>,
     /// Container image for Kubernetes.
     #[arg(long, value_name = "IMAGE", default_value = "firstlight:latest")]
     image: String,
@@ -113,9 +113,13 @@ impl LookArgs {
             ("--max-depth", self.max_depth.map(|depth| depth.to_string())),
             ("--exposure", self.exposure.map(|stops| stops.to_string())),
         ];
-        let given = options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?]));
-        given.flatten().collect()
+        words_of(options).collect()
     }
+}
+
+/// Options with their values, as `--camera=-x`: a value that begins with `-` is not taken for an option.
+fn words_of<const N: usize>(options: [(&str, Option<String>); N]) -> impl Iterator<Item = String> {
+    options.into_iter().filter_map(|(option, value)| Some(format!("{option}={}", value?)))
 }
 
 /// The options for opening the scene as options of `render`, except the environment image.
@@ -128,8 +132,7 @@ fn open_words(how: &OpenArgs) -> Vec<String> {
         ("--shutter", how.shutter.map(|share| share.to_string())),
         ("--variant", how.variant.clone()),
     ];
-    let given = options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?]));
-    given.flatten().chain(how.allow_outside.then(|| "--allow-outside".to_owned())).collect()
+    words_of(options).chain(how.allow_outside.then(|| "--allow-outside".to_owned())).collect()
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -157,7 +160,7 @@ impl SubmitArgs {
     fn frame_words(&self) -> Vec<String> {
         let frames = self.frames.map(FramesArg::range).map(|frames| format!("{}..{}", frames.start, frames.end));
         let options = [("--frames", frames), ("--fps", self.fps.map(|fps| fps.to_string()))];
-        options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?])).flatten().collect()
+        words_of(options).collect()
     }
 }
 
@@ -168,10 +171,7 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         Some(folder) => folder.clone(),
         None => PathBuf::from(format!("firstlight-job-{title}")),
     };
-    if folder.join("job.json").exists() {
-        let message = "has a job already: see `firstlight status`, or choose another folder with -o";
-        return Err(Failure::Failed(format!("{}: {message}", folder.display())));
-    }
+    check_is_free(&folder)?;
     let spp = args.spp.unwrap_or(match args.error {
         Some(_) => Job::first_round(args.parts, args.max_spp),
         None => super::render_args::DEFAULT_SPP,
@@ -183,9 +183,17 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
     if u64::from(args.parts) > u64::from(spp) && args.error.is_none() && frames.is_none() {
         return Err(Failure::Usage(format!("--parts: {} parts of {spp} samples: use at most {spp} parts", args.parts)));
     }
+    let package = package(&args.scene)?;
     make_folders(&folder, frames.is_some())?;
-    let (scene, environment) = pack(&args.scene, &folder)?;
-    let environment = environment.into_iter().flat_map(|path| ["--env".to_owned(), path]);
+    let (scene, environment) = match package {
+        Ok(package) => {
+            package.write_folder(&folder.join("scene"))?;
+            let inside = |name: &str| format!("scene/{name}");
+            (inside(&package.scene), package.environment.as_deref().map(inside))
+        }
+        Err(builtin) => (builtin, None),
+    };
+    let environment = words_of([("--env", environment)]);
     let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
     let job = Job {
         format: Job::FORMAT,
@@ -235,7 +243,27 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         job.spp,
         if job.error.is_some() { " in the first round" } else { "" }
     ));
-    hand_over(engine, &folder, args.dry_run)
+    hand_over(engine, &options.folder, args.dry_run)
+}
+
+/// Refuses a folder that has a job, or anything that a job would replace.
+fn check_is_free(folder: &Path) -> Result<(), Failure> {
+    let is_empty = |path: &Path| std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    // A folder that is not there is made, or cannot be and then says why.
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let name = folder.display();
+    if folder.join("job.json").exists() {
+        let message = "has a job already: see `firstlight status`, or choose another folder with -o";
+        return Err(Failure::Failed(format!("{name}: {message}")));
+    }
+    match entries.find(|path| !is_empty(path)) {
+        None => Ok(()),
+        Some(path) => {
+            let found = path.file_name().unwrap_or_default().display();
+            let message = "a job needs a new or an empty folder: choose another one with -o";
+            Err(Failure::Failed(format!("{name}: has other files, such as {found}: {message}")))
+        }
+    }
 }
 
 fn not_utf8(path: &Path) -> Failure {
@@ -249,29 +277,32 @@ fn make_folders(folder: &Path, has_frames: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Copies the scene into the folder; returns the scene argument of the parts, and the environment image.
-fn pack(scene: &SceneArgs, folder: &Path) -> Result<(String, Option<String>), Failure> {
+/// The scene with all of its files, or the name of a built-in one.
+fn package(scene: &SceneArgs) -> Result<Result<Package, String>, Failure> {
     let source = scene.source()?;
     if let SceneSource::Builtin(name) = &source
         && scene.how.env.is_none()
     {
-        return Ok((name.clone(), None));
+        return Ok(Err(name.clone()));
     }
     let loaded = scene.load(None, &mut Files::default(), &|_| ())?;
     let package = Package::of(&loaded, &source)?;
-    package.write_folder(&folder.join("scene"))?;
-    let inside = |name: &str| format!("scene/{name}");
-    Ok((inside(&package.scene), package.environment.as_deref().map(inside)))
+    super::pack::tell_outside(&package);
+    Ok(Ok(package))
 }
 
 /// Submits the first round if the engine is available.
-fn hand_over(engine: Engine, folder: &Path, dry_run: bool) -> Result<(), Failure> {
-    let name = folder.display();
+///
+/// - `folder`: absolute.
+fn hand_over(engine: Engine, folder: &str, dry_run: bool) -> Result<(), Failure> {
+    // To be copied into a shell: a name must not run anything there either.
+    let quoted = |path: String| shell_word(&path);
     let (tool, line) = match engine {
-        Engine::Slurm => ("sbatch", format!("{name}/submit.sh 1")),
-        Engine::Kubernetes => ("kubectl", format!("{name}/submit.sh")),
+        Engine::Slurm => ("sbatch", format!("{} 1", quoted(format!("{folder}/submit.sh")))),
+        Engine::Kubernetes => ("kubectl", quoted(format!("{folder}/submit.sh"))),
         Engine::Openjd => {
-            inform(format_args!("submit {name}/template.yaml to a farm, with Folder={name}"));
+            let template = quoted(format!("{folder}/template.yaml"));
+            inform(format_args!("submit {template} to a farm, with Folder={}", quoted(folder.to_owned())));
             return Ok(());
         }
     };
@@ -282,7 +313,7 @@ fn hand_over(engine: Engine, folder: &Path, dry_run: bool) -> Result<(), Failure
         inform(format_args!("submit it with: {line}"));
         return Ok(());
     }
-    let status = std::process::Command::new("bash").arg(folder.join("submit.sh")).arg("1").status();
+    let status = std::process::Command::new("bash").arg(format!("{folder}/submit.sh")).arg("1").status();
     match status {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(Failure::Failed(format!("{line}: {status}"))),

@@ -10,7 +10,7 @@ use super::render::Command;
 use super::stop::Stop;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
-use firstlight::cluster::job::{Job, JobError, Round, Rounds};
+use firstlight::cluster::job::{Job, JobError, ROUNDS, Round, Rounds};
 use firstlight::cluster::part::Part;
 use firstlight::frame::{FilmFile, Print, read_film_summary, write_film_with_features};
 use firstlight::scene::whole_file::{Replace, WholeFile};
@@ -107,6 +107,7 @@ impl Work {
             inform(format_args!("part {part}/{parts} of round {number}, {what}: there is nothing to do"));
             return Ok(());
         }
+        self.check_outputs(number, Part { index: part.index, count })?;
         let mut words = render_words(&self.job);
         words.extend(["--part".to_owned(), format!("{}/{count}", part.number())]);
         words.extend(match self.job.frames {
@@ -127,11 +128,27 @@ impl Work {
         }
     }
 
+    /// Refuses outputs of a part that lead out of the folder of the job.
+    fn check_outputs(&self, number: usize, part: Part) -> Result<(), Failure> {
+        let check = |name: &str| Job::output(&self.folder, name).map_err(|error| Failure::from(error).of_part());
+        if self.job.frames.is_none() {
+            return check(&self.job.film_of(number, &part.padded())).map(drop);
+        }
+        // Whichever of them the options of the job name.
+        let frames = std::fs::read_dir(check("frames")?).into_iter().flatten().flatten();
+        for frame in frames {
+            if frame.path().is_symlink() {
+                return Err(Failure::from(JobError::Link { path: frame.path() }).of_part());
+            }
+        }
+        Ok(())
+    }
+
     /// The existing films of the parts of a round, and the number of its parts.
     fn films(&self, number: usize, round: &Round) -> (Vec<PathBuf>, u32) {
         let count = self.job.parts_of(&round.range());
-        let path = |index| self.folder.join(self.job.film_of(number, &Part { index, count }.padded()));
-        ((0..count).map(path).filter(|path| path.is_file()).collect(), count)
+        let films = self.job.films_there(&self.folder, number, &round.range());
+        (films.into_iter().map(|(_, path)| path).collect(), count)
     }
 
     fn merge(&self, number: usize, round: &Round, allow_missing: bool, stop: &Stop) -> Result<(), Failure> {
@@ -139,6 +156,9 @@ impl Work {
             inform(format_args!("round {number} is merged already"));
             self.tell_next(&self.rounds);
             return Ok(());
+        }
+        for output in [ALL[0], ALL[1], ROUNDS] {
+            Job::output(&self.folder, output)?;
         }
         if let Some((start, end)) = self.job.frames {
             return self.count_frames(number, end - start, allow_missing);

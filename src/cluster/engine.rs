@@ -1,10 +1,12 @@
 //! What engines are told: readable files that run `firstlight work` in the folder of a job.
 //!
-//! A file is a template of `cluster/` in which words in `@` are replaced. It stays simple enough to be changed by hand:
+//! A file is a template of `cluster/` in which words in `@` are replaced, in one pass over the template: what a value
+//! contains is never looked at again. Values are typed and quoted for the language of the file (`fill`), so a name of a
+//! scene or a folder stands for itself whatever is in it. Files stay simple enough to be changed by hand:
 //! which samples a part has, whether it is done, and whether another round follows, is decided by the program.
 
 use super::job::{Engine, Job};
-use std::fmt::Write;
+use std::str::FromStr;
 
 /// A file of a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,40 +24,120 @@ pub struct JobFile {
 pub struct EngineOptions {
     /// The folder of the job, absolute.
     pub folder: String,
-    /// Lines for the head of Slurm scripts, as `--partition=long`.
-    pub slurm: Vec<String>,
+    /// Lines for the head of Slurm scripts.
+    pub slurm: Vec<SlurmOption>,
     /// The container image for Kubernetes.
     pub image: String,
     /// The persistent volume claim for Kubernetes.
     pub claim: String,
 }
 
+/// An option for the head of Slurm scripts, as `--partition=long`: one line of text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlurmOption(String);
+
+impl FromStr for SlurmOption {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.contains(char::is_control) {
+            true => Err("expected one line of text, without control characters".to_owned()),
+            false => Ok(Self(text.to_owned())),
+        }
+    }
+}
+
+/// The language of a template, which decides how texts are quoted.
+#[derive(Clone, Copy)]
+enum Language {
+    Shell,
+    /// A string of JSON is one of YAML, too.
+    Yaml,
+}
+
+/// What a word in a template stands for.
+enum Value {
+    Number(u64),
+    /// Letters, digits and `-`, which mean the same in every language, even within a word or a string.
+    Name(String),
+    /// Any text: a word of a shell script, or a string of YAML, by itself.
+    Text(String),
+    /// Further lines of a comment.
+    Directives(Vec<SlurmOption>),
+}
+
+impl Value {
+    fn quoted(&self, language: Language) -> String {
+        match (self, language) {
+            (Self::Number(number), _) => number.to_string(),
+            (Self::Name(name), _) => {
+                let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+                assert!(name.chars().all(is_plain), "`{name}` is not a name of a job");
+                name.clone()
+            }
+            (Self::Text(text), Language::Shell) => shell_word(text),
+            (Self::Text(text), Language::Yaml) => serde_json::Value::from(&**text).to_string(),
+            (Self::Directives(options), _) => {
+                let lines = options.iter().map(|SlurmOption(option)| format!("SBATCH {option}"));
+                lines.collect::<Vec<_>>().join("\n#")
+            }
+        }
+    }
+}
+
+/// A word of a shell script, or of a line for a shell, that stands for itself.
+///
+/// # Panics
+/// If it contains a zero byte, which paths and arguments cannot.
+pub fn shell_word(text: &str) -> String {
+    shlex::try_quote(text).expect("a text without zero bytes").into_owned()
+}
+
+/// The text of a template with every word in `@` replaced by its value; of values, nothing is replaced.
+fn fill(template: &str, language: Language, values: &[(&str, Value)]) -> String {
+    let mut text = String::with_capacity(template.len());
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once('@') {
+        text.push_str(before);
+        let is_word = |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_uppercase());
+        let Some((word, after)) = after.split_once('@').filter(|(word, _)| is_word(word)) else {
+            text.push('@');
+            rest = after;
+            continue;
+        };
+        let value = values.iter().find(|(name, _)| *name == word);
+        let (_, value) = value.unwrap_or_else(|| panic!("the word @{word}@ of a template has no value"));
+        text.push_str(&value.quoted(language));
+        rest = after;
+    }
+    text + rest
+}
+
 /// The files with which an engine runs `job`.
 pub fn files(job: &Job, options: &EngineOptions) -> Vec<JobFile> {
-    let fill = |text: &str| {
-        let slurm: String = options.slurm.iter().map(|option| format!("#SBATCH {option}\n")).collect();
-        text.replace("@NAME@", &job.name)
-            .replace("@PROGRAM@", &shell_word(&job.program))
-            .replace("@FOLDER@", &shell_word(&options.folder))
-            .replace("#@OPTIONS@\n", &slurm)
-            .replace("@IMAGE@", &yaml_word(&options.image))
-            .replace("@CLAIM@", &yaml_word(&options.claim))
-            .replace("@COMMAND@", &yaml_word(&job.program))
-            .replace("@SUBFOLDER@", &yaml_word(options.folder.rsplit('/').next().unwrap_or_default()))
-            .replace("@PARTS@", &job.parts.to_string())
-    };
-    let file = |name, text: &str| JobFile { name, text: fill(text), is_script: false };
-    let script = |name, text: &str| JobFile { is_script: true, ..file(name, text) };
+    let values = [
+        ("NAME", Value::Name(job.name.clone())),
+        ("PROGRAM", Value::Text(job.program.clone())),
+        ("FOLDER", Value::Text(options.folder.clone())),
+        ("SUBFOLDER", Value::Text(options.folder.rsplit('/').next().unwrap_or_default().to_owned())),
+        ("OPTIONS", Value::Directives(options.slurm.clone())),
+        ("IMAGE", Value::Text(options.image.clone())),
+        ("CLAIM", Value::Text(options.claim.clone())),
+        ("PARTS", Value::Number(job.parts.into())),
+    ];
+    let script = |name, text| JobFile { name, text: fill(text, Language::Shell, &values), is_script: false };
+    let program = |name, text| JobFile { is_script: true, ..script(name, text) };
+    let yaml = |name, text| JobFile { name, text: fill(text, Language::Yaml, &values), is_script: false };
     match job.engine {
         Engine::Slurm => vec![
-            file("part.sbatch", include_str!("../../cluster/slurm/part.sbatch")),
-            file("merge.sbatch", include_str!("../../cluster/slurm/merge.sbatch")),
-            script("submit.sh", include_str!("../../cluster/slurm/submit.sh")),
+            script("part.sbatch", include_str!("../../cluster/slurm/part.sbatch")),
+            script("merge.sbatch", include_str!("../../cluster/slurm/merge.sbatch")),
+            program("submit.sh", include_str!("../../cluster/slurm/submit.sh")),
         ],
         Engine::Kubernetes => vec![
-            file("parts.yaml", include_str!("../../cluster/kubernetes/parts.yaml")),
-            file("merge.yaml", include_str!("../../cluster/kubernetes/merge.yaml")),
-            script("submit.sh", include_str!("../../cluster/kubernetes/submit.sh")),
+            yaml("parts.yaml", include_str!("../../cluster/kubernetes/parts.yaml")),
+            yaml("merge.yaml", include_str!("../../cluster/kubernetes/merge.yaml")),
+            program("submit.sh", include_str!("../../cluster/kubernetes/submit.sh")),
         ],
         Engine::Openjd => vec![JobFile { name: "template.yaml", text: openjd(job), is_script: false }],
     }
@@ -64,35 +146,21 @@ pub fn files(job: &Job, options: &EngineOptions) -> Vec<JobFile> {
 /// A template of Open Job Description: its rounds are steps that depend on each other, as many as there can be at most.
 /// Those that turn out not to be needed end at once.
 fn openjd(job: &Job) -> String {
-    let text = include_str!("../../cluster/openjd/template.yaml")
-        .replace("@NAME@", &job.name)
-        .replace("@COMMAND@", &yaml_word(&job.program));
-    let (head, step) = text.split_once("#@STEPS@\n").expect("the template has steps");
-    let mut steps = head.to_owned();
-    for round in 1..=job.most_rounds() {
-        // What a later round has is not known yet, but no more parts than samples.
-        let after = match round {
-            1 => String::new(),
-            _ => format!("    dependencies:\n      - dependsOn: Merge{}\n", round - 1),
-        };
-        let step = step.replace("    #@AFTER@\n", &after).replace("@ROUND@", &round.to_string());
-        let _ = write!(steps, "{}", step.replace("@PARTS@", &job.parts.to_string()));
+    let template = include_str!("../../cluster/openjd/template.yaml");
+    let (head, step) = template.split_once("#@STEPS@\n").expect("the template has steps");
+    let values = [("NAME", Value::Name(job.name.clone())), ("PROGRAM", Value::Text(job.program.clone()))];
+    let mut steps = fill(head, Language::Yaml, &values);
+    for round in 1..=job.most_rounds() as u64 {
+        let after = if round == 1 { "" } else { "    dependencies:\n      - dependsOn: Merge@BEFORE@\n" };
+        let values = [
+            ("ROUND", Value::Number(round)),
+            ("BEFORE", Value::Number(round - 1)),
+            // What a later round has is not known yet, but no more parts than samples.
+            ("PARTS", Value::Number(job.parts.into())),
+        ];
+        steps += &fill(&step.replace("    #@AFTER@\n", after), Language::Yaml, &values);
     }
     steps
-}
-
-/// A word of a shell script that stands for itself.
-fn shell_word(text: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text.to_owned();
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
-}
-
-/// A string of YAML: JSON strings are.
-fn yaml_word(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
 }
 
 /// A name that every engine takes, made of the name of a scene: lower case letters, digits and single `-`.
@@ -128,25 +196,32 @@ mod tests {
     }
 
     #[test]
-    fn files_have_no_holes_and_quote_what_they_are_given() {
+    fn files_quote_what_they_are_given() {
         let options = EngineOptions {
             folder: "/data/it's here".to_owned(),
-            slurm: vec!["--partition=long".to_owned()],
+            slurm: vec!["--partition=long".parse().unwrap()],
             image: "registry/firstlight:1".to_owned(),
             claim: "shared".to_owned(),
         };
-        for engine in [Engine::Slurm, Engine::Kubernetes, Engine::Openjd] {
-            for file in files(&job(engine, Some(0.01)), &options) {
-                let hole = file.text.split('@').nth(1).filter(|word| word.chars().all(|c| c.is_ascii_uppercase()));
-                assert_eq!(hole.filter(|word| !word.is_empty()), None, "{}", file.name);
-            }
-        }
         let slurm = files(&job(Engine::Slurm, None), &options);
         assert!(slurm[0].text.contains("#SBATCH --partition=long\n"));
         assert!(slurm[0].text.contains("'/opt/first light/firstlight' work"), "{}", slurm[0].text);
-        assert!(slurm[2].text.contains(r"'/data/it'\''s here'"), "{}", slurm[2].text);
+        let folder = slurm[2].text.lines().find_map(|line| line.strip_prefix("cd -- ")).and_then(shlex::split);
+        assert_eq!(folder, Some(vec![options.folder.clone()]), "{}", slurm[2].text);
+        assert!("--partition=a\nrm -rf x".parse::<SlurmOption>().is_err());
         assert_eq!(job(Engine::Slurm, None).name, "scenes-my-room-ron");
         assert_eq!((job_name("É"), job_name("-a--b-")), ("scene".to_owned(), "a-b".to_owned()));
+    }
+
+    #[test]
+    fn values_are_not_filled_again() {
+        let hostile = "x'||touch y;#@SUBFOLDER@ @PARTS@ @NONE@ \"$(z)`".to_owned();
+        let text = |text: &str| Value::Text(text.to_owned());
+        let values = [("A", text(&hostile)), ("SUBFOLDER", text("'")), ("PARTS", Value::Number(3))];
+        let words = shlex::split(&fill("@A@ @SUBFOLDER@ @PARTS@", Language::Shell, &values));
+        assert_eq!(words, Some(vec![hostile.clone(), "'".to_owned(), "3".to_owned()]));
+        let string: String = serde_json::from_str(&fill("@A@", Language::Yaml, &values)).unwrap();
+        assert_eq!(string, hostile);
     }
 
     #[test]

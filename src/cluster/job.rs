@@ -11,15 +11,19 @@
 //! Without a target error there is one round. With one, each round at most doubles the samples, so that all powers of two
 //! are ends of rounds; after each merge the error estimate decides whether another follows.
 
+use super::part::Part;
 use crate::scene::whole_file::write_whole;
 use crate::scene::{FileKind, InputFile, ReadError, WriteError};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A newer program that writes something else counts this up.
 const FORMAT: u32 = 1;
+/// The file of the rounds.
+pub const ROUNDS: &str = "rounds.json";
 
 /// What runs the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,6 +117,12 @@ pub enum JobError {
         /// What is wrong.
         reason: String,
     },
+    /// An output is a symbolic link.
+    #[error("{}: is a symbolic link: a job writes only into its own folder; remove the link", path.display())]
+    Link {
+        /// The link.
+        path: PathBuf,
+    },
 }
 
 impl JobError {
@@ -137,6 +147,10 @@ fn write(value: &impl Serialize, path: &Path) -> Result<(), WriteError> {
 impl Job {
     /// The version of the file that this program writes.
     pub const FORMAT: u32 = FORMAT;
+    /// The largest number of parts of a round.
+    pub const MOST_PARTS: u32 = 1_000_000;
+    /// The largest number of frames.
+    pub const MOST_FRAMES: u32 = 100_000;
 
     /// Reads the job in `folder`.
     ///
@@ -151,6 +165,14 @@ impl Job {
         }
         if job.frames.is_some_and(|(start, end)| start >= end) {
             return content("has no frames");
+        }
+        let n_frames = job.frames.map_or(0, |(start, end)| end - start);
+        if job.parts > Self::MOST_PARTS || n_frames > Self::MOST_FRAMES {
+            return content(&format!("has more than {} parts or {} frames", Self::MOST_PARTS, Self::MOST_FRAMES));
+        }
+        // Both are arguments of `render`.
+        if job.scene.starts_with('-') {
+            return content("has an option in place of a scene");
         }
         if job.parts == 0 || job.spp == 0 || job.max_spp < job.spp {
             return content("has no parts, or no samples");
@@ -184,6 +206,38 @@ impl Job {
     pub fn missing_frames(&self, folder: &Path) -> Vec<u32> {
         let (start, end) = self.frames.unwrap_or_default();
         (start..end).filter(|&frame| !folder.join(self.image_of(Some(frame))).is_file()).collect()
+    }
+
+    /// The parts of a round with these samples whose films are there, ascending.
+    pub fn films_there(&self, folder: &Path, round: usize, samples: &Range<u32>) -> Vec<(Part, PathBuf)> {
+        let count = self.parts_of(samples);
+        let names: HashSet<_> = std::fs::read_dir(folder.join("parts"))
+            .map(|entries| entries.flatten().map(|entry| entry.file_name()).collect())
+            .unwrap_or_default();
+        let of_part = |index| {
+            let part = Part { index, count };
+            let name = self.film_of(round, &part.padded());
+            let is_there = Path::new(&name).file_name().is_some_and(|name| names.contains(name));
+            is_there.then(|| (part, folder.join(name)))
+        };
+        (0..count).filter_map(of_part).filter(|(_, path)| path.is_file()).collect()
+    }
+
+    /// The path of an output in the folder of the job.
+    ///
+    /// - `name`: from the folder.
+    ///
+    /// # Errors
+    /// When it is, or lies behind, a symbolic link: the folder of somebody else could lead to any file.
+    pub fn output(folder: &Path, name: &str) -> Result<PathBuf, JobError> {
+        let mut path = folder.to_path_buf();
+        for part in Path::new(name) {
+            path.push(part);
+            if path.is_symlink() {
+                return Err(JobError::Link { path });
+            }
+        }
+        Ok(path)
     }
 
     /// The film of one part of a round, or all of them with `{part}`.
@@ -226,7 +280,7 @@ impl Rounds {
     /// # Errors
     /// When there are none.
     pub fn read(folder: &Path) -> Result<Self, JobError> {
-        let path = folder.join("rounds.json");
+        let path = folder.join(ROUNDS);
         let rounds: Self = read(path.clone())?;
         let is_right = |round: &Round| round.samples.0 < round.samples.1;
         if rounds.0.is_empty() || !rounds.0.iter().all(is_right) {
@@ -240,7 +294,7 @@ impl Rounds {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
-        write(self, &folder.join("rounds.json"))
+        write(self, &folder.join(ROUNDS))
     }
 
     /// The round with this number, from 1.

@@ -15,6 +15,7 @@ mod parts;
 mod reopening;
 mod report;
 mod said;
+mod submit;
 mod terminal;
 mod usage;
 mod warnings;
