@@ -2,8 +2,9 @@
 
 use super::gltf::images::part_of_model;
 use super::gltf::{BuiltMesh, Document, GltfError, GltfProblem, Located, MeshKey, Posed, ReadOptions, Surfaces};
+use super::limits::Limits;
 use super::model::ModelNormals;
-use super::picture::{PictureError, picture_of_bytes, read_picture};
+use super::picture::{PictureError, PixelBudget, picture_of_bytes, read_picture_of_scene};
 use super::stamp::{Stamp, stamp};
 use crate::render::ImageTexture;
 use rayon::prelude::*;
@@ -22,6 +23,8 @@ pub(super) struct Documents {
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
     /// Number of vertices and indices that were built.
     made: AtomicU64,
+    /// Of all images that are decoded.
+    pixels: PixelBudget,
     /// Images that were decoded and not yet taken, by path.
     decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
 }
@@ -94,11 +97,11 @@ impl Documents {
 
     /// An image in a file of its own, or inside a model.
     pub(super) fn picture(&self, path: &Path) -> ReadPicture {
-        let Some((model, number)) = part_of_model(path) else { return read_picture(path) };
+        let Some((model, number)) = part_of_model(path) else { return read_picture_of_scene(path, &self.pixels) };
         let failed = |error: GltfError| PictureError::Model(error.to_string());
         let opened = self.open(&model).map_err(failed)?;
         let bytes = opened.document.picture_bytes(number).map_err(|located| failed(opened.document.error(located)))?;
-        picture_of_bytes(&bytes)
+        picture_of_bytes(&bytes, &Limits::of_this_process(), &self.pixels)
     }
 
     /// Decodes images in parallel, for [`take_picture`](Self::take_picture).

@@ -10,6 +10,7 @@ use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Maximum width and height, pixels.
 const MAX_SIDE: u32 = 32_768;
@@ -42,9 +43,37 @@ pub enum PictureError {
         /// Pixels that an image may have.
         limit: u64,
     },
+    /// All images of the scene together have more pixels than the limits allow.
+    #[error("is left out: the images of the scene have more than {limit} pixels together: {}", Limits::advice())]
+    TooLargeTogether {
+        /// Pixels that they may have.
+        limit: u64,
+    },
     /// The image is truncated or damaged, or uses a feature that the decoder does not support.
     #[error("cannot be decoded: {0}")]
     Decode(#[from] image::ImageError),
+}
+
+/// The pixels that the images of a scene may still have, all together.
+#[derive(Debug)]
+pub(super) struct PixelBudget {
+    limit: u64,
+    used: AtomicU64,
+}
+
+impl Default for PixelBudget {
+    fn default() -> Self {
+        Self { limit: Limits::of_this_process().scene_pixels, used: AtomicU64::new(0) }
+    }
+}
+
+impl PixelBudget {
+    fn take(&self, pixels: u64) -> Result<(), PictureError> {
+        let limit = self.limit;
+        let used = |used: u64| used.checked_add(pixels).filter(|used| *used <= limit);
+        let taken = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, used);
+        taken.map(drop).map_err(|_| PictureError::TooLargeTogether { limit })
+    }
 }
 
 impl From<PictureError> for String {
@@ -62,15 +91,30 @@ pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), Pictu
     read_picture_within(path, &Limits::of_this_process())
 }
 
-/// Like [`read_picture`], from bytes inside another file.
+/// Like [`read_picture`], one of the images of a scene.
 ///
 /// # Errors
-/// Like [`read_picture_within`].
-pub(super) fn picture_of_bytes(bytes: &[u8]) -> Result<(ImageTexture, Option<String>), PictureError> {
+/// Like [`read_picture_within`], and if all of them together are too large.
+pub(super) fn read_picture_of_scene(
+    path: &Path,
+    budget: &PixelBudget,
+) -> Result<(ImageTexture, Option<String>), PictureError> {
     let limits = Limits::of_this_process();
+    texture(picture_reader(path, &limits)?, &limits, budget)
+}
+
+/// Like [`read_picture_of_scene`], from bytes inside another file.
+///
+/// # Errors
+/// Like [`read_picture_of_scene`].
+pub(super) fn picture_of_bytes(
+    bytes: &[u8],
+    limits: &Limits,
+    budget: &PixelBudget,
+) -> Result<(ImageTexture, Option<String>), PictureError> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(ReadError::from)?;
-    reader.limits(limits_of_decoder(&limits));
-    texture(reader, &limits)
+    reader.limits(limits_of_decoder(limits));
+    texture(reader, limits, budget)
 }
 
 /// Like [`read_picture`], with the given limits.
@@ -80,16 +124,17 @@ pub(super) fn picture_of_bytes(bytes: &[u8]) -> Result<(ImageTexture, Option<Str
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
     if let Some((model, number)) = part_of_model(path) {
         let bytes = picture_of(&model, number).map_err(|error| PictureError::Model(error.to_string()))?;
-        return picture_of_bytes(&bytes);
+        return picture_of_bytes(&bytes, limits, &PixelBudget::default());
     }
-    texture(picture_reader(path, limits)?, limits)
+    texture(picture_reader(path, limits)?, limits, &PixelBudget::default())
 }
 
 fn texture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
+    budget: &PixelBudget,
 ) -> Result<(ImageTexture, Option<String>), PictureError> {
-    let picture = decode_picture(reader, limits)?;
+    let picture = decode_counted(reader, limits, budget)?;
     let (width, height) = (picture.width(), picture.height());
     let (texels, bad) = texels_of(picture);
     let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were set to black"));
@@ -143,7 +188,7 @@ pub(super) fn alpha_of(path: &Path) -> Result<Alpha, PictureError> {
     if !decoder.color_type().has_alpha() {
         return Ok(Alpha::Missing);
     }
-    let picture = decode_within(decoder, &limits)?;
+    let picture = decode_within(decoder, &limits, &PixelBudget::default())?;
     let pixels = picture.into_luma_alpha16();
     let mut alphas = pixels.pixels().map(|pixel| pixel.0[1]);
     let first = alphas.next();
@@ -182,8 +227,16 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<DynamicImage, PictureError> {
+    decode_counted(reader, limits, &PixelBudget::default())
+}
+
+fn decode_counted<R: BufRead + Seek>(
+    reader: ImageReader<R>,
+    limits: &Limits,
+    budget: &PixelBudget,
+) -> Result<DynamicImage, PictureError> {
     if reader.format().is_some_and(|format| format != ImageFormat::Hdr) {
-        return decode_within(reader.into_decoder()?, limits);
+        return decode_within(reader.into_decoder()?, limits, budget);
     }
     let mut bytes = reader.into_inner();
     if bytes.fill_buf().map_err(ReadError::from)?.starts_with(ktx2::SIGNATURE) {
@@ -194,21 +247,27 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
         if is_large {
             return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
         }
+        budget.take(u64::from(width) * u64::from(height))?;
         return ktx2::decode(&whole).map_err(PictureError::Ktx2);
     }
     if !bytes.fill_buf().map_err(ReadError::from)?.starts_with(HDR) {
         return Err(PictureError::Format);
     }
-    decode_within(HdrDecoder::new_nonstrict(bytes)?, limits)
+    decode_within(HdrDecoder::new_nonstrict(bytes)?, limits, budget)
 }
 
-fn decode_within(decoder: impl ImageDecoder, limits: &Limits) -> Result<DynamicImage, PictureError> {
+fn decode_within(
+    decoder: impl ImageDecoder,
+    limits: &Limits,
+    budget: &PixelBudget,
+) -> Result<DynamicImage, PictureError> {
     // A few bytes can claim any size: it is checked before decoding.
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
     if pixels > limits.picture_pixels {
         return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
     }
+    budget.take(pixels)?;
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
@@ -296,6 +355,17 @@ mod tests {
         image::GrayImage::new(2, 1).save(&path).unwrap();
         assert_eq!(alpha_of(&path).unwrap(), Alpha::Missing);
         assert!(alpha_of(&dir.path().join("none.png")).is_err());
+    }
+
+    #[test]
+    fn all_images_of_a_scene_have_a_limit_together() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("small.png");
+        image::GrayImage::new(10, 10).save(&path).unwrap();
+        let budget = PixelBudget { limit: 250, used: AtomicU64::new(0) };
+        let read = || read_picture_of_scene(&path, &budget).map(drop).map_err(|error| error.to_string());
+        assert_eq!((read(), read()), (Ok(()), Ok(())));
+        assert!(read().unwrap_err().contains("more than 250 pixels together"));
     }
 
     #[test]

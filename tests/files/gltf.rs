@@ -297,6 +297,52 @@ fn gpu_instances_stand_in_their_node() {
     assert_eq!(places, [DVec3::new(2.0, 0.0, 5.0), DVec3::new(3.0, 2.0, 5.0)]);
 }
 
+#[test]
+fn equal_meshes_at_one_place_count_once() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    // Without a view: all are zero.
+    let moves = writer.accessor(json!({ "componentType": 5126, "count": 1 << 20, "type": "VEC3" }));
+    let nodes = (0..5000).map(|i| json!({ "mesh": 0, "translation": [0, 0, i % 2] }));
+    let instances = json!({ "mesh": 0, "translation": [0, 0, 7], "extensions": {
+        "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": moves } }
+    } });
+    writer.json["nodes"] = Value::Array(nodes.chain([instances]).collect());
+    let scene = opened(&writer.glb());
+    assert_eq!(meshes(&scene).len(), 3);
+    let left_out = (1 << 20) - 1 + 4998;
+    let expected = format!("{left_out} meshes lie exactly where an equal one is already");
+    assert!(scene.warnings.iter().any(|warning| warning.contains(&expected)), "{:?}", scene.warnings);
+}
+
+#[test]
+fn equal_images_are_decoded_once() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::GrayImage::new(64, 64).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let view = writer.view(png.get_ref(), None);
+    let same = json!({ "buffer": 0, "byteOffset": writer.json["bufferViews"][view]["byteOffset"],
+        "byteLength": png.get_ref().len() });
+    writer.json["bufferViews"].as_array_mut().unwrap().push(same);
+    let uv = writer.floats("VEC2", &[0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+    let views = [view, view, view + 1];
+    let images = views.map(|view| json!({ "bufferView": view, "mimeType": "image/png" }));
+    writer.json["images"] = json!(images);
+    writer.json["textures"] = json!([{ "source": 0 }, { "source": 1 }, { "source": 2 }]);
+    let textured = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
+    writer.json["materials"] = json!([textured(0), textured(1), textured(2)]);
+    let mut primitive = writer.json["meshes"][0]["primitives"][0].clone();
+    primitive["attributes"]["TEXCOORD_0"] = json!(uv);
+    writer.json["meshes"][0]["primitives"] = (0..3)
+        .map(|material| {
+            primitive["material"] = json!(material);
+            primitive.clone()
+        })
+        .collect();
+    assert_eq!(opened(&writer.glb()).picture_bytes(), 64 * 64);
+}
+
 /// A square whose upper corners follow a joint, and that has a morph target; both are animated from 0 to 2 seconds.
 fn animated() -> Writer {
     let mut writer = Writer::default();

@@ -8,6 +8,7 @@ use super::lights::GltfLight;
 use super::nodes::Tree;
 use crate::scene::file::SceneFile;
 use glam::DAffine3;
+use std::collections::HashSet;
 
 /// A mesh of a file in the pose of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -68,6 +69,8 @@ impl Document {
     /// If there are more instances than a file of this size can have.
     pub(in crate::scene) fn assembly(&self, posed: &Posed) -> Result<Assembly, Located> {
         let mut found = Assembly { cameras: self.cameras(&posed.tree), ..Assembly::default() };
+        let moved = self.moved_nodes();
+        let (mut places, mut repeated) = (HashSet::new(), 0_usize);
         for &node in &posed.tree.scene {
             let json = &self.root.nodes[node as usize];
             let part = |what: &str| format!("{}.{what}", place("nodes", node));
@@ -92,13 +95,32 @@ impl Document {
             let world = if json.skin.is_some() { DAffine3::IDENTITY } else { world };
             let instances = self.omissions.kept(&part("instances"), self.instances(node));
             for instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
+                let world = world * instance;
+                // Where nothing moves, a mesh at the place of an equal one shows nothing more, and costs each ray as much.
+                let here = match moved[node as usize] {
+                    true => (key, Some(node), bits(&instance)),
+                    false => (key, None, bits(&world)),
+                };
+                if !places.insert(here) {
+                    repeated += 1;
+                    continue;
+                }
                 if found.meshes.len() as u64 >= self.most_elements() {
                     let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
                     return Err((place("nodes", node), problem));
                 }
-                found.meshes.push(PlacedMesh { name: name.clone(), key, world: world * instance, node });
+                found.meshes.push(PlacedMesh { name: name.clone(), key, world, node });
             }
+        }
+        if repeated > 0 {
+            let meshes = if repeated == 1 { "mesh lies" } else { "meshes lie" };
+            let sentence = format!("{repeated} {meshes} exactly where an equal one is already: left out");
+            self.omissions.tell("equal meshes", sentence);
         }
         Ok(found)
     }
+}
+
+fn bits(transform: &DAffine3) -> [u64; 12] {
+    transform.to_cols_array().map(f64::to_bits)
 }

@@ -6,7 +6,7 @@
 
 use super::container::chunks;
 use super::error::{GltfError, GltfProblem, Located, place};
-use super::json::{BufferView, Root};
+use super::json::{BufferView, Root, first_equal_images};
 use super::lenient;
 use super::meshopt;
 use super::omissions::Omissions;
@@ -87,6 +87,8 @@ pub struct Document {
     buffers: Vec<Option<Bytes>>,
     /// Decompressed views, by index.
     pub(super) decoded: HashMap<u32, Vec<u8>>,
+    /// For each image the first one with the same bytes.
+    pub(super) first_equal_image: Vec<u32>,
     /// Total size of the buffers, bytes.
     n_bytes: u64,
     /// The file and the files of its buffers.
@@ -117,7 +119,9 @@ impl Document {
             return Err(GltfError::at(path, ("asset".to_owned(), GltfProblem::Version(version.clone()))));
         }
         let binary = found.binary.map(|range| Bytes { data: Arc::new(bytes), range });
+        let first_equal_image = first_equal_images(&root);
         let mut document = Self {
+            first_equal_image,
             path: path.to_owned(),
             options,
             root,

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::{Deref, DerefMut};
 
 /// Extensions of an object, by name. Whole numbers in them are integers, also where the file has `4.0`.
@@ -295,4 +295,30 @@ pub(super) struct AnimationSampler {
     pub input: u32,
     pub interpolation: Option<String>,
     pub output: u32,
+}
+
+/// For each image the first one with the same bytes: in the same view, in one of the same range, or in the same URI.
+pub(super) fn first_equal_images(root: &Root) -> Vec<u32> {
+    #[derive(PartialEq, Eq, Hash)]
+    enum Source<'a> {
+        Range(u32, u64, u64),
+        View(u32),
+        Uri(&'a str),
+    }
+    let mut known = HashMap::new();
+    let images = (0..).zip(&root.images);
+    images
+        .map(|(number, image)| {
+            let view = image.buffer_view.map(|index| match root.buffer_views.get(index as usize) {
+                Some(view) if view.extensions.is_empty() => {
+                    Source::Range(view.buffer, view.byte_offset, view.byte_length)
+                }
+                _ => Source::View(index),
+            });
+            match view.or(image.uri.as_deref().map(Source::Uri)) {
+                Some(source) => *known.entry(source).or_insert(number),
+                None => number,
+            }
+        })
+        .collect()
 }

@@ -277,7 +277,10 @@ impl Document {
                 return Ok((named.or(stem).unwrap_or_default(), path_to_text(&folder.join(path))));
             }
         }
-        Ok((named.unwrap_or_else(|| format!("image {image}")), format!("{file}#{image}")))
+        Ok((
+            named.unwrap_or_else(|| format!("image {image}")),
+            format!("{file}#{}", self.first_equal_image[image as usize]),
+        ))
     }
 }
 
