@@ -129,6 +129,10 @@ impl Oidn {
         let (library, name) = match path.map(|path| in_folder(path.into())) {
             Some(path) => {
                 let name = path.to_string_lossy().into_owned();
+                // The system would wait for somebody to write into a pipe.
+                if path.exists() && !path.is_file() {
+                    return Err(OidnError::Unreadable { path: name, reason: "it is not a regular file".to_owned() });
+                }
                 match open(&path) {
                     Ok(library) => (library, name),
                     Err(error) => return Err(OidnError::Unreadable { path: name, reason: error.to_string() }),
@@ -293,6 +297,12 @@ mod tests {
         let error = Oidn::load_from(Some("nowhere/library.so".into()), 1).map(drop).unwrap_err();
         assert!(matches!(&error, OidnError::Unreadable { path, .. } if path == "nowhere/library.so"), "{error:?}");
         assert!(error.to_string().starts_with("FIRSTLIGHT_OIDN: nowhere/library.so cannot be loaded"), "{error}");
+        #[cfg(unix)]
+        {
+            // Not a file: a pipe would be waited for.
+            let error = Oidn::load_from(Some("/dev/null".into()), 1).map(drop).unwrap_err().to_string();
+            assert!(error.contains("/dev/null cannot be loaded: it is not a regular file"), "{error}");
+        }
     }
 
     /// Only where the library is installed, or named by the variable.

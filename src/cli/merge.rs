@@ -137,7 +137,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let note = |path: &Path| note_of(&film, shot.clone(), &first, path);
     let note_of_film = note(output);
     if !args.overwrite.overwrite {
-        check_replaced_film(&film, &note_of_film, output)?;
+        check_replaced_film(&film, features.as_ref(), &note_of_film, output)?;
     }
     write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
     let denoised = denoiser.as_ref().map(|denoiser| denoiser.denoise(&film, &shot)).transpose()?;

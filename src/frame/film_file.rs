@@ -167,7 +167,7 @@ const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * OldFilmLayout::N_PLANES as u64);
 /// If samples would be lost, another process has the file open, or it cannot be written.
 pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
     let claim = WholeFile::claim(path, Replace::Anything)?;
-    check_replaced_film(film, note, path)?;
+    check_replaced_film(film, None, note, path)?;
     write_film_into(film, note, claim)
 }
 
@@ -261,11 +261,18 @@ fn checksum(bytes: &[u8], place: &Range<usize>) -> Fingerprint {
     Fingerprint::default().with([before, NO_CHECK.as_bytes(), after].concat())
 }
 
-/// Checks that `film` can replace the file at `path` without losing samples.
+/// Checks that `film` can replace the file at `path` without losing samples or layers.
+///
+/// - `features`: what is written with it.
 ///
 /// # Errors
-/// If there is a film with other samples, of another image, or that cannot be read.
-pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
+/// If there is a film with other samples or more layers, of another image, or that cannot be read.
+pub fn check_replaced_film(
+    film: &Film,
+    features: Option<&FeatureLayers>,
+    note: &str,
+    path: &Path,
+) -> Result<(), WriteError> {
     if !is_film(path) {
         return Ok(());
     }
@@ -274,7 +281,14 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), W
     if let Some(what) = ImageMetadata::from_note(note)?.differs_from(&old.shot) {
         return Err(refused(format!("with a different {what}")));
     }
-    if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
+    let samples = |features: Option<&FeatureLayers>| features.map_or(0, |features| features.buffers.samples);
+    if !film.layout().has_all_of(&old.film.layout()) {
+        return Err(refused("with other samples".to_owned()));
+    }
+    match samples(old.features.as_ref()) > samples(features) {
+        true => Err(refused("with layers that the new one does not have".to_owned())),
+        false => Ok(()),
+    }
 }
 
 /// Rejects an image that is a damaged film. An image is opened by its metadata alone, but that of a film is covered by

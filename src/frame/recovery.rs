@@ -4,9 +4,10 @@
 //! Each window has its own scene file and holds a lock on a file beside it. A scene whose lock is free is an orphan.
 //! Nothing here knows a window.
 
+use crate::scene::whole_file::lock_file;
 use crate::scene::{Description, FileKind, InputFile, LoadOptions, SceneSource, load, save_scene};
 use bevy_ecs::prelude::World;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
@@ -151,7 +152,7 @@ impl LeftBehind {
 
 /// Takes the lock beside a scene file, if it is free.
 fn lock(scene: &Path) -> std::io::Result<Option<File>> {
-    let file = OpenOptions::new().create(true).truncate(false).write(true).open(scene.with_extension(LOCK))?;
+    let file = lock_file(&scene.with_extension(LOCK))?;
     Ok(file.try_lock().is_ok().then_some(file))
 }
 

@@ -80,6 +80,9 @@ pub struct ReplayOptions {
     pub spp: Option<u32>,
 }
 
+/// Samples per pixel that a recording may ask for by itself.
+const MOST_SAMPLES: u32 = 16_384;
+
 /// Replays a recording without a window, as fast as possible, and renders the image at its end.
 ///
 /// # Errors
@@ -141,7 +144,12 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     let Player { mut session, mut warnings, .. } = player;
     session.send(Command::Pause);
     session.update(Duration::MAX);
-    let spp = options.spp.or(end).unwrap_or(0);
+    let spp = options.spp.or(end.map(|end| end.min(MOST_SAMPLES))).unwrap_or(0);
+    if options.spp.is_none() && end > Some(MOST_SAMPLES) {
+        let more = "--spp renders more";
+        warnings
+            .push(format!("the recording ends at more samples than {MOST_SAMPLES} per pixel: rendering those; {more}"));
+    }
     if end.is_none() {
         warnings.push("the recording is incomplete: its last line is not the end of a session".to_owned());
     }

@@ -173,11 +173,13 @@ impl SettingsStore {
     fn read<T: DeserializeOwned + Default + Kept>(&self, name: &str) -> (T, Option<String>) {
         let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return (T::default(), None) };
         let text = match InputFile::open(&path, FileKind::Settings).and_then(InputFile::text) {
-            Ok(text) => text,
+            Ok(text) => Ok(text),
             Err(ReadError::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => return (T::default(), None),
+            // Such as text that is not UTF-8; what could not be read now may be readable later.
+            Err(error @ (ReadError::NotText { .. } | ReadError::TooLong { .. })) => Err(format!(" {error}")),
             Err(error) => return (T::default(), Some(format!("{}: {error}", path.display()))),
         };
-        let understood = options().from_str::<T>(&text).map_err(|error| error.to_string());
+        let understood = text.and_then(|text| options().from_str::<T>(&text).map_err(|error| error.to_string()));
         match understood.and_then(|value| value.check().map(|()| value).map_err(|bad| format!(" {bad}"))) {
             Ok(value) => (value, None),
             Err(error) => {
@@ -259,6 +261,12 @@ mod tests {
         assert!(trouble.contains("settings.ron:1:") && trouble.contains("settings.broken"), "{trouble}");
         assert_eq!(std::fs::read_to_string(path.with_extension("broken")).unwrap(), "(window: (800, ");
         assert_eq!(store.settings(), (Settings::default(), None));
+        for damaged in [b"(window: \xff\xfe)".to_vec(), vec![b' '; (1 << 20) + 1]] {
+            std::fs::write(&path, &damaged).unwrap();
+            let trouble = store.settings().1.unwrap();
+            assert!(trouble.contains("renamed to"), "{trouble}");
+            assert!(std::fs::read(path.with_extension("broken")).unwrap() == damaged);
+        }
         // Unknown fields of a newer version do not invalidate the rest.
         std::fs::write(&path, "(window: (3, 4), theme: \"dark\")").unwrap();
         assert_eq!(store.settings().0.window, Some((3, 4)));

@@ -523,6 +523,21 @@ mod tests {
         assert!(write_whole(&root.join("round"), b"").is_err());
     }
 
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_pipe_in_place_of_a_lock_is_not_waited_for() {
+        use rustix::fs::{CWD, Mode, mkfifoat};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let claimed = part_name(&path, None);
+        for pipe in [&folder.path().join("lock"), &claimed] {
+            mkfifoat(CWD, pipe, Mode::RUSR | Mode::WUSR).unwrap();
+        }
+        assert!(lock_file(&folder.path().join("lock")).is_err());
+        write_whole(&path, b"text").unwrap();
+        assert!(lock_file(&folder.path().join("new")).unwrap().try_lock().is_ok());
+    }
+
     #[test]
     fn what_is_in_the_way_is_named_and_the_temporary_name_is_not() {
         let folder = tempfile::tempdir().unwrap();

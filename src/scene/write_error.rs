@@ -140,7 +140,12 @@ fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
     let kind = std::iter::from_fn(|| {
         let this = cause?;
         cause = this.source();
-        Some(this.downcast_ref::<io::Error>().map(io::Error::kind))
+        let of_png = match this.downcast_ref::<png::EncodingError>() {
+            // It does not name its cause.
+            Some(png::EncodingError::IoError(error)) => Some(error.kind()),
+            _ => None,
+        };
+        Some(this.downcast_ref::<io::Error>().map(io::Error::kind).or(of_png))
     });
     kind.flatten().next()
 }
@@ -152,5 +157,20 @@ fn reason(error: &(dyn Error + 'static)) -> String {
         Some(ErrorKind::QuotaExceeded) => "the disk quota is exceeded".to_owned(),
         Some(ErrorKind::FileTooLarge) => "the file would exceed the size limit".to_owned(),
         _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_told_in_the_same_words_by_all_encoders() {
+        let full = || io::Error::from(ErrorKind::StorageFull);
+        let errors: [Box<dyn Error + Send + Sync>; 2] =
+            [Box::new(full()), Box::new(png::EncodingError::IoError(full()))];
+        for error in errors {
+            assert_eq!(reason(&*error), "the disk is full", "{error:?}");
+        }
     }
 }
