@@ -1,10 +1,11 @@
 //! Simplification: what must hold for every mesh, and for the awkward ones.
 
+use crate::random::Random;
 use firstlight::mesh::procedural::{
     DisplacedSphere, Terrain, bored_block, cuboid, displaced_sphere, icosphere, slivers, terrain, torus,
 };
 use firstlight::mesh::simplify::{CollapseOrder, Method, SimplifyError, Target, collapse_order, simplify};
-use firstlight::mesh::{Deviation, Mesh, NormalWeight, Topology};
+use firstlight::mesh::{Deviation, Mesh, NormalWeight, Topology, Welding};
 use firstlight::scene::obj::{ObjExtras, load_obj, save_obj};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashSet;
@@ -207,6 +208,99 @@ fn dirty_meshes_do_not_get_worse() {
             }
         }
     }
+}
+
+#[test]
+fn damaged_meshes_of_any_kind_are_simplified() {
+    let (mut seams, mut isolated) = (0, 0);
+    for seed in 0..150 {
+        let mut random = Random(seed);
+        let (mesh, unused) = damaged(&mut random);
+        isolated += usize::from(unused > 0);
+        seams += usize::from(Topology::of(&mesh).vertices + unused < mesh.positions.len());
+        for method in METHODS {
+            let ratio = [1.0, 0.7, 0.3, 1e-6][random.below(4)];
+            let name = format!("seed {seed}, {method:?}, {ratio}");
+            let result = match simplify(&mesh, method, Target::Ratio(ratio)) {
+                Err(SimplifyError::Degenerate) => continue,
+                result => result.unwrap_or_else(|error| panic!("{name}: {error}")),
+            };
+            result.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+            let (before, after) = (Topology::of(&mesh), Topology::of(&result));
+            assert!(after.loose_vertices == 0 && after.duplicate_triangles == 0, "{name}: {after:?}");
+            assert!(after.triangles <= before.triangles && after.triangles > 0, "{name}: {after:?}");
+            assert!(after.non_manifold_edges <= before.non_manifold_edges, "{name}: {before:?} {after:?}");
+            assert!(result.triangles.iter().all(|[a, b, c]| a != b && b != c && c != a), "{name}");
+            let order = collapse_order(&mesh, method, 1).unwrap();
+            let halfway = order.mesh_with(mesh.triangles.len() / 2);
+            halfway.validate().unwrap_or_else(|error| panic!("{name}, halfway: {error}"));
+        }
+    }
+    assert!(seams > 50 && isolated > 50, "the meshes have what is tested: {seams} {isolated}");
+}
+
+/// A small mesh with random damage, and the number of its vertices that no whole triangle uses: triangles are removed,
+/// doubled, turned and collapsed to two or one of their corners; corners get vertices of their own with other texture
+/// coordinates and normals.
+fn damaged(random: &mut Random) -> (Mesh, usize) {
+    let mut mesh = match random.below(3) {
+        0 => terrain(&Terrain { cells: 2 + random.below(10) as u32, ..Terrain::default() }),
+        1 => torus(1.0, 0.3, 5 + random.below(10) as u32, 3 + random.below(8) as u32),
+        _ => subdivided(&cuboid(DVec3::ONE), random.below(3) as u32),
+    };
+    if random.below(2) == 0 {
+        mesh = mesh.with_smooth_normals(NormalWeight::Angle, Some(0.5));
+    }
+    match random.below(3) {
+        0 => mesh.uvs = Vec::new(),
+        1 => mesh.uvs = mesh.positions.iter().map(|p| Vec2::new(p.x, p.y)).collect(),
+        _ => {}
+    }
+    for _ in 0..random.below(mesh.triangles.len()) {
+        let t = random.below(mesh.triangles.len());
+        let k = random.below(3);
+        match random.below(8) {
+            0..=2 if mesh.triangles.len() > 1 => {
+                mesh.triangles.swap_remove(t);
+            }
+            3 => mesh.triangles.push(mesh.triangles[t]),
+            4 => mesh.triangles[t].swap(0, 1),
+            5 => mesh.triangles[t][k] = mesh.triangles[t][(k + 1) % 3],
+            6 => {
+                // A third corner at the position of another one, but with an own vertex.
+                let twin = mesh.triangles[t][(k + 1) % 3] as usize;
+                mesh.triangles[t][k] = copied(&mut mesh, twin, random);
+            }
+            _ => {
+                let vertex = mesh.triangles[t][k] as usize;
+                mesh.triangles[t][k] = copied(&mut mesh, vertex, random);
+            }
+        }
+    }
+    mesh.slots = match random.below(2) {
+        0 => Vec::new(),
+        _ => mesh.triangles.iter().map(|_| random.below(2) as u16).collect(),
+    };
+    let place = Welding::of(&mesh.positions).place;
+    let whole = |[a, b, c]: [u32; 3]| {
+        let [a, b, c] = [a, b, c].map(|vertex| place[vertex as usize]);
+        a != b && b != c && c != a
+    };
+    let used: HashSet<u32> = mesh.triangles.iter().filter(|&&t| whole(t)).flatten().copied().collect();
+    let unused = mesh.positions.len() - used.len();
+    (mesh, unused)
+}
+
+/// Appends a vertex at the position of another one, with texture coordinates and a normal of its own.
+fn copied(mesh: &mut Mesh, vertex: usize, random: &mut Random) -> u32 {
+    mesh.positions.push(mesh.positions[vertex]);
+    if !mesh.uvs.is_empty() {
+        mesh.uvs.push(Vec2::new(random.signed(), random.signed()));
+    }
+    if !mesh.normals.is_empty() {
+        mesh.normals.push(Vec3::new(random.signed(), random.signed(), 2.0).normalize());
+    }
+    mesh.positions.len() as u32 - 1
 }
 
 #[test]

@@ -178,7 +178,9 @@ impl PreparedMesh {
 
     /// For corners of a closed fan: whether both triangles at each edge have the same wedges.
     fn has_one_wedge_an_edge(&self, corners: &[u32], next: &[u32], after: &[u32]) -> bool {
-        let here = self.corner_wedges[corners[0] as usize];
+        // A vertex that only removed triangles used has no corners.
+        let Some(&first) = corners.first() else { return true };
+        let here = self.corner_wedges[first as usize];
         corners.iter().enumerate().all(|(i, &corner)| {
             let partner = after.iter().position(|&v| v == next[i]).unwrap_or(i);
             let ends = [ring(corner)[0], ring(corners[partner])[1]].map(|c| self.corner_wedges[c as usize]);
