@@ -118,7 +118,7 @@ pub enum Material<P: Params = InSnapshot> {
         /// Angular dependence of the reflectance.
         #[serde(default, skip_serializing_if = "is_default")]
         fresnel: Fresnel,
-        /// Compensate the energy that single scattering loses (Turquin 2019).
+        /// Compensate the energy that single scattering loses, see `shading::metal`.
         #[serde(default, skip_serializing_if = "is_default")]
         compensate: bool,
     },

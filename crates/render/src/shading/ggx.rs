@@ -4,7 +4,7 @@
 //! All vectors are unit and in the shading frame, with the normal along +z.
 
 use crate::sampling::warp::uniform_disc;
-use crate::shading::integral_table::IntegralTable;
+use crate::shading::integral_table::{GAUSS, IntegralTable};
 use firstlight_simd::{Real, Vector3, select, select_vector};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -147,7 +147,7 @@ pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
 
 /// See [`single_scattering_albedo`].
 pub(crate) static ALBEDOS: IntegralTable =
-    IntegralTable::new(N * N, |i| integrate_albedo(table_cos(i % N, i / N), table_alpha(i / N), 64, 32).0);
+    IntegralTable::new(N * N, |i| integrate_isotropic(table_cos(i % N, i / N), table_alpha(i / N), 12, 32).0);
 
 /// Returns lost energy over returned energy of single scattering, for [`crate::shading::metal::Metal`]; arguments as
 /// for [`single_scattering_albedo`].
@@ -158,7 +158,7 @@ pub fn lost_over_returned(cos_theta: f32, alpha: f32) -> f32 {
 }
 
 /// Entries per side of the albedo table.
-const N: usize = 48;
+const N: usize = 50;
 
 /// The albedo has its largest curvature where the cosine is about alpha: columns are uniform in the root of
 /// `cos (1 + BEND α) / (cos + BEND α)`.
@@ -199,47 +199,54 @@ const N_MEANS: usize = 64;
 pub(crate) static SCHLICK_MEANS: IntegralTable = IntegralTable::new(N_MEANS * N_MEANS, |i| {
     let at = |k: usize| k as f32 / (N_MEANS - 1) as f32;
     let (cos, alpha) = (at(i % N_MEANS).powi(2).max(1e-6), at(i / N_MEANS).powi(2).max(TABLE_LEAST_ALPHA));
-    let (whole, of_schlick) = integrate_albedo(cos, alpha, 32, 16);
+    let (whole, of_schlick) = integrate_isotropic(cos, alpha, 4, 16);
     of_schlick / whole
 });
 
 /// Smoother surfaces have the same values, to the accuracy of the tables.
-const TABLE_LEAST_ALPHA: f32 = 1e-4;
+pub(crate) const TABLE_LEAST_ALPHA: f32 = 1e-4;
+
+/// [`integrate_albedo`] of an isotropic surface.
+fn integrate_isotropic(cos_theta: f32, alpha: f32, panels: u32, n_angles: u32) -> (f32, f32) {
+    let wo = Vec3::new((1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta);
+    // The other half is symmetric.
+    integrate_albedo(wo, [alpha; 2], panels, n_angles, PI)
+}
 
 /// Integrates the single-scattering albedo, and the same with the factor (1 − cos)⁵ of Schlick for the angle with the
-/// microfacet normal: over all visible normals, by the midpoint rule. Most of the loss of a smooth surface is in the
-/// long tail of its normals, at the rim of the disc that [`sample_visible_normal`] maps from, so the radii are dense
-/// there.
-fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> (f32, f32) {
-    let wo = Vec3::new((1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta);
-    let stretch = Vec3::new(alpha, alpha, 1.0);
+/// microfacet normal: over all visible normals, on the disc that [`sample_visible_normal`] maps from. Most of the loss
+/// of a smooth surface is in the long tail of its normals, at the rim of the disc, so the radii are dense there.
+///
+/// - `panels`: of eight radii each, by Gauss–Legendre quadrature; `n_angles`: by the midpoint rule; `turn`: range of
+///   the angles, 2π or a symmetric part of it.
+pub(crate) fn integrate_albedo(wo: Vec3, alpha: [f32; 2], panels: u32, n_angles: u32, turn: f32) -> (f32, f32) {
+    let stretch = Vec3::new(alpha[0], alpha[1], 1.0);
     let wo_std = (wo * stretch).normalize();
-    let lambda_o = lambda(wo.into(), alpha);
+    let lambda_o = anisotropic_lambda(wo.into(), alpha);
     let (mut sum, mut sum_of_schlick) = (0.0, 0.0);
-    for i in 0..n_radii {
+    for (i, (at, share)) in (0..panels).flat_map(|i| GAUSS.map(|point| (i, point))) {
         // 1 − r², by its cube root.
-        let rest = 1.0 - (i as f32 + 0.5) / n_radii as f32;
-        let (gap, weight) = (rest.powi(3), 3.0 * rest * rest);
+        let rest = (i as f32 + at) / panels as f32;
+        let (gap, weight) = (rest.powi(3), 3.0 * rest * rest * share);
         let z = gap * (1.0 + wo_std.z) - wo_std.z;
         let sin_theta = (1.0 - z * z).max(0.0).sqrt();
         for k in 0..n_angles {
-            // The other half is symmetric.
-            let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
+            let (sin_phi, cos_phi) = (turn * (k as f32 + 0.5) / n_angles as f32).sin_cos();
             // `z + wo_std.z` without cancellation.
             let up = gap * (1.0 + wo_std.z);
-            let h =
-                (Vec3::new(sin_theta * cos_phi + wo_std.x, sin_theta * sin_phi, up) * stretch).normalize_or(Vec3::Z);
+            let h = (Vec3::new(sin_theta * cos_phi + wo_std.x, sin_theta * sin_phi + wo_std.y, up) * stretch)
+                .normalize_or(Vec3::Z);
             let wi = 2.0 * wo.dot(h) * h - wo;
             if wi.z > 0.0 {
                 // G2 / G1, see [`Reflection`].
                 let masking = lambda_o + 1.0;
-                let returned = f64::from(weight * (masking / (masking + lambda(wi.into(), alpha))));
+                let returned = f64::from(weight * (masking / (masking + anisotropic_lambda(wi.into(), alpha))));
                 sum += returned;
                 sum_of_schlick += returned * f64::from((1.0 - wo.dot(h)).max(0.0).powi(5));
             }
         }
     }
-    let n = f64::from(n_radii * n_angles);
+    let n = f64::from(panels * n_angles);
     ((sum / n) as f32, (sum_of_schlick / n) as f32)
 }
 
@@ -338,7 +345,7 @@ mod tests {
         let steps = [1e-3, 3e-3, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.73, 0.85, 0.93, 1.0];
         for (cos_theta, alpha) in steps.into_iter().flat_map(|cos| steps.map(|alpha| (cos, alpha))) {
             let table = single_scattering_albedo(cos_theta, alpha);
-            let integral = integrate_albedo(cos_theta, alpha, 200, 100).0;
+            let integral = integrate_isotropic(cos_theta, alpha, 25, 100).0;
             assert!((table / integral - 1.0).abs() < 5e-4, "cos {cos_theta}, α {alpha}: {table} for {integral}");
             assert!(integral <= 1.0 + 1e-6, "a surface must not make light");
         }

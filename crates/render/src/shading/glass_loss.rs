@@ -5,7 +5,7 @@
 use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
-use crate::shading::integral_table::IntegralTable;
+use crate::shading::integral_table::{Between, IntegralTable};
 use firstlight_simd::Vector3;
 use std::f32::consts::PI;
 
@@ -34,26 +34,6 @@ static MEAN_LOSSES: IntegralTable = IntegralTable::new(N_ETA * N_ALPHA, |i| {
     let at = |cos: f32| cos_at(cos, alpha_of(row)).mean(|column| losses[i * N_COS + column]);
     (0..n).map(|k| at(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32
 });
-
-/// Linear interpolation between two neighbours in a table.
-struct Between {
-    first: usize,
-    part: f32,
-}
-
-impl Between {
-    /// - `x`: position in 0..1; `n`: number of entries.
-    fn new(x: f32, n: usize) -> Self {
-        let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
-        let first = (x as usize).min(n - 2);
-        Self { first, part: x - first as f32 }
-    }
-
-    fn mean(&self, at: impl Fn(usize) -> f32) -> f32 {
-        let (a, b) = (at(self.first), at(self.first + 1));
-        a + self.part * (b - a)
-    }
-}
 
 fn contrast_at(eta: f32) -> Between {
     let contrast = (eta - 1.0) / (eta + 1.0) / MOST_CONTRAST;

@@ -32,3 +32,39 @@ impl IntegralTable {
         }
     }
 }
+
+/// Linear interpolation between two neighbours in a table.
+#[derive(Clone, Copy)]
+pub(crate) struct Between {
+    first: usize,
+    part: f32,
+}
+
+impl Between {
+    /// - `x`: position, limited to 0..1; `n`: number of entries, at least 2.
+    #[inline]
+    pub fn new(x: f32, n: usize) -> Self {
+        let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
+        let first = (x as usize).min(n - 2);
+        Self { first, part: x - first as f32 }
+    }
+
+    /// Interpolates linearly.
+    #[inline]
+    pub fn mean(&self, at: impl Fn(usize) -> f32) -> f32 {
+        let (a, b) = (at(self.first), at(self.first + 1));
+        a + self.part * (b - a)
+    }
+}
+
+/// Eight-point Gauss–Legendre rule on 0..1: points and weights.
+pub(crate) const GAUSS: [(f32, f32); 8] = [
+    (0.019_855_072, 0.050_614_268),
+    (0.101_666_76, 0.111_190_52),
+    (0.237_233_8, 0.156_853_32),
+    (0.408_282_68, 0.181_341_89),
+    (0.591_717_3, 0.181_341_89),
+    (0.762_766_2, 0.156_853_32),
+    (0.898_333_25, 0.111_190_52),
+    (0.980_144_9, 0.050_614_268),
+];

@@ -2,9 +2,12 @@
 //!
 //! All are tables of integrals over the visible microfacets, computed at first use.
 
-use crate::shading::ggx::{mean_schlick, single_scattering_albedo};
+use crate::shading::anisotropic_albedo;
+use crate::shading::ggx::{TABLE_LEAST_ALPHA, mean_schlick, single_scattering_albedo};
+use crate::shading::integral_table::{Between, GAUSS, IntegralTable};
 use crate::shading::sheen;
-use std::f32::consts::PI;
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::OnceLock;
 
 /// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵:
@@ -19,14 +22,36 @@ impl SchlickAlbedo {
     /// Albedo at an angle; within 10⁻³ of the integral.
     #[inline]
     pub fn new(cos_theta: f32, alpha: f32) -> Self {
-        let whole = single_scattering_albedo(cos_theta, alpha);
-        let grazing = whole * mean_schlick(cos_theta, alpha);
+        Self::of(single_scattering_albedo(cos_theta, alpha), mean_schlick(cos_theta, alpha))
+    }
+
+    /// Albedo for a direction in the frame of a surface with two widths; within 1 % of the integral in nearly all
+    /// directions.
+    ///
+    /// - `w`: unit, above the surface; `alpha`: along x and y.
+    #[inline]
+    pub fn along(w: Vec3, alpha: [f32; 2]) -> Self {
+        if alpha[0] == alpha[1] {
+            return Self::new(w.z, alpha[0]);
+        }
+        let (whole, schlick) = anisotropic_albedo::albedo(w, alpha);
+        Self::of(whole, schlick)
+    }
+
+    /// - `schlick`: mean of Schlick's (1 − cos)⁵ over the returned light.
+    #[inline]
+    fn of(whole: f32, schlick: f32) -> Self {
+        let grazing = whole * schlick;
         Self { facing: whole - grazing, grazing }
     }
 
     /// Mean over all directions, weighted by their cosine.
     #[inline]
-    pub fn mean(alpha: f32) -> Self {
+    pub fn mean(alpha: [f32; 2]) -> Self {
+        if alpha[0] == alpha[1] { Self::isotropic_mean(alpha[0]) } else { Self::anisotropic_mean(alpha) }
+    }
+
+    fn isotropic_mean(alpha: f32) -> Self {
         static TABLE: OnceLock<Vec<SchlickAlbedo>> = OnceLock::new();
         let table = TABLE.get_or_init(|| {
             (0..N_MEANS)
@@ -37,69 +62,107 @@ impl SchlickAlbedo {
                 })
                 .collect()
         });
-        let (i, f) = place(alpha.clamp(0.0, 1.0).sqrt(), N_MEANS);
-        let between = |part: fn(&Self) -> f32| part(&table[i]) + f * (part(&table[i + 1]) - part(&table[i]));
-        Self { facing: between(|albedo| albedo.facing), grazing: between(|albedo| albedo.grazing) }
+        let rows = Between::new(alpha.max(0.0).sqrt(), N_MEANS);
+        let of = |part: fn(&Self) -> f32| rows.mean(|row| part(&table[row]));
+        Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
+    }
+
+    fn anisotropic_mean(alpha: [f32; 2]) -> Self {
+        static TABLE: OnceLock<Vec<SchlickAlbedo>> = OnceLock::new();
+        let table = TABLE.get_or_init(|| {
+            let at = |k: usize| k as f32 / (N_ANISOTROPIC - 1) as f32;
+            (0..N_ANISOTROPIC * N_ANISOTROPIC)
+                .map(|i| {
+                    let narrow = at(i % N_ANISOTROPIC).powi(2).max(TABLE_LEAST_ALPHA);
+                    let wide = narrow + (1.0 - narrow) * at(i / N_ANISOTROPIC).powi(2);
+                    let of = |part: fn(Self) -> f32| hemisphere_mean(|w| part(Self::along(w, [wide, narrow])));
+                    Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
+                })
+                .collect()
+        });
+        let (narrow, wide) = (alpha[0].min(alpha[1]), alpha[0].max(alpha[1]));
+        let columns = Between::new(narrow.max(0.0).sqrt(), N_ANISOTROPIC);
+        let rows = Between::new(((wide - narrow) / (1.0 - narrow).max(f32::MIN_POSITIVE)).sqrt(), N_ANISOTROPIC);
+        let of =
+            |part: fn(&Self) -> f32| rows.mean(|row| columns.mean(|column| part(&table[row * N_ANISOTROPIC + column])));
+        Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
+    }
+
+    /// Albedo of a white layer.
+    #[inline]
+    pub fn whole(&self) -> f32 {
+        self.facing + self.grazing
     }
 }
 
 const N_MEANS: usize = 65;
+const N_ANISOTROPIC: usize = 17;
 
-/// Returns the albedo of a sheen of strength 1 at an angle; see [`sheen`].
+/// Returns f of a sheen of strength 1, sr⁻¹, reciprocal: [`sheen::value`], where its albedo would exceed 1 divided by
+/// the larger albedo of both directions.
 ///
-/// - `alpha`: width, from [`sheen::LEAST_ALPHA`] to 1.
+/// - `cos_o`, `cos_i`, `cos_h`: as of [`sheen::value`]; `alpha`: width, from [`sheen::LEAST_ALPHA`] to 1.
 #[inline]
-pub(crate) fn sheen_albedo(cos_theta: f32, alpha: f32) -> f32 {
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    let table = TABLE.get_or_init(|| {
-        (0..N_SHEEN * N_SHEEN)
-            .map(|i| {
-                let at = |k: usize| k as f32 / (N_SHEEN - 1) as f32;
-                integrate_sheen(at(i % N_SHEEN).powi(2), sheen_alpha(at(i / N_SHEEN)))
-            })
-            .collect()
-    });
-    let (x, fx) = place(cos_theta.clamp(0.0, 1.0).sqrt(), N_SHEEN);
-    let spread = (alpha - sheen::LEAST_ALPHA) / (1.0 - sheen::LEAST_ALPHA);
-    let (y, fy) = place(spread.clamp(0.0, 1.0).sqrt(), N_SHEEN);
-    let at = |dx: usize, dy: usize| table[(y + dy) * N_SHEEN + x + dx];
-    let row = |dy| at(0, dy) + fx * (at(1, dy) - at(0, dy));
-    row(0) + fy * (row(1) - row(0))
+pub(crate) fn bounded_sheen(cos_o: f32, cos_i: f32, cos_h: f32, alpha: f32) -> f32 {
+    let most = [cos_o, cos_i].map(|cos| sheen_entry(UNBOUNDED_SHEEN.get(), cos, alpha)).into_iter().fold(1.0, f32::max);
+    sheen::value(cos_o, cos_i, cos_h, alpha) / most
 }
 
-const N_SHEEN: usize = 48;
+/// Returns the albedo of [`bounded_sheen`] at an angle.
+#[inline]
+pub(crate) fn sheen_albedo(cos_theta: f32, alpha: f32) -> f32 {
+    sheen_entry(BOUNDED_SHEEN.get(), cos_theta, alpha)
+}
 
-fn sheen_alpha(at: f32) -> f32 {
+/// Computes the tables of sheen on all threads.
+pub(crate) fn compute_sheen() {
+    UNBOUNDED_SHEEN.compute();
+    BOUNDED_SHEEN.compute();
+}
+
+/// Albedo of [`sheen::value`]: above 1 for a narrow sheen at grazing angles.
+static UNBOUNDED_SHEEN: IntegralTable =
+    IntegralTable::new(N_SHEEN * N_SHEEN, |i| integrate_sheen(sheen_cos(i), sheen_alpha(i), sheen::value));
+
+static BOUNDED_SHEEN: IntegralTable =
+    IntegralTable::new(N_SHEEN * N_SHEEN, |i| integrate_sheen(sheen_cos(i), sheen_alpha(i), bounded_sheen));
+
+fn sheen_cos(entry: usize) -> f32 {
+    ((entry % N_SHEEN) as f32 / (N_SHEEN - 1) as f32).powi(2)
+}
+
+fn sheen_alpha(entry: usize) -> f32 {
+    let at = (entry / N_SHEEN) as f32 / (N_SHEEN - 1) as f32;
     sheen::LEAST_ALPHA + (1.0 - sheen::LEAST_ALPHA) * at * at
 }
 
-/// Returns the table entry below a position in 0..=1, and the offset to the next entry.
 #[inline]
-fn place(at: f32, n: usize) -> (usize, f32) {
-    let x = at * (n - 1) as f32;
-    let i = (x as usize).min(n - 2);
-    (i, x - i as f32)
+fn sheen_entry(table: &[f32], cos_theta: f32, alpha: f32) -> f32 {
+    let columns = Between::new(cos_theta.max(0.0).sqrt(), N_SHEEN);
+    let spread = (alpha - sheen::LEAST_ALPHA) / (1.0 - sheen::LEAST_ALPHA);
+    Between::new(spread.max(0.0).sqrt(), N_SHEEN).mean(|row| columns.mean(|column| table[row * N_SHEEN + column]))
 }
+
+const N_SHEEN: usize = 48;
 
 /// Returns ∫ 2 cos θ f(cos θ) d cos θ by Gauss–Legendre quadrature.
 pub(crate) fn cosine_mean(f: impl Fn(f32) -> f32) -> f32 {
     GAUSS.iter().map(|&(x, weight)| 2.0 * x * weight * f(x)).sum()
 }
 
-/// Eight-point Gauss–Legendre rule on 0..1: points and weights.
-pub(crate) const GAUSS: [(f32, f32); 8] = [
-    (0.019_855_072, 0.050_614_268),
-    (0.101_666_76, 0.111_190_52),
-    (0.237_233_8, 0.156_853_32),
-    (0.408_282_68, 0.181_341_89),
-    (0.591_717_3, 0.181_341_89),
-    (0.762_766_2, 0.156_853_32),
-    (0.898_333_25, 0.111_190_52),
-    (0.980_144_9, 0.050_614_268),
-];
+/// Mean over directions, weighted by their cosine, of a function that is symmetric about x and y.
+pub(crate) fn hemisphere_mean(f: impl Fn(Vec3) -> f32) -> f32 {
+    // Two-point Gauss–Legendre rule over the azimuths of a quadrant.
+    const AZIMUTHS: [f32; 2] = [0.211_324_87 * FRAC_PI_2, 0.788_675_1 * FRAC_PI_2];
+    cosine_mean(|cos| {
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let at = |phi: f32| f(Vec3::new(sin * phi.cos(), sin * phi.sin(), cos));
+        0.5 * (at(AZIMUTHS[0]) + at(AZIMUTHS[1]))
+    })
+}
 
 /// Integrates by uniform steps of the light's angles, denser at the horizon.
-fn integrate_sheen(cos_o: f32, alpha: f32) -> f32 {
+fn integrate_sheen(cos_o: f32, alpha: f32, value: fn(f32, f32, f32, f32) -> f32) -> f32 {
     const N: u32 = 96;
     let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
     let mut sum = 0.0;
@@ -113,7 +176,7 @@ fn integrate_sheen(cos_o: f32, alpha: f32) -> f32 {
             let cos_between = sin_o * sin_i * phi.cos() + cos_o * cos_i;
             let half = (2.0 + 2.0 * cos_between).max(1e-12).sqrt();
             let cos_h = (cos_o + cos_i) / half;
-            sum += f64::from(sheen::value(cos_o.max(1e-4), cos_i, cos_h, alpha) * cos_i * 2.0 * x);
+            sum += f64::from(value(cos_o.max(1e-4), cos_i, cos_h, alpha) * cos_i * 2.0 * x);
         }
     }
     (sum * 2.0 * std::f64::consts::PI / f64::from(N * N)) as f32

@@ -144,10 +144,15 @@ impl Vertex {
     /// - `wo`: unit, towards the viewer.
     #[inline]
     pub fn seen_along(&self, wo: Vec3) -> Self {
-        let is_mapped = self.smooth_normal != self.interpolated;
         let faces_away = self.smooth_normal.dot(wo) <= 0.0;
         let seen = Self { wo, normal: if faces_away { self.geometric_normal } else { self.smooth_normal }, ..*self };
-        if is_mapped { seen.with_bent_normal() } else { seen }
+        if self.is_mapped() { seen.with_bent_normal() } else { seen }
+    }
+
+    /// Whether the shading normal is from a normal map.
+    #[inline]
+    pub fn is_mapped(&self) -> bool {
+        self.smooth_normal != self.interpolated
     }
 
     /// Returns the shading normal of another normal map than the material's own; see [`tangent`].

@@ -2,7 +2,7 @@
 
 use super::iridescence::Film;
 use super::layers::{Inside, Principled, Transmission};
-use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
+use crate::core::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lookups::Lookups;
@@ -77,6 +77,10 @@ pub(crate) fn principled_at(
         let strength = anisotropy * map.z;
         // The lobe is wider along the direction of anisotropy (`KHR_materials_anisotropy`).
         widths[0] = alpha + (1.0 - alpha) * strength * strength;
+        if widths[0] >= SMALLEST_ALPHA {
+            // A mirror along one direction only.
+            widths[1] = alpha.max(SMALLEST_ALPHA);
+        }
         let across = Vec2::from_angle(anisotropy_rotation.to_radians()).rotate(2.0 * Vec2::new(map.x, map.y) - 1.0);
         direction = Some(across.normalize_or(Vec2::X));
     }
@@ -92,6 +96,8 @@ pub(crate) fn principled_at(
         Transmission { share: (1.0 - metallic) * transmitting, tint: base, inside, is_lit }
     });
     let coat = share(clearcoat);
+    let is_mapped = vertex.is_mapped() || (coat > 0.0 && clearcoat_normal_map.is_normal_map());
+    let true_normal = (is_mapped && transmission.is_none()).then(|| vertex.reach_normal());
     Some(Principled {
         dielectric: if *thin_walled { 1.0 - metallic } else { opaque },
         facing,
@@ -101,6 +107,7 @@ pub(crate) fn principled_at(
         metal,
         alpha: widths,
         tangent: direction.map(|direction| vertex.tangent.along(direction, vertex.normal)),
+        true_normal,
         transmission,
         sheen: color(sheen_color),
         sheen_alpha: sheen::alpha_of(share(sheen_roughness)),

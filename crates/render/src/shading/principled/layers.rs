@@ -27,6 +27,9 @@ pub(crate) struct Principled {
     pub alpha: [f32; 2],
     /// Unit, approximately in the surface; `None` if the direction does not matter.
     pub tangent: Option<Vec3>,
+    /// Normal of the true surface where that of shading is from a map, unit, on the side from which the surface was hit:
+    /// light that would be scattered below it is mirrored at it. `None` for transmissive surfaces too.
+    pub true_normal: Option<Vec3>,
     pub transmission: Option<Transmission>,
     /// Strength of the sheen, and its width.
     pub sheen: Vec3,
@@ -68,7 +71,7 @@ impl Transmission {
 }
 
 impl Principled {
-    /// Isotropic width of the base, for tables.
+    /// Isotropic width for transmitted light.
     pub fn mean_alpha(&self) -> f32 {
         if self.alpha[0] == self.alpha[1] { self.alpha[0] } else { (self.alpha[0] * self.alpha[1]).sqrt() }
     }

@@ -5,8 +5,12 @@
 //! - A dielectric reflects by GGX and Schlick; the rest reaches the diffuse layer below, whose light must pass the
 //!   dielectric again: f = albedo/π · (1 − E(θₒ)) (1 − E(θᵢ)) / (1 − Ē), where E is the albedo of all layers above
 //!   (Kelemen and Szirmay-Kalos 2001). It is reciprocal, and a white base returns all light.
-//! - Coat and sheen transmit 1 − E to the metal, the reflection and the glass below: the smaller value of both
-//!   directions.
+//! - Coat and sheen transmit 1 − E to the reflection and the glass below: the smaller value of both directions, which
+//!   is reciprocal and loses what they reflect back down. To metal they transmit that of the viewer, and light that
+//!   they reflect back down returns: white metal below them returns all light.
+//! - Where a normal map turns the shading normal, light that would be scattered below the true surface is mirrored at
+//!   it, as if neighbouring facets returned it (a simpler form of Schüssler et al. 2017, "Microfacet-based Normal
+//!   Mapping for Robust Monte Carlo Path Tracing"): none is lost, and none is added.
 //! - Light that a rough metal or rough glass loses between microfacets is compensated, as in [`crate::shading::metal`]
 //!   and [`crate::shading::rough_glass`].
 //!
@@ -51,6 +55,7 @@ impl Scatter for Principled {
 mod tests {
     use super::layers::{Inside, Transmission};
     use super::*;
+    use crate::core::material::SMALLEST_ALPHA;
     use crate::sampling::Sampler;
     use crate::shading::interface::MediumId;
     use crate::shading::sheen;
@@ -71,6 +76,7 @@ mod tests {
             metal: Vec3::ONE,
             alpha: [0.25; 2],
             tangent: None,
+            true_normal: None,
             transmission: None,
             sheen: Vec3::ZERO,
             sheen_alpha: 0.25,
@@ -92,10 +98,15 @@ mod tests {
         Inside::Solid(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE })
     }
 
+    fn brushed(surface: Principled) -> Principled {
+        Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..surface }
+    }
+
     /// Surfaces with each layer, alone and combined, with a name.
     fn surfaces() -> Vec<(&'static str, Principled)> {
         let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
         let color = Vec3::new(0.8, 0.4, 0.1);
+        let true_normal = Some(Vec3::new(0.6, 0.0, 0.8));
         let half = Principled { dielectric: 0.5, diffuse: 0.5 * color, metallic: 0.5, metal: color, ..plain() };
         let velvet = Principled { sheen: Vec3::new(0.9, 0.5, 0.7), sheen_alpha: 0.09, ..plain() };
         let thin = Principled { diffuse: Vec3::ZERO, ..plain() };
@@ -105,10 +116,10 @@ mod tests {
             ("glossy dielectric", Principled { alpha: [0.06; 2], ..plain() }),
             ("rough dielectric", Principled { alpha: [1.0; 2], ..plain() }),
             ("metal", metal.clone()),
-            (
-                "brushed metal",
-                Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..metal.clone() },
-            ),
+            ("brushed metal", brushed(metal.clone())),
+            ("brushed plastic", brushed(plain())),
+            ("mapped metal", Principled { true_normal, ..metal.clone() }),
+            ("mapped coated plastic", Principled { true_normal, coat: 1.0, coat_alpha: 0.2, ..plain() }),
             ("half metal", half.clone()),
             ("velvet", velvet.clone()),
             ("coated", Principled { coat: 1.0, coat_alpha: 0.04, ..half }),
@@ -145,7 +156,7 @@ mod tests {
 
     #[test]
     fn sampled_directions_follow_their_pdf_and_carry_f_over_it() {
-        // Significance 1 % over all thirty-six cases (Šidák: 3.5 σ).
+        // Significance 1 % over all forty-five cases (Šidák: 3.5 σ).
         for (case, (name, surface)) in (0..).zip(surfaces()) {
             for (view, cos) in (0..).zip([0.9, 0.4, 0.08]) {
                 let wo = direction(cos);
@@ -212,25 +223,48 @@ mod tests {
         sum / n as f32
     }
 
+    /// Like [`furnace`], mean over all directions of the viewer.
+    fn mean_furnace(surface: &Principled, n: u32) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for i in 0..n {
+            let sampler = Sampler::new(8, 0, 0, i);
+            let wo = crate::sampling::cosine_hemisphere(sampler.pair(4));
+            if let Some(sample) = surface.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(0)) {
+                sum += sample.weight;
+            }
+        }
+        sum / n as f32
+    }
+
     #[test]
     fn a_white_base_returns_all_light_and_nothing_returns_more() {
         for roughness in [0.0f32, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0] {
             for cos in [1.0, 0.7, 0.4, 0.15, 0.05, 0.01] {
                 let alpha = [roughness * roughness; 2];
+                let metal = Principled { alpha, dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
+                let coat = Principled { alpha: [0.09; 2], coat: 1.0, coat_alpha: alpha[0], ..plain() };
+                let sheen = Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(roughness), ..plain() };
+                let below = Principled { alpha: [0.09; 2], ..metal.clone() };
                 let white = [
                     ("dielectric", Principled { alpha, ..plain() }),
                     ("tinted reflection", Principled { alpha, facing: Vec3::new(0.3, 0.1, 0.0), ..plain() }),
-                    ("metal", Principled { alpha, dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() }),
-                    ("coat", Principled { alpha: [0.09; 2], coat: 1.0, coat_alpha: alpha[0], ..plain() }),
-                    ("sheen", Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(roughness), ..plain() }),
+                    ("mapped metal", Principled { true_normal: Some(Vec3::new(0.6, 0.0, 0.8)), ..metal.clone() }),
+                    ("metal", metal),
+                    ("coated metal", Principled { coat: 1.0, coat_alpha: alpha[0], ..below.clone() }),
+                    ("sheen on metal", Principled { sheen: sheen.sheen, sheen_alpha: sheen.sheen_alpha, ..below }),
+                    ("coat", coat),
+                    ("sheen", sheen),
                 ];
                 for (name, surface) in white {
                     let found = furnace(&surface, cos, 1 << 15);
                     let name = format!("{name}, roughness {roughness}, cos {cos}: {found}");
-                    assert!(found.max_element() <= 1.008, "{name}");
-                    // The coat hides part of the reflection below it, and finite tables are inaccurate at grazing
-                    // angles.
-                    let is_whole = !name.starts_with("coat") && !name.starts_with("sheen") && cos > 0.02;
+                    println!("{name}");
+                    // The albedo of a narrow sheen is less accurate.
+                    let most = if name.starts_with("sheen on") { 1.02 } else { 1.008 };
+                    assert!(found.max_element() <= most, "{name}");
+                    // A coat or sheen hides a part of the reflection of a dielectric below it, and finite tables are
+                    // inaccurate at grazing angles.
+                    let is_whole = !name.starts_with("coat,") && !name.starts_with("sheen,") && cos > 0.02;
                     let least = if is_whole { 0.994 } else { 0.9 };
                     assert!(found.min_element() >= least, "{name}");
                 }
@@ -239,10 +273,42 @@ mod tests {
     }
 
     #[test]
+    fn white_light_from_all_around_returns_from_every_white_surface() {
+        let strengths = [0.0f32, 0.3, 0.5, 0.8, 0.9, 1.0];
+        let cases = [0.0f32, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0].map(|roughness| strengths.map(|a| (roughness, a)));
+        cases.as_flattened().par_iter().for_each(|&(roughness, anisotropy)| {
+            let narrow = (roughness * roughness).max(SMALLEST_ALPHA);
+            let alpha = match anisotropy {
+                0.0 => [roughness * roughness; 2],
+                _ => [narrow + (1.0 - narrow) * anisotropy * anisotropy, narrow],
+            };
+            let plastic = Principled { alpha, tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..plain() };
+            let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plastic.clone() };
+            for (base, surface) in [("metal", metal), ("plastic", plastic)] {
+                let coated = |coat_alpha| Principled { coat: 1.0, coat_alpha, ..surface.clone() };
+                let sheen = Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(0.3), ..surface.clone() };
+                let above = [
+                    ("", surface.clone()),
+                    ("coated ", coated(0.0)),
+                    ("roughly coated ", coated(0.04)),
+                    ("velvet ", sheen),
+                ];
+                for (above, surface) in above {
+                    let found = mean_furnace(&surface, 1 << 16);
+                    let name = format!("{above}{base}, roughness {roughness}, anisotropy {anisotropy}: {}", found.x);
+                    println!("{name}");
+                    assert!((0.99..=1.005).contains(&found.x) && found.x == found.y && found.x == found.z, "{name}");
+                }
+            }
+        });
+    }
+
+    #[test]
     fn scattering_is_the_same_both_ways() {
         for (name, surface) in surfaces() {
-            // The compensation of a metal's losses depends on the view angle only (Turquin 2019).
-            let surface = if surface.metallic > 0.0 { Principled { metallic: 0.0, ..surface } } else { surface };
+            // The compensation of a metal's losses, and what coats pass to it, depend on the view angle only (Turquin
+            // 2019); so does the side of the true surface.
+            let surface = Principled { metallic: 0.0, true_normal: None, ..surface };
             for i in 0..200 {
                 let sampler = Sampler::new(1, 2, 0, i);
                 let [a, b] = [0, 1].map(|k| crate::sampling::cosine_hemisphere(sampler.pair(k)));
@@ -287,6 +353,7 @@ mod tests {
             metal: Vec3::new(ends(11), ends(12), ends(13)),
             alpha: [ends(14).powi(2), if pick(15) < 0.5 { ends(14).powi(2) } else { ends(15).powi(2) }],
             tangent: (pick(16) < 0.5).then_some(Vec3::X),
+            true_normal: (pick(35) < 0.5).then_some(normal),
             transmission: (pick(17) < 0.5).then(|| Transmission {
                 share: ends(18),
                 tint: Vec3::splat(ends(19)),

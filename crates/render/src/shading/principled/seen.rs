@@ -4,12 +4,12 @@ use super::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::core::color::luminance;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
-use crate::shading::ggx::{self, anisotropic_distribution, anisotropic_lambda, sample_anisotropic_normal};
+use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_anisotropic_normal};
 use crate::shading::interface::Interface;
-use crate::shading::layer_albedo::{SchlickAlbedo, cosine_mean, sheen_albedo};
+use crate::shading::layer_albedo::{SchlickAlbedo, bounded_sheen, cosine_mean, hemisphere_mean, sheen_albedo};
+use crate::shading::metal::{mean_reflectance, with_further_bounces};
 use crate::shading::rough_glass::RoughGlass;
 use crate::shading::scatter::BsdfSample;
-use crate::shading::sheen;
 use firstlight_kdtree::geometry::Frame;
 use glam::{Vec2, Vec3};
 
@@ -45,8 +45,10 @@ pub(super) struct Seen<'a> {
     past_all: Vec3,
     /// Mean of `past_all` over all directions.
     mean_past_all: Vec3,
-    /// Lost over returned energy of single scattering for a metal.
-    lost: f32,
+    /// Share of the light that reaches the metal.
+    above_metal: f32,
+    /// Factor that adds further bounces between microfacets of the metal.
+    metal_gain: Vec3,
     /// Total over single-scattering transmittance of a rough pane.
     passed_again: Vec3,
     pmf: [f32; 4],
@@ -91,7 +93,6 @@ impl<'a> Seen<'a> {
         };
         let mut local = frame.to_local(wo);
         local.z = local.z.max(SMALLEST_COS);
-        let alpha = of.mean_alpha();
         let coat = of.has_coat().then(|| {
             // A coat normal that faces away is replaced by that of the base.
             let normal = if of.coat_normal.dot(wo) > 0.0 { of.coat_normal } else { normal };
@@ -102,20 +103,20 @@ impl<'a> Seen<'a> {
         });
         let past_coat = coat.as_ref().map_or(1.0, |coat| coat.past);
         let past_sheen = past_sheen(of, local.z);
-        let base = SchlickAlbedo::new(local.z, alpha);
+        let base = SchlickAlbedo::along(local, of.alpha);
         let reflected = of.dielectric_albedo(base);
         let past_all = past_coat * past_sheen * (Vec3::ONE - reflected).max(Vec3::ZERO);
         let is_diffuse = of.diffuse != Vec3::ZERO;
-        let mean_past_all = if is_diffuse { mean_past_all(of, alpha) } else { Vec3::ONE };
-        let lost = if of.metallic > 0.0 { ggx::lost_over_returned(local.z, alpha) } else { 0.0 };
+        let mean_past_all = if is_diffuse { mean_past_all(of) } else { Vec3::ONE };
+        let metal_gain = if of.metallic > 0.0 && !of.is_smooth() { metal_gain(of, base) } else { Vec3::ONE };
         let upper = past_coat * past_sheen;
-        let metal = (of.metal * base.facing + Vec3::splat(base.grazing)) * (Vec3::ONE + of.metal * lost);
+        let metal = (of.metal * base.facing + Vec3::splat(base.grazing)) * metal_gain;
         let transmitted = of.transmission.map_or(0.0, |transmission| match transmission.inside {
             Inside::Solid(_) => transmission.share,
             Inside::Thin(_) => transmission.share * luminance(transmission.tint * (Vec3::ONE - reflected)),
         });
         // All light that is not reflected is transmitted (as in Turquin 2019 for metals).
-        let once = Vec3::splat(base.facing + base.grazing) - reflected;
+        let once = Vec3::splat(base.whole()) - reflected;
         let passed_again = (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3));
         let sheen = luminance(of.sheen);
         let strength = [
@@ -130,7 +131,19 @@ impl<'a> Seen<'a> {
             return None;
         }
         let pmf = strength.map(|one| one / sum);
-        Some(Self { of, frame, wo: local, coat, past_sheen, past_all, mean_past_all, lost, passed_again, pmf })
+        Some(Self {
+            of,
+            frame,
+            wo: local,
+            coat,
+            past_sheen,
+            past_all,
+            mean_past_all,
+            above_metal: upper,
+            metal_gain,
+            passed_again,
+            pmf,
+        })
     }
 
     /// Transmittance of the coat for light from one direction to the viewer.
@@ -141,6 +154,16 @@ impl<'a> Seen<'a> {
 
     /// f · |cos| and pdf of all non-specular layers. `wi`: unit, in world space.
     pub fn eval(&self, wi: Vec3) -> (Vec3, f32) {
+        let Some(surface) = self.of.true_normal else { return self.eval_layers(wi) };
+        if surface.dot(wi) <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let (straight, mirrored) = (self.eval_layers(wi), self.eval_layers(wi - 2.0 * surface.dot(wi) * surface));
+        (straight.0 + mirrored.0, straight.1 + mirrored.1)
+    }
+
+    /// [`Self::eval`] without the light that is mirrored at the true surface.
+    fn eval_layers(&self, wi: Vec3) -> (Vec3, f32) {
         let of = self.of;
         let local = self.frame.to_local(wi);
         if local.z < 0.0 {
@@ -160,24 +183,20 @@ impl<'a> Seen<'a> {
             let cosine = cosine_hemisphere_pdf(local.z);
             pdf += self.pmf[0] * cosine;
             if of.diffuse != Vec3::ZERO {
-                let reflected = of.dielectric_albedo(SchlickAlbedo::new(local.z, of.mean_alpha()));
+                let reflected = of.dielectric_albedo(SchlickAlbedo::along(local, of.alpha));
                 let coat = self.coat.as_ref().map_or(1.0, |coat| past_coat(of, coat.frame.z.dot(wi).abs()));
                 let past_all_i = coat * past_sheen_i * (Vec3::ONE - reflected).max(Vec3::ZERO);
                 value += of.diffuse * cosine * self.past_all * past_all_i / self.mean_past_all;
             }
             if of.sheen != Vec3::ZERO {
                 let half = (self.wo + local).normalize();
-                // A narrow sheen would return more than all light at grazing angles: the excess is removed
-                // symmetrically.
-                let most =
-                    [self.wo.z, local.z].map(|cos| sheen_albedo(cos, of.sheen_alpha)).into_iter().fold(1.0, f32::max);
-                let sheen = sheen::value(self.wo.z, local.z, half.z, of.sheen_alpha) / most;
+                let sheen = bounded_sheen(self.wo.z, local.z, half.z, of.sheen_alpha);
                 value += of.sheen * (below_coat * sheen * local.z);
             }
         }
         if self.pmf[1] > 0.0 && !of.is_smooth() {
             let (half, f, density) = reflection(self.wo, local, of.alpha);
-            value += self.tint(self.wo.dot(half)) * (below * f);
+            value += self.tint(self.wo.dot(half), below) * f;
             pdf += self.pmf[1] * density;
         }
         if let Some(coat) = self.coat.as_ref().filter(|_| !of.is_coat_smooth()) {
@@ -222,15 +241,18 @@ impl<'a> Seen<'a> {
         (transmission.tint * (transmission.share * below) * f, self.pmf[3] * density)
     }
 
-    /// Reflectance of the base at an angle with its microfacets.
-    fn tint(&self, cos: f32) -> Vec3 {
+    /// Reflectance of the base below the upper layers, at an angle with its microfacets.
+    ///
+    /// - `below`: transmittance of the upper layers for both directions; for metal that of the viewer counts, so that
+    ///   a white one returns all light.
+    fn tint(&self, cos: f32, below: f32) -> Vec3 {
         let of = self.of;
-        let dielectric = of.dielectric * schlick(of.facing, of.grazing, cos);
+        let dielectric = of.dielectric * below * schlick(of.facing, of.grazing, cos);
         if of.metallic == 0.0 {
             return dielectric;
         }
-        let metal = schlick(of.metal, Vec3::ONE, cos) * (Vec3::ONE + of.metal * self.lost);
-        dielectric + of.metallic * metal
+        let metal = schlick(of.metal, Vec3::ONE, cos) * self.metal_gain;
+        dielectric + of.metallic * self.above_metal * metal
     }
 
     /// Transmittance of a thin pane at an angle.
@@ -263,21 +285,29 @@ impl<'a> Seen<'a> {
         }
     }
 
+    /// A reflected direction, mirrored at the true surface if it is below.
+    fn above_surface(&self, wi: Vec3) -> Vec3 {
+        match self.of.true_normal {
+            Some(surface) if surface.dot(wi) < 0.0 => wi - 2.0 * surface.dot(wi) * surface,
+            _ => wi,
+        }
+    }
+
     /// All non-specular layers could have sampled this direction: one-sample estimate over their mixture.
     fn reflected(&self, local: Vec3, frame: &Frame) -> Option<BsdfSample> {
         if local.z <= 0.0 {
             return None;
         }
-        let wi = frame.to_world(local).normalize();
+        let wi = self.above_surface(frame.to_world(local).normalize());
         let (value, pdf) = self.eval(wi);
         (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, chance: 1.0, through: None })
     }
 
     fn sample_reflection(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
         if self.of.is_smooth() {
-            let wi = self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize();
+            let wi = self.above_surface(self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize());
             let below = self.below_coat(wi) * self.past_sheen;
-            let weight = self.tint(self.wo.z) * (below / pmf);
+            let weight = self.tint(self.wo.z, below) / pmf;
             return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
         }
         let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
@@ -287,7 +317,7 @@ impl<'a> Seen<'a> {
     fn sample_coat(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
         let coat = self.coat.as_ref()?;
         if self.of.is_coat_smooth() {
-            let wi = coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize();
+            let wi = self.above_surface(coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize());
             let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.z);
             let weight = tint * (self.of.coat / pmf);
             return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
@@ -374,18 +404,34 @@ fn past_sheen(of: &Principled, cos: f32) -> f32 {
     (1.0 - of.sheen.max_element() * sheen_albedo(cos, of.sheen_alpha)).max(0.0)
 }
 
+/// Factor of single scattering that adds further bounces between the microfacets of a metal.
+///
+/// - `base`: albedo of the microfacets in the direction of the viewer.
+fn metal_gain(of: &Principled, base: SchlickAlbedo) -> Vec3 {
+    let [x, y] = of.alpha;
+    let alpha = if x == y { x } else { (0.5 * (x * x + y * y)).sqrt() };
+    let returned = base.whole();
+    with_further_bounces(mean_reflectance(true, of.metal.into()), (1.0 - returned) / returned, alpha).into()
+}
+
 /// Mean transmittance of all layers over all directions; not 0.
-fn mean_past_all(of: &Principled, alpha: f32) -> Vec3 {
+fn mean_past_all(of: &Principled) -> Vec3 {
     let least = Vec3::splat(1e-6);
     if !of.has_coat() && of.sheen == Vec3::ZERO {
-        return (Vec3::ONE - of.dielectric_albedo(SchlickAlbedo::mean(alpha))).max(least);
+        return (Vec3::ONE - of.dielectric_albedo(SchlickAlbedo::mean(of.alpha))).max(least);
     }
-    let reflected = |cos: f32| of.dielectric_albedo(SchlickAlbedo::new(cos, alpha));
+    let past = |w: Vec3, k: usize| {
+        let coat = if of.has_coat() { past_coat(of, w.z) } else { 1.0 };
+        let reflected = of.dielectric_albedo(SchlickAlbedo::along(w, of.alpha));
+        coat * past_sheen(of, w.z) * (1.0 - reflected[k]).max(0.0)
+    };
+    let is_isotropic = of.alpha[0] == of.alpha[1];
     let channel = |k: usize| {
-        cosine_mean(|cos| {
-            let coat = if of.has_coat() { past_coat(of, cos) } else { 1.0 };
-            coat * past_sheen(of, cos) * (1.0 - reflected(cos)[k]).max(0.0)
-        })
+        if is_isotropic {
+            cosine_mean(|cos| past(Vec3::new(0.0, 0.0, cos), k))
+        } else {
+            hemisphere_mean(|w| past(w, k))
+        }
     };
     Vec3::new(channel(0), channel(1), channel(2)).max(least)
 }

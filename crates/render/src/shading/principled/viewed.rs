@@ -70,6 +70,7 @@ mod tests {
             metal: Vec3::new(0.9, 0.6, 0.3),
             alpha: [0.3, 0.1],
             tangent: Some(Vec3::X),
+            true_normal: Some(Vec3::new(0.6, 0.0, 0.8)),
             transmission: None,
             sheen: Vec3::splat(0.3),
             sheen_alpha: sheen::alpha_of(0.5),
