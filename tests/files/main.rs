@@ -13,6 +13,7 @@ mod neutral;
 mod obj;
 mod outputs;
 mod pictures;
+mod ply_programs;
 mod ply_stl;
 mod save;
 mod scene;

@@ -294,17 +294,16 @@ fn bad_ply_files_are_refused_with_their_place() {
     for index in ["3", "-1", "4294967295", "0.5"] {
         assert_eq!(of("3", "1", &format!("{CORNERS}3 0 1 {index}\n")), (Place::Line(13), out(index)));
     }
-    let not_finite = PlyProblem::NotFinite { what: "position", vertex: 1 };
-    for number in ["nan", "inf", "-1e999"] {
+    for number in ["nan", "inf", "-1e999", "-nan(ind)"] {
         assert_eq!(
             of("3", "1", &format!("0 0 0\n1 {number} 0\n0 1 0\n3 0 1 2\n")),
-            (Place::Line(11), not_finite.clone())
+            (Place::File, PlyProblem::NotFinite { faces: 1 })
         );
     }
     assert_eq!(of("3", "2", &format!("{CORNERS}3 0 1 2\n")), (Place::Line(13), truncated("face", 1, 2)));
     let text = "x".to_owned();
     assert_eq!(of("3", "1", "0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n"), (Place::Line(10), PlyProblem::NotNumber { text }));
-    for (line, found) in [("3 0 1", 3), ("3 0 1 2 2", 5), ("9 0 1 2", 4)] {
+    for (line, found) in [("3 0 1", 3), ("9 0 1 2", 4)] {
         let numbers = PlyProblem::Numbers { element: "face".to_owned(), row: 0, found };
         assert_eq!(of("3", "1", &format!("{CORNERS}{line}\n")), (Place::Line(13), numbers));
     }
@@ -370,8 +369,8 @@ fn huge_counts_are_refused_before_anything_is_allocated() {
         String::from_utf8(empty).unwrap().replace("element face", "element nothing 18446744073709551615\nelement face");
     assert_eq!(ply(text.as_bytes()).mesh.triangles.len(), 1);
     let stl = [&[0; 80][..], &u32::MAX.to_le_bytes(), &[0; 500]].concat();
-    let (count, expected) = (u32::MAX, 84 + 50 * u64::from(u32::MAX));
-    assert_eq!(stl_problem(&stl), (Place::Byte(80), StlProblem::Truncated { count, expected, bytes: 584 }));
+    let flat = problem(ModelFormat::Stl, &stl).1;
+    assert!(matches!(flat, ModelProblem::NoArea { triangles: 10 }), "{flat}");
 }
 
 #[test]
@@ -464,6 +463,14 @@ fn odd_stl_files_are_read_with_a_word_about_it() {
 fn bad_stl_files_are_refused_with_their_place() {
     let whole = binary_stl(b"", &tetrahedron());
     for length in 0..whole.len() {
+        if length >= 84 + 50 {
+            // What is there is read.
+            let cut = stl(&whole[..length]);
+            let found = (length - 84) / 50;
+            assert_eq!(cut.mesh.triangles.len(), found, "{length}");
+            assert!(cut.warnings[0].contains(&format!("its length is that of {found}")), "{:?}", cut.warnings);
+            continue;
+        }
         let (place, found) = stl_problem(&whole[..length]);
         if length < 84 {
             assert_eq!((place, found), (Place::File, StlProblem::NotStl { bytes: length }));
@@ -471,22 +478,46 @@ fn bad_stl_files_are_refused_with_their_place() {
             assert!(matches!(found, StlProblem::Truncated { count: 4, expected: 284, .. }), "{length}: {found}");
         }
     }
-    let mut bad = tetrahedron();
-    bad[2][1].y = f64::NAN;
-    let not_finite = StlProblem::NotFinite { triangle: 2, corner: 1 };
-    assert_eq!(stl_problem(&binary_stl(b"", &bad)), (Place::Byte(84 + 100 + 24), not_finite));
+    let page = [b"<!doctype html>".as_slice(), &[b' '; 400]].concat();
+    assert!(matches!(stl_problem(&page).1, StlProblem::Truncated { bytes: 415, .. }), "a text is no binary file");
     assert_eq!(stl_problem(&binary_stl(b"", &[])), (Place::File, StlProblem::Empty));
     assert_eq!(stl_problem(b"solid nothing\nendsolid nothing\n"), (Place::File, StlProblem::Empty));
     let of = |text: &str| stl_problem(text.as_bytes());
-    let (line, found) = of("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 inf\n");
-    assert!(line == Place::Line(4) && found.to_string().contains("`inf` found"), "{found}");
-    let few = of("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
-    assert_eq!(few, (Place::Line(6), StlProblem::FewCorners { corners: 2 }));
+    let (line, found) = of("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n");
+    assert!(line == Place::Line(4) && found.to_string().contains("`x` found"), "{found}");
+    for vertices in ["vertex 0 0 0\nvertex 0 1 0", "vertex 0 0 0\nvertex 0 1 0\nvertex 1 0 inf"] {
+        let none = format!("solid\nfacet normal 0 0 1\nouter loop\n{vertices}\nendloop\nendfacet\nendsolid\n");
+        assert_eq!(of(&none), (Place::File, StlProblem::NotFinite { facets: 1 }));
+    }
     assert!(matches!(of("solid a\nv 0 0 0\n"), (Place::Line(2), StlProblem::Word { .. })));
     let text = text_stl(&tetrahedron()[..1]);
     let last = text.find("endfacet").unwrap();
     for end in 0..last {
         assert!(read(ModelFormat::Stl, &text.as_bytes()[..end], &ModelOptions::default()).is_err(), "{end}");
+    }
+}
+
+#[test]
+fn broken_stl_facets_are_left_out() {
+    for number in [f64::NAN, f64::INFINITY] {
+        let mut bad = tetrahedron();
+        bad[2][1].y = number;
+        let text = text_stl(&bad);
+        for text in [text.clone(), text.replace("NaN", "-nan(ind)"), text.replace("facet normal 0 0 1", "facet normal")]
+        {
+            for model in [stl(&binary_stl(b"", &bad)), stl(text.as_bytes())] {
+                assert_eq!(model.mesh.triangles.len(), 3);
+                assert!(model.warnings[0].contains("1 facets have a coordinate"), "{:?}", model.warnings);
+            }
+        }
+    }
+    // Programs that do not know the number of triangles when they begin.
+    let mut streamed = binary_stl(b"", &tetrahedron());
+    for count in [0, 5, u32::MAX] {
+        streamed[80..84].copy_from_slice(&count.to_le_bytes());
+        let model = stl(&streamed);
+        assert_eq!(model.mesh.triangles.len(), 4);
+        assert!(model.warnings[0].contains(&format!("declares {count} triangles")), "{:?}", model.warnings);
     }
 }
 

@@ -19,6 +19,8 @@ pub(in crate::scene) struct Indexed {
     /// Linear Rec. 709 with alpha; empty, or one per position.
     pub colors: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
+    /// Material of each triangle; empty if there is one.
+    pub slots: Vec<u16>,
 }
 
 /// The mesh, and whether all of its normals are from the file.
@@ -32,7 +34,10 @@ pub(in crate::scene) fn assemble(
 ) -> Result<(Mesh, bool), ModelError> {
     let failed = |problem: ModelProblem| ModelError::of(path, Place::File, problem);
     let before = model.triangles.len();
-    model.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+    let is_triangle = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
+    let mut kept = model.triangles.iter().map(is_triangle);
+    model.slots.retain(|_| kept.next().expect("slots are empty or as many as triangles"));
+    model.triangles.retain(is_triangle);
     let dropped = before - model.triangles.len();
     if model.triangles.is_empty() {
         return Err(failed(ModelProblem::NoArea { triangles: before }));
@@ -45,7 +50,7 @@ pub(in crate::scene) fn assemble(
     if !mesh.triangles.iter().any(|&triangle| has_area(&mesh, triangle)) {
         return Err(failed(ModelProblem::NoArea { triangles: before }));
     }
-    (mesh.uvs, mesh.colors) = (model.uvs, model.colors);
+    (mesh.uvs, mesh.colors, mesh.slots) = (model.uvs, model.colors, model.slots);
     let (mesh, from_file) = match options.normals {
         ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &model.normals, crease_angle),
         ModelNormals::OfPositions => {

@@ -8,6 +8,7 @@ pub(in crate::scene) mod assemble;
 pub(in crate::scene) mod error;
 mod format;
 pub(in crate::scene) mod imported;
+pub(in crate::scene) mod number;
 pub(in crate::scene) mod polygon;
 pub(in crate::scene) mod reference;
 

@@ -75,8 +75,8 @@ pub enum PlyProblem {
         /// How many the header declares.
         declared: u64,
     },
-    /// A line of text has the wrong number of values.
-    #[error("element `{element}` {row} has a line of {found} numbers, which does not fit the properties in the header")]
+    /// A line of text has too few values.
+    #[error("element `{element}` {row} has a line of {found} numbers, fewer than the properties in the header")]
     Numbers {
         /// Name of the element.
         element: String,
@@ -101,13 +101,11 @@ pub enum PlyProblem {
         /// The length, as written.
         length: String,
     },
-    /// A vertex has a number that is NaN or infinite.
-    #[error("the {what} of vertex {vertex} is not finite")]
+    /// No face is left without those that use a vertex whose position is NaN or infinite.
+    #[error("all {faces} faces use a vertex whose position is not finite")]
     NotFinite {
-        /// Position or texture coordinate.
-        what: &'static str,
-        /// Its index, from 0.
-        vertex: u64,
+        /// Number of faces.
+        faces: usize,
     },
     /// A vertex index of a face is out of range.
     #[error("element `{element}` {row} uses vertex {index}, but the file has {count} (counted from 0)")]

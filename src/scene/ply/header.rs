@@ -2,6 +2,7 @@
 
 use super::error::PlyProblem;
 use crate::printable;
+use crate::scene::relative::bytes_to_text;
 
 /// Encoding of the data after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +51,10 @@ pub(super) struct Header {
     pub body: usize,
     /// Number of lines of the header.
     pub lines: usize,
+    /// Image files that comments name, as MeshLab writes them.
+    pub textures: Vec<String>,
+    /// The first line with an unknown keyword, and the number of such lines.
+    pub unknown: Option<(String, usize)>,
 }
 
 /// Longer headers are rejected: they could list elements endlessly.
@@ -124,8 +129,9 @@ impl Header {
             (false, false) => return Err((1, PlyProblem::NotPly)),
         };
         let (mut encoding, mut elements, mut at, mut lines) = (None, Vec::<Element>::new(), 0, 0);
+        let (mut textures, mut unknown_lines) = (Vec::new(), None);
         while let Some(length) = head[at..].iter().position(|&byte| byte == end) {
-            let line = String::from_utf8_lossy(&head[at..at + length]);
+            let line = bytes_to_text(&head[at..at + length]);
             at += length + 1;
             lines += 1;
             let located = |problem| (lines, problem);
@@ -136,6 +142,11 @@ impl Header {
             };
             match words[..] {
                 ["ply"] if lines == 1 => {}
+                ["comment", "TextureFile", _, ..] => {
+                    // Names may contain spaces.
+                    let name = line.split_once("TextureFile").map_or("", |(_, name)| name.trim());
+                    textures.push(name.to_owned());
+                }
                 [] | ["comment" | "obj_info", ..] => {}
                 ["format", kind, "1.0"] if encoding.is_none() => {
                     encoding = Some(match kind {
@@ -167,9 +178,14 @@ impl Header {
                 }
                 ["end_header"] => {
                     let encoding = encoding.ok_or(located(PlyProblem::Format))?;
-                    return Ok(Self { encoding, elements, body: at, lines });
+                    return Ok(Self { encoding, elements, body: at, lines, textures, unknown: unknown_lines });
                 }
-                _ => return Err(unknown("format, element, property, comment, obj_info or end_header")),
+                ["element", ..] => return Err(unknown("`element NAME COUNT` with a whole number")),
+                // Comments that lack their keyword or go on in a second line.
+                _ => {
+                    let text = || (printable::name(line.trim()).to_string(), 0);
+                    unknown_lines.get_or_insert_with(text).1 += 1;
+                }
             }
         }
         Err((lines + 1, PlyProblem::EndlessHeader { limit: head.len() }))
@@ -195,6 +211,16 @@ mod tests {
     }
 
     #[test]
+    fn textures_are_named_by_comments_and_other_text_is_passed() {
+        let text = "ply\r\nformat ascii 1.0\r\nCreated by a program\r\ncomment TextureFile  my image 1.png \r\n\
+                    comment texturefile no\r\ncomment TextureFile b.jpg\r\ncomment TextureFile\r\nelement vertex 1\r\n\
+                    source: a\r\nend_header\r\n";
+        let header = Header::parse(text.as_bytes()).unwrap();
+        assert_eq!(header.textures, ["my image 1.png", "b.jpg"]);
+        assert_eq!((header.unknown, header.elements.len()), (Some(("Created by a program".to_owned(), 2)), 1));
+    }
+
+    #[test]
     fn bad_headers_are_named_by_their_line() {
         let of = |text: &str| Header::parse(text.as_bytes()).unwrap_err();
         assert_eq!(of("plyx\n"), (1, PlyProblem::NotPly));
@@ -202,7 +228,7 @@ mod tests {
         assert_eq!(of("ply\nend_header\n"), (2, PlyProblem::Format));
         let text = "quad".to_owned();
         assert_eq!(of("ply\nformat ascii 1.0\nelement v 1\nproperty quad x\n"), (4, PlyProblem::Type { text }));
-        for line in ["element v -1", "element v 99999999999999999999", "property float x", "element v", "what"] {
+        for line in ["element v -1", "element v 99999999999999999999", "property float x", "element v"] {
             let (number, problem) = of(&format!("ply\nformat ascii 1.0\n{line}\n"));
             assert!(number == 3 && matches!(problem, PlyProblem::HeaderLine { .. }), "{line}: {problem}");
         }

@@ -3,9 +3,10 @@
 //! All values are returned as `f64`, which represents all types of the format exactly.
 
 use super::error::PlyProblem;
-use super::header::Number;
+use super::header::{Element, Number, Property};
 use crate::printable;
 use crate::scene::model::Place;
+use crate::scene::model::number::parse_number;
 
 /// Why a value cannot be read.
 #[derive(Debug)]
@@ -24,12 +25,62 @@ pub(super) trait Rows {
     fn next(&mut self, number: Number) -> Result<f64, Missing>;
     /// Skips `count` values.
     fn skip(&mut self, number: Number, count: u64) -> Result<(), Missing>;
-    /// The error gives the number of values in the line if there are too many.
-    fn end_row(&mut self) -> Result<(), Missing>;
+    /// Returns whether the line goes on: the rest is not read.
+    fn end_row(&mut self) -> bool;
     /// Location of the last value.
     fn place(&self) -> Place;
     /// Number of remaining bytes.
     fn left(&self) -> usize;
+}
+
+/// A problem with its location.
+pub(super) type Located = (Place, PlyProblem);
+
+/// Skips a row of an element.
+pub(super) fn skip_row(element: &Element, row: u64, rows: &mut impl Rows) -> Result<(), Located> {
+    rows.begin_row().map_err(|problem| missing(problem, element, row, rows))?;
+    for property in &element.properties {
+        if property.length.is_some() {
+            skip_list(element, row, property, rows)?;
+        } else {
+            rows.skip(property.number, 1).map_err(|problem| missing(problem, element, row, rows))?;
+        }
+    }
+    rows.end_row();
+    Ok(())
+}
+
+/// Skips a list property.
+pub(super) fn skip_list(element: &Element, row: u64, property: &Property, rows: &mut impl Rows) -> Result<(), Located> {
+    let length = next_length(element, row, property, rows)?;
+    rows.skip(property.number, length).map_err(|problem| missing(problem, element, row, rows))
+}
+
+/// Reads the length of a list property: up to 2³² − 1, since longer lists exceed any file.
+pub(super) fn next_length(
+    element: &Element,
+    row: u64,
+    property: &Property,
+    rows: &mut impl Rows,
+) -> Result<u64, Located> {
+    let number = property.length.unwrap_or(property.number);
+    let length = rows.next(number).map_err(|problem| missing(problem, element, row, rows))?;
+    if length >= 0.0 && length <= f64::from(u32::MAX) && length.fract() == 0.0 {
+        return Ok(length as u64);
+    }
+    let element = printable::name(&element.name).to_string();
+    Err((rows.place(), PlyProblem::Length { element, row, length: length.to_string() }))
+}
+
+/// The problem of a missing value, with its location.
+pub(super) fn missing(problem: Missing, element: &Element, row: u64, rows: &impl Rows) -> Located {
+    let name = || printable::name(&element.name).to_string();
+    let problem = match problem {
+        Missing::End => PlyProblem::Truncated { element: name(), row, declared: element.count },
+        Missing::Line(found) => PlyProblem::Numbers { element: name(), row, found },
+        Missing::Problem(problem) => problem,
+    };
+    (rows.place(), problem)
 }
 
 /// Binary values, big-endian if `BIG`.
@@ -88,8 +139,8 @@ impl<const BIG: bool> Rows for Bytes<'_, BIG> {
     }
 
     #[inline]
-    fn end_row(&mut self) -> Result<(), Missing> {
-        Ok(())
+    fn end_row(&mut self) -> bool {
+        false
     }
 
     fn place(&self) -> Place {
@@ -151,8 +202,7 @@ impl Rows for Text<'_> {
         if word.len() <= 15 && word.iter().all(u8::is_ascii_digit) {
             return Ok(word.iter().fold(0_u64, |sum, &digit| sum * 10 + u64::from(digit - b'0')) as f64);
         }
-        let number = str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-        number.ok_or_else(|| {
+        parse_number(word).ok_or_else(|| {
             let text = printable::name(&String::from_utf8_lossy(word)).to_string();
             Missing::Problem(PlyProblem::NotNumber { text })
         })
@@ -162,12 +212,8 @@ impl Rows for Text<'_> {
         (0..count).try_for_each(|_| self.word().map(drop))
     }
 
-    fn end_row(&mut self) -> Result<(), Missing> {
-        if self.line.trim_ascii_start().is_empty() {
-            return Ok(());
-        }
-        while self.word().is_ok() {}
-        Err(Missing::Line(self.words))
+    fn end_row(&mut self) -> bool {
+        !self.line.trim_ascii_start().is_empty()
     }
 
     fn place(&self) -> Place {

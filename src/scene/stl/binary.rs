@@ -1,7 +1,7 @@
 //! Binary STL: a header of 80 bytes, the number of triangles, and 50 bytes per triangle, little-endian.
 
 use super::error::StlProblem;
-use super::{Located, Soup};
+use super::{Located, Soup, is_plain};
 use crate::scene::model::Place;
 use glam::DVec3;
 
@@ -26,30 +26,40 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
     let not_stl = (Place::File, StlProblem::NotStl { bytes: bytes.len() });
     let count = declared(bytes).ok_or(not_stl)?;
     let (expected, found) = (length_for(count), bytes.len() as u64);
-    if expected > found {
+    let mut soup = Soup::default();
+    // Programs that write triangles as they come may not know their number in advance, and some files are cut.
+    let records = &bytes[START..];
+    let there = records.len() / TRIANGLE;
+    let is_miscounted = expected > found || (count == 0 && there > 0);
+    if is_miscounted && (there == 0 || bytes.iter().all(is_plain)) {
         return Err((Place::Byte(HEADER), StlProblem::Truncated { count, expected, bytes: bytes.len() }));
     }
-    let mut soup = Soup { corners: Vec::with_capacity(3 * count as usize), ..Soup::default() };
+    let count = if is_miscounted { there } else { count as usize };
+    if is_miscounted {
+        soup.notes.push(format!(
+            "declares {} triangles, but its length is that of {there}, which were read",
+            declared(bytes).unwrap_or(0)
+        ));
+    }
+    soup.corners.reserve_exact(3 * count);
     let mut has_attributes = false;
-    for (triangle, record) in bytes[START..expected as usize].chunks_exact(TRIANGLE).enumerate() {
+    for record in records.chunks_exact(TRIANGLE).take(count) {
         let number = |at: usize| {
             let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
             f64::from(f32::from_le_bytes(bytes))
         };
-        for corner in 0..3 {
-            // After the normal.
-            let at = 12 + 12 * corner;
-            let position = DVec3::new(number(at), number(at + 4), number(at + 8));
-            if !position.is_finite() {
-                let place = Place::Byte(START + TRIANGLE * triangle + at);
-                return Err((place, StlProblem::NotFinite { triangle, corner }));
-            }
-            soup.corners.push(position);
+        // After the normal.
+        let corners = [12, 24, 36].map(|at| DVec3::new(number(at), number(at + 4), number(at + 8)));
+        if corners.iter().all(|corner| corner.is_finite()) {
+            soup.corners.extend(corners);
+        } else {
+            soup.left_out += 1;
         }
         has_attributes |= record[48..] != [0, 0];
     }
-    if found > expected {
-        soup.notes.push(format!("{} bytes after the last of {count} triangles were ignored", found - expected));
+    let rest = records.len() - count * TRIANGLE;
+    if rest > 0 {
+        soup.notes.push(format!("{rest} bytes after the last of {count} triangles were ignored"));
     }
     if has_attributes {
         soup.notes.push("attributes of triangles (colours of some programs) are not modelled and were ignored".into());

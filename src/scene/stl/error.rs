@@ -11,7 +11,7 @@ pub enum StlProblem {
         /// Its length, bytes.
         bytes: usize,
     },
-    /// Its length does not match its number of triangles.
+    /// It is too short for one triangle, or a text.
     #[error(
         "declares {count} triangles, which take {expected} bytes, but the file has {bytes}: it is truncated or not an \
          STL file"
@@ -41,19 +41,11 @@ pub enum StlProblem {
         /// What was expected.
         expected: &'static str,
     },
-    /// A facet has fewer than three vertices.
-    #[error("the facet has {corners} vertices, but needs at least 3")]
-    FewCorners {
-        /// Number of its vertices.
-        corners: usize,
-    },
-    /// A coordinate is NaN or infinite.
-    #[error("vertex {corner} of triangle {triangle} has a coordinate that is NaN or infinite (both counted from 0)")]
+    /// No facet is left without those that have a coordinate that is NaN or infinite, or too few vertices.
+    #[error("none of the {facets} facets has three vertices with finite coordinates")]
     NotFinite {
-        /// Index of the triangle, from 0.
-        triangle: usize,
-        /// 0, 1 or 2.
-        corner: usize,
+        /// Number of facets.
+        facets: usize,
     },
     /// There are more triangle corners than 32-bit indices allow.
     #[error("has more triangles than 32-bit indices can name the corners of")]

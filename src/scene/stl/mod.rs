@@ -1,7 +1,7 @@
 //! STL (stereolithography): unconnected triangles, in text or binary form.
 //!
 //! Corners with exactly equal positions become one vertex, so that the mesh is connected; facet normals are ignored,
-//! since they are redundant. Start reading at [`load_stl`].
+//! since they are redundant. A facet that is broken is left out. Start reading at [`load_stl`].
 
 mod binary;
 mod error;
@@ -36,16 +36,21 @@ pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         .and_then(InputFile::bytes)
         .map_err(|error| ModelError::of(path, Place::File, error))?;
     let parsed = if is_text(&bytes) { text::parse(&bytes) } else { binary::parse(&bytes) };
-    let Soup { corners, polygons, notes } = parsed.map_err(|(place, problem)| ModelError::of(path, place, problem))?;
+    let Soup { corners, polygons, left_out, notes } =
+        parsed.map_err(|(place, problem)| ModelError::of(path, place, problem))?;
     drop(bytes);
     let failed = |problem: StlProblem| ModelError::of(path, Place::File, ModelProblem::Stl(problem));
     if corners.is_empty() {
-        return Err(failed(StlProblem::Empty));
+        return Err(failed(if left_out > 0 { StlProblem::NotFinite { facets: left_out } } else { StlProblem::Empty }));
     }
     if u32::try_from(corners.len()).is_err() {
         return Err(failed(StlProblem::TooMany));
     }
     let mut warnings = Warnings::default();
+    if left_out > 0 {
+        let what = "facets have a coordinate that is NaN or infinite, or fewer than three vertices, and were removed";
+        warnings.push(format!("{}: {left_out} {what}", path.display()));
+    }
     notes.into_iter().for_each(|note| warnings.push(format!("{}: {note}", path.display())));
     let welding = Welding::of_f64(&corners);
     let model = Indexed {
@@ -73,11 +78,18 @@ struct Soup {
     corners: Vec<DVec3>,
     /// Number of facets with more than three vertices.
     polygons: usize,
+    /// Number of facets that are no triangles or polygons of finite size.
+    left_out: usize,
     /// Remarks for the user.
     notes: Vec<String>,
 }
 
 type Located = (Place, StlProblem);
+
+/// Whether text may contain the byte.
+fn is_plain(byte: &u8) -> bool {
+    *byte >= b' ' || byte.is_ascii_whitespace()
+}
 
 /// Text begins with `solid`, but so do the headers of many binary files: those are detected by their length, or by
 /// bytes that text does not contain.
@@ -87,7 +99,6 @@ fn is_text(bytes: &[u8]) -> bool {
     }
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let begins_with = |word: &[u8]| start.get(..word.len()).is_some_and(|first| first.eq_ignore_ascii_case(word));
-    let is_plain = |byte: &u8| *byte >= b' ' || byte.is_ascii_whitespace();
     (begins_with(b"solid") || begins_with(b"facet")) && bytes.iter().take(1024).all(is_plain)
 }
 

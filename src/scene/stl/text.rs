@@ -4,6 +4,7 @@ use super::error::StlProblem;
 use super::{Located, Soup};
 use crate::printable;
 use crate::scene::model::Place;
+use crate::scene::model::number::parse_number;
 use crate::scene::model::polygon::triangulate;
 use glam::DVec3;
 
@@ -42,24 +43,16 @@ impl<'a> Words<'a> {
         (Place::Line(self.line), problem)
     }
 
-    fn expect(&mut self, words: [&[u8]; 2], expected: &'static str) -> Result<(), Located> {
-        for word in words {
-            let found = self.next();
-            if !found.eq_ignore_ascii_case(word) {
-                return Err(self.wrong(found, expected));
-            }
-        }
-        Ok(())
+    fn expect(&mut self, word: &[u8], expected: &'static str) -> Result<(), Located> {
+        let found = self.next();
+        if found.eq_ignore_ascii_case(word) { Ok(()) } else { Err(self.wrong(found, expected)) }
     }
 
     fn position(&mut self) -> Result<DVec3, Located> {
         let mut position = [0.0; 3];
         for coordinate in &mut position {
             let word = self.next();
-            let number = str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-            *coordinate = number
-                .filter(|number: &f64| number.is_finite())
-                .ok_or_else(|| self.wrong(word, "a coordinate of a vertex, a finite number"))?;
+            *coordinate = parse_number(word).ok_or_else(|| self.wrong(word, "a coordinate of a vertex"))?;
         }
         Ok(DVec3::from_array(position))
     }
@@ -81,6 +74,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
             words.skip_line();
         } else if word.eq_ignore_ascii_case(b"facet") {
             facet(&mut words, &mut corners)?;
+            if corners.len() < 3 || !corners.iter().all(|corner| corner.is_finite()) {
+                soup.left_out += 1;
+                continue;
+            }
             cut.clear();
             triangulate(&corners, &mut cut);
             soup.corners.extend(cut.iter().flatten().map(|&corner| corners[corner]));
@@ -103,11 +100,16 @@ fn facet(words: &mut Words, corners: &mut Vec<DVec3>) -> Result<(), Located> {
     if !word.eq_ignore_ascii_case(b"normal") {
         return Err(words.wrong(word, "`normal`"));
     }
-    // The normal is not used.
+    // The normal is not used; some programs write none.
+    let is_outer = |word: &[u8]| word.eq_ignore_ascii_case(b"outer");
+    let mut word = words.next();
     for _ in 0..3 {
-        words.next();
+        word = if is_outer(word) { word } else { words.next() };
     }
-    words.expect([b"outer", b"loop"], "`outer loop`")?;
+    if !is_outer(word) {
+        return Err(words.wrong(word, "`outer loop`"));
+    }
+    words.expect(b"loop", "`outer loop`")?;
     corners.clear();
     loop {
         let word = words.next();
@@ -119,9 +121,5 @@ fn facet(words: &mut Words, corners: &mut Vec<DVec3>) -> Result<(), Located> {
             return Err(words.wrong(word, "`vertex` or `endloop`"));
         }
     }
-    if corners.len() < 3 {
-        return Err((Place::Line(words.line), StlProblem::FewCorners { corners: corners.len() }));
-    }
-    let word = words.next();
-    if word.eq_ignore_ascii_case(b"endfacet") { Ok(()) } else { Err(words.wrong(word, "`endfacet`")) }
+    words.expect(b"endfacet", "`endfacet`")
 }
