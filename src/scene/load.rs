@@ -15,7 +15,7 @@ use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::model::ModelFormat;
-use super::model_light::{Model, light_model};
+use super::model_light::{Model, light_as_in, light_model};
 use super::own_materials::{emits, without_lost_textures};
 use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
@@ -141,7 +141,15 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     scene.build_trees(options)?;
     scene.build_seconds = start.elapsed().as_secs_f64();
     if let Some(model) = model {
-        light_model(&mut scene, &model);
+        match options.choice() {
+            // Frames may be loaded apart: their light must not depend on their moment.
+            choice if choice.at.is_some() && model.is_measured(&scene) => {
+                let stored = ModelChoice { at: None, shutter: None, ..choice.clone() };
+                let stored = load(source, &LoadOptions { choice: Some(&stored), ..*options })?;
+                light_as_in(&mut scene, &stored);
+            }
+            _ => light_model(&mut scene, &model),
+        }
     }
     Ok(scene)
 }

@@ -7,7 +7,7 @@
 
 use super::default_scene;
 use super::extract::Extraction;
-use super::file::DisplayPart;
+use super::file::{DisplayPart, ObjectPart};
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::sources::EnvironmentSource;
@@ -87,11 +87,36 @@ impl Light {
     }
 }
 
+impl Model {
+    fn brings_light(&self, scene: &LoadedScene) -> bool {
+        self.emits || !scene.file.lights.is_empty()
+    }
+
+    /// Whether its light depends on where things are.
+    pub(super) fn is_measured(&self, scene: &LoadedScene) -> bool {
+        self.brings_light(scene) || self.has_camera
+    }
+}
+
+/// Adds to a scene what was added to the same model in its stored pose.
+pub(super) fn light_as_in(scene: &mut LoadedScene, stored: &LoadedScene) {
+    let added = stored.file.objects.iter().filter(|object| !matches!(object, ObjectPart::Mesh { .. }));
+    for object in added {
+        let of_object = stored.file.materials.iter().filter(|(name, _)| object.material() == Some(*name));
+        scene.file.materials.0.extend(of_object.map(|(name, part)| (name.to_owned(), part.clone())));
+        scene.file.objects.push(object.clone());
+    }
+    (scene.file.environment, scene.file.display) = (stored.file.environment.clone(), stored.file.display);
+    scene.warnings.append(&stored.warnings);
+    scene.meshes.resize(scene.file.objects.len(), None);
+    scene.balls.resize(scene.file.objects.len(), None);
+}
+
 /// Adds what the scene of a model lacks: environment, key light and ground, and sets the exposure of physical lights.
 /// An environment that was chosen stays as it is.
 pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
     let has_lights = !scene.file.lights.is_empty();
-    let brings_light = has_lights || model.emits;
+    let brings_light = model.brings_light(scene);
     let own = if brings_light {
         let chosen = std::mem::replace(&mut scene.file.environment, EnvironmentSource::Black);
         let own = measure(scene, model.aspect);
@@ -108,15 +133,18 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
         }
         if scene.environment.is_none() {
             let reason = if brings_light { "its own light is too weak or does not reach it" } else { "has no light" };
-            let text = format!("{title}: {reason}: an environment and a key light are added");
-            scene.warnings.push(Warning::notice(text));
+            // A format without lights needs no words for that.
+            if brings_light || scene.facts.is_some() {
+                let text = format!("{title}: {reason}: an environment and a key light are added");
+                scene.warnings.push(Warning::notice(text));
+            }
             let share = own.as_ref().filter(|_| model.emits).map_or(1.0, Light::dimming);
             default_scene::light(&mut scene.file, model.bounds, model.side, share);
         }
         scene.meshes.resize(scene.file.objects.len(), None);
         scene.balls.resize(scene.file.objects.len(), None);
     }
-    if !brings_light && !model.has_camera {
+    if !model.is_measured(scene) {
         return;
     }
     let Some(light) = own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
