@@ -5,12 +5,18 @@ use std::path::{Component, Path, PathBuf};
 
 /// The folder below which each archive has one of its own.
 pub fn archive_cache() -> PathBuf {
-    #[cfg(feature = "cli")]
-    let of_platform = directories::ProjectDirs::from("", "", "firstlight").map(|it| it.cache_dir().to_path_buf());
-    // Only the commands unpack archives.
-    #[cfg(not(feature = "cli"))]
-    let of_platform: Option<PathBuf> = None;
-    of_platform.unwrap_or_else(|| std::env::temp_dir().join("firstlight")).join("packed")
+    of_platform().unwrap_or_else(|| std::env::temp_dir().join("firstlight")).join("packed")
+}
+
+#[cfg(feature = "cli")]
+fn of_platform() -> Option<PathBuf> {
+    directories::ProjectDirs::from("", "", "firstlight").map(|it| it.cache_dir().to_path_buf())
+}
+
+/// Only the commands unpack archives.
+#[cfg(not(feature = "cli"))]
+fn of_platform() -> Option<PathBuf> {
+    None
 }
 
 /// The folder of the archive that a file was unpacked from; `None` for all other files.

@@ -5,6 +5,7 @@
 //! of what it shows. That is how bright a white surface would be there, so dark models are not taken for unlit ones. The
 //! result is a function of model and camera.
 
+use super::bounds::MOST_STOPS;
 use super::default_scene;
 use super::extract::Extraction;
 use super::file::{DisplayPart, ObjectPart};
@@ -71,7 +72,7 @@ impl Light {
             return 0.0;
         }
         let stops = (2.0 * (Self::EXPOSED / median).log2()).round() / 2.0;
-        stops.min(Self::LONGEST)
+        stops.clamp(-f64::from(MOST_STOPS), Self::LONGEST)
     }
 
     /// Whether the model can be seen by it: by lights at their exposure, by emitters as they are.

@@ -8,7 +8,7 @@ use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
-use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::io::{BufRead, BufReader, Cursor, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -223,6 +223,7 @@ fn limits_of_decoder(limits: &Limits) -> image::Limits {
 const HDR: &[u8] = b"#?";
 
 /// Decodes the image if it has no more pixels than the limit.
+#[cfg(feature = "cli")]
 pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
@@ -235,6 +236,15 @@ fn decode_counted<R: BufRead + Seek>(
     limits: &Limits,
     budget: &PixelBudget,
 ) -> Result<DynamicImage, PictureError> {
+    if reader.format() == Some(ImageFormat::Tiff) {
+        let mut bytes = reader.into_inner();
+        if !tiff_counts_fit(&mut bytes).map_err(ReadError::from)? {
+            return Err(PictureError::Format);
+        }
+        let mut reader = ImageReader::with_format(bytes, ImageFormat::Tiff);
+        reader.limits(limits_of_decoder(limits));
+        return decode_within(reader.into_decoder()?, limits, budget);
+    }
     if reader.format().is_some_and(|format| format != ImageFormat::Hdr) {
         return decode_within(reader.into_decoder()?, limits, budget);
     }
@@ -254,6 +264,36 @@ fn decode_counted<R: BufRead + Seek>(
         return Err(PictureError::Format);
     }
     decode_within(HdrDecoder::new_nonstrict(bytes)?, limits, budget)
+}
+
+/// Whether the lists that the first directory of a TIFF file declares are no longer than the file. The decoder makes room
+/// for them before it knows of any limit. Afterwards the reader is at the beginning.
+fn tiff_counts_fit(reader: &mut (impl BufRead + Seek)) -> std::io::Result<bool> {
+    let length = reader.seek(SeekFrom::End(0))?;
+    reader.rewind()?;
+    let mut start = [0; 8];
+    reader.read_exact(&mut start)?;
+    let is_little = start[0] == b'I';
+    let short = |bytes: [u8; 2]| if is_little { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) };
+    let long = |bytes: [u8; 4]| if is_little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) };
+    /// The other one has numbers of 64 bits.
+    const CLASSIC: u16 = 42;
+    if short([start[2], start[3]]) != CLASSIC {
+        return Ok(false);
+    }
+    reader.seek(SeekFrom::Start(long([start[4], start[5], start[6], start[7]]).into()))?;
+    let mut count = [0; 2];
+    let mut entry = [0; 12];
+    let mut fits = reader.read_exact(&mut count).is_ok();
+    for _ in 0..short(count) {
+        fits &= reader.read_exact(&mut entry).is_ok();
+        fits = fits && u64::from(long([entry[4], entry[5], entry[6], entry[7]])) <= length;
+        if !fits {
+            break;
+        }
+    }
+    reader.rewind()?;
+    Ok(fits)
 }
 
 fn decode_within(
