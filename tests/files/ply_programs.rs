@@ -60,6 +60,13 @@ fn a_texture_that_a_comment_names_is_the_material() {
         let scene = load(&SceneSource::Model(folder.path().join("model.ply")), &LoadOptions::default());
         assert!(scene.is_ok(), "{:?}", scene.err());
     }
+    // Not what lies outside of the folder of the model.
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).unwrap();
+    let outside = square("comment TextureFile ../b.png\n", [ST, ""], &["0 0", "1 0", "1 1", "0 1", "", ""]);
+    let model = read(&inner, &outside);
+    assert_eq!(model.materials[0].diffuse_texture, None);
+    assert!(model.material_warnings.iter().any(|warning| warning.contains("--allow-outside")));
     let missing = square("comment TextureFile no.png\n", [ST, ""], &["0 0", "1 0", "1 1", "0 1", "", ""]);
     let model = read(folder.path(), &missing);
     assert!(model.materials[0].diffuse_texture.is_none() && model.material_warnings[0].contains("no.png"));

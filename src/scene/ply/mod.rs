@@ -20,8 +20,8 @@ use self::vertices::Vertices;
 use super::model::assemble::assemble;
 use super::model::error::{ModelError, Place};
 use super::model::imported::{ImportedModel, ModelOptions};
+use super::model::reference::References;
 use super::obj::{ImportedMaterial, TextureMap};
-use super::relative::text_to_path;
 use super::warnings::Warnings;
 use crate::printable;
 use crate::scene::input_file::{FileKind, InputFile};
@@ -77,7 +77,8 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     }
     let has_uvs = !vertices.indexed.uvs.is_empty() || !faces.uvs.is_empty();
     let mut material_warnings = Warnings::default();
-    let images = images(path, &header.textures, has_uvs, &mut material_warnings);
+    let files = References::of(path, options.allow_outside);
+    let images = images(path, files, &header.textures, has_uvs, &mut material_warnings);
     let plain = if faces.colours.count > 0 { faces.colours.material() } else { vertices.colours.material() };
     let (materials, slots) = materials(plain, &images, faces.take_textures());
     let polygons = faces.polygons();
@@ -98,7 +99,13 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
 }
 
 /// The image of each texture that the header names; `None` if it cannot be used.
-fn images(path: &Path, names: &[String], has_uvs: bool, warnings: &mut Warnings) -> Vec<Option<(String, PathBuf)>> {
+fn images(
+    path: &Path,
+    files: References,
+    names: &[String],
+    has_uvs: bool,
+    warnings: &mut Warnings,
+) -> Vec<Option<(String, PathBuf)>> {
     if !names.is_empty() && !has_uvs {
         warnings.push(format!("{}: names a texture, but has no texture coordinates", path.display()));
         return Vec::new();
@@ -106,12 +113,15 @@ fn images(path: &Path, names: &[String], has_uvs: bool, warnings: &mut Warnings)
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut missing = Vec::new();
     let found = names.iter().map(|name| {
-        let image = folder.join(text_to_path(&name.replace('\\', "/")));
+        let image_of = |name: &str| files.resolve(folder, name).map(|file| folder.join(file.path));
         // A path of another computer.
-        let beside = image.file_name().map(|name| folder.join(name));
-        let image = [Some(image), beside].into_iter().flatten().find(|image| image.is_file());
-        if image.is_none() {
-            missing.push(format!("`{}`", printable::name(name)));
+        let beside = name.rsplit(['/', '\\']).next().and_then(|last| image_of(last).ok());
+        let named = image_of(name);
+        let image = named.as_ref().ok().cloned().into_iter().chain(beside).find(|image| image.is_file());
+        match (&image, named) {
+            (None, Err(outside)) => warnings.push(format!("{}: {outside}; shown without", path.display())),
+            (None, Ok(_)) => missing.push(format!("`{}`", printable::name(name))),
+            _ => {}
         }
         image.map(|image| (name.clone(), image))
     });
