@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub enum PictureFormat {
     /// 8 bits, sRGB, exposed and tone-mapped.
     Png,
-    /// As a PNG, compressed with loss ([`JPEG_QUALITY`]), without metadata.
+    /// As a PNG, compressed with loss, without metadata.
     Jpeg,
     /// 32-bit floats, linear Rec. 709 radiance.
     Exr,
