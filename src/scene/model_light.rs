@@ -23,7 +23,7 @@ pub(super) struct Model {
     pub bounds: (DVec3, DVec3),
     /// Signs of the direction of its front.
     pub side: DVec3,
-    /// Whether it has emissive materials; unlit ones, which show a color without light, do not count.
+    /// Whether it has emissive materials; unlit ones, which show a colour without light, do not count.
     pub emits: bool,
     /// Whether the camera is that of the file: then the file is a scene, which stands on a ground of its own.
     pub has_camera: bool,

@@ -437,6 +437,28 @@ fn names_of_files_may_differ_by_case_and_slash() {
     assert_eq!(with(&format!("data:application/octet-stream;base64,{}", lines.join("\r\n"))), Ok(0));
 }
 
+/// In other formats too: material libraries, their textures and those of PLY.
+#[test]
+fn names_that_differ_by_case_are_told_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    image::RgbImage::new(1, 1).save(folder.path().join("image.png")).unwrap();
+    write("library.mtl", "newmtl a\nmap_Kd IMAGE.png\n");
+    write("a.obj", "mtllib Library.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+    write(
+        "a.ply",
+        "ply\nformat ascii 1.0\ncomment TextureFile Image.png\nelement vertex 3\nproperty float x\nproperty float y\n\
+         property float z\nproperty float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\n\
+         end_header\n0 0 0 0 0\n1 0 0 0 0\n0 1 0 0 0\n3 0 1 2\n",
+    );
+    for (model, names) in [("a.obj", vec!["Library.mtl", "IMAGE.png"]), ("a.ply", vec!["Image.png"])] {
+        let warnings = open(&folder.path().join(model)).unwrap().warnings;
+        let told: Vec<_> = warnings.iter().filter(|warning| warning.contains("differs by case")).collect();
+        assert_eq!(told.len(), names.len(), "{warnings:?}");
+        assert!(names.iter().all(|name| told.iter().any(|it| it.contains(name))), "{told:?}");
+    }
+}
+
 #[test]
 fn textures_of_basis_universal_are_read() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,7 +13,7 @@ use super::omissions::Omissions;
 use super::uri::{Uri, resolve};
 use crate::scene::input_file::{FileKind, InputFile};
 use crate::scene::limits::Limits;
-use crate::scene::model::reference::References;
+use crate::scene::model::reference::{References, Referred};
 use crate::scene::relative::path_to_text;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -234,7 +234,7 @@ impl Document {
     fn read_uri(&self, uri: &str, part: &str, room: u64) -> Result<(Vec<u8>, Option<PathBuf>), GltfProblem> {
         match self.resolved(uri, part)? {
             Uri::Data(data) => Ok((data, None)),
-            Uri::File { path, .. } => {
+            Uri::File(Referred { path, .. }) => {
                 let full = self.folder().join(&path);
                 let read = InputFile::open_within(&full, FileKind::Model, room).and_then(InputFile::bytes);
                 let data = read.map_err(|error| GltfProblem::File { file: path_to_text(&path), error })?;
@@ -252,10 +252,10 @@ impl Document {
     pub(super) fn resolved(&self, uri: &str, part: &str) -> Result<Uri, GltfProblem> {
         let files = References::of(&self.path, self.options.allow_outside);
         let resolved = resolve(uri, files, self.folder())?;
-        if let Uri::File { path, is_renamed: true } = &resolved {
-            let [uri, file] = [uri, &path_to_text(path)].map(|name| crate::printable::name(name).into_owned());
-            let sentence = format!("{part}: there is no `{uri}`: `{file}` is read, which differs by case");
-            self.omissions.tell(&format!("{part}.uri"), sentence);
+        if let Uri::File(file) = &resolved
+            && let Some(difference) = file.difference(uri)
+        {
+            self.omissions.tell(&format!("{part}.uri"), format!("{part}: {difference}"));
         }
         Ok(resolved)
     }

@@ -10,6 +10,7 @@ use super::material::{Alpha, GltfMaterial, TextureUse};
 use super::uri::{Uri, is_data};
 use crate::render::{Channel, Encoding, Material};
 use crate::scene::file::MaterialPart;
+use crate::scene::model::reference::Referred;
 use crate::scene::names::Names;
 use crate::scene::own_materials::without_lost_textures;
 use crate::scene::relative::path_to_text;
@@ -270,7 +271,7 @@ impl Document {
         if let Some(uri) = json.uri.as_deref().filter(|uri| !is_data(uri)) {
             let part = super::error::place("images", image);
             let found = self.resolved(uri, &part).map_err(|problem| (part, problem))?;
-            if let Uri::File { path, .. } = found {
+            if let Uri::File(Referred { path, .. }) = found {
                 let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
                 // Paths are relative to the scene, which may be in another folder than the model.
                 let folder = std::path::Path::new(file).parent().unwrap_or(std::path::Path::new(""));

@@ -6,19 +6,14 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A resolved URI.
 pub(super) enum Uri {
     /// Embedded data.
     Data(Vec<u8>),
     /// A file.
-    File {
-        /// Relative to the folder of the model; absolute only if that is allowed.
-        path: PathBuf,
-        /// Whether the file differs from the URI by the case of letters.
-        is_renamed: bool,
-    },
+    File(Referred),
 }
 
 /// Whether a URI contains its data.
@@ -48,8 +43,7 @@ pub(super) fn resolve(uri: &str, files: References, folder: &Path) -> Result<Uri
         text = rest.strip_prefix("//").unwrap_or(rest);
         text = text.strip_prefix("localhost").unwrap_or(text);
     }
-    let Referred { path, is_renamed } = files.resolve(folder, text)?;
-    Ok(Uri::File { path, is_renamed })
+    Ok(Uri::File(files.resolve(folder, text)?))
 }
 
 fn is_scheme(word: &str) -> bool {
@@ -141,7 +135,7 @@ mod tests {
         }
         let model = folder.path().join("a.gltf");
         let found = |uri: &str| match resolve(uri, References::of(&model, false), folder.path()) {
-            Ok(Uri::File { path, is_renamed }) => (path.to_string_lossy().into_owned(), is_renamed),
+            Ok(Uri::File(file)) => (file.path.to_string_lossy().into_owned(), file.is_renamed),
             _ => panic!("{uri}"),
         };
         for (uri, path, is_renamed) in [

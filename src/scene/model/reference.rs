@@ -6,7 +6,7 @@
 //! Start reading at [`References::resolve`].
 
 use crate::printable::name;
-use crate::scene::relative::text_to_path;
+use crate::scene::relative::{path_to_text, text_to_path};
 use std::path::{Component, Path, PathBuf};
 
 /// Entries of a folder that are compared with a name, at most.
@@ -27,6 +27,14 @@ pub(in crate::scene) struct Referred {
     pub path: PathBuf,
     /// Whether it differs from the name by the case of letters.
     pub is_renamed: bool,
+}
+
+impl Referred {
+    /// What the user is told if the file differs from its name in the model by case.
+    pub(in crate::scene) fn difference(&self, name_in_model: &str) -> Option<String> {
+        let [wanted, found] = [name_in_model, &path_to_text(&self.path)].map(|it| name(it).into_owned());
+        self.is_renamed.then(|| format!("there is no `{wanted}`: `{found}` is read, which differs by case"))
+    }
 }
 
 impl From<PathBuf> for Referred {

@@ -262,7 +262,12 @@ fn find_materials(
         let names: Vec<&str> = if is_one { vec![line] } else { line.split_whitespace().collect() };
         for name in names {
             let library = match files.resolve(folder, name) {
-                Ok(file) => folder.join(file.path),
+                Ok(file) => {
+                    if let Some(difference) = file.difference(name) {
+                        warnings.push(format!("{}: {difference}", path.display()));
+                    }
+                    folder.join(file.path)
+                }
                 Err(outside) => {
                     warnings.push(format!("{}: {outside}; its materials use default values", path.display()));
                     continue;

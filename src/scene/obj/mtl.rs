@@ -194,7 +194,12 @@ pub(super) fn load_library(
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut file = |material: &str, name: &str| match files.resolve(folder, name) {
         _ if name.is_empty() || name.ends_with(['/', '\\']) => None,
-        Ok(file) => Some(folder.join(file.path)),
+        Ok(file) => {
+            if let Some(difference) = file.difference(name) {
+                warn(format!("material `{material}`: {difference}"));
+            }
+            Some(folder.join(file.path))
+        }
         Err(outside) => {
             warn(format!("material `{material}`: {outside}; the texture is omitted"));
             None

@@ -113,17 +113,21 @@ fn images(
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut missing = Vec::new();
     let found = names.iter().map(|name| {
-        let image_of = |name: &str| files.resolve(folder, name).map(|file| folder.join(file.path));
+        let resolve = |name: &str| files.resolve(folder, name);
         // A path of another computer.
-        let beside = name.rsplit(['/', '\\']).next().and_then(|last| image_of(last).ok());
-        let named = image_of(name);
-        let image = named.as_ref().ok().cloned().into_iter().chain(beside).find(|image| image.is_file());
+        let beside = name.rsplit(['/', '\\']).next().and_then(|last| resolve(last).ok());
+        let named = resolve(name);
+        let mut found = named.as_ref().ok().cloned().into_iter().chain(beside);
+        let image = found.find(|file| folder.join(&file.path).is_file());
         match (&image, named) {
+            (Some(file), _) => {
+                let difference = file.difference(name).map(|it| format!("{}: {it}", path.display()));
+                warnings.extend(difference);
+            }
             (None, Err(outside)) => warnings.push(format!("{}: {outside}; shown without", path.display())),
             (None, Ok(_)) => missing.push(format!("`{}`", printable::name(name))),
-            _ => {}
         }
-        image.map(|image| (name.clone(), image))
+        image.map(|file| (name.clone(), folder.join(file.path)))
     });
     let found = found.collect();
     if !missing.is_empty() {
