@@ -32,7 +32,7 @@ impl Document {
         let uri = image.uri.as_deref().ok_or_else(|| here(GltfProblem::Missing("its uri or bufferView")))?;
         match self.resolved(uri, &place("images", number)).map_err(here)? {
             Uri::Data(bytes) => Ok(bytes),
-            Uri::File { .. } => Err(here(GltfProblem::Missing("its image: it is a file of its own, and"))),
+            Uri::File(_) => Err(here(GltfProblem::Missing("its image: it is a file of its own, and"))),
         }
     }
 }

@@ -79,7 +79,7 @@ mod tests {
 
     fn file(uri: &str, outside: bool) -> Option<String> {
         match resolve(uri, References::of(Path::new("nowhere/a.gltf"), outside), Path::new("nowhere")) {
-            Ok(Uri::File { path, .. }) => Some(path.to_string_lossy().into_owned()),
+            Ok(Uri::File(Referred { path, .. })) => Some(path.to_string_lossy().into_owned()),
             _ => None,
         }
     }
