@@ -124,7 +124,6 @@ pub enum FilterArg {
     Tent,
     Gaussian,
     // As scene files spell it.
-    #[value(alias = "blackman_harris")]
     BlackmanHarris,
     Mitchell,
 }

@@ -36,7 +36,7 @@ pub struct MergeArgs {
     #[arg(short, long, value_name = "FILM.exr")]
     output: PathBuf,
     /// Also save the image: .png is tone-mapped, .exr holds linear light (HDR).
-    #[arg(long, value_name = "FILE", alias = "picture")]
+    #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
     /// Samples that the films must have together [default: from the first to the last that any film has].
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
@@ -254,14 +254,11 @@ impl FilmSet {
     ///
     /// - `progress`: called with the number of films that are added and the total number.
     pub fn add_up(&self, progress: &dyn Fn(usize, usize)) -> Result<FilmFile, Failure> {
-        let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
         let (first, others) = self.films.split_first().expect("one film at least");
-        let FilmFile { mut film, mut shot, mut features, warning } = read_film_file(first)?;
-        warn(warning);
+        let FilmFile { mut film, mut shot, mut features } = read_film_file(first)?;
         for (i, path) in others.iter().enumerate() {
             progress(i + 1, self.films.len());
             let mut other = read_film_file(path)?;
-            warn(other.warning.take());
             agree_on_allocation(&mut shot, &mut other.shot);
             if let Some(what) = shot.differs_from(&other.shot) {
                 return Err(refused(first, path, format!("they have a different {what}")));
@@ -269,7 +266,7 @@ impl FilmSet {
             film.merge(&other.film).map_err(|error| refused(first, path, error.to_string()))?;
             features = FeatureLayers::of_parts(features, other.features);
         }
-        Ok(FilmFile { film, shot, features, warning: None })
+        Ok(FilmFile { film, shot, features })
     }
 }
 

@@ -259,7 +259,6 @@ fn film_so_far(args: &RenderArgs, job: &RenderJob, path: &Path) -> Result<(Film,
     }
     match read_film_file(path) {
         Ok(mut kept) => {
-            kept.warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
             let features = kept.features.take();
             Ok((job.film(args, Some((kept, path)))?, features))
         }

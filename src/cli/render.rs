@@ -181,9 +181,6 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         Some(path) => Some((read_film_file(path)?, path)),
         None => None,
     };
-    if let Some(warning) = kept.as_ref().and_then(|(kept, _)| kept.warning.as_ref()) {
-        progress.suspend(|| remark(format_args!("warning: {warning}")));
-    }
     let job = RenderJob::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);

@@ -71,7 +71,7 @@ pub struct RenderArgs {
     /// Save the estimated relative error of each pixel as an .exr in which 0.05 is 5 %
     ///
     /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole image.
-    #[arg(help_heading = "Output", long, value_name = "FILE.exr", alias = "error-picture", conflicts_with_all = ["turntable", "bookmarks", "region"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.exr", conflicts_with_all = ["turntable", "bookmarks", "region"])]
     pub error_image: Option<PathBuf>,
     #[command(flatten)]
     pub layers: LayerArgs,

@@ -45,7 +45,7 @@ pub struct ReportArgs {
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Output folder for the HTML page and the CSV table.
-    #[arg(short, long, alias = "out", value_name = "FOLDER", default_value = "report")]
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
     /// Maximum samples per pixel [default: 256, unless --time is given].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(1, 1 << 20))]

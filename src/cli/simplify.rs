@@ -117,6 +117,9 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     }
     // Materials that no library defines are not written.
     let kept = model.materials.iter().filter(|_| format == ModelFormat::Obj);
+    if format != ModelFormat::Obj && (format == ModelFormat::Gltf || !model.materials.is_empty()) {
+        remark(format_args!("warning: materials and textures are not kept: only OBJ files name theirs in a library"));
+    }
     let names: Vec<String> = kept.map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };

@@ -20,7 +20,7 @@ pub struct StatusArgs {
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
     /// Save an image of all samples that are there, .png, .jpg or .exr.
-    #[arg(long, value_name = "FILE", alias = "picture")]
+    #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]

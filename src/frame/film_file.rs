@@ -10,7 +10,7 @@
 
 use super::feature_layers::{FeatureHeader, FeatureLayers, LAYERS, channels_of, id_channels, read_layers};
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, NoRoom, OldFilmLayout, Purpose, Room};
+use crate::render::{Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, NoRoom, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
@@ -36,8 +36,6 @@ pub struct FilmFile {
     pub shot: ImageMetadata,
     /// Feature buffers, if the film has them.
     pub features: Option<FeatureLayers>,
-    /// Warning for the user about missing information, with the name of the file.
-    pub warning: Option<String>,
 }
 
 /// Summary of a film file, without its pixels.
@@ -125,12 +123,12 @@ impl From<FilmError> for String {
 
 /// Contents of the attribute.
 #[derive(Serialize, Deserialize)]
-struct Header<Layout> {
+struct Header {
     /// Format version; increased by incompatible changes.
     format: u32,
-    /// Checksum of all bytes of the file with zeros in place of these 32 digits. In format 1, of the pixel values only.
+    /// Checksum of all bytes of the file with zeros in place of these 32 digits.
     check: String,
-    layout: Layout,
+    layout: FilmLayout,
     /// Header of the feature buffers, if there are any; programs that do not know them skip their channels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     features: Option<FeatureHeader>,
@@ -140,16 +138,9 @@ struct Header<Layout> {
 #[derive(Deserialize)]
 struct HeaderStart {
     format: u32,
-    check: String,
 }
 
-const FORMAT: u32 = 3;
-
-/// Format in which all pixels of a tile had the same samples, and light tracing had no stored mean.
-const TILES_FORMAT: u32 = 2;
-
-/// Format in which header and metadata are not covered by the checksum.
-const OLD_FORMAT: u32 = 1;
+const FORMAT: u32 = 1;
 
 /// Magic number of OpenEXR files.
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -158,7 +149,7 @@ const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 const NO_CHECK: &str = "00000000000000000000000000000000";
 
 /// Bytes per pixel of all channels, at least: three means, and two words for each number of the film.
-const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * OldFilmLayout::N_PLANES as u64);
+const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
 
 /// Writes a film with its metadata atomically. May replace a film of the same image whose samples are all in this one,
 /// and no other film.
@@ -210,7 +201,7 @@ fn encode(
     (planes, changes): (&[Vec<f64>], Option<Vec<Vec<f32>>>),
     features: Option<&FeatureLayers>,
     note: &str,
-    header: &Header<impl Serialize>,
+    header: &Header,
 ) -> Result<Vec<u8>, exr::error::Error> {
     // Serialising plain data cannot fail.
     let header = ron::to_string(header).expect("a film's header is plain data");
@@ -257,8 +248,7 @@ fn place_of_check(bytes: &[u8]) -> Option<Range<usize>> {
 
 /// Returns the checksum of everything except the bytes at `place`.
 fn checksum(bytes: &[u8], place: &Range<usize>) -> Fingerprint {
-    let (before, after) = (&bytes[..place.start], &bytes[place.end..]);
-    Fingerprint::default().with([before, NO_CHECK.as_bytes(), after].concat())
+    Fingerprint::of(&bytes[..place.start]).with(&bytes[place.end..])
 }
 
 /// Checks that `film` can replace the file at `path` without losing samples or layers.
@@ -341,16 +331,7 @@ fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
     if format > FORMAT {
         return Err(FilmProblem::Newer);
     }
-    Ok(header_of(format, &text).map_err(damaged)?.0)
-}
-
-/// Parses the layout and the feature header of a film of this format.
-fn header_of(format: u32, text: &str) -> Result<(FilmLayout, Option<FeatureHeader>), ron::error::SpannedError> {
-    if format > TILES_FORMAT {
-        ron::from_str::<Header<FilmLayout>>(text).map(|header| (header.layout, header.features))
-    } else {
-        ron::from_str::<Header<OldFilmLayout>>(text).map(|header| (header.layout.renewed(), header.features))
-    }
+    Ok(ron::from_str::<Header>(&text).map_err(damaged)?.layout)
 }
 
 /// Reads a film exactly.
@@ -379,11 +360,11 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
         return Err(FilmProblem::NoFilm);
     }
     let bytes = file.bytes()?;
-    decode(&bytes, path, limits)
+    decode(&bytes, limits)
 }
 
 /// Decodes a film from the bytes of its file.
-fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
+fn decode(bytes: &[u8], limits: &Limits) -> Result<FilmFile, FilmProblem> {
     if bytes.get(..4) != Some(&MAGIC) {
         return Err(FilmProblem::NoFilm);
     }
@@ -394,18 +375,16 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
         return Err(FilmProblem::NoFilm);
     };
     let text = string_of(text);
-    let HeaderStart { format, check } = ron::from_str(&text).map_err(|error| damaged(&error))?;
+    let HeaderStart { format } = ron::from_str(&text).map_err(|error| damaged(&error))?;
     if format > FORMAT {
         return Err(FilmProblem::Newer);
     }
     const WRONG: &str = "checksum mismatch";
-    if format > OLD_FORMAT {
-        let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
-        if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
-            return Err(damaged(&WRONG));
-        }
+    let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
+    if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
+        return Err(damaged(&WRONG));
     }
-    let (layout, features) = header_of(format, &text).map_err(|error| damaged(&error))?;
+    let Header { layout, features, .. } = ron::from_str(&text).map_err(|error| damaged(&error))?;
     let FilmLayout { width, height, .. } = layout;
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {
@@ -449,17 +428,11 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
     });
     let features = features.transpose()?;
     let mut planes = Vec::with_capacity(N_PLANES);
-    let n_planes = if format > TILES_FORMAT { N_PLANES } else { OldFilmLayout::N_PLANES };
-    for name in plane_names().take(n_planes) {
+    for name in plane_names() {
         let (upper, lower) = (words(format!("{name}.upper"))?, words(format!("{name}.lower"))?);
         let pairs = upper.iter().zip(lower);
         planes.push(pairs.map(|(&u, &l)| f64::from_bits(u64::from(u) << 32 | u64::from(l))).collect());
     }
-    let is_old = format <= OLD_FORMAT;
-    if is_old && checksum_of_numbers(&planes).to_string() != check {
-        return Err(damaged(&WRONG));
-    }
-    planes.resize_with(N_PLANES, || vec![0.0; n_pixels as usize]);
     let of_change = |name: String| match samples(&name) {
         Some(FlatSamples::F32(numbers)) => Some(numbers.clone()),
         _ => None,
@@ -472,15 +445,11 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
     if (shot.film.width, shot.film.height, shot.first_sample, shot.spp) != of_film {
         return Err(damaged(&"its metadata has a different size or number of samples"));
     }
-    let warning = is_old.then(|| {
-        let path = path.display();
-        format!("{path}: is a film of an older format, whose metadata has no checksum")
-    });
-    Ok(FilmFile { film, shot, features, warning })
+    Ok(FilmFile { film, shot, features })
 }
 
 fn plane_names() -> impl Iterator<Item = String> {
-    ["sum", "rest", "mean", "lamps.sum", "lamps.rest", "lamps.mean"]
+    ["sum", "rest", "mean", "light.sum", "light.rest", "light.mean"]
         .into_iter()
         .flat_map(|part| ["R", "G", "B"].map(|channel| format!("{part}.{channel}")))
 }
@@ -488,21 +457,14 @@ fn plane_names() -> impl Iterator<Item = String> {
 /// Names of [`FilmRecord::changes`].
 fn change_names() -> impl Iterator<Item = String> {
     let of_part = |part| ["R", "G", "B", "relative"].map(|channel| format!("{part}.{channel}"));
-    ["change", "lamps.change"].into_iter().flat_map(of_part).take(N_CHANGE_PLANES)
-}
-
-/// The checksum of [`OLD_FORMAT`].
-fn checksum_of_numbers(planes: &[Vec<f64>]) -> Fingerprint {
-    planes.iter().fold(Fingerprint::default(), |print, plane| {
-        print.with(plane.iter().flat_map(|number| number.to_bits().to_le_bytes()))
-    })
+    ["change", "light.change"].into_iter().flat_map(of_part).take(N_CHANGE_PLANES)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::frame::{Target, render_offline};
-    use crate::render::{CausticPlan, OldTileRecord, RenderSettings, Techniques, TileRecord};
+    use crate::render::RenderSettings;
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
     /// A film of a scene with light paths, and its metadata.
@@ -513,9 +475,7 @@ mod tests {
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
         let mut film = Film::new(3, 2);
         let target = Target { spp: Some(spp), ..Target::default() };
-        // The same number of light paths as in films of older formats.
-        let techniques = Techniques { caustic_plan: Some(CausticPlan::UNKNOWN), ..Techniques::default() };
-        let settings = RenderSettings { techniques, ..RenderSettings::default() };
+        let settings = RenderSettings::default();
         render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
         let samples = ImageSamples { first: 0, spp, uneven: false };
         let draft = MetadataDraft::of(&mut world, Some(&loaded));
@@ -524,7 +484,7 @@ mod tests {
     }
 
     fn read_bytes(bytes: &[u8]) -> Result<FilmFile, FilmProblem> {
-        decode(bytes, Path::new("a.exr"), &Limits::USUAL)
+        decode(bytes, &Limits::USUAL)
     }
 
     #[test]
@@ -535,7 +495,7 @@ mod tests {
         let whole = std::fs::read(folder.path().join("a.exr")).unwrap();
         let kept = read_bytes(&whole).unwrap();
         assert!(film.half_steps().is_some() && kept.film.half_steps() == film.half_steps());
-        assert!(kept.film.to_record() == film.to_record() && kept.shot.to_note() == note && kept.warning.is_none());
+        assert!(kept.film.to_record() == film.to_record() && kept.shot.to_note() == note);
         for at in 0..whole.len() {
             for flip in [1, 2, 0x20, 0x80, 0xff] {
                 let mut changed = whole.clone();
@@ -550,8 +510,8 @@ mod tests {
             (text("mean_of:4"), text("mean_of:2")),
             (text("seed: 0"), text("seed: 1")),
             (text("spp: 4"), text("spp: 8")),
-            (text("format:3"), text("format:2")),
-            (text("format:3"), text("format:1")),
+            (text("format:1"), text("format:0")),
+            (text("format:1"), text("format:2")),
             (text("cornell-balls"), text("cornell-bells")),
         ] {
             let at = whole.windows(from.len()).position(|part| part == from);
@@ -559,49 +519,6 @@ mod tests {
             let mut changed = whole.clone();
             changed.splice(at..at + from.len(), to);
             assert!(read_bytes(&changed).is_err(), "{}", String::from_utf8_lossy(&from));
-        }
-    }
-
-    /// The film as a file of an older format.
-    fn old_file(film: &Film, note: &str, format: u32) -> Vec<u8> {
-        let FilmRecord { layout, mut planes, .. } = film.to_record();
-        planes.truncate(OldFilmLayout::N_PLANES);
-        let of_tile = |tile: &TileRecord| OldTileRecord { samples: tile.blocks[0].samples.clone(), bad: vec![] };
-        let FilmLayout { width, height, tile_size, tiles, light_traced, .. } = layout;
-        let tiles = tiles.iter().map(of_tile).collect();
-        let layout = OldFilmLayout { width, height, tile_size, tiles, light_traced };
-        let check = if format > OLD_FORMAT { NO_CHECK.to_owned() } else { checksum_of_numbers(&planes).to_string() };
-        let mut bytes =
-            encode(film, (&planes, None), None, note, &Header { format, check, layout, features: None }).unwrap();
-        if format > OLD_FORMAT {
-            let place = place_of_check(&bytes).unwrap();
-            let check = checksum(&bytes, &place).to_string();
-            bytes[place].copy_from_slice(check.as_bytes());
-        }
-        bytes
-    }
-
-    #[test]
-    fn a_film_of_an_old_format_is_read_and_written_in_the_new_one() {
-        let folder = tempfile::tempdir().unwrap();
-        let (film, note) = tiny(4);
-        for format in [OLD_FORMAT, TILES_FORMAT] {
-            let old = old_file(&film, &note, format);
-            let kept = read_bytes(&old).unwrap();
-            assert!(kept.film.means() == film.means() && kept.film.spp() == 4);
-            // Its error is known again after the next two doublings, its noise after the next one.
-            assert!(kept.film.error_estimate().is_none() && kept.film.half_steps().is_none());
-            let warning = kept.warning.unwrap_or_default();
-            assert_eq!(warning.contains("a.exr: is a film of an older format"), format == OLD_FORMAT, "{warning}");
-            // The pixel values are always covered by the checksum, and the two sample counts must agree.
-            let find = |what: &[u8]| old.windows(what.len()).position(|part| part == what).unwrap();
-            let mut changed = old.clone();
-            changed[find(b"check:\"") + 7] ^= 1;
-            assert!(read_bytes(&changed).is_err());
-            assert!(read_bytes(&old_file(&film, &note.replace("spp: 4", "spp: 8"), format)).is_err());
-            let path = folder.path().join(format!("{format}.exr"));
-            write_film_file(&kept.film, &kept.shot.to_note(), &path).unwrap();
-            assert_eq!(read_film_file(&path).unwrap().warning, None);
         }
     }
 

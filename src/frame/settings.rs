@@ -230,7 +230,7 @@ fn bookmark_file(source: &SceneSource) -> String {
     let stem = Path::new(&name).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let plain: String =
         stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
-    format!("bookmarks/{plain}-{}.ron", Fingerprint::default().with(name.bytes()))
+    format!("bookmarks/{plain}-{}.ron", Fingerprint::of(name.as_bytes()))
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl Key {
         let allocation = SampleAllocation::Uniform;
         let settings = RenderSettings { seed: 0, techniques: Default::default(), allocation, ..*settings };
         let rest = format!("{settings:?} {}", env!("CARGO_PKG_VERSION"));
-        let hash = Fingerprint::default().with(scene.0.to_le_bytes()).with(rest.bytes());
+        let hash = scene.with(rest.as_bytes());
         Self { name: format!("{plain}-{}x{}-{hash}", size.0, size.1), size }
     }
 }

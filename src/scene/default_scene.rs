@@ -1,6 +1,6 @@
 //! What a model gets that is opened by itself: a camera that frames it, ground, environment, key light.
 
-use super::file::{DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
+use super::file::{DisplayPart, FilmPart, LightPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
 use super::framing::Framing;
 use super::meshes::LoadedMesh;
 use super::orientation::faces_away;
@@ -10,11 +10,16 @@ use super::up_axis::{guess_up, guess_up_of_obj};
 use super::value::{ColorValue, Rgb};
 use crate::render::Integrator;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// Names of the parts in a saved scene.
 const CLAY: &str = "clay";
 const KEY_LIGHT: &str = "key light";
 const GROUND: &str = "ground";
+const INNER_LIGHT: &str = "inner light";
+
+/// Between model and ground, of the diagonal of the model: too small to be seen.
+const GAP: f64 = 1.0 / 4096.0;
 
 fn sky(share: f32) -> EnvironmentSource {
     EnvironmentSource::Gradient {
@@ -37,7 +42,8 @@ fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
     let center = 0.5 * (min + max);
     ObjectPart::Plane {
         name: Some(GROUND.to_owned()),
-        point: DVec3::new(center.x, min.y, center.z),
+        // Below what lies on it, or has a floor of its own.
+        point: DVec3::new(center.x, min.y - GAP * (max - min).length(), center.z),
         normal: DVec3::Y,
         material,
         transform: TransformPart::default(),
@@ -70,6 +76,22 @@ pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3), side: DVec3, share: f
 pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
     let name = new_material(file, GROUND, ground_material());
     file.objects.push(ground(name, bounds));
+}
+
+/// Adds a light inside of a model that is closed: where the camera is, or in the middle. It cannot be seen.
+pub fn light_inside(file: &mut SceneFile, (min, max): (DVec3, DVec3)) {
+    let eye = file.camera.eye;
+    let is_inside = eye.cmpge(min).all() && eye.cmple(max).all();
+    let position = if is_inside { eye } else { 0.5 * (min + max) };
+    // A white surface has the radiance 1 at a quarter of the diagonal.
+    let distance = (0.25 * (max - min).length()).max(SceneFile::MIN_SIZE);
+    let intensity = Rgb(Vec3::splat((PI * distance * distance) as f32));
+    file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
+}
+
+/// Whether it is the light of [`light_inside`].
+pub fn is_inner(light: &LightPart) -> bool {
+    light.name() == Some(INNER_LIGHT)
 }
 
 /// Adds a material under a new name, which is returned.

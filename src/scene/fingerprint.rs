@@ -7,16 +7,19 @@ use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::mesh::Mesh;
-use crate::render::{Environment, ImageTexture, Integrator, TexturePattern};
+use crate::render::{Environment, ImageTexture, Integrator, Texels, TexturePattern};
 use bevy_ecs::prelude::World;
+use bytemuck::cast_slice;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
+use xxhash_rust::xxh3::xxh3_128;
 
 /// 128-bit hash of all inputs of a scene's image: the scene itself, its meshes and its images.
 ///
-/// The same in every run and on every machine; detects changes, but is not cryptographic.
+/// The same in every run and on every little-endian machine; detects changes, but is not cryptographic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Fingerprint(pub u128);
 
@@ -26,67 +29,59 @@ impl fmt::Display for Fingerprint {
     }
 }
 
-impl Default for Fingerprint {
-    fn default() -> Self {
-        Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
+impl Fingerprint {
+    /// XXH3 (Collet 2019), 128 bits.
+    pub fn of(bytes: &[u8]) -> Self {
+        Self(xxh3_128(bytes))
+    }
+
+    /// Of this one and of these bytes after it; other splits into parts give another one.
+    #[must_use]
+    pub fn with(self, bytes: &[u8]) -> Self {
+        Self::of(bytemuck::bytes_of(&[self.0, Self::of(bytes).0]))
+    }
+
+    fn of_mesh(mesh: &Mesh) -> Self {
+        let Mesh { positions, center, triangles, normals, uvs, slots, uvs2, colors, tangents } = mesh;
+        let lists = [cast_slice(normals), cast_slice(uvs), cast_slice(slots), cast_slice(uvs2), cast_slice(colors)];
+        let shape = Self::of(cast_slice(positions)).with(bytemuck::bytes_of(center)).with(cast_slice(triangles));
+        lists.into_iter().chain([cast_slice(tangents)]).fold(shape, Self::with)
+    }
+
+    fn of_picture(picture: &ImageTexture) -> Self {
+        let texels = match &picture.texels {
+            Texels::U8 { channels, data } => Self::of(&[1, *channels as u8]).with(data),
+            Texels::U16 { channels, data } => Self::of(&[2, *channels as u8]).with(cast_slice(data)),
+            Texels::F32(data) => Self::of(&[4, 3]).with(cast_slice(data)),
+        };
+        texels.with(cast_slice(&[picture.width, picture.height]))
     }
 }
 
-impl Fingerprint {
-    /// FNV-1a (Fowler, Noll and Vo 1991), 128 bits. The length is hashed too, so that different splits into parts
-    /// differ.
-    #[must_use]
-    pub fn with(mut self, bytes: impl IntoIterator<Item = u8>) -> Self {
-        const PRIME: u128 = (1 << 88) + 0x13b;
-        let mut length = 0u64;
-        for byte in bytes {
-            self.0 = (self.0 ^ u128::from(byte)).wrapping_mul(PRIME);
-            length += 1;
-        }
-        for byte in length.to_le_bytes() {
-            self.0 = (self.0 ^ u128::from(byte)).wrapping_mul(PRIME);
-        }
-        self
-    }
-
-    fn with_floats(self, numbers: impl IntoIterator<Item = f32>) -> Self {
-        self.with(numbers.into_iter().flat_map(|x| x.to_bits().to_le_bytes()))
-    }
-
-    fn with_mesh(self, mesh: &Mesh) -> Self {
-        let plain = self
-            .with_floats(mesh.positions.iter().flat_map(|p| p.to_array()))
-            .with(mesh.center.to_array().into_iter().flat_map(|x| x.to_bits().to_le_bytes()))
-            .with(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()))
-            .with_floats(mesh.normals.iter().flat_map(|n| n.to_array()))
-            .with_floats(mesh.uvs.iter().flat_map(|uv| uv.to_array()))
-            .with(mesh.slots.iter().flat_map(|slot| slot.to_le_bytes()));
-        if [mesh.uvs2.len(), mesh.colors.len(), mesh.tangents.len()] == [0; 3] {
-            return plain;
-        }
-        plain
-            .with_floats(mesh.uvs2.iter().flat_map(|uv| uv.to_array()))
-            .with_floats(mesh.colors.iter().flat_map(|color| color.to_array()))
-            .with_floats(mesh.tangents.iter().flat_map(|tangent| tangent.to_array()))
-    }
-
-    fn with_picture(self, picture: &ImageTexture) -> Self {
-        self.with([picture.width, picture.height].into_iter().flat_map(u32::to_le_bytes))
-            .with_floats((0..picture.len()).flat_map(|i| picture.linear(i).to_array()))
-    }
+/// The fingerprint of each of these, which may be shared: each is read once, in parallel.
+fn of_each<T: Send + Sync>(shared: &[Arc<T>], of: impl Fn(&T) -> Fingerprint + Sync) -> Vec<Fingerprint> {
+    let mut first: HashMap<*const T, usize> = HashMap::new();
+    let firsts: Vec<usize> =
+        shared.iter().enumerate().map(|(i, it)| *first.entry(Arc::as_ptr(it)).or_insert(i)).collect();
+    let known: Vec<Option<Fingerprint>> =
+        shared.par_iter().enumerate().map(|(i, it)| (firsts[i] == i).then(|| of(it))).collect();
+    firsts.into_iter().map(|i| known[i].expect("the first one of each was read")).collect()
 }
 
 impl LoadedScene {
     /// Equal for scenes with the same contents, wherever their files are.
     pub fn fingerprint(&self) -> Fingerprint {
-        let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
-        for mesh in self.meshes.iter().flatten() {
-            print = print.with_mesh(&mesh.mesh).with(format!("{:?}", mesh.slots).bytes());
+        let mut print = Fingerprint::of(self.file.to_ron().as_bytes());
+        let meshes: Vec<_> = self.meshes.iter().flatten().collect();
+        let shared: Vec<_> = meshes.iter().map(|mesh| mesh.mesh.clone()).collect();
+        for (mesh, of_mesh) in meshes.iter().zip(of_each(&shared, Fingerprint::of_mesh)) {
+            print = print.with(bytemuck::bytes_of(&of_mesh.0)).with(format!("{:?}", mesh.slots).as_bytes());
         }
         let mut pictures: Vec<_> = self.pictures.iter().collect();
         pictures.sort_by_key(|(name, _)| *name);
-        for (name, picture) in pictures {
-            print = print.with(name.bytes()).with_picture(picture);
+        let shared: Vec<_> = pictures.iter().map(|(_, picture)| (*picture).clone()).collect();
+        for ((name, _), of_picture) in pictures.iter().zip(of_each(&shared, Fingerprint::of_picture)) {
+            print = print.with(name.as_bytes()).with(bytemuck::bytes_of(&of_picture.0));
         }
         print
     }
@@ -157,21 +152,12 @@ impl SceneContent {
         Self { file, meshes, pictures }
     }
 
-    /// Hashes each vertex and each texel once, however often they are used: some milliseconds for a large mesh.
+    /// Reads each vertex and each texel once, however often they are used.
     pub fn fingerprint(&self) -> Fingerprint {
-        let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
-        let mut meshes: HashMap<*const Mesh, Fingerprint> = HashMap::new();
-        for mesh in &self.meshes {
-            let known = *meshes.entry(Arc::as_ptr(mesh)).or_insert_with(|| Fingerprint::default().with_mesh(mesh));
-            print = print.with(known.0.to_le_bytes());
-        }
-        let mut pictures: HashMap<*const ImageTexture, Fingerprint> = HashMap::new();
-        for picture in &self.pictures {
-            let known =
-                *pictures.entry(Arc::as_ptr(picture)).or_insert_with(|| Fingerprint::default().with_picture(picture));
-            print = print.with(known.0.to_le_bytes());
-        }
-        print
+        let parts = of_each(&self.meshes, Fingerprint::of_mesh).into_iter();
+        let parts = parts.chain(of_each(&self.pictures, Fingerprint::of_picture));
+        let file = Fingerprint::of(self.file.to_ron().as_bytes());
+        parts.fold(file, |print, part| print.with(bytemuck::bytes_of(&part.0)))
     }
 }
 
@@ -181,13 +167,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_hash_to_the_published_value() {
-        // FNV-1a of "a" is d228cb696f1a8caf78912b704e4a8964; the eight bytes of its length follow.
-        let mut expected = Fingerprint(0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
-        for byte in 1u64.to_le_bytes() {
-            expected.0 = (expected.0 ^ u128::from(byte)).wrapping_mul((1 << 88) + 0x13b);
-        }
-        assert_eq!(Fingerprint::default().with(*b"a"), expected);
+    fn the_split_into_parts_matters() {
+        let of = |parts: &[&str]| parts.iter().fold(Fingerprint::of(b""), |print, part| print.with(part.as_bytes()));
+        let all = [of(&[]), of(&[""]), of(&["ab"]), of(&["a", "b"]), of(&["b", "a"]), of(&["ab", ""])];
+        assert!(all.iter().enumerate().all(|(i, print)| all[..i].iter().all(|other| other != print)), "{all:?}");
+    }
+
+    /// Alpha as well, which a hash of colours would miss.
+    #[test]
+    fn every_texel_counts() {
+        let of = |data: &[u8], channels, width, height| {
+            let texels = Texels::U8 { channels, data: data.to_vec() };
+            Fingerprint::of_picture(&ImageTexture { width, height, texels })
+        };
+        let all = [
+            of(&[1, 2, 3, 4], 4, 1, 1),
+            of(&[1, 2, 3, 5], 4, 1, 1),
+            of(&[1, 2, 3, 4], 1, 4, 1),
+            of(&[1, 2, 3, 4], 1, 1, 4),
+            of(&[1, 2, 3, 4], 2, 2, 1),
+        ];
+        assert!(all.iter().enumerate().all(|(i, print)| all[..i].iter().all(|other| other != print)), "{all:?}");
     }
 
     #[test]

@@ -6,9 +6,9 @@
 //! result is a function of model and camera.
 
 use super::bounds::MOST_STOPS;
-use super::default_scene;
+use super::default_scene::{self, is_inner};
 use super::extract::Extraction;
-use super::file::{DisplayPart, ObjectPart};
+use super::file::{DisplayPart, LightPart, MaterialPart, ObjectPart};
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::sources::EnvironmentSource;
@@ -38,13 +38,15 @@ struct Light(Vec<f32>);
 
 impl Light {
     /// Medians outside of this range call for another exposure.
-    const USUAL: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+    const USUAL: std::ops::RangeInclusive<f64> = 0.2..=1.5;
     /// The median after it.
     const EXPOSED: f64 = 1.0;
     /// Lights that would need a longer exposure, in stops, do not matter.
     const LONGEST: f64 = 6.0;
     /// Share of the surfaces below which light does not reach the model.
     const REACHED: f64 = 0.05;
+    /// Share below which the user is told why the rest is black.
+    const MOSTLY_REACHED: f64 = 0.6;
     /// Mean brightness of a model that can be seen by emitters alone, and by lights, of which shadows are expected.
     const BRIGHT: f64 = 0.35;
     const SHADED: f64 = 0.15;
@@ -54,8 +56,13 @@ impl Light {
         &self.0[self.0.partition_point(|level| *level == 0.0)..]
     }
 
+    /// Share of the surfaces that get any light.
+    fn reached(&self) -> f64 {
+        self.lit().len() as f64 / self.0.len() as f64
+    }
+
     fn reaches(&self) -> bool {
-        self.lit().len() as f64 >= Self::REACHED * self.0.len() as f64
+        self.reached() >= Self::REACHED
     }
 
     /// Mean of what the display shows of a white surface, at an exposure in stops.
@@ -93,9 +100,11 @@ impl Model {
         self.emits || !scene.file.lights.is_empty()
     }
 
-    /// Whether its light depends on where things are.
+    /// Whether its light depends on where things are. Generated light reaches what stands free; a room that is seen
+    /// through the backs of its walls is closed for light.
     pub(super) fn is_measured(&self, scene: &LoadedScene) -> bool {
-        self.brings_light(scene) || self.has_camera
+        let is_one_sided = |part: &MaterialPart| matches!(part, MaterialPart::Principled { two_sided: false, .. });
+        self.brings_light(scene) || self.has_camera || scene.file.materials.iter().any(|(_, part)| is_one_sided(part))
     }
 }
 
@@ -108,6 +117,9 @@ pub(super) fn light_as_in(scene: &mut LoadedScene, stored: &LoadedScene) {
         scene.file.objects.push(object.clone());
     }
     (scene.file.environment, scene.file.display) = (stored.file.environment.clone(), stored.file.display);
+    let has = |light: &LightPart| scene.file.lights.iter().any(|own| own.name() == light.name());
+    let added: Vec<_> = stored.file.lights.iter().filter(|light| is_inner(light) && !has(light)).cloned().collect();
+    scene.file.lights.extend(added);
     scene.warnings.append(&stored.warnings);
     scene.meshes.resize(scene.file.objects.len(), None);
     scene.balls.resize(scene.file.objects.len(), None);
@@ -148,17 +160,37 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
     if !model.is_measured(scene) {
         return;
     }
-    let Some(light) = own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
+    let Some(mut light) =
+        own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
     else {
         return;
     };
+    if !light.reaches() {
+        default_scene::light_inside(&mut scene.file, model.bounds);
+        match measure(scene, model.aspect).filter(Light::reaches) {
+            Some(inside) => {
+                light = inside;
+                let text = format!("{title}: it is closed, and no light reaches its inside: a light is added there");
+                scene.warnings.push(Warning::notice(text));
+            }
+            None => {
+                scene.file.lights.pop();
+            }
+        }
+    }
     if !light.reaches() {
         scene.warnings.push(format!(
             "{title}: hardly any light reaches what the camera sees, which is enclosed or faces away: choose another view, \
              or add a light"
         ));
+    } else if light.reached() < Light::MOSTLY_REACHED {
+        let share = 100.0 * light.reached();
+        scene.warnings.push(Warning::notice(format!(
+            "{title}: its lights reach {share:.0} % of what the camera sees: --env FILE adds light from all around"
+        )));
     }
-    let exposure = light.exposure();
+    // Generated light has the usual level.
+    let exposure = if scene.file.lights.is_empty() && !model.emits { 0.0 } else { light.exposure() };
     if exposure != 0.0 {
         let text = format!("{title}: the exposure is set to {exposure:+} stops, for the level of its light");
         scene.warnings.push(Warning::notice(text));

@@ -222,7 +222,9 @@ impl<'a> Meaning<'a> {
         };
         // A colour texture of the PBR extension tints glass; elsewhere it says that there is a surface.
         let has_surface = if material.pbr.is_some() { material.opacity_texture.is_some() } else { has_image };
-        if is_glass && !has_surface {
+        // `illum` alone says too little: some programs write 7 for everything that reflects.
+        let is_seen_through = material.ior.is_some() || meaning.opacity < 1.0 || meaning.base == Vec3::ZERO;
+        if is_glass && is_seen_through && !has_surface {
             (meaning.transmits, meaning.opacity) = (true, 1.0);
         }
         let glow = material.emission.unwrap_or(Vec3::ZERO);

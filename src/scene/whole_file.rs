@@ -316,7 +316,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Writ
 /// Temporary name for `target`: that of a claim, or that of the writer with this number.
 fn part_name(target: &Path, number: Option<u32>) -> PathBuf {
     let name = target.file_name().unwrap_or_default().as_encoded_bytes();
-    let hash = Fingerprint::default().with(name.iter().copied()).0 as u64;
+    let hash = Fingerprint::of(name).0 as u64;
     let number = number.map_or_else(String::new, |number| format!("-{number}"));
     target.with_file_name(format!(".firstlight-{hash:016x}{number}.part"))
 }

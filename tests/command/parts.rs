@@ -223,7 +223,7 @@ fn two_hundred_parts_are_merged_at_once_or_in_groups() {
         }
     });
     let all: Vec<String> = parts().collect();
-    does(path, &format!("merge {} -o all.exr --picture all.png", all.join(" ")));
+    does(path, &format!("merge {} -o all.exr --image all.png", all.join(" ")));
     equal(path, "whole.exr", "all.exr");
     equal(path, "whole.png", "all.png");
     // As an array job does it, with more groups than there is work for.

@@ -207,14 +207,14 @@ fn films_keep_layers_through_resuming_and_merging() {
     does(path, &format!("{scene} --samples 1..2 -o p.exr --film b.exr"));
     does(path, &format!("{scene} --samples 2..4 -o p.exr --film c.exr --layers albedo,object --threads 3"));
     for order in ["a.exr b.exr c.exr", "c.exr a.exr b.exr"] {
-        does(path, &format!("merge {order} -o merged.exr --picture merged-picture.exr --layers {ALL} --overwrite"));
+        does(path, &format!("merge {order} -o merged.exr --image merged-picture.exr --layers {ALL} --overwrite"));
         assert!(bytes("merged.exr") == bytes("whole-film.exr"), "{order}");
         assert!(layers_of(&path.join("merged-picture.exr")).0 == layers_of(&path.join("whole.exr")).0, "{order}");
     }
     let said = refused(path, "merge b.exr c.exr -o d.exr --layers albedo");
     assert!(said.contains("--image"), "{said}");
     does(path, &format!("{scene} --samples 2..3 -o p.exr --film d.exr"));
-    let said = refused(path, "merge b.exr d.exr -o e.exr --picture e-picture.exr --layers albedo");
+    let said = refused(path, "merge b.exr d.exr -o e.exr --image e-picture.exr --layers albedo");
     assert!(said.contains("have no such layers"), "{said}");
     // More samples for features take the place of fewer.
     does(path, &format!("{scene} --spp 2 -o r.exr --film more.exr --layers albedo --layer-samples 4"));

@@ -85,20 +85,20 @@ fn nothing_that_a_command_reads_is_written_over() {
         "render a.exr --resume -o a.exr --spp 4",
         "render a.exr --resume -o sub/../a.exr --spp 4",
         "render room.ron --film a.exr --resume -o ./a.exr",
-        "render a.exr --resume --error-picture ./a.exr -o x.png --spp 4",
+        "render a.exr --resume --error-image ./a.exr -o x.png --spp 4",
         // A picture, and what the scene is made of.
         "render a.png -o a.png",
         "render a.png -o x.png --film a.png",
         "render room.ron -o wall.png",
-        "render room.ron -o x.exr --film y.exr --error-picture x.exr",
+        "render room.ron -o x.exr --film y.exr --error-image x.exr",
         "render frames.ron -o wall.png --turntable 3",
         "render cornell --film ./c.exr -o c.exr",
-        "render cornell -o c.exr --error-picture sub/../c.exr",
+        "render cornell -o c.exr --error-image sub/../c.exr",
         // Films that are added up.
         "merge a.exr b.exr -o a.exr",
-        "merge a.exr b.exr -o c.exr --picture c.exr",
-        "merge a.exr b.exr -o c.exr --picture ./b.exr",
-        "merge a.exr b.exr -o c.exr --overwrite --picture a.exr",
+        "merge a.exr b.exr -o c.exr --image c.exr",
+        "merge a.exr b.exr -o c.exr --image ./b.exr",
+        "merge a.exr b.exr -o c.exr --overwrite --image a.exr",
         "save room.ron -o ./room.ron",
         "simplify tent.obj -o sub/../tent.obj --ratio 0.5",
     ];
@@ -131,10 +131,10 @@ fn a_film_is_replaced_by_nothing_that_lacks_its_samples() {
     does(&path, "merge a.exr b.exr -o ab.exr");
     for line in [
         "render room.ron -o a.exr --spp 1",
-        "render room.ron -o x.png --error-picture a.exr --spp 2",
+        "render room.ron -o x.png --error-image a.exr --spp 2",
         "render room.ron -o x.png --film a.exr --spp 1",
         "render cornell --film x.exr -o a.exr --spp 1",
-        "merge a.exr b.exr -o x.exr --picture other.exr",
+        "merge a.exr b.exr -o x.exr --image other.exr",
         "merge a.exr b.exr -o other.exr",
         // It has samples that the two have not.
         "merge a.exr b.exr -o c.exr",
@@ -169,10 +169,10 @@ fn a_render_says_what_it_replaces() {
     let line = "render room.ron -o a.png --spp 2";
     assert!(!does(&path, line).contains("replaced"));
     assert!(does(&path, line).contains("replaced the existing a.png"));
-    let out = run(&path, &format!("{line} --error-picture e.exr --json"));
+    let out = run(&path, &format!("{line} --error-image e.exr --json"));
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(json["replaced"], serde_json::json!(["a.png"]));
-    let said = does(&path, &format!("{line} --error-picture e.exr"));
+    let said = does(&path, &format!("{line} --error-image e.exr"));
     assert!(said.contains("replaced the existing a.png, e.exr"), "{said}");
     std::fs::write(path.join("turn-0002.png"), "old").unwrap();
     let said = does(&path, "render room.ron -o turn.png --spp 1 --turntable 3");
@@ -312,11 +312,11 @@ fn names_of_any_bytes_are_read_and_written() {
     std::fs::rename(path.join("room.ron"), path.join(odd("r?.ron"))).unwrap();
     for line in [
         "render r?.ron -o a?.png --film a?.exr --spp 2",
-        "render r?.ron -o b?.png --film b?.exr --samples 2..4 --error-picture e?.exr",
+        "render r?.ron -o b?.png --film b?.exr --samples 2..4 --error-image e?.exr",
         "render a?.exr --resume -o a?.png --film a?.exr --spp 2",
         "render t?.obj -o m?.png --spp 1 --size 16x12",
         "render m?.png -o m2?.png",
-        "merge a?.exr b?.exr -o ab?.exr --picture ab?.png",
+        "merge a?.exr b?.exr -o ab?.exr --image ab?.png",
         "render ab?.exr -o c?.exr --spp 3",
         "save t?.obj -o s?.ron",
         "render s?.ron -o s?.png --spp 1 --size 16x12",

@@ -131,7 +131,7 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     render("whole", "0..128");
     render("a", "0..64");
     render("b", "64..128");
-    does(path, "merge a.exr b.exr -o ab.exr --picture ab.png");
+    does(path, "merge a.exr b.exr -o ab.exr --image ab.png");
     does(path, "merge b.exr a.exr -o ba.exr");
     assert_equal(path, "whole.exr", "ab.exr");
     assert_equal(path, "whole.exr", "ba.exr");
@@ -141,14 +141,14 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     for (name, samples) in [("c", "0..7"), ("d", "100..128"), ("e", "7..100")] {
         render(name, samples);
     }
-    does(path, "merge c.exr d.exr e.exr -o cde.exr --picture cde.png");
+    does(path, "merge c.exr d.exr e.exr -o cde.exr --image cde.png");
     assert_equal(path, "whole.png", "cde.png");
     // Not a byte depends on the order in which they are named, nor on how each of them is shown.
     does(path, "render cornell-balls -o f.png --film f.exr --size 40x33 --samples 128..129 --exposure 2");
     let orders = ["c d e f", "f e d c", "e c f d", "d f c e"];
     for (i, order) in orders.iter().enumerate() {
         let names: String = order.split(' ').map(|name| format!("{name}.exr ")).collect();
-        does(path, &format!("merge {names} -o order-{i}.exr --picture order-{i}.png"));
+        does(path, &format!("merge {names} -o order-{i}.exr --image order-{i}.png"));
         assert_equal(path, "order-0.exr", &format!("order-{i}.exr"));
         assert_equal(path, "order-0.png", &format!("order-{i}.png"));
     }

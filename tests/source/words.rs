@@ -159,12 +159,8 @@ fn doc_comments(source: &str) -> Vec<(usize, String)> {
 
 /// A field, a scene or a part of a film by its name alone, or a whole scene.
 fn is_grammar(text: &str) -> bool {
-    // Names that options had.
-    let old = ["picture", "error-picture"];
-    ["eye", "ball", "balls", "lamps"].contains(&text)
-        || old.contains(&text)
+    ["eye", "ball", "balls"].contains(&text)
         || text.ends_with(".ron")
-        || text.starts_with("lamps.")
         || text.contains("camera: (")
         || text.contains("(eye: (")
 }

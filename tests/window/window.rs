@@ -296,8 +296,13 @@ fn a_window_with_unsaved_changes_asks_before_it_closes() {
     let asks = |program: &Program, bare: &image::RgbImage| {
         until("the question", || (difference(bare, &middle(program)) > 15.0).then_some(()));
     };
-    std::thread::sleep(Duration::from_secs(1));
-    let bare = middle(&program);
+    // Pausing may take a while on a busy machine.
+    let mut bare = middle(&program);
+    until("the image to stand still", || {
+        std::thread::sleep(Duration::from_millis(500));
+        let before = std::mem::replace(&mut bare, middle(&program));
+        (difference(&before, &bare) < 0.5).then_some(())
+    });
     // However it is closed, it asks; Esc goes on as if nothing had been.
     program.key("Escape");
     for way in 0..3 {

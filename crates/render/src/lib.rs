@@ -55,8 +55,8 @@ pub use film::estimate::ErrorEstimate;
 pub use film::features::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares};
 pub use film::halves::HalfSteps;
 pub use film::record::{
-    BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_CHANGE_PLANES, N_PLANES, OldFilmLayout, OldTileRecord,
-    RoundRecord, StepsRecord, TileRecord,
+    BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_CHANGE_PLANES, N_PLANES, RoundRecord, StepsRecord,
+    TileRecord,
 };
 pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};

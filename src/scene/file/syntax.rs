@@ -18,8 +18,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
             format!("unknown field `{found}`{}{}", of(outer), suggestion(found, expected.iter().copied()))
         }
         Error::NoSuchEnumVariant { expected, found, outer } => {
-            // Capitalised names are those of older versions: accepted, but not suggested.
-            let words = expected.iter().copied().filter(|word| word.starts_with(char::is_lowercase));
+            let words = expected.iter().copied();
             let what = outer.as_ref().map_or("kind".to_owned(), |name| plain(name));
             format!("unknown {what} `{found}`{}", elsewhere(&what, found).unwrap_or_else(|| suggestion(found, words)))
         }

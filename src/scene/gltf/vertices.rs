@@ -85,6 +85,13 @@ impl Document {
                 _ => attribute.floats::<4>("COLOR_0", index),
             };
             vertices.colors.iter_mut().flatten().for_each(|c| *c = c.clamp(0.0, 1.0));
+            // A list that an exporter reserved and never filled: as alpha it would hide the model, as color paint it black.
+            if !vertices.colors.is_empty() && vertices.colors.iter().all(|color| *color == [0.0; 4]) {
+                let (what, found) = ("a number in it", "only zeros, alpha included".to_owned());
+                let problem = GltfProblem::Value { what, found, expected: "colours" };
+                attribute.omitted.push((format!("{part}.COLOR_0"), (String::new(), problem)));
+                vertices.colors.clear();
+            }
         }
         for (i, (target, &weight)) in primitive.targets.iter().zip(deformation.weights).enumerate() {
             if weight == 0.0 {

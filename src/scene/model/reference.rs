@@ -112,6 +112,8 @@ impl<'a> References<'a> {
                 Component::CurDir => {}
                 Component::ParentDir if depth == 0 => return Some("a path out of the folder"),
                 Component::ParentDir => depth -= 1,
+                // With `.\\` it is here, as its spelling with `/` says.
+                Component::Normal(part) if part.as_encoded_bytes().starts_with(b".\\") => {}
                 Component::Normal(part) if part.as_encoded_bytes().starts_with(b".") => return Some("a hidden file"),
                 Component::Normal(_) => depth += 1,
                 Component::Prefix(_) | Component::RootDir => return Some(ABSOLUTE),

@@ -98,7 +98,7 @@ pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
     let (mut materials, libraries) = find_materials(path, parsed, options, &mut of_materials);
-    if !mesh.colors.is_empty() && !use_vertex_colors(&mut materials, &mesh) {
+    if !mesh.colors.is_empty() && !use_vertex_colors(&mut materials, &mesh, &mut of_materials) {
         mesh.colors = Vec::new();
     }
     Ok(ImportedModel {
@@ -136,9 +136,16 @@ fn reason_of_no_faces(bytes: &[u8], parsed: &ParsedObj) -> String {
 /// Lets vertex colours replace the diffuse colours of materials without a texture; returns whether there are any.
 ///
 /// With a texture they would darken it: photogrammetry writes the same colours in both.
-fn use_vertex_colors(materials: &mut [ImportedMaterial], mesh: &Mesh) -> bool {
+fn use_vertex_colors(materials: &mut [ImportedMaterial], mesh: &Mesh, warnings: &mut Warnings) -> bool {
     let mean = mesh.colors.iter().map(|color| color.as_dvec4()).sum::<DVec4>() / mesh.colors.len() as f64;
     let mut used = false;
+    for material in materials.iter_mut() {
+        // ZBrush names an image that few people pass on.
+        if let Some(lost) = material.diffuse_texture.take_if(|map| !map.path.exists()) {
+            let path = lost.path.display();
+            warnings.push(format!("{path}: cannot be read: no such file; the vertex colours are shown instead"));
+        }
+    }
     for material in materials.iter_mut().filter(|material| material.diffuse_texture.is_none()) {
         (used, material.vertex_colors, material.diffuse) = (true, true, Some(mean.truncate().as_vec3()));
         if material.name.is_empty() {

@@ -30,6 +30,21 @@ pub(super) struct Faces {
     pub too_short: usize,
     /// Number of corners without finite texture coordinates; they are 0.
     pub bad_uvs: usize,
+    /// The first index that no vertex has: its corner is [`NOWHERE`].
+    pub stray: Option<Located>,
+    /// What ended the faces before their number was reached.
+    pub broken: Option<Located>,
+}
+
+/// Index of a corner that is no vertex; files have fewer.
+pub(super) const NOWHERE: u32 = u32::MAX;
+
+/// What a face has beside its corners.
+#[derive(Default)]
+struct OfFace {
+    uvs: Vec<f32>,
+    channels: [f64; 3],
+    texture: u16,
 }
 
 /// An index that no texture has.
@@ -60,7 +75,8 @@ impl Faces {
         std::mem::take(&mut self.textures)
     }
 
-    /// Reads all rows of `face`; returns the number of those with more numbers than declared.
+    /// Reads the rows of `face` up to the first that is broken; returns the number of those with more numbers than
+    /// declared.
     ///
     /// - `n_textures`: number of textures in the header; `ignored`: receives the indices of properties that are not
     ///   used.
@@ -92,36 +108,13 @@ impl Faces {
         self.uvs.resize(if has_uvs { self.corners.len() } else { 0 }, Vec2::ZERO);
         self.textures.resize(if has_textures { self.arities.len() } else { 0 }, NO_TEXTURE);
         self.colors.resize(if colour.is_some() { self.arities.len() } else { 0 }, Vec3::ONE);
-        let (mut uvs, mut channels, mut texture, mut long_rows) = (Vec::new(), [0.0; 3], NO_TEXTURE, 0);
+        let (mut face, mut long_rows) = (OfFace { texture: NO_TEXTURE, ..OfFace::default() }, 0);
         for row in 0..element.count {
-            let missing = |problem, rows: &_| missing(problem, element, row, rows);
-            rows.begin_row().map_err(|problem| missing(problem, rows))?;
             let start = self.corners.len();
-            for (property, &role) in element.properties.iter().zip(&roles) {
-                match (role, property.length) {
-                    (Role::Indices, Some(_)) => {
-                        for _ in 0..next_length(element, row, property, rows)? {
-                            let index = self.next_index(element, row, property, rows, "face")?;
-                            self.corners.push(index);
-                        }
-                    }
-                    (Role::Uvs, Some(_)) => {
-                        uvs.clear();
-                        for _ in 0..next_length(element, row, property, rows)? {
-                            uvs.push(rows.next(property.number).map_err(|problem| missing(problem, rows))? as f32);
-                        }
-                    }
-                    (_, Some(_)) => skip_list(element, row, property, rows)?,
-                    (Role::Texture, None) => {
-                        let number = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
-                        let is_there = number >= 0.0 && number < n_textures.min(usize::from(NO_TEXTURE)) as f64;
-                        texture = if is_there { number as u16 } else { NO_TEXTURE };
-                    }
-                    (Role::Channel(channel), None) => {
-                        channels[channel] = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
-                    }
-                    (_, None) => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
-                }
+            if let Err(located) = self.read_face(element, row, rows, &roles, &mut face) {
+                self.corners.truncate(start);
+                self.broken = Some(located);
+                break;
             }
             long_rows += usize::from(rows.end_row());
             let count = self.corners.len() - start;
@@ -132,19 +125,61 @@ impl Faces {
             }
             self.arities.push(count as u32);
             if has_uvs {
-                self.add_uvs(&uvs, count);
+                self.add_uvs(&face.uvs, count);
             }
             if has_textures {
-                self.textures.push(texture);
+                let is_there = usize::from(face.texture) < n_textures;
+                self.textures.push(if is_there { face.texture } else { NO_TEXTURE });
             }
             if let Some((_, white)) = colour {
-                self.colors.push(self.colours.add(channels, white));
+                self.colors.push(self.colours.add(face.channels, white));
             }
         }
         if !self.colours.differ {
             self.colors = Vec::new();
         }
         Ok(long_rows)
+    }
+
+    /// Reads one row of `face`: its corners, and the rest into `face`.
+    fn read_face(
+        &mut self,
+        element: &Element,
+        row: u64,
+        rows: &mut impl Rows,
+        roles: &[Role],
+        face: &mut OfFace,
+    ) -> Result<(), Located> {
+        let missing = |problem, rows: &_| missing(problem, element, row, rows);
+        rows.begin_row().map_err(|problem| missing(problem, rows))?;
+        for (property, &role) in element.properties.iter().zip(roles) {
+            match (role, property.length) {
+                (Role::Indices, Some(_)) => {
+                    for _ in 0..next_length(element, row, property, rows)? {
+                        let index = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                        let corner = self.corner(index, element, row, rows);
+                        self.corners.push(corner);
+                    }
+                }
+                (Role::Uvs, Some(_)) => {
+                    face.uvs.clear();
+                    for _ in 0..next_length(element, row, property, rows)? {
+                        face.uvs.push(rows.next(property.number).map_err(|problem| missing(problem, rows))? as f32);
+                    }
+                }
+                (_, Some(_)) => skip_list(element, row, property, rows)?,
+                (Role::Texture, None) => {
+                    let number = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                    let is_number = number >= 0.0 && number < f64::from(NO_TEXTURE);
+                    face.texture = if is_number { number as u16 } else { NO_TEXTURE };
+                }
+                (Role::Channel(channel), None) => {
+                    face.channels[channel] = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                }
+                (_, None) => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
+            }
+        }
+        Ok(())
     }
 
     /// Adds the texture coordinates of a face.
@@ -162,7 +197,8 @@ impl Faces {
         }
     }
 
-    /// Reads all rows of `tristrips`; returns the number of those with more numbers than declared.
+    /// Reads the rows of `tristrips` up to the first that is broken; returns the number of those with more numbers than
+    /// declared.
     ///
     /// - `ignored`: receives the indices of properties that are not used.
     pub fn read_strips(
@@ -175,27 +211,9 @@ impl Faces {
         ignored.extend((0..element.properties.len()).filter(|&i| i != indices));
         let (mut strip, mut long_rows) = (Strip::default(), 0);
         for row in 0..element.count {
-            let missing = |problem, rows: &_| missing(problem, element, row, rows);
-            rows.begin_row().map_err(|problem| missing(problem, rows))?;
-            for (i, property) in element.properties.iter().enumerate() {
-                match property.length {
-                    None => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
-                    Some(_) if i != indices => skip_list(element, row, property, rows)?,
-                    Some(_) => {
-                        strip.restart();
-                        for _ in 0..next_length(element, row, property, rows)? {
-                            let index = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
-                            if index == -1.0 {
-                                strip.restart();
-                            } else if let Some(triangle) =
-                                strip.next(self.checked_index(index, element, row, rows, "tristrips")?)
-                            {
-                                self.corners.extend(triangle);
-                                self.arities.push(3);
-                            }
-                        }
-                    }
-                }
+            if let Err(located) = self.read_strip(element, row, rows, indices, &mut strip) {
+                self.broken = Some(located);
+                break;
             }
             long_rows += usize::from(rows.end_row());
         }
@@ -206,34 +224,50 @@ impl Faces {
         Ok(long_rows)
     }
 
-    #[inline]
-    fn next_index(
-        &self,
+    /// Reads one row of `tristrips`.
+    fn read_strip(
+        &mut self,
         element: &Element,
         row: u64,
-        property: &Property,
         rows: &mut impl Rows,
-        name: &'static str,
-    ) -> Result<u32, Located> {
-        let index = rows.next(property.number).map_err(|problem| missing(problem, element, row, rows))?;
-        self.checked_index(index, element, row, rows, name)
+        indices: usize,
+        strip: &mut Strip,
+    ) -> Result<(), Located> {
+        let missing = |problem, rows: &_| missing(problem, element, row, rows);
+        rows.begin_row().map_err(|problem| missing(problem, rows))?;
+        for (i, property) in element.properties.iter().enumerate() {
+            match property.length {
+                None => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
+                Some(_) if i != indices => skip_list(element, row, property, rows)?,
+                Some(_) => {
+                    strip.restart();
+                    for _ in 0..next_length(element, row, property, rows)? {
+                        let index = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                        if index == -1.0 {
+                            strip.restart();
+                        } else if let Some(triangle) = strip.next(self.corner(index, element, row, rows)) {
+                            self.corners.extend(triangle);
+                            self.arities.push(3);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 
+    /// The corner of an index of the file.
     #[inline]
-    fn checked_index(
-        &self,
-        index: f64,
-        element: &Element,
-        row: u64,
-        rows: &impl Rows,
-        name: &'static str,
-    ) -> Result<u32, Located> {
+    fn corner(&mut self, index: f64, element: &Element, row: u64, rows: &impl Rows) -> u32 {
         if index >= 0.0 && index < self.n_vertices as f64 && index.fract() == 0.0 {
-            return Ok(index as u32);
+            return index as u32;
         }
-        debug_assert_eq!(element.name, name);
-        let (index, count) = (index.to_string(), self.n_vertices);
-        Err((rows.place(), PlyProblem::OutOfRange { element: name, row, index, count }))
+        self.stray.get_or_insert_with(|| {
+            let name = if element.name == "face" { "face" } else { "tristrips" };
+            let (index, count) = (index.to_string(), self.n_vertices);
+            (rows.place(), PlyProblem::OutOfRange { element: name, row, index, count })
+        });
+        NOWHERE
     }
 
     /// Removes the faces with such a vertex; returns their number.

@@ -13,8 +13,8 @@ mod vertices;
 
 pub use error::PlyProblem;
 
-use self::faces::Faces;
-use self::header::{Encoding, Header};
+use self::faces::{Faces, NOWHERE};
+use self::header::{Element, Encoding, Header};
 use self::rows::{Bytes, Located, Rows, Text, skip_row};
 use self::vertices::Vertices;
 use super::model::assemble::assemble;
@@ -64,6 +64,21 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     if !unused.is_empty() {
         warn(format!("not modelled and ignored: {}", list(&unused)));
     }
+    let told = |(place, problem): Located| ModelError::of(path, place, problem);
+    let stray = faces.leave_out(|vertex| vertex == NOWHERE);
+    if let Some(first) = faces.stray.take() {
+        if faces.is_empty() {
+            return Err(told(first));
+        }
+        warnings.push(format!("{}; {stray} faces with such a vertex were removed", told(first)));
+    }
+    if let Some(end) = faces.broken.take() {
+        if faces.is_empty() {
+            return Err(told(end));
+        }
+        warnings.push(format!("{}; what comes before is shown", told(end)));
+    }
+    let mut warn = |text: String| warnings.push(format!("{}: {text}", path.display()));
     let lost = faces.leave_out(|vertex| !vertices.indexed.positions[vertex as usize].is_finite());
     if lost > 0 && faces.is_empty() {
         return Err(ModelError::of(path, Place::File, PlyProblem::NotFinite { faces: lost }));
@@ -212,13 +227,14 @@ impl Contents {
             let least = element.least_bytes(header.encoding);
             // The last line of a text may lack a line ending.
             let room = (rows.left() as u64 + 1) / least as u64;
-            if element.count > room {
+            if element.count > room && !has_faces(element) {
                 let (element, declared) = (printable::name(&element.name).to_string(), element.count);
                 return Err((rows.place(), PlyProblem::NoRoom { element, declared, room }));
             }
             let mut ignored = Vec::new();
             contents.long_rows += match &*element.name {
                 "vertex" => contents.vertices.read(element, &mut rows, &mut ignored)?,
+                _ if contents.faces.broken.is_some() => break,
                 "face" => contents.faces.read(element, &mut rows, n_textures, wants_colours, &mut ignored)?,
                 "tristrips" => contents.faces.read_strips(element, &mut rows, &mut ignored)?,
                 name => {
@@ -233,8 +249,17 @@ impl Contents {
             let property = |i: usize| format!("{name} property {}", printable::name(&element.properties[i].name));
             contents.unused.extend(ignored.into_iter().map(property));
         }
-        Ok(contents)
+        // The vertices may come after the faces.
+        match contents.faces.broken.take_if(|_| contents.vertices.indexed.positions.is_empty()) {
+            Some(end) => Err(end),
+            None => Ok(contents),
+        }
     }
+}
+
+/// Faces are read as far as they are there.
+fn has_faces(element: &Element) -> bool {
+    ["face", "tristrips"].contains(&&*element.name)
 }
 
 /// The first names, and the number of further ones.

@@ -14,20 +14,15 @@ use serde::{Deserialize, Serialize};
 pub enum PixelFilter {
     /// The pixel's square, uniform.
     #[default]
-    #[serde(alias = "Box")]
     Box,
     /// Falls linearly to zero at 1.
-    #[serde(alias = "Tent")]
     Tent,
     /// Gaussian with a standard deviation of 1/2, offset to reach zero at 1.5.
-    #[serde(alias = "Gaussian")]
     Gaussian,
     /// The four-term window of Harris 1978, zero from 1.65 on: almost no ringing.
-    #[serde(alias = "BlackmanHarris")]
     BlackmanHarris,
     /// Mitchell and Netravali 1988, B = C = 1/3, zero from 2 on: sharpens. Its negative lobes give samples negative
     /// weights, so that images with few samples look speckled; the expectation is correct.
-    #[serde(alias = "Mitchell")]
     Mitchell,
 }
 

@@ -12,10 +12,8 @@ use thiserror::Error;
 pub enum Integrator {
     /// Unbiased path tracing.
     #[default]
-    #[serde(alias = "Path")]
     Path,
     /// The classic local model with shadows and recursive mirrors and glass.
-    #[serde(alias = "Phong")]
     Phong,
 }
 

@@ -50,11 +50,6 @@ impl Block {
         Self { start, size, spp: 0, ranges, mean_of: 0, steps, base: 0, due, shadow_share: 0.0 }
     }
 
-    /// Number of blocks in a tile of this size.
-    pub fn count(tile: UVec2) -> usize {
-        tile.x.div_ceil(BLOCK_SIZE) as usize * tile.y.div_ceil(BLOCK_SIZE) as usize
-    }
-
     /// Whether the change of the mean between the halves of `mean_of` samples is measured.
     pub fn knows_half_step(&self) -> bool {
         self.steps.at > 0 && self.steps.at == self.mean_of

@@ -46,10 +46,8 @@ pub struct FilmLayout {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub round: Option<RoundRecord>,
     /// State of light tracing, if there is any.
-    #[serde(rename = "lamps")]
     pub light_traced: Option<LightTracingRecord>,
-    /// How caustics are rendered; `None` without samples. Older films without this field have one light path per four
-    /// camera paths, if they have light paths.
+    /// How caustics are rendered; `None` without samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub caustics: Option<CausticPlan>,
 }
@@ -143,54 +141,6 @@ impl StepsRecord {
 
 fn is_zero(n: &u32) -> bool {
     *n == 0
-}
-
-/// Layout of films from before blocks had their own sample counts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OldFilmLayout {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Side of a tile in pixels.
-    pub tile_size: u32,
-    /// Row by row from the top.
-    pub tiles: Vec<OldTileRecord>,
-    /// State of light tracing, if there is any.
-    #[serde(rename = "lamps")]
-    pub light_traced: Option<LightTracingRecord>,
-}
-
-/// Sample ranges of a tile; its error statistics are not read.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OldTileRecord {
-    /// First sample and the one after the last, per range.
-    pub samples: Vec<(u32, u32)>,
-    /// Rejected samples: pixel index in the tile and sample number.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub bad: Vec<(u32, u32)>,
-}
-
-impl OldFilmLayout {
-    /// Planes of such a film: the first ones of the current format.
-    pub const N_PLANES: usize = 15;
-
-    /// Converts to the current layout with the same samples; the error is unknown until they double.
-    pub fn renewed(self) -> FilmLayout {
-        let Self { width, height, tile_size, tiles, light_traced } = self;
-        let n_tiles_x = width.div_ceil(tile_size.max(1)).max(1);
-        let renew = |(i, tile): (usize, OldTileRecord)| {
-            let at = UVec2::new(i as u32 % n_tiles_x, i as u32 / n_tiles_x).saturating_mul(UVec2::splat(tile_size));
-            let size = UVec2::new(width, height).saturating_sub(at).min(UVec2::splat(tile_size));
-            let steps = StepsRecord::default();
-            let block = BlockRecord { samples: tile.samples, mean_of: 0, steps, due: None, shadow_share: 0 };
-            // Missing tiles are rejected later.
-            let blocks = vec![block; Block::count(size)];
-            TileRecord { blocks, bad: tile.bad, light_mean_of: 0, light_steps: StepsRecord::default() }
-        };
-        let tiles = tiles.into_iter().enumerate().map(renew).collect();
-        FilmLayout { width, height, tile_size, tiles, round: None, light_traced, caustics: None }
-    }
 }
 
 impl FilmLayout {
@@ -340,7 +290,7 @@ impl Film {
             }
         }
         film.round = record.layout.round(&film)?;
-        film.caustic_plan = caustics.or(light_traced.as_ref().map(|_| CausticPlan::UNKNOWN));
+        film.caustic_plan = *caustics;
         if film.caustic_plan.is_some_and(|plan| !plan.is_valid() || light_traced.is_some() && !plan.has_light_paths()) {
             return Err(RecordError::LightPaths);
         }

@@ -85,7 +85,7 @@ impl Scatter for Lobe {
                 if !metal.facing() {
                     return (Vec3::ZERO, 0.0);
                 }
-                let found = metal.eval_one(metal.local(wi.into()));
+                let found = metal.eval(metal.local(wi.into()));
                 (Vec3::from(found.tint) * found.value, found.pdf)
             }
             _ => (Vec3::ZERO, 0.0),
@@ -130,7 +130,7 @@ impl Scatter for Lobe {
                 if local.z <= 0.0 {
                     return None;
                 }
-                let found = metal.eval_one(local);
+                let found = metal.eval(local);
                 let weight = Vec3::from(found.tint) * found.weight;
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, chance: 1.0, through: None })
             }

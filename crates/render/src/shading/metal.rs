@@ -3,7 +3,6 @@
 use crate::shading::dielectric::reflect;
 use crate::shading::ggx;
 use firstlight_simd::{Real, Truth, Vector3, select_vector};
-use std::f32::consts::PI;
 
 /// A metal seen along `wo`.
 #[derive(Clone, Copy)]
@@ -78,25 +77,6 @@ impl<R: Real> Metal<R> {
         let found = ggx::reflection(self.wo, self.lambda_o, wi, self.alpha);
         let tint = tint(self.schlick, self.reflectance, self.wo.dot(found.half));
         MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight }
-    }
-}
-
-impl Metal<f32> {
-    /// Like [`Self::eval`], with value and pdf rounded in another order: images of scenes whose metals are shaded one
-    /// at a time depend on it.
-    #[inline]
-    pub fn eval_one(&self, wi: Vector3<f32>) -> MetalValue<f32> {
-        let found = self.eval(wi);
-        let h = (self.wo + wi).normalize();
-        let (a2, lambda_i) = (self.alpha * self.alpha, ggx::lambda(wi, self.alpha));
-        let d = a2 * h.z * h.z + (h.x * h.x + h.y * h.y);
-        let distribution = a2 / (PI * d * d);
-        let g2 = 1.0 / (1.0 + self.lambda_o + lambda_i);
-        MetalValue {
-            value: distribution * g2 / (4.0 * self.wo.z * wi.z) * wi.z,
-            pdf: distribution / ((1.0 + self.lambda_o) * 4.0 * self.wo.z),
-            ..found
-        }
     }
 }
 

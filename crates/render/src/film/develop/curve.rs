@@ -9,14 +9,11 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
     /// Clips at 1.
-    #[serde(alias = "Linear")]
     Linear,
     /// Khronos PBR Neutral: preserves colours, compresses highlights.
     #[default]
-    #[serde(alias = "Neutral")]
     Neutral,
     /// Filmic: Hill's fit of the ACES reference rendering and output transforms.
-    #[serde(alias = "Filmic")]
     Filmic,
 }
 
