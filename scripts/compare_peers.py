@@ -309,7 +309,7 @@ def firstlight_curve(args, scene, source, reference_path, turn):
         with open(target, "w", encoding="utf-8") as file:
             file.write(converter.Converter(scene, source, target).convert())
         subprocess.run(
-            [args.program, "report", target, "--reference", reference_path, "--no-ablation", "--out", folder,
+            [args.program, "report", target, "--reference", reference_path, "--no-ablation", "--output", folder,
              "--threads", str(args.threads), "--spp", str(args.spp * args.further), "--seed", str(1 + turn)],
             check=True, stdout=subprocess.DEVNULL,
         )

@@ -21,8 +21,6 @@ type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 pub(super) struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
-    /// Number of vertices and indices that were built.
-    made: AtomicU64,
     /// Of all images that are decoded.
     pixels: PixelBudget,
     /// Images that were decoded and not yet taken, by path.
@@ -40,6 +38,8 @@ pub(super) struct Opened {
     /// By the path of the model in texture paths.
     surfaces: Mutex<HashMap<String, Arc<Surfaces>>>,
     meshes: Mutex<HashMap<(MeshKey, Option<u64>), Arc<BuiltMesh>>>,
+    /// Number of their vertices and indices, as the file states it.
+    made: AtomicU64,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -73,6 +73,7 @@ impl Documents {
             posed: Mutex::default(),
             surfaces: Mutex::default(),
             meshes: Mutex::default(),
+            made: AtomicU64::default(),
         });
         open.insert(path.to_owned(), opened.clone());
         Ok(opened)
@@ -84,14 +85,14 @@ impl Documents {
         if let Some(mesh) = lock(&opened.meshes).get(&known) {
             return Ok(mesh.clone());
         }
+        let limit = opened.document.most_own_numbers();
+        let numbers = opened.document.numbers_of(key.mesh);
+        if opened.made.fetch_add(numbers, Ordering::Relaxed) + numbers > limit {
+            return Err((String::new(), GltfProblem::TooLarge { limit }));
+        }
         let posed = opened.posed(at);
         let mesh =
             Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
-        let limit = opened.document.most_numbers();
-        let numbers = (mesh.mesh.positions.len() + 3 * mesh.mesh.triangles.len()) as u64;
-        if self.made.fetch_add(numbers, Ordering::Relaxed) + numbers > limit {
-            return Err((String::new(), GltfProblem::TooLarge { limit }));
-        }
         Ok(lock(&opened.meshes).entry(known).or_insert(mesh).clone())
     }
 

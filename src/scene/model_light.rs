@@ -6,6 +6,7 @@
 //! result is a function of model and camera.
 
 use super::bounds::MOST_STOPS;
+use super::components::Shape;
 use super::default_scene::{self, is_inner};
 use super::extract::Extraction;
 use super::file::{DisplayPart, LightPart, MaterialPart, ObjectPart};
@@ -210,7 +211,10 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
 
     let mut world = World::new();
     scene.spawn(&mut world);
-    let scene = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
+    let mut inputs = SceneInputs::of(&mut world);
+    // The ground is none of the model, and always lit.
+    inputs.objects.retain(|object| !matches!(object.shape, Shape::Plane { .. }));
+    let scene = Extraction::new(&inputs, &scene.trees).prepared;
     let width = (PIXELS * aspect).sqrt().clamp(8.0, PIXELS / 8.0).round();
     let size = UVec2::new(width as u32, (PIXELS / width).round() as u32);
     let settings = |max_depth| {

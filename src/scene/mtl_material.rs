@@ -6,13 +6,13 @@
 
 use super::file::MaterialPart;
 use super::obj::{ImportedMaterial, PbrMaterial, TextureMap};
-use super::picture::{Alpha, alpha_of};
+use super::picture::{Alpha, PixelBudget, alpha_of};
 use super::sources::TextureSource;
 use super::value::{ColorValue, Rgb, ScalarValue};
 use crate::render::{Channel, Encoding, Wrap};
 use glam::{DVec2, Vec3};
-use std::collections::HashSet;
-use std::path::PathBuf;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
 /// Exponents from here on belong to mirrors: textbooks write 900 to 1024, and for Blender it is a roughness below 0.05.
 const MIRROR_EXPONENT: f32 = 900.0;
@@ -23,6 +23,9 @@ pub(super) struct MtlMaterials {
     /// Name, description and image of each texture.
     pub textures: Vec<(String, TextureSource, PathBuf)>,
     names: HashSet<String>,
+    /// Alpha of the images that were looked at, by their real paths, and the pixels that may be decoded for it.
+    alphas: HashMap<PathBuf, Alpha>,
+    pixels: PixelBudget,
 }
 
 impl MtlMaterials {
@@ -108,8 +111,7 @@ impl MtlMaterials {
         let is_of_color = material.diffuse_texture.as_ref().is_some_and(|color| color.path == map.path);
         let channel = match map.channel {
             Some(channel) => Some(channel),
-            // That an image cannot be read is told when its texture is.
-            None => match alpha_of(&map.path).unwrap_or(Alpha::Missing) {
+            None => match self.alpha(&map.path) {
                 Alpha::Varies => Some(Channel::A),
                 Alpha::Uniform if is_of_color => return ScalarValue::Number(opacity),
                 Alpha::Uniform | Alpha::Missing => None,
@@ -117,6 +119,13 @@ impl MtlMaterials {
         };
         let factor = if opacity > 0.0 { opacity } else { 1.0 };
         ScalarValue::Texture(self.data(&TextureMap { gain: factor * map.gain, ..map.clone() }, channel))
+    }
+
+    /// That an image cannot be read is told when its texture is.
+    fn alpha(&mut self, path: &Path) -> Alpha {
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let pixels = &self.pixels;
+        *self.alphas.entry(real).or_insert_with(|| alpha_of(path, pixels).unwrap_or(Alpha::Missing))
     }
 
     fn data_or(&mut self, map: Option<&TextureMap>, plain: f32) -> ScalarValue {
@@ -223,7 +232,8 @@ impl<'a> Meaning<'a> {
         // A colour texture of the PBR extension tints glass; elsewhere it says that there is a surface.
         let has_surface = if material.pbr.is_some() { material.opacity_texture.is_some() } else { has_image };
         // `illum` alone says too little: some programs write 7 for everything that reflects.
-        let is_seen_through = material.ior.is_some() || meaning.opacity < 1.0 || meaning.base == Vec3::ZERO;
+        let is_black = material.diffuse.is_none_or(|color| color == Vec3::ZERO);
+        let is_seen_through = material.ior.is_some() || meaning.opacity < 1.0 || is_black;
         if is_glass && is_seen_through && !has_surface {
             (meaning.transmits, meaning.opacity) = (true, 1.0);
         }

@@ -33,6 +33,9 @@ pub enum PictureError {
     /// A KTX2 file that is damaged, or that is no texture of Basis Universal.
     #[error("cannot be decoded: {0}")]
     Ktx2(String),
+    /// The image says that it has no pixels.
+    #[error("has no pixels")]
+    Empty,
     /// The image has more pixels than the limits allow.
     #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
     TooLarge {
@@ -176,9 +179,11 @@ pub(super) enum Alpha {
 
 /// Whether alpha of an image says anything, for maps that do not tell their channel. Decodes images with alpha.
 ///
+/// - `budget`: pixels that may be decoded for this.
+///
 /// # Errors
 /// Like [`read_picture`].
-pub(super) fn alpha_of(path: &Path) -> Result<Alpha, PictureError> {
+pub(super) fn alpha_of(path: &Path, budget: &PixelBudget) -> Result<Alpha, PictureError> {
     let limits = Limits::of_this_process();
     let reader = picture_reader(path, &limits)?;
     if matches!(reader.format(), None | Some(ImageFormat::Hdr)) {
@@ -188,7 +193,7 @@ pub(super) fn alpha_of(path: &Path) -> Result<Alpha, PictureError> {
     if !decoder.color_type().has_alpha() {
         return Ok(Alpha::Missing);
     }
-    let picture = decode_within(decoder, &limits, &PixelBudget::default())?;
+    let picture = decode_within(decoder, &limits, budget)?;
     let pixels = picture.into_luma_alpha16();
     let mut alphas = pixels.pixels().map(|pixel| pixel.0[1]);
     let first = alphas.next();
@@ -304,6 +309,9 @@ fn decode_within(
     // A few bytes can claim any size: it is checked before decoding.
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 {
+        return Err(PictureError::Empty);
+    }
     if pixels > limits.picture_pixels {
         return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
     }
@@ -342,6 +350,20 @@ mod tests {
         }
         std::fs::write(&path, "#?RGBE\n").unwrap();
         assert!(read_picture(&path).unwrap_err().to_string().contains("decoded"));
+    }
+
+    #[test]
+    fn pictures_without_pixels_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, bytes) in [
+            ("a.ppm", "P6\n0 1\n255\n"),
+            ("a.pam", "P7\nWIDTH 0\nHEIGHT 1\nDEPTH 3\nMAXVAL 255\nTUPLTYPE RGB\nENDHDR\n"),
+            ("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 2\n"),
+        ] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            assert!(matches!(read_picture(&path), Err(PictureError::Empty)), "{name}");
+        }
     }
 
     /// A few hundred bytes that would decode to gigabytes are rejected by their size; devices and pipes are not opened.
@@ -389,12 +411,12 @@ mod tests {
         let path = dir.path().join("a.png");
         let alpha = |pixels: Vec<u8>| {
             image::GrayAlphaImage::from_raw(2, 1, pixels).unwrap().save(&path).unwrap();
-            alpha_of(&path).unwrap()
+            alpha_of(&path, &PixelBudget::default()).unwrap()
         };
         assert_eq!([alpha(vec![9, 255, 7, 255]), alpha(vec![9, 0, 9, 255])], [Alpha::Uniform, Alpha::Varies]);
         image::GrayImage::new(2, 1).save(&path).unwrap();
-        assert_eq!(alpha_of(&path).unwrap(), Alpha::Missing);
-        assert!(alpha_of(&dir.path().join("none.png")).is_err());
+        assert_eq!(alpha_of(&path, &PixelBudget::default()).unwrap(), Alpha::Missing);
+        assert!(alpha_of(&dir.path().join("none.png"), &PixelBudget::default()).is_err());
     }
 
     #[test]

@@ -143,7 +143,7 @@ fn time_and_error_end_a_render() {
 #[test]
 fn the_error_of_each_pixel_is_written_as_the_picture_tells_it() {
     let folder = tempfile::tempdir().unwrap();
-    let line = "render cornell -o a.png --size 50x40 --spp 24 --error-picture e.exr --json";
+    let line = "render cornell -o a.png --size 50x40 --spp 24 --error-image e.exr --json";
     let out = firstlight(folder.path(), &line.split(' ').collect::<Vec<_>>());
     let json: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
     let told = json["estimated_error"].as_f64().unwrap();
@@ -154,7 +154,7 @@ fn the_error_of_each_pixel_is_written_as_the_picture_tells_it() {
     assert!((mean / told - 1.0).abs() < 1e-4, "{mean} for {told}");
     assert!(errors.pixels().all(|pixel| pixel[0] >= 0.0 && pixel[0] == pixel[2]));
     for (name, why) in [("e.png", "must end in .exr"), ("b.exr", "two outputs have the same name")] {
-        let line = format!("render cornell -o b.exr --spp 2 --error-picture {name}");
+        let line = format!("render cornell -o b.exr --spp 2 --error-image {name}");
         let mut command = Command::cargo_bin("firstlight").unwrap();
         let output = command.current_dir(folder.path()).args(line.split(' ')).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);

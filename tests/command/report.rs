@@ -144,7 +144,7 @@ fn the_command_writes_a_page_and_a_table() {
         command.current_dir(&folder).env("XDG_CACHE_HOME", folder.path().join("cache"));
         command
     };
-    let text = ["report", "cornell", "--size", "20x20", "--spp", "4", "--out", "deep/page"];
+    let text = ["report", "cornell", "--size", "20x20", "--spp", "4", "--output", "deep/page"];
     let output = command().args(text).assert().success();
     let said = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
     assert!(said.contains("cornell") && said.contains("20x20"), "{said}");
@@ -184,7 +184,7 @@ fn a_reference_of_another_scene_is_told_from_a_noisy_one() {
         ("classic", "render cornell --size 64x64 --spp 64 --seed 5 --integrator phong"),
     ] {
         assert!(report_in(folder.path(), &format!("{line} -o {reference}.exr")).status().unwrap().success());
-        let line = format!("report cornell --reference {reference}.exr --spp 16 --no-ablation --out {reference}");
+        let line = format!("report cornell --reference {reference}.exr --spp 16 --no-ablation --output {reference}");
         let output = report_in(folder.path(), &line).output().unwrap();
         assert!(output.status.success());
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -208,7 +208,7 @@ fn ctrl_c_writes_what_was_measured_and_leaves_no_empty_folder() {
     for (more, is_written) in [("--size 48x48", false), ("--reference truth.exr", true)] {
         // A busy machine may need a while until Ctrl+C is heard, and for the first step.
         let output = [1.0, 5.0, 25.0].into_iter().find_map(|seconds| {
-            let line = format!("report cornell {more} --spp 1048576 --out deep/page");
+            let line = format!("report cornell {more} --spp 1048576 --output deep/page");
             let mut command = report_in(folder.path(), &line);
             let child =
                 command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();

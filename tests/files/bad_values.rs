@@ -426,3 +426,25 @@ fn a_byte_order_mark_changes_nothing() {
     let places = ["\u{feff}", ""].map(|mark| SceneFile::parse(&format!("{mark}(objets: 3)"), "a.ron").unwrap_err());
     assert_eq!(places[0], places[1]);
 }
+
+/// What a few bytes could ask for very often has a limit for the whole scene.
+#[test]
+fn totals_of_a_scene_are_limited() {
+    let of = |objects: &[String]| {
+        let text =
+            format!("({CAMERA_PART}, materials: {{\"m\": diffuse(albedo: 0.5)}}, objects: [{}])", objects.join(", "));
+        SceneFile::parse(&text, Path::new("a.ron")).map(drop).map_err(|error| error.to_string())
+    };
+    let grid =
+        |i: u32| format!("ball_grid(first: ({i}, 0, 0), steps: [(4000000, (1, 0, 0))], radius: 0.1, material: \"m\")");
+    let grids: Vec<String> = (0..5).map(grid).collect();
+    assert_eq!(of(&grids[..4]), Ok(()));
+    assert!(of(&grids).unwrap_err().contains("all grids together may have up to 16000000 spheres"));
+    let mesh =
+        |i: u32| format!("mesh(source: builtin(\"torus\"), simplify: {}, material: \"m\")", 0.5 + f64::from(i) / 1e4);
+    let meshes: Vec<String> = (0..257).map(mesh).collect();
+    assert_eq!(of(&meshes[..256]), Ok(()));
+    assert!(of(&meshes).unwrap_err().contains("may be simplified to up to 256 ratios"));
+}
+
+const CAMERA_PART: &str = "camera: (eye: (0, 1, 5), look_at: (0, 1, 0))";

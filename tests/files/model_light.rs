@@ -2,8 +2,10 @@
 
 use super::gltf_writer::{Writer, quad};
 use firstlight::scene::{
-    ColorValue, EnvironmentSource, LoadOptions, LoadedScene, SceneSource, file::MaterialPart, file::ObjectPart, load,
+    ColorValue, EnvironmentSource, LoadOptions, LoadedScene, SceneSource, file::LightPart, file::MaterialPart,
+    file::ObjectPart, load,
 };
+use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -114,10 +116,36 @@ fn a_room_under_its_own_ceiling_gets_no_other_light() {
     assert!(says(&glaring, "exposure"));
 }
 
+/// Seen from its own camera, or from outside through the backs of its walls.
 #[test]
-fn a_view_that_no_light_reaches_says_so() {
-    let dark = opened("a.glb", &room(0.0), None);
-    assert!(generated(&dark).is_some() && says(&dark, "hardly any light reaches"), "{:?}", dark.warnings);
+fn a_closed_room_is_lit_inside() {
+    let mut json = room(0.0);
+    let inside = opened("a.glb", &json, None);
+    // The same length, so that the chunk stays whole.
+    let at = json.windows(10).position(|part| part == b"\"camera\":0").unwrap();
+    json[at..at + 10].copy_from_slice(b"\"kamera\":0");
+    let outside = opened("a.glb", &json, None);
+    for (scene, position) in [(&inside, DVec3::new(0.0, 0.0, 0.9)), (&outside, DVec3::ZERO)] {
+        assert!(generated(scene).is_some() && says(scene, "a light is added there"), "{:?}", scene.warnings);
+        let [LightPart::Point { position: at, .. }] = &scene.file.lights[..] else { panic!("one light inside") };
+        assert!(at.abs_diff_eq(position, 0.01), "{at}");
+        assert!(!says(scene, "hardly any light"), "{:?}", scene.warnings);
+    }
+    // A wall that is open needs none.
+    assert!(opened("a.glb", &with_part(&json!({}), 0.5), None).file.lights.is_empty());
+}
+
+/// Its floor would be at the same place, and rays would find either.
+#[test]
+fn the_ground_is_below_the_floor_of_the_model() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    writer.json["nodes"][0]["rotation"] = json!([-0.5_f64.sqrt(), 0, 0, 0.5_f64.sqrt()]);
+    let scene = opened("a.glb", &writer.glb(), None);
+    let heights: Vec<f64> = (scene.file.objects.iter())
+        .filter_map(|object| if let ObjectPart::Plane { point, .. } = object { Some(point.y) } else { None })
+        .collect();
+    assert!(matches!(heights[..], [y] if (-1e-3..-1e-4).contains(&y)), "{heights:?}");
 }
 
 #[test]

@@ -325,7 +325,7 @@ fn names_of_any_bytes_are_read_and_written() {
         "info m?.png",
         "explain s?.ron --pixel 3,3 --spp 1",
         "render r?.ron -o turn?.png --spp 1 --turntable 2",
-        "report r?.ron --out rep? --spp 4 --no-ablation --size 8x6",
+        "report r?.ron --output rep? --spp 4 --no-ablation --size 8x6",
         "r?.ron --size 8x6",
     ] {
         run(line, 0);

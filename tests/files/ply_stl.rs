@@ -286,6 +286,21 @@ fn doubled_vertices_of_a_seam_are_smoothed_as_one() {
     assert!((mesh.normals[1] - Vec3::new(2., 0., 1.).normalize()).length() < 1e-6);
 }
 
+/// What is broken costs only itself, as in OBJ.
+#[test]
+fn faces_of_ply_that_are_whole_are_shown() {
+    let of = |body: &str| read(ModelFormat::Ply, &plain("3", "3", body), &ModelOptions::default()).unwrap();
+    for (faces, told) in [
+        ("3 0 1 2\n3 0 1 3\n3 0 2 1\n", "uses vertex 3"),
+        ("3 0 1 2\n3 0 2 1\n", "the file ends in element `face` 2 of 3"),
+        ("3 0 1 2\n3 0 2 1\n3 0 x 1\n", "`x`"),
+    ] {
+        let model = of(&format!("{CORNERS}{faces}"));
+        assert_eq!(model.mesh.triangles.len(), 2, "{faces}");
+        assert!(model.warnings.iter().any(|warning| warning.contains(told)), "{:?}", model.warnings);
+    }
+}
+
 #[test]
 fn bad_ply_files_are_refused_with_their_place() {
     let truncated = |element: &str, row, declared| PlyProblem::Truncated { element: element.to_owned(), row, declared };
@@ -300,7 +315,7 @@ fn bad_ply_files_are_refused_with_their_place() {
             (Place::File, PlyProblem::NotFinite { faces: 1 })
         );
     }
-    assert_eq!(of("3", "2", &format!("{CORNERS}3 0 1 2\n")), (Place::Line(13), truncated("face", 1, 2)));
+    assert_eq!(of("3", "1", CORNERS), (Place::Line(12), truncated("face", 0, 1)));
     let text = "x".to_owned();
     assert_eq!(of("3", "1", "0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n"), (Place::Line(10), PlyProblem::NotNumber { text }));
     for (line, found) in [("3 0 1", 3), ("9 0 1 2", 4)] {
@@ -338,8 +353,15 @@ fn huge_counts_are_refused_before_anything_is_allocated() {
                 );
                 let mut file = Ply::new(encoding, &header);
                 (0..3).for_each(|_| file.put("uchar", 0.0).end_row());
-                (0..3).for_each(|i| file.put_all("float", &[i.into(), 1.0, 0.0]).end_row());
+                (0..3).for_each(|i| file.put_all("float", &[i.into(), f64::from(i % 2), 0.0]).end_row());
                 (0..3).for_each(|_| file.put("int", 3.0).put_all("int", &[0.0, 1.0, 2.0]).end_row());
+                if element == "face" {
+                    // Those that are there are shown.
+                    let model = ply(&file.bytes);
+                    let told = model.warnings.iter().any(|warning| warning.contains("it is truncated"));
+                    assert!(told && model.mesh.triangles.len() == 3, "{:?}", model.warnings);
+                    continue;
+                }
                 let (_, found) = ply_problem(&file.bytes);
                 let is_refused = matches!(found, PlyProblem::NoRoom { .. } | PlyProblem::TooManyVertices { .. });
                 assert!(is_refused, "{encoding:?} {element}: {found}");
@@ -374,14 +396,17 @@ fn huge_counts_are_refused_before_anything_is_allocated() {
 }
 
 #[test]
-fn a_ply_file_that_is_cut_anywhere_is_an_error() {
+fn a_ply_file_that_is_cut_anywhere_is_told() {
     for encoding in ENCODINGS {
         let whole = pyramid(encoding, "float", "int");
         // Text may lose the end of its last line and still be a number.
         let last = if encoding == Encoding::Ascii { whole.len() - 8 } else { whole.len() };
         for length in 0..last {
-            let error = read(ModelFormat::Ply, &whole[..length], &ModelOptions::default()).err();
-            assert!(error.is_some(), "{encoding:?}: {length} of {} bytes", whole.len());
+            let told = match read(ModelFormat::Ply, &whole[..length], &ModelOptions::default()) {
+                Err(_) => true,
+                Ok(model) => model.warnings.iter().any(|warning| warning.contains("what comes before is shown")),
+            };
+            assert!(told, "{encoding:?}: {length} of {} bytes", whole.len());
         }
     }
 }

@@ -485,7 +485,65 @@ fn textures_of_basis_universal_are_read() {
             let _ = read_picture_within(&image, &Limits::USUAL);
         }
     }
+    // Nor where parts of the file wrap around or overlap.
+    for at in (44..104).step_by(4) {
+        for first in [1, 12, 150, 0x7fff_ffff, u32::MAX - 7, u32::MAX] {
+            for second in [0, 1, 20, 0x8000_0000, u32::MAX] {
+                let mut bytes = uastc();
+                bytes[at..at + 4].copy_from_slice(&first.to_le_bytes());
+                bytes[at + 4..at + 8].copy_from_slice(&second.to_le_bytes());
+                std::fs::write(&image, &bytes).unwrap();
+                let _ = read_picture_within(&image, &Limits::USUAL);
+            }
+        }
+    }
     assert_eq!(saved(&scene, folder.path()).content_fingerprint(), scene.content_fingerprint());
+}
+
+/// An exporter reserved them and never filled them.
+#[test]
+fn vertex_colours_of_zeros_alone_are_left_out() {
+    let mut writer = two_squares();
+    let colors = writer.floats("VEC4", &[0.0; 16]);
+    writer.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, writer.glb()).unwrap();
+    let scene = open(&path).unwrap();
+    assert!(scene.warnings.iter().any(|warning| warning.contains("COLOR_0 is left out")), "{:?}", scene.warnings);
+    assert_eq!(n_triangles(&scene), 4);
+}
+
+/// A few bytes refer to the same data very often.
+#[test]
+fn shared_data_is_counted_before_it_is_built() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let refused = |writer: &Writer| {
+        std::fs::write(&path, writer.glb()).unwrap();
+        let start = std::time::Instant::now();
+        let error = open(&path).err().unwrap_or_default();
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+        error
+    };
+    // Meshes that differ only in their names.
+    let mut writer = Writer::default();
+    let positions = writer.accessor(json!({ "componentType": 5126, "count": 1 << 20, "type": "VEC3" }));
+    for _ in 0..200 {
+        writer.mesh(json!({ "attributes": { "POSITION": positions } }));
+    }
+    let error = refused(&writer);
+    assert!(error.contains("vertices and indices together"), "{error}");
+    // Nodes with a million equal instances each.
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let moves = writer.accessor(json!({ "componentType": 5126, "count": 1 << 20, "type": "VEC3" }));
+    let instances = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": moves } } });
+    let node = json!({ "mesh": 0, "extensions": instances });
+    writer.json["nodes"] = json!(vec![node; 500]);
+    writer.json["scenes"] = json!([{ "nodes": (0..500).collect::<Vec<_>>() }]);
+    let error = refused(&writer);
+    assert!(error.contains("more than a file of this size can have"), "{error}");
 }
 
 /// A KTX2 file of 4 x 4 red pixels: one block of UASTC in its mode of a single colour.

@@ -33,6 +33,26 @@ fn rendered(scene: &Prepared, settings: &RenderSettings, spp: u32) -> Film {
     film
 }
 
+/// Light in physical units, such as a sun of 100,000 lux: what is relative does not depend on the unit. Powers of two round
+/// nothing.
+#[test]
+fn a_scene_of_another_unit_gets_the_same_samples() {
+    let film = |power: i32| {
+        let unit = 2.0_f32.powi(power);
+        let ball = sphere(Vec3::new(0.0, 0.5, 0.0), 0.5);
+        let lamp = quad(Vec3::new(-0.3, 2.0, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+        let eye = camera(Vec3::new(0.0, 1.5, 4.0), Vec3::new(0.0, 0.5, 0.0), 50.0);
+        let materials = vec![diffuse(0.7), emissive(300.0 * unit)];
+        rendered(&scene(vec![(ball, 0), (lamp, 1)], materials, Environment::Black, eye), &adaptive(), 64)
+    };
+    let (small, large) = (film(7), film(17));
+    let error = |film: &Film| film.error_estimate().map(|estimate| estimate.relative);
+    assert_eq!(error(&small), error(&large));
+    let counts = |film: &Film| (0..75 * 50).map(|i| film.samples(i % 75, i / 75)).collect::<Vec<_>>();
+    assert!(counts(&small) == counts(&large));
+    assert!(small.sample_counts().2 > small.sample_counts().0, "samples differ");
+}
+
 #[test]
 fn samples_go_where_the_error_is_and_are_no_more_than_asked_for() {
     let scene = half_empty();

@@ -41,6 +41,7 @@ pub fn check(file: &SceneFile, most: usize) -> Found {
     for (name, material) in file.materials.iter() {
         check.material(name, material);
     }
+    check.totals();
     for (i, object) in file.objects.iter().enumerate() {
         check.object(&format!("objects/{i}"), object);
     }
@@ -348,8 +349,35 @@ impl Check<'_> {
         }
     }
 
+    /// What a few bytes could ask for very often.
+    fn totals(&mut self) {
+        let mut spheres = 0;
+        let mut ratios: HashMap<&MeshSource, HashSet<u64>> = HashMap::new();
+        for (i, object) in self.file.objects.iter().enumerate() {
+            match object {
+                ObjectPart::BallGrid { steps, .. } => {
+                    spheres += number_of(steps).min(SceneFile::MAX_GRID_BALLS);
+                    if spheres > SceneFile::MAX_BALLS {
+                        let message = format!("all grids together may have up to {} spheres", SceneFile::MAX_BALLS);
+                        return self.wrong(&format!("objects/{i}/steps"), message);
+                    }
+                }
+                ObjectPart::Mesh { source, simplify: Some(ratio), .. } => {
+                    let of_source = ratios.entry(source).or_default();
+                    of_source.insert(ratio.to_bits());
+                    if of_source.len() > SceneFile::MAX_RATIOS {
+                        let most = SceneFile::MAX_RATIOS;
+                        let message = format!("a mesh may be simplified to up to {most} ratios in one scene");
+                        return self.wrong(&format!("objects/{i}/simplify"), message);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
     fn steps(&mut self, path: &str, first: DVec3, steps: &[(u32, DVec3)]) {
-        let n: u64 = steps.iter().map(|(count, _)| u64::from(*count)).fold(1, u64::saturating_mul);
+        let n = number_of(steps);
         let reach = steps.iter().map(|(count, step)| f64::from(*count) * step.abs()).fold(first.abs(), |a, b| a + b);
         if n == 0 || n > SceneFile::MAX_GRID_BALLS || steps.len() > 3 {
             let message =
@@ -506,4 +534,9 @@ impl Check<'_> {
             self.wrong(path, format!("the {what} has no area: its edges are parallel"));
         }
     }
+}
+
+/// Number of spheres of a grid.
+fn number_of(steps: &[(u32, DVec3)]) -> u64 {
+    steps.iter().map(|(count, _)| u64::from(*count)).fold(1, u64::saturating_mul)
 }

@@ -31,6 +31,12 @@ use std::path::Path;
 impl SceneFile {
     /// Maximum number of spheres of one grid.
     pub const MAX_GRID_BALLS: u64 = 4_000_000;
+
+    /// Maximum number of spheres in all grids together.
+    pub const MAX_BALLS: u64 = 4 * Self::MAX_GRID_BALLS;
+
+    /// Maximum number of ratios to which one mesh is simplified.
+    pub const MAX_RATIOS: usize = 256;
     /// Maximum number of pixels along one side of a film.
     pub const MAX_FILM_SIDE: u32 = 65_536;
     /// Maximum number of pixels of a film: it takes 88 bytes per pixel, 22 GiB in all.

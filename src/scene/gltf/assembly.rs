@@ -101,13 +101,13 @@ impl Document {
                     true => (key, Some(node), bits(&instance)),
                     false => (key, None, bits(&world)),
                 };
+                if (found.meshes.len() + repeated) as u64 >= self.most_elements() {
+                    let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
+                    return Err((place("nodes", node), problem));
+                }
                 if !places.insert(here) {
                     repeated += 1;
                     continue;
-                }
-                if found.meshes.len() as u64 >= self.most_elements() {
-                    let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
-                    return Err((place("nodes", node), problem));
                 }
                 found.meshes.push(PlacedMesh { name: name.clone(), key, world, node });
             }

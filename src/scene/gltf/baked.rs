@@ -35,9 +35,11 @@ impl Document {
         let mut materials: Vec<Option<u32>> = Vec::new();
         let mut warnings = Vec::new();
         let mut normals_from_file = true;
-        let limit = self.most_numbers();
+        let (limit, mut room) = (self.most_numbers(), self.most_own_numbers());
         for placed in &assembly.meshes {
             if let Entry::Vacant(entry) = built.entry(placed.key) {
+                let left = room.checked_sub(self.numbers_of(placed.key.mesh));
+                room = left.ok_or_else(|| whole(GltfProblem::TooLarge { limit: self.most_own_numbers() }))?;
                 let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
                 let mesh = self.built_mesh(placed.key.mesh, node, &options.normals);
                 let mesh = self.omissions.kept(&place("meshes", placed.key.mesh), mesh);

@@ -173,10 +173,28 @@ impl Document {
         (self.n_bytes + decoded).max(ALWAYS.min(self.most_numbers()))
     }
 
-    /// Maximum number of vertices and indices of all meshes: a few bytes could refer to the same data many times.
+    /// Maximum number of vertices and indices of all meshes with their instances.
     pub(in crate::scene) fn most_numbers(&self) -> u64 {
         const BYTES_A_NUMBER: u64 = 8;
         self.options.max_bytes / BYTES_A_NUMBER
+    }
+
+    /// Maximum number of vertices and indices of all meshes, which take their space in memory: a few bytes could refer
+    /// to the same data many times.
+    pub(in crate::scene) fn most_own_numbers(&self) -> u64 {
+        /// Several for each byte, since skins share meshes and primitives share attributes.
+        const A_BYTE: u64 = 32;
+        const ALWAYS: u64 = 1 << 23;
+        let decoded: u64 = self.decoded.values().map(|bytes| bytes.len() as u64).sum();
+        (ALWAYS + A_BYTE * self.n_bytes + decoded).min(self.most_numbers())
+    }
+
+    /// Maximum number of bytes of all compressed streams.
+    pub(super) fn most_decoded(&self) -> u64 {
+        /// More than any model is compressed.
+        const A_BYTE: u64 = 512;
+        const ALWAYS: u64 = 64 << 20;
+        (ALWAYS + A_BYTE * self.n_bytes).min(self.options.max_bytes)
     }
 
     /// Reads the buffers that views refer to.
@@ -267,7 +285,7 @@ impl Document {
 
     /// Decompresses the compressed views. The bytes of those that are damaged may be in a buffer as well.
     fn decode(&mut self) {
-        let mut room = self.options.max_bytes;
+        let mut room = self.most_decoded();
         for (i, view) in self.root.buffer_views.iter().enumerate() {
             let Some(compressed) = meshopt::of_view(&view.extensions) else { continue };
             let decode = |compressed: meshopt::View| {

@@ -5,19 +5,19 @@
 //! memory limit.
 
 use super::document::Document;
-use super::error::{GltfProblem, place};
+use super::error::{GltfProblem, Located, place};
 use super::json::{Accessor, BufferView};
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use rayon::prelude::*;
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
 /// The extension object of a primitive.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Compressed {
+struct Stream {
     buffer_view: u32,
     /// Id of each attribute in the stream.
     attributes: BTreeMap<String, u32>,
@@ -38,39 +38,46 @@ struct Decoded {
     attributes: Vec<(String, Values)>,
 }
 
+/// The accessors of a stream.
+#[derive(Clone, Debug)]
+struct Shared {
+    indices: u32,
+    attributes: Vec<(String, u32)>,
+}
+
 impl Document {
-    /// Decodes all streams and makes their primitives refer to the results. A primitive whose stream is damaged keeps
-    /// its own accessors if it has some with data, else it loses its attributes.
+    /// Decodes all streams and makes their primitives refer to the results; primitives of one stream share them. A
+    /// primitive whose stream is damaged keeps its own accessors if it has some with data, else it loses its attributes.
     pub(super) fn decode_draco(&mut self) {
-        let mut jobs = Vec::new();
+        let mut streams: Vec<(Stream, String)> = Vec::new();
+        let mut known: HashMap<Stream, usize> = HashMap::new();
+        let mut users = Vec::new();
         for (mesh, json) in self.root.meshes.iter_mut().enumerate() {
             for (primitive, json) in json.primitives.iter_mut().enumerate() {
                 let Some(extension) = json.extensions.remove(NAME) else { continue };
-                let compressed = Compressed::deserialize(extension);
-                jobs.push((mesh, primitive, compressed.map_err(|error| GltfProblem::Json(format!("{NAME}: {error}")))));
+                let stream = Stream::deserialize(extension)
+                    .map_err(|error| (at(mesh, primitive), GltfProblem::Json(format!("{NAME}: {error}"))));
+                let number = stream.map(|stream| {
+                    *known.entry(stream.clone()).or_insert_with(|| {
+                        streams.push((stream, at(mesh, primitive)));
+                        streams.len() - 1
+                    })
+                });
+                users.push((mesh, primitive, number));
             }
         }
-        let this = &*self;
-        let decode = |(mesh, primitive, compressed): (usize, usize, Result<Compressed, GltfProblem>)| {
-            let part = at(mesh, primitive);
-            let decoded = compressed.map_err(|problem| (part.clone(), problem)).and_then(|compressed| {
-                let bytes = this.view(compressed.buffer_view)?.0;
-                decoded(bytes, &compressed, this.options.max_bytes).map_err(|problem| (part.clone(), problem))
+        let decoded = self.decode_streams(&streams);
+        let mut shared: Vec<Result<Shared, Option<Located>>> =
+            decoded.into_iter().map(|decoded| decoded.map(|decoded| self.share(decoded)).map_err(Some)).collect();
+        for (mesh, primitive, number) in users {
+            let found = number.and_then(|number| match &mut shared[number] {
+                Ok(shared) => Ok(shared.clone()),
+                Err(first) => Err(first.take().unwrap_or_else(|| {
+                    let first = &streams[number].1;
+                    (at(mesh, primitive), GltfProblem::Draco(format!("it is the stream of {first}, which is left out")))
+                })),
             });
-            (mesh, primitive, part, decoded)
-        };
-        let all: Vec<_> = jobs.into_par_iter().map(decode).collect();
-        let mut room = self.options.max_bytes;
-        for (mesh, primitive, part, decoded) in all {
-            let fitting = decoded.and_then(|decoded| {
-                let bytes: u64 = decoded.attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
-                let limit = self.options.max_bytes;
-                let too_long = || GltfProblem::Draco(format!("all streams together have more than {limit} bytes"));
-                let left = room.checked_sub(bytes + decoded.indices.bytes.len() as u64);
-                room = left.ok_or_else(|| (part.clone(), too_long()))?;
-                Ok(decoded)
-            });
-            let Some(Decoded { indices, attributes }) = self.omissions.kept(&part, fitting) else {
+            let Some(Shared { indices, attributes }) = self.omissions.kept(&at(mesh, primitive), found) else {
                 let json = &self.root.meshes[mesh].primitives[primitive];
                 let position = json.attributes.get("POSITION").and_then(|&i| self.root.accessors.get(i as usize));
                 if position.is_none_or(|position| position.buffer_view.is_none()) {
@@ -78,12 +85,11 @@ impl Document {
                 }
                 continue;
             };
-            let indices = self.add(indices, false);
             let mut named = self.root.meshes[mesh].primitives[primitive].attributes.clone();
-            for (name, values) in attributes {
-                let written = named.get(&name).and_then(|&accessor| self.root.accessors.get(accessor as usize));
-                let normalized = written.is_some_and(|accessor| accessor.normalized);
-                let accessor = self.add(values, normalized);
+            for (name, accessor) in attributes {
+                let written = named.get(&name).and_then(|&written| self.root.accessors.get(written as usize));
+                let normalized = written.is_some_and(|written| written.normalized);
+                let accessor = if normalized { self.normalized(accessor) } else { accessor };
                 named.insert(name, accessor);
             }
             let primitive = &mut self.root.meshes[mesh].primitives[primitive];
@@ -91,22 +97,52 @@ impl Document {
         }
     }
 
+    /// Decodes streams, a few at a time: together they have a limit, and none is kept beyond it.
+    fn decode_streams(&self, streams: &[(Stream, String)]) -> Vec<Result<Decoded, Located>> {
+        let most = self.most_decoded();
+        let (mut room, mut all) = (most, Vec::with_capacity(streams.len()));
+        for some in streams.chunks(2 * rayon::current_num_threads()) {
+            let decode = |(stream, part): &(Stream, String)| {
+                let bytes = self.view(stream.buffer_view)?.0;
+                decoded(bytes, stream, room).map_err(|problem| (part.clone(), problem))
+            };
+            let found: Vec<_> = some.par_iter().map(decode).collect();
+            for (decoded, (_, part)) in found.into_iter().zip(some) {
+                all.push(decoded.and_then(|decoded| {
+                    let bytes: u64 = decoded.attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
+                    let too_long = || GltfProblem::Draco(format!("all streams together have more than {most} bytes"));
+                    let left = room.checked_sub(bytes + decoded.indices.bytes.len() as u64);
+                    room = left.ok_or_else(|| (part.clone(), too_long()))?;
+                    Ok(decoded)
+                }));
+            }
+        }
+        all
+    }
+
+    /// Adds the values of a stream as accessors.
+    fn share(&mut self, decoded: Decoded) -> Shared {
+        let indices = self.add(decoded.indices);
+        let attributes = decoded.attributes.into_iter().map(|(name, values)| (name, self.add(values))).collect();
+        Shared { indices, attributes }
+    }
+
+    /// The same accessor, normalized.
+    fn normalized(&mut self, accessor: u32) -> u32 {
+        let accessor = Accessor { normalized: true, ..self.root.accessors[accessor as usize].clone() };
+        self.root.accessors.push(accessor);
+        self.root.accessors.len() as u32 - 1
+    }
+
     /// Adds a view and an accessor for the values; returns the index of the accessor.
-    fn add(&mut self, values: Values, normalized: bool) -> u32 {
+    fn add(&mut self, values: Values) -> u32 {
         let Values { component_type, kind, count, bytes } = values;
         let view = self.root.buffer_views.len() as u32;
         self.root.buffer_views.push(BufferView { byte_length: bytes.len() as u64, ..BufferView::default() });
         self.decoded.insert(view, bytes);
         let kind = kind.to_owned();
         let buffer_view = Some(view);
-        self.root.accessors.push(Accessor {
-            buffer_view,
-            component_type,
-            normalized,
-            count,
-            kind,
-            ..Accessor::default()
-        });
+        self.root.accessors.push(Accessor { buffer_view, component_type, count, kind, ..Accessor::default() });
         self.root.accessors.len() as u32 - 1
     }
 }
@@ -116,7 +152,7 @@ fn at(mesh: usize, primitive: usize) -> String {
 }
 
 /// - `most_bytes`: maximum size of the decoded attributes.
-fn decoded(bytes: &[u8], compressed: &Compressed, most_bytes: u64) -> Result<Decoded, GltfProblem> {
+fn decoded(bytes: &[u8], stream: &Stream, most_bytes: u64) -> Result<Decoded, GltfProblem> {
     /// Bytes of the indices of a triangle.
     const FACE: u64 = 12;
     let limits = DecodeLimits::default()
@@ -124,15 +160,15 @@ fn decoded(bytes: &[u8], compressed: &Compressed, most_bytes: u64) -> Result<Dec
         .with_max_faces(most_bytes / FACE)
         .with_max_decoded_bytes(most_bytes);
     let mut mesh = Mesh::new();
-    let mut stream = DecoderBuffer::new(bytes).with_limits(limits);
-    MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| GltfProblem::Draco(error.to_string()))?;
+    let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
+    MeshDecoder::new().decode(&mut buffer, &mut mesh).map_err(|error| GltfProblem::Draco(error.to_string()))?;
     let indices = Values {
         component_type: 5125,
         kind: "SCALAR",
         count: 3 * mesh.num_faces() as u64,
         bytes: mesh.faces().iter().flatten().flat_map(|point| point.0.to_le_bytes()).collect(),
     };
-    let attributes = compressed.attributes.iter().map(|(name, &id)| {
+    let attributes = stream.attributes.iter().map(|(name, &id)| {
         let attribute = mesh.attribute_by_unique_id(id);
         let attribute = attribute.ok_or_else(|| GltfProblem::Draco(format!("it has no attribute {id}")))?;
         Ok((name.clone(), values(attribute, mesh.num_points())?))

@@ -128,7 +128,7 @@ pub(super) struct Primitive {
     pub extensions: Extensions,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Accessor {
     pub buffer_view: Option<u32>,
@@ -141,7 +141,7 @@ pub(super) struct Accessor {
     pub sparse: Option<Sparse>,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Sparse {
     pub count: u64,
@@ -149,7 +149,7 @@ pub(super) struct Sparse {
     pub values: SparsePart,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SparsePart {
     pub buffer_view: u32,

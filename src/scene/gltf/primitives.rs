@@ -10,7 +10,7 @@ use super::error::{GltfProblem, Located, place};
 use super::json;
 use super::vertices::{Deformation, NO_UV, Vertices};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Identity of a slot: its material, and its materials by variant.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -58,6 +58,18 @@ impl Document {
         let count = self.root.meshes.len();
         let problem = GltfProblem::Index { list: "meshes", index, count };
         self.root.meshes.get(index as usize).ok_or((place("meshes", index), problem))
+    }
+
+    /// Number of vertices and indices of a mesh, as its accessors state them.
+    pub(in crate::scene) fn numbers_of(&self, mesh: u32) -> u64 {
+        let count = |accessor: u32| self.root.accessors.get(accessor as usize).map_or(0, |accessor| accessor.count);
+        let primitives = self.root.meshes.get(mesh as usize).map_or(&[][..], |mesh| &mesh.primitives);
+        let positions: HashSet<u32> =
+            primitives.iter().filter_map(|it| it.attributes.get("POSITION").copied()).collect();
+        let indices = primitives
+            .iter()
+            .filter_map(|primitive| primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied()));
+        positions.into_iter().chain(indices).map(count).fold(0, u64::saturating_add)
     }
 
     /// All triangles of a mesh. Broken primitives and attributes are left out.

@@ -125,7 +125,11 @@ impl<'a> References<'a> {
     /// Refuses what leads out of the folder by a symbolic link.
     fn without_link(&self, base: &Path, referred: Referred, name: &str) -> Result<Referred, Outside> {
         let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { self.folder };
-        match (base.join(&referred.path).canonicalize(), folder.canonicalize()) {
+        // `model.glb#3` is an image inside a model.
+        let full = base.join(&referred.path);
+        let file = full.to_str().filter(|_| !full.exists()).and_then(|text| text.rsplit_once('#'));
+        let file = file.map_or(full.as_path(), |(file, _)| Path::new(file));
+        match (file.canonicalize(), folder.canonicalize()) {
             (Ok(real), Ok(folder)) if !real.starts_with(&folder) => {
                 Err(Outside { name_in_model: name.to_owned(), why: "a link out of the folder" })
             }
@@ -265,6 +269,8 @@ mod tests {
         }
         std::os::unix::fs::symlink(outer.path().join("secret.png"), inner.join("link.png")).unwrap();
         std::os::unix::fs::symlink(outer.path(), inner.join("up")).unwrap();
+        std::fs::write(outer.path().join("secret.glb"), "").unwrap();
+        std::os::unix::fs::symlink(outer.path().join("secret.glb"), inner.join("link.glb")).unwrap();
         let model = inner.join("a.obj");
         let at = |name: &str| resolve(&model, &inner, name, false);
         assert_eq!(at("maps\\wood.png"), Ok("Maps/Wood.PNG".to_owned()));
@@ -272,7 +278,9 @@ mod tests {
         assert_eq!(at("/elsewhere/moved.png"), Ok("moved.png".to_owned()));
         assert_eq!(at(outer.path().join("moved.png").to_str().unwrap()), Ok("moved.png".to_owned()));
         assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));
-        for link in ["link.png", "up/secret.png", "LINK.png", "/away/link.png"] {
+        assert_eq!(at(".\\moved.png"), Ok("./moved.png".to_owned()));
+        assert_eq!(at(".\\.moved.png"), Err("a hidden file"));
+        for link in ["link.png", "up/secret.png", "LINK.png", "/away/link.png", "link.glb#0", "up/secret.glb#12"] {
             assert_eq!(at(link), Err("a link out of the folder"), "{link}");
         }
     }

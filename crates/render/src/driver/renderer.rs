@@ -66,6 +66,7 @@ pub fn advance_region<'a>(
     }
     let size = UVec2::new(film.width(), film.height());
     let Some(plan) = plan_of_film(snapshot, settings, film, stop) else { return PassReport::default() };
+    film.set_radiance_unit(snapshot.tables.radiance_unit);
     let mut pass = Pass::new(snapshot, settings, size, plan);
     pass.notes_surfaces = film.notes_surfaces() && settings.integrator == Integrator::Path;
     let metric = match settings.allocation {

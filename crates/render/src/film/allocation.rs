@@ -263,12 +263,13 @@ fn variance_of(steps: &Steps, n_values: u32) -> Option<f64> {
 /// relative error, mean over pixels and channels. It is small above white, which is 1 after exposure.
 fn display_weight(tile: &FilmTile, block: &Block, exposure_stops: f32) -> f64 {
     let exposure = f64::from(exposure_stops).exp2();
+    let floor = 0.01 * f64::from(tile.unit).powi(2);
     let encoded = |light: f64| (1.0 - (-light.max(0.0) * exposure).exp()).powf(1.0 / 2.2);
     let of = |light: f64| {
         // A finite difference as wide as the error of a noisy mean, and a hundredth of white, so that black is no pole.
         let step = 0.1 * light.abs() + 0.01 / exposure;
         let slope = (encoded(light + step) - encoded(light - step)) / (2.0 * step);
-        slope * slope * (light * light + 0.01)
+        slope * slope * (light * light + floor)
     };
     let weight = |mean: DVec3| of(mean.x) + of(mean.y) + of(mean.z);
     let sum: f64 = block.locals(tile.size.x).map(|local| weight(tile.mean(local))).sum();

@@ -18,7 +18,8 @@ use glam::DVec3;
 /// The estimated error of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
-    /// Root of relMSE, the mean over pixels and channels of variance / (mean² + 0.01).
+    /// Root of relMSE, the mean over pixels and channels of variance / (mean² + 0.01), in the radiance unit of the scene:
+    /// 1, but for lights of physical strength.
     pub relative: f64,
     /// Lower bound of an interval that contains the true value for this image with a probability of about 95 %, and
     /// more where the slope is well known. The interval is wide as long as the rate of convergence rests on few

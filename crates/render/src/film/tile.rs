@@ -33,6 +33,8 @@ pub(crate) struct FilmTile {
     pub light: TileLight,
     /// What the first samples of each pixel see; empty where nobody asks.
     pub surfaces: Vec<SurfaceSums>,
+    /// The radiance that counts as 1 in relative errors, W·m⁻²·sr⁻¹.
+    pub unit: f32,
 }
 
 /// Error statistics of light tracing in a tile.
@@ -94,7 +96,7 @@ impl FilmTile {
         let blocks = starts(size.y).flat_map(|y| starts(size.x).map(move |x| UVec2::new(x, y)));
         let blocks = blocks.map(|start| Block::new(start, (size - start).min(UVec2::splat(BLOCK_SIZE)))).collect();
         let (bad, surfaces, light) = (Vec::new(), Vec::new(), TileLight::default());
-        Ok(Self { origin, size, blocks, sums, bad, before, last, half_steps, light, surfaces })
+        Ok(Self { origin, size, blocks, sums, bad, before, last, half_steps, light, surfaces, unit: 1.0 })
     }
 
     /// Reserves the memory for light tracing.
@@ -107,7 +109,7 @@ impl FilmTile {
 
     /// Removes all samples; the next one has number `first`.
     pub fn clear(&mut self, first: u32) {
-        let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light, surfaces } = self;
+        let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light, surfaces, unit: _ } = self;
         blocks.iter_mut().for_each(|block| block.clear(first));
         sums.fill(ExactSum::default());
         bad.clear();
@@ -247,7 +249,7 @@ impl FilmTile {
                 } else {
                     local_level(of_tile, shown_before, self.size.x as usize, local)
                 };
-                let step = relative_square(seen[i] - before, level);
+                let step = relative_square(seen[i] - before, level, self.unit);
                 self.last[local] = (step / 3.0) as f32;
                 self.half_steps[local] = (seen[i] - before).as_vec3();
                 sum += step;
@@ -280,12 +282,12 @@ impl FilmTile {
         if mean_of > 0 && mean_of == spp / 2 {
             let seen: Vec<DVec3> = (0..self.n_pixels()).map(|local| self.mean(local)).collect();
             let shown: Vec<DVec3> = seen.iter().zip(&now).map(|(seen, traced)| *seen + *traced).collect();
-            let Self { light, size, .. } = self;
+            let Self { light, size, unit, .. } = self;
             light.last.clear();
             let mut sum = 0.0;
             for (local, (traced, before)) in now.iter().zip(&light.before).enumerate() {
                 let level = local_level(&shown, seen[local] + *before, size.x as usize, local);
-                let step = relative_square(*traced - *before, level);
+                let step = relative_square(*traced - *before, level, *unit);
                 light.last.push((step / 3.0) as f32);
                 light.half_steps.push((*traced - *before).as_vec3());
                 sum += step;
@@ -336,7 +338,8 @@ fn copy_one<T: Copy + Default>(from: &[T], to: &mut Vec<T>, at: usize, n: usize)
     }
 }
 
-/// Returns the squared difference over the squared level plus 0.01, summed over channels.
-fn relative_square(difference: DVec3, level: DVec3) -> f64 {
-    (difference * difference / (level * level + 0.01)).element_sum()
+/// Returns the squared difference over the squared level plus 0.01 squared units, summed over channels.
+fn relative_square(difference: DVec3, level: DVec3, unit: f32) -> f64 {
+    let floor = 0.01 * f64::from(unit).powi(2);
+    (difference * difference / (level * level + floor)).element_sum()
 }

@@ -439,6 +439,11 @@ impl Film {
         self.tiles.par_iter_mut().for_each(|tile| tile.record_light(layer, width));
     }
 
+    /// Sets the radiance that counts as 1 in relative errors, W·m⁻²·sr⁻¹: a property of the scene.
+    pub(crate) fn set_radiance_unit(&mut self, unit: f32) {
+        self.tiles.iter_mut().for_each(|tile| tile.unit = unit);
+    }
+
     /// Whether the next round of an adaptive film must be decided, because the previous one is over.
     pub(crate) fn round_is_due(&self) -> bool {
         // Tiles of other sizes cut blocks, which then have no neighbours.

@@ -19,6 +19,7 @@ pub(crate) mod light;
 pub(crate) mod material_table;
 pub(crate) mod plan_cache;
 pub(crate) mod prepared;
+mod radiance_unit;
 pub(crate) mod surface_table;
 
 pub use exposed::{Exposed, moment_of_sample};

@@ -12,8 +12,9 @@ use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
 use crate::prepare::contacts::{ContactScene, Contacts};
 use crate::prepare::large_textures::LargeTextures;
-use crate::prepare::light::LightTable;
+use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
+use crate::prepare::radiance_unit::radiance_unit;
 use crate::prepare::surface_table::SurfaceTable;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch};
@@ -95,6 +96,8 @@ pub(crate) struct Tables {
     pub(crate) casters: Option<CasterTable>,
     /// See [`crate::prepare::bound`].
     pub(crate) radiance_bound: Option<f32>,
+    /// See [`crate::prepare::radiance_unit`].
+    pub(crate) radiance_unit: f32,
     pub(crate) features: Features,
 }
 
@@ -243,7 +246,7 @@ impl Tables {
             cutouts: materials.iter().any(Material::is_cutout),
         };
         Self {
-            ambient,
+            radiance_unit: radiance_unit(&lights, &ambient, reach_of(geometry)),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             large_textures: LargeTextures::build(materials, textures),
             cutouts: materials.iter().map(Material::is_cutout).collect(),
@@ -251,6 +254,7 @@ impl Tables {
             radiance_bound: (delta_lights.is_empty())
                 .then(|| radiance_bound(environment, &emission, materials))
                 .flatten(),
+            ambient,
             emission,
             lights,
             bodies,

@@ -44,6 +44,12 @@ pub struct LightTable {
     pub(crate) lanes: Option<LightArrays>,
 }
 
+/// Radius of a scene, metres.
+pub(crate) fn reach_of(geometry: &Geometry) -> f32 {
+    let reach = (0.5 * geometry.tree.bounds().size().length()).clamp(1e-12, EVERYTHING);
+    if geometry.objects.is_empty() { 1.0 } else { reach }
+}
+
 impl LightTable {
     /// Finds the emitters among the objects; `emission` per material. Delta lights follow after them.
     pub(crate) fn build(
@@ -63,8 +69,7 @@ impl LightTable {
                 ObjectLights::add(&mut lights, object, shape, &emission, &mut means)
             })
             .collect();
-        let reach = (0.5 * geometry.tree.bounds().size().length()).clamp(1e-12, EVERYTHING);
-        let reach = if geometry.objects.is_empty() { 1.0 } else { reach };
+        let reach = reach_of(geometry);
         lights.extend(delta_lights.iter().map(|light| Light::without_size(light, reach)));
         let selection = LightSelection::build(&lights);
         let lanes = LightArrays::build(&lights);
