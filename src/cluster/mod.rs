@@ -10,6 +10,7 @@
 pub mod coverage;
 pub mod engine;
 pub mod job;
+pub mod job_option;
 pub mod pack;
 pub mod part;
 pub mod unpack;
