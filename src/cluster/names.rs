@@ -3,10 +3,14 @@
 //! A place is told twice: as it is named, which decides the name in the package, and where it really lies behind symbolic
 //! links, which decides whether it is outside.
 
-use super::pack::PackError;
 use crate::scene::{ReadFiles, path_to_text, text_to_path};
 use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
+
+/// A path that cannot be a name in a package.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be packed: its name is not UTF-8", .0.display())]
+pub struct NotUtf8(PathBuf);
 
 /// The folder of what has no place in a package.
 pub(super) const OUTSIDE: &str = "outside";
@@ -137,7 +141,7 @@ impl Names {
     ///
     /// # Errors
     /// When it is not UTF-8.
-    pub fn keep(&mut self, path: &Path) -> Result<String, PackError> {
+    pub fn keep(&mut self, path: &Path) -> Result<String, NotUtf8> {
         let place = place(path);
         let below = self.base.as_ref().and_then(|base| place.strip_prefix(&base.place).ok());
         let name = text_of(below.unwrap_or_else(|| Path::new(place.file_name().unwrap_or_default())), &place)?;
@@ -149,7 +153,7 @@ impl Names {
     ///
     /// # Errors
     /// When it is not UTF-8.
-    pub fn opened(&self, path: &Path) -> Result<String, PackError> {
+    pub fn opened(&self, path: &Path) -> Result<String, NotUtf8> {
         text_of(Path::new(path.file_name().unwrap_or_default()), path)
     }
 
@@ -157,7 +161,7 @@ impl Names {
     ///
     /// # Errors
     /// When one is not UTF-8.
-    pub fn of(&mut self, paths: &[PathBuf]) -> Result<Vec<String>, PackError> {
+    pub fn of(&mut self, paths: &[PathBuf]) -> Result<Vec<String>, NotUtf8> {
         let places: Vec<PathBuf> = paths.iter().map(|path| place(path)).collect();
         let keeps = |base: &Folder| match self.is_fixed {
             true => places.iter().all(|place| place.starts_with(&base.place)),
@@ -202,8 +206,8 @@ impl Names {
     }
 }
 
-fn text_of(name: &Path, place: &Path) -> Result<String, PackError> {
-    name.to_str().map(|_| path_to_text(name)).ok_or_else(|| PackError::Name(place.to_path_buf()))
+fn text_of(name: &Path, place: &Path) -> Result<String, NotUtf8> {
+    name.to_str().map(|_| path_to_text(name)).ok_or_else(|| NotUtf8(place.to_path_buf()))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! is rewritten: a scene from elsewhere that an image shows goes beside the image. Only what was read as what it is named
 //! for is packed. The package of the same files has the same bytes. Start reading at [`Package::of`].
 
-use super::names::{Names, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to};
+use super::names::{Names, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to};
 use crate::printable;
 use crate::scene::file::SceneFile;
 use crate::scene::whole_file::{WholeFile, unwritable, write_whole};
@@ -96,8 +96,8 @@ pub enum PackError {
     )]
     Unportable(String),
     /// A path is not UTF-8.
-    #[error("{}: cannot be packed: its name is not UTF-8", .0.display())]
-    Name(PathBuf),
+    #[error(transparent)]
+    Name(#[from] NotUtf8),
     /// The package cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
