@@ -84,6 +84,11 @@ fn an_image_has_its_scene_beside_it_in_a_package() {
     does(path, "render models/m.obj -o renders/m.png --size 8x6 --spp 1");
     does(path, "pack renders/m.png -o m.zip");
     assert_eq!(names_in(&path.join("m.zip")), ["SHA256SUMS", "m.mtl", "m.obj", "m.png", "maps/a b.png"]);
+    // Unless a file of it has the name of the image.
+    std::fs::copy(path.join("models/maps/a b.png"), path.join("models/m.png")).unwrap();
+    std::fs::write(path.join("models/m.mtl"), "newmtl a\nKd 1 1 1\nmap_Kd m.png\n").unwrap();
+    let said = fails(path, "pack renders/m.png -o m.zip", 1);
+    assert!(said.contains("would both be `m.png` in the package: rename one of them"), "{said}");
     // And a scene with changes that were not saved, as long as its files are found.
     let text = |texture: &str| {
         let of_camera = SCENE.trim_end_matches(')');

@@ -280,7 +280,9 @@ fn files_that_a_foreign_model_names_are_neither_read_nor_packed() {
     // A user who means it, means it.
     std::fs::write(path.join("home/look.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
     std::fs::write(path.join("home/down/chair.obj"), format!("mtllib ../look.mtl\n{mesh}")).unwrap();
-    does(path, "pack home/down/chair.obj --allow-outside -o c.zip");
+    let said = does(path, "pack home/down/chair.obj --allow-outside -o c.zip");
+    assert!(said.contains("look.mtl is not in the folder of the scene, and is packed as look.mtl"), "{said}");
+    assert_eq!(said.matches("is packed as").count(), 1, "{said}");
     let there = tempfile::tempdir().unwrap();
     let mut names = unpack(&path.join("c.zip"), there.path());
     names.sort();
