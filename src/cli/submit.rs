@@ -12,6 +12,7 @@ use super::work::render_words;
 use clap::{Args, ValueEnum};
 use firstlight::cluster::engine::{EngineOptions, SlurmOption, files, job_name, shell_word};
 use firstlight::cluster::job::{Engine, Job};
+use firstlight::cluster::job_option::{JobOption, OptionName};
 use firstlight::cluster::pack::Package;
 use firstlight::render::Film;
 use firstlight::scene::whole_file::write_whole;
@@ -101,38 +102,39 @@ struct LookArgs {
 }
 
 impl LookArgs {
-    /// The same as options of `render`.
-    fn words(&self) -> Vec<String> {
-        let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
-        let options = [
-            ("--size", self.size.map(|(width, height)| format!("{width}x{height}"))),
-            ("--scale", self.scale.map(|scale| scale.to_string())),
-            ("--seed", self.seed.map(|seed| seed.to_string())),
-            ("--integrator", name(self.integrator.and_then(|arg| arg.to_possible_value()))),
-            ("--filter", name(self.filter.and_then(|arg| arg.to_possible_value()))),
-            ("--max-depth", self.max_depth.map(|depth| depth.to_string())),
-            ("--exposure", self.exposure.map(|stops| stops.to_string())),
-        ];
-        words_of(options).collect()
+    /// The same for the parts of a job.
+    fn options(&self) -> impl Iterator<Item = JobOption> {
+        [
+            self.size.map(|(width, height)| OptionName::Size.with(format!("{width}x{height}"))),
+            self.scale.map(|scale| OptionName::Scale.with(scale)),
+            self.seed.map(|seed| OptionName::Seed.with(seed)),
+            self.integrator.map(|arg| OptionName::Integrator.with(name_of(arg))),
+            self.filter.map(|arg| OptionName::Filter.with(name_of(arg))),
+            self.max_depth.map(|depth| OptionName::MaxDepth.with(depth)),
+            self.exposure.map(|stops| OptionName::Exposure.with(stops)),
+        ]
+        .into_iter()
+        .flatten()
     }
 }
 
-/// Options with their values, as `--camera=-x`: a value that begins with `-` is not taken for an option.
-fn words_of<const N: usize>(options: [(&str, Option<String>); N]) -> impl Iterator<Item = String> {
-    options.into_iter().filter_map(|(option, value)| Some(format!("{option}={}", value?)))
+/// A value of an option, as it is written.
+fn name_of(arg: impl ValueEnum) -> String {
+    arg.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-/// The options for opening the scene as options of `render`, except the environment image.
-fn open_words(how: &OpenArgs) -> Vec<String> {
-    let up = how.up.and_then(|up| up.to_possible_value()).map(|value| value.get_name().to_owned());
-    let options = [
-        ("--up", up),
-        ("--camera", how.camera.clone()),
-        ("--at", how.at.map(|at| at.to_string())),
-        ("--shutter", how.shutter.map(|share| share.to_string())),
-        ("--variant", how.variant.clone()),
-    ];
-    words_of(options).chain(how.allow_outside.then(|| "--allow-outside".to_owned())).collect()
+/// The options for opening the scene, except the environment image.
+fn open_options(how: &OpenArgs) -> impl Iterator<Item = JobOption> {
+    [
+        how.up.map(|up| OptionName::Up.with(name_of(up))),
+        how.camera.as_ref().map(|camera| OptionName::Camera.with(camera)),
+        how.at.map(|at| OptionName::At.with(at)),
+        how.shutter.map(|share| OptionName::Shutter.with(share)),
+        how.variant.as_ref().map(|variant| OptionName::Variant.with(variant)),
+        how.allow_outside.then(|| OptionName::AllowOutside.flag()),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -152,15 +154,6 @@ impl From<EngineArg> for Engine {
             EngineArg::Kubernetes => Self::Kubernetes,
             EngineArg::Openjd => Self::Openjd,
         }
-    }
-}
-
-impl SubmitArgs {
-    /// Which frames, as options of `render`.
-    fn frame_words(&self) -> Vec<String> {
-        let frames = self.frames.map(FramesArg::range).map(|frames| format!("{}..{}", frames.start, frames.end));
-        let options = [("--frames", frames), ("--fps", self.fps.map(|fps| fps.to_string()))];
-        words_of(options).collect()
     }
 }
 
@@ -193,7 +186,6 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         }
         Err(builtin) => (builtin, None),
     };
-    let environment = words_of([("--env", environment)]);
     let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
     let job = Job {
         format: Job::FORMAT,
@@ -204,11 +196,10 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
             _ => this.unwrap_or_else(|| "firstlight".to_owned()),
         }),
         scene,
-        options: open_words(&args.scene.how)
-            .into_iter()
-            .chain(args.look.words())
-            .chain(environment)
-            .chain(args.frame_words())
+        options: open_options(&args.scene.how)
+            .chain(args.look.options())
+            .chain(environment.map(|path| OptionName::Env.with(path)))
+            .chain(args.fps.map(|fps| OptionName::Fps.with(fps)))
             .collect(),
         parts: args.parts,
         spp,
@@ -248,7 +239,9 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
 
 /// Refuses a folder that has a job, or anything that a job would replace.
 fn check_is_free(folder: &Path) -> Result<(), Failure> {
-    let is_empty = |path: &Path| std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    // A link to a folder would lead what is written out of the job.
+    let is_empty =
+        |path: &Path| !path.is_symlink() && std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
     // A folder that is not there is made, or cannot be and then says why.
     let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let name = folder.display();

@@ -249,5 +249,6 @@ fn inform_of(done: usize, n: usize) {
 
 /// The arguments of `render` that are common to all parts of a job.
 pub fn render_words(job: &Job) -> Vec<String> {
-    [job.scene.clone()].into_iter().chain(job.options.iter().cloned()).collect()
+    let frames = job.frames.map(|(start, end)| format!("--frames={start}..{end}"));
+    [job.scene.clone()].into_iter().chain(job.options.iter().cloned().map(String::from)).chain(frames).collect()
 }

@@ -11,6 +11,7 @@
 //! Without a target error there is one round. With one, each round at most doubles the samples, so that all powers of two
 //! are ends of rounds; after each merge the error estimate decides whether another follows.
 
+use super::job_option::JobOption;
 use super::part::Part;
 use crate::scene::whole_file::write_whole;
 use crate::scene::{FileKind, InputFile, ReadError, WriteError};
@@ -52,7 +53,7 @@ pub struct Job {
     /// A built-in scene, or a path from the folder.
     pub scene: String,
     /// Options of `render` for every part; paths count from the folder.
-    pub options: Vec<String>,
+    pub options: Vec<JobOption>,
     /// Parts of each round, at most.
     pub parts: u32,
     /// Samples per pixel of the first round.
@@ -310,6 +311,7 @@ impl Rounds {
 
 #[cfg(test)]
 mod tests {
+    use super::super::job_option::OptionName;
     use super::*;
 
     fn job(error: Option<f64>) -> Job {
@@ -319,7 +321,7 @@ mod tests {
             engine: Engine::Slurm,
             program: "firstlight".to_owned(),
             scene: "cornell".to_owned(),
-            options: vec!["--seed".to_owned(), "3".to_owned()],
+            options: vec![OptionName::Seed.with(3)],
             parts: 12,
             spp: Job::first_round(12, 1000),
             error,

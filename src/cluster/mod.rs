@@ -10,6 +10,8 @@
 pub mod coverage;
 pub mod engine;
 pub mod job;
+pub mod job_option;
+mod names;
 pub mod pack;
 pub mod part;
 pub mod unpack;

@@ -3,15 +3,16 @@
 //! Every file must be in the list of checksums and have its sum, and no name may lead out of the folder. The folder is
 //! named after the archive's own checksum; one in which a file has changed since is left alone, and another one is made.
 
+use super::names::is_portable;
 use super::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
 use crate::printable;
 use crate::scene::model::ModelFormat;
 use crate::scene::whole_file::lock_file;
-use crate::scene::{FileKind, InputFile, Limits, ReadError, WriteError, text_to_path};
+use crate::scene::{FileKind, InputFile, Limits, ReadError, WriteError, path_to_text, text_to_path};
 use sha2::{Digest, Sha256};
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io::{Read, Write};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
 /// Number of folders that are tried for one archive.
@@ -56,6 +57,9 @@ pub enum UnpackError {
     /// A file is damaged, or in one of archive and list only.
     #[error("`{}` in the archive is damaged or not in {CHECKSUMS}: copy the archive again", printable::name(.0))]
     Damaged(String),
+    /// Two files have one place, or one is the folder of the other.
+    #[error("`{}` in the archive takes the place of another file: it was not made by `firstlight pack`", printable::name(.0))]
+    Twice(String),
     /// There are too many files.
     #[error("has {0} files, more than the {MOST_FILES} of the largest scenes")]
     TooMany(usize),
@@ -190,16 +194,26 @@ fn check_entries(
     if zip.len() > MOST_FILES {
         return Err(UnpackError::TooMany(zip.len()));
     }
-    let (mut names, mut places) = (HashSet::new(), HashSet::new());
+    let (mut names, mut data, mut places) = (HashSet::new(), HashSet::new(), BTreeSet::new());
     let mut size = 0_u64;
     for i in 0..zip.len() {
         let file = zip.by_index_raw(i)?;
         let name = name_of(&file)?;
-        // The same bytes under several names, or a name twice.
-        if !places.insert(file.header_start()) || !names.insert(name.clone()) {
+        // The same bytes under several names.
+        if !data.insert(file.header_start()) {
             return Err(UnpackError::Damaged(name));
         }
+        // Two names may be spellings of one.
+        if !places.insert(text_to_path(&name)) {
+            return Err(UnpackError::Twice(name));
+        }
+        names.insert(name);
         size = size.saturating_add(file.size());
+    }
+    // What is below a file follows it.
+    let mut pairs = places.iter().zip(places.iter().skip(1));
+    if let Some((_, below)) = pairs.find(|(file, next)| next.starts_with(file)) {
+        return Err(UnpackError::Twice(path_to_text(below)));
     }
     // In the list there may be any path of this computer.
     if let Some(missing) = sums.keys().find(|name| !names.contains(*name) || *name == CHECKSUMS) {
@@ -246,10 +260,7 @@ fn sum_of(file: &mut InputFile) -> Result<String, ReadError> {
 /// The name of a regular file that stays in its folder.
 fn name_of<R: Read>(file: &zip::read::ZipFile<R>) -> Result<String, UnpackError> {
     let name = file.name()?.into_owned();
-    let is_plain = |part: Component| matches!(part, Component::Normal(_));
-    let is_safe =
-        !name.is_empty() && !name.contains(['\\', ':', '\0']) && text_to_path(&name).components().all(is_plain);
-    if is_safe && !file.is_symlink() && !file.is_dir() { Ok(name) } else { Err(UnpackError::Name(name)) }
+    if is_portable(&name) && !file.is_symlink() && !file.is_dir() { Ok(name) } else { Err(UnpackError::Name(name)) }
 }
 
 /// The checksums by name.
@@ -257,11 +268,14 @@ fn sums_of(zip: &mut ZipArchive<InputFile>) -> Result<BTreeMap<String, String>, 
     let mut text = String::new();
     let file = zip.by_name(CHECKSUMS).map_err(|_| UnpackError::NoSums)?;
     file.take(MOST_SUMS).read_to_string(&mut text).map_err(|_| UnpackError::NoSums)?;
-    let parse = |line: &str| {
-        let (sum, name) = line.split_once("  ")?;
-        (sum.len() == 64).then(|| (name.to_owned(), sum.to_owned()))
-    };
-    text.lines().map(parse).collect::<Option<_>>().ok_or(UnpackError::NoSums)
+    let mut sums = BTreeMap::new();
+    for line in text.lines() {
+        let (sum, name) = line.split_once("  ").filter(|(sum, _)| sum.len() == 64).ok_or(UnpackError::NoSums)?;
+        if sums.insert(name.to_owned(), sum.to_owned()).is_some() {
+            return Err(UnpackError::NoSums);
+        }
+    }
+    Ok(sums)
 }
 
 /// The scene, and the environment image: as the comment says, or else the only scene file or model.

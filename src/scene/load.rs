@@ -17,7 +17,7 @@ use super::meshes::{LoadedMesh, load_mesh};
 use super::model::ModelFormat;
 use super::model_light::{Model, light_as_in, light_model};
 use super::own_materials::{emits, without_lost_textures};
-use super::relative::{path_to_text, relative_path, text_to_path};
+use super::relative::{absolute, path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
@@ -164,7 +164,8 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
         (Some(text), source) => {
             let start = Instant::now();
             // Its paths are relative to the folder of the scene.
-            let source = source.unwrap_or_else(|| SceneSource::Picture(path.to_path_buf()));
+            let own = SceneSource::Picture(path.to_path_buf());
+            let source = source.unwrap_or_else(|| own.clone());
             let folder = match &source {
                 SceneSource::Builtin(_) => PathBuf::new(),
                 SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
@@ -174,7 +175,15 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
             let mut scene = {
                 let documents = Documents::new(options.choice().allow_outside);
                 let file = SceneFile::parse(text, path)?;
-                let mut scene = resolve(&source, file, Some(text), folder, &options, &documents)?;
+                let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
+                match source {
+                    source if scene.has_read(&source) => scene.source = source,
+                    source => scene.warnings.push(format!(
+                        "{}: {} is not its scene: what is saved in the image is shown",
+                        path.display(),
+                        source.title()
+                    )),
+                }
                 scene.move_as_model(shot.model_camera(), &documents)?;
                 scene
             };
@@ -188,8 +197,11 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
         (None, None) => return Err(SceneError::in_file(path, "its metadata names no scene")),
     };
     if scene.content_fingerprint().to_string() != shot.fingerprint {
-        let (picture, title) = (path.display(), scene.source.title());
-        scene.warnings.push(format!("{picture}: {title} has changed since the image was rendered"));
+        let what = match &scene.source {
+            SceneSource::Picture(_) => "a file of its scene".to_owned(),
+            source => source.title(),
+        };
+        scene.warnings.push(format!("{}: {what} has changed since the image was rendered", path.display()));
     }
     shot.apply(&mut scene.file);
     if scene.facts.is_none() {
@@ -307,6 +319,19 @@ fn resolve(
 }
 
 impl LoadedScene {
+    /// Whether what an image names as its scene is one. A foreign image may name any file of the computer.
+    fn has_read(&self, source: &SceneSource) -> bool {
+        match source {
+            SceneSource::Builtin(_) | SceneSource::Picture(_) => true,
+            SceneSource::Scene(path) => read_text(path).and_then(|text| SceneFile::parse(&text, path)).is_ok(),
+            SceneSource::Model(path) => {
+                let path = absolute(path);
+                let mut files = self.meshes.iter().flatten().flat_map(|mesh| &mesh.files);
+                files.any(|(file, _)| absolute(file) == path)
+            }
+        }
+    }
+
     /// Moves a glTF model from an image with motion blur as its file does.
     ///
     /// - `camera`: name of the camera of the model that the image was opened with.

@@ -74,7 +74,12 @@ impl MetadataDraft {
                 let camera = self.loaded.as_ref().and_then(|loaded| loaded.choice.camera.clone());
                 ImageScene::Model { path: relative(path), up, camera }
             }
-            Some(SceneSource::Picture(_)) | None => ImageScene::None,
+            // What is named by the image, though it could not be read, is where the paths in the text count from.
+            Some(SceneSource::Picture(from)) => {
+                let shot = self.loaded.as_ref().and_then(|loaded| loaded.shot.clone());
+                shot.map_or(ImageScene::None, |shot| shot.moved(from, path).scene)
+            }
+            None => ImageScene::None,
         };
         let file = &self.description.file;
         let Prints { content, has_changed } = self.prints();

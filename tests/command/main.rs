@@ -8,6 +8,7 @@ mod cli_simplify;
 mod denoising;
 mod explain;
 mod faults;
+mod foreign;
 mod frames;
 mod motion_blur;
 mod pack;

@@ -3,14 +3,27 @@
 use super::parts::{does, equal, fails};
 use std::path::Path;
 
-fn unpack(archive: &Path, folder: &Path) -> Vec<String> {
+/// Names of the files of an archive, in order.
+pub fn names_in(archive: &Path) -> Vec<String> {
+    let archive = zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap();
+    let mut names: Vec<String> = archive.file_names().map(|name| name.unwrap().into_owned()).collect();
+    names.sort();
+    names
+}
+
+pub fn unpack(archive: &Path, folder: &Path) -> Vec<String> {
     let mut archive = zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap();
     archive.extract(folder).unwrap();
     (0..archive.len()).map(|i| archive.by_index(i).unwrap().name().unwrap().into_owned()).collect()
 }
 
+/// A small environment image.
+pub fn hdr() -> Vec<u8> {
+    [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec(), [128, 120, 110, 129].repeat(8)].concat()
+}
+
 /// A model with a library and a texture below it, a texture beside the scene, and one that is named by its absolute path.
-fn write_scene(path: &Path) {
+pub fn write_scene(path: &Path) {
     for folder in ["scenes", "models/maps", "far"] {
         std::fs::create_dir_all(path.join(folder)).unwrap();
     }
@@ -84,8 +97,7 @@ fn models_images_and_built_in_scenes_are_packed_as_they_are() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     write_scene(path);
-    let hdr = [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec(), [128, 120, 110, 129].repeat(8)].concat();
-    std::fs::write(path.join("far/light.hdr"), hdr).unwrap();
+    std::fs::write(path.join("far/light.hdr"), hdr()).unwrap();
     let model = "models/m.obj --env far/light.hdr";
     does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
     let said = does(path, &format!("pack {model} -o m.zip"));
@@ -173,13 +185,17 @@ fn an_archive_opens_directly_and_only_whole() {
     assert_eq!(folders().count(), 2);
 
     let original = path.join("s.zip");
-    let forgeries: [(&str, Option<&[u8]>, &str); 6] = [
+    let forgeries: [(&str, Option<&[u8]>, &str); 10] = [
         ("s.ron", Some(b"()"), "damaged"),
         ("outside/2/far.png", None, "damaged"),
         ("SHA256SUMS", None, "no valid list"),
         ("more.txt", Some(b"!"), "not in SHA256SUMS"),
         ("../out.txt", Some(b"!"), "does not stay"),
         ("/tmp/out.txt", Some(b"!"), "does not stay"),
+        ("./s.ron", Some(b"!"), "does not stay"),
+        ("outside//1/m.obj", Some(b"!"), "does not stay"),
+        ("s.ron/x", Some(b"!"), "takes the place of another file"),
+        ("outside", Some(b"!"), "takes the place of another file"),
     ];
     for (name, content, wanted) in forgeries {
         forged(&original, &path.join("forged.zip"), name, content);
@@ -204,6 +220,10 @@ fn an_archive_opens_directly_and_only_whole() {
         let (code, said) = run("render forged.zip -o no.png --spp 1");
         assert!(code == Some(1) && said.contains("damaged or not in"), "{name}: {code:?} {said}");
     }
+    let twice = format!("{}  s.ron\n{sums}", "0".repeat(64));
+    forged(&original, &path.join("forged.zip"), "SHA256SUMS", Some(twice.as_bytes()));
+    let (code, said) = run("render forged.zip -o no.png --spp 1");
+    assert!(code == Some(1) && said.contains("no valid list"), "{code:?} {said}");
     // What an interrupted process has left is removed.
     let left = cache.join("firstlight/packed/.part-abcdef");
     std::fs::create_dir(&left).unwrap();
@@ -217,8 +237,7 @@ fn the_environment_image_of_an_archive_counts() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     write_scene(path);
-    let hdr = [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec(), [128, 120, 110, 129].repeat(8)].concat();
-    std::fs::write(path.join("far/light.hdr"), hdr).unwrap();
+    std::fs::write(path.join("far/light.hdr"), hdr()).unwrap();
     let model = "models/m.obj --env far/light.hdr";
     does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
     does(path, &format!("pack {model} -o m.zip"));
@@ -261,7 +280,9 @@ fn files_that_a_foreign_model_names_are_neither_read_nor_packed() {
     // A user who means it, means it.
     std::fs::write(path.join("home/look.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
     std::fs::write(path.join("home/down/chair.obj"), format!("mtllib ../look.mtl\n{mesh}")).unwrap();
-    does(path, "pack home/down/chair.obj --allow-outside -o c.zip");
+    let said = does(path, "pack home/down/chair.obj --allow-outside -o c.zip");
+    assert!(said.contains("look.mtl is not in the folder of the scene, and is packed as look.mtl"), "{said}");
+    assert_eq!(said.matches("is packed as").count(), 1, "{said}");
     let there = tempfile::tempdir().unwrap();
     let mut names = unpack(&path.join("c.zip"), there.path());
     names.sort();

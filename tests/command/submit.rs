@@ -148,6 +148,14 @@ fn a_job_gets_a_new_or_empty_folder() {
     let said = fails(path, &format!("{line} mine"), 1);
     assert!(said.contains("submit.sh") && said.contains("empty folder"), "{said}");
     assert_eq!(std::fs::read_to_string(path.join("mine/submit.sh")).unwrap(), "mine");
+    #[cfg(unix)]
+    {
+        std::fs::create_dir_all(path.join("far")).unwrap();
+        std::fs::create_dir(path.join("linked")).unwrap();
+        std::os::unix::fs::symlink("../far", path.join("linked/scene")).unwrap();
+        let said = fails(path, &format!("{line} linked"), 1);
+        assert!(said.contains("such as scene") && said.contains("empty folder"), "{said}");
+    }
     std::fs::create_dir(path.join("empty")).unwrap();
     does(path, &format!("{line} empty"));
     let said = fails(path, &format!("{line} empty"), 1);
@@ -173,6 +181,21 @@ fn numbers_and_words_in_the_jobs_of_others_are_checked() {
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
             assert!(!output.status.success() && said.contains(expected), "{line}: {said}");
         }
+    }
+    // Only options that `submit` writes: none that names an output, or that ends the options.
+    let outer = path.join("outer");
+    for option in
+        ["--", "--film=../outer.exr", "--overwrite", "-o=../outer.png", "--frames=0..2", "--size", "--env=../e.hdr"]
+    {
+        std::fs::write(&file, text.replace("\"options\": []", &format!("\"options\": [{option:?}]"))).unwrap();
+        for line in ["status job", "work job --merge", "work job --part 1/2"] {
+            let output = super::parts::run_in(path, line, &[]);
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(said.contains(&format!("`{option}` is no option")), "{line}: {said}");
+            let code = if line.starts_with("work") { 2 } else { 1 };
+            assert_eq!(output.status.code(), Some(code), "{line}: {said}");
+        }
+        assert!(!outer.with_extension("exr").exists() && !outer.with_extension("png").exists(), "{option}");
     }
     // A million parts are counted at once.
     let many = text.replace("\"parts\": 2", "\"parts\": 1000000").replace("\"spp\": 4", "\"spp\": 1000000");
@@ -200,6 +223,20 @@ fn a_job_writes_through_no_link() {
     assert_eq!(std::fs::read_to_string(path.join("mine.png")).unwrap(), "mine");
     std::fs::remove_file(&link).unwrap();
     does(path, "work job --merge");
+    // Frames of a job have no films, whatever it says.
+    does(path, "submit slurm carousel --frames 0..2 --size 8x6 --parts 2 --spp 4 --dry-run -o moving");
+    let file = path.join("moving/job.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let forged = text.replace("\"options\": [", "\"options\": [\"--film=f.exr\",");
+    assert!(forged != text && !text.contains("--frames"), "{text}");
+    std::os::unix::fs::symlink("../mine.png", path.join("moving/f-0000.exr")).unwrap();
+    std::fs::write(&file, forged).unwrap();
+    let said = fails(path, "work moving --part 1/2", 2);
+    assert!(said.contains("`--film=f.exr` is no option"), "{said}");
+    assert_eq!(std::fs::read_to_string(path.join("mine.png")).unwrap(), "mine");
+    std::fs::write(&file, text).unwrap();
+    does(path, "work moving --part 1/2");
+    assert!(path.join("moving/frames/frame-0000.png").is_file());
     // A folder that is a link leads out as well.
     std::fs::rename(path.join("job/parts"), path.join("elsewhere")).unwrap();
     std::os::unix::fs::symlink(path.join("elsewhere"), path.join("job/parts")).unwrap();
