@@ -105,6 +105,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         SimplifyError::Degenerate => Failure::Failed(format!("{}: {error}", args.input.display())),
         _ => Failure::Usage(error.to_string()),
     })?;
+    let result = result.with_colors_of(&model.mesh);
     let seconds = start.elapsed().as_secs_f64();
     let after = result.triangles.len();
     let missed = match target {
@@ -116,8 +117,9 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         remark(format_args!("warning: borders, seams and non-manifold edges allow no fewer than {after} triangles"));
     }
     // Materials that no library defines are not written.
-    let kept = model.materials.iter().filter(|_| format == ModelFormat::Obj);
-    if format != ModelFormat::Obj && (format == ModelFormat::Gltf || !model.materials.is_empty()) {
+    let kept = model.materials.iter().filter(|_| !model.libraries.is_empty());
+    let has_textures = model.materials.iter().any(|material| material.diffuse_texture.is_some());
+    if format == ModelFormat::Gltf || (format != ModelFormat::Obj && has_textures) {
         remark(format_args!("warning: materials and textures are not kept: only OBJ files name theirs in a library"));
     }
     let names: Vec<String> = kept.map(|material| material.name.clone()).collect();

@@ -2,6 +2,7 @@
 
 use super::file::{DisplayPart, FilmPart, LightPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
 use super::framing::Framing;
+use super::inner_light::Inside;
 use super::meshes::LoadedMesh;
 use super::orientation::faces_away;
 use super::source::UpAxis;
@@ -78,13 +79,9 @@ pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
     file.objects.push(ground(name, bounds));
 }
 
-/// Adds a light inside of a model that is closed: where the camera is, or in the middle. It cannot be seen.
-pub fn light_inside(file: &mut SceneFile, (min, max): (DVec3, DVec3)) {
-    let eye = file.camera.eye;
-    let is_inside = eye.cmpge(min).all() && eye.cmple(max).all();
-    let position = if is_inside { eye } else { 0.5 * (min + max) };
-    // A white surface has the radiance 1 at a quarter of the diagonal.
-    let distance = (0.25 * (max - min).length()).max(SceneFile::MIN_SIZE);
+/// Adds a light inside of a model that is closed: a point, which cannot be seen.
+pub fn light_inside(file: &mut SceneFile, &Inside { position, distance }: &Inside) {
+    // A white surface has the radiance 1 at this distance.
     let intensity = Rgb(Vec3::splat((PI * distance * distance) as f32));
     file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
 }

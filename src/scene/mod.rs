@@ -27,6 +27,7 @@ mod gltf_motion;
 mod gltf_parts;
 mod gltf_scene;
 pub mod image_metadata;
+mod inner_light;
 pub mod input_file;
 mod inputs;
 mod inventory;

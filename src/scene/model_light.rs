@@ -10,6 +10,7 @@ use super::components::Shape;
 use super::default_scene::{self, is_inner};
 use super::extract::Extraction;
 use super::file::{DisplayPart, LightPart, MaterialPart, ObjectPart};
+use super::inner_light::{middle_of_room, sees_anything};
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::sources::EnvironmentSource;
@@ -164,19 +165,22 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
     let Some(mut light) =
         own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
     else {
+        if model.has_camera && !sees_anything(&extraction(scene)) {
+            scene.warnings.push(format!("{title}: the camera of the file sees nothing of it: choose another view"));
+        }
         return;
     };
-    if !light.reaches() {
-        default_scene::light_inside(&mut scene.file, model.bounds);
-        match measure(scene, model.aspect).filter(Light::reaches) {
+    // Only what is added may be too little here.
+    if !is_enough && light.mean(0.0) < Light::SHADED {
+        let place = middle_of_room(&extraction(scene));
+        let added = place.map(|place| default_scene::light_inside(&mut scene.file, &place));
+        match added.and_then(|()| measure(scene, model.aspect)).filter(|inside| inside.reached() > light.reached()) {
             Some(inside) => {
                 light = inside;
-                let text = format!("{title}: it is closed, and no light reaches its inside: a light is added there");
+                let text = format!("{title}: hardly any light gets into it: a light is added inside");
                 scene.warnings.push(Warning::notice(text));
             }
-            None => {
-                scene.file.lights.pop();
-            }
+            None => scene.file.lights.retain(|light| !is_inner(light)),
         }
     }
     if !light.reaches() {
@@ -190,13 +194,23 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
             "{title}: its lights reach {share:.0} % of what the camera sees: --env FILE adds light from all around"
         )));
     }
-    // Generated light has the usual level.
-    let exposure = if scene.file.lights.is_empty() && !model.emits { 0.0 } else { light.exposure() };
+    // Generated light has the usual level outside.
+    let is_usual = scene.file.lights.is_empty() && !model.emits && !model.has_camera;
+    let exposure = if is_usual { 0.0 } else { light.exposure() };
     if exposure != 0.0 {
         let text = format!("{title}: the exposure is set to {exposure:+} stops, for the level of its light");
         scene.warnings.push(Warning::notice(text));
         scene.file.display = DisplayPart { exposure: exposure as f32, ..scene.file.display };
     }
+}
+
+/// The scene without its ground, which is none of the model, and always lit.
+fn extraction(scene: &LoadedScene) -> Extraction {
+    let mut world = World::new();
+    scene.spawn(&mut world);
+    let mut inputs = SceneInputs::of(&mut world);
+    inputs.objects.retain(|object| !matches!(object.shape, Shape::Plane { .. }));
+    Extraction::new(&inputs, &scene.trees)
 }
 
 /// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
@@ -209,12 +223,7 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
     /// What is darker may be noise of its texture.
     const LEAST_ALBEDO: f32 = 0.05;
 
-    let mut world = World::new();
-    scene.spawn(&mut world);
-    let mut inputs = SceneInputs::of(&mut world);
-    // The ground is none of the model, and always lit.
-    inputs.objects.retain(|object| !matches!(object.shape, Shape::Plane { .. }));
-    let scene = Extraction::new(&inputs, &scene.trees).prepared;
+    let scene = extraction(scene).prepared;
     let width = (PIXELS * aspect).sqrt().clamp(8.0, PIXELS / 8.0).round();
     let size = UVec2::new(width as u32, (PIXELS / width).round() as u32);
     let settings = |max_depth| {

@@ -137,6 +137,30 @@ fn texture_coordinates_normals_and_materials_are_kept() {
     }
 }
 
+/// Colours of vertices need no library, and no material.
+#[test]
+fn vertex_colours_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, out) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
+    write_ball(&model, 3);
+    let plain = std::fs::read_to_string(&model).unwrap();
+    let colored = plain.lines().map(|line| match line.strip_prefix("v ") {
+        Some(point) => format!("v {point} {}\n", if point.starts_with('-') { "1 0 0" } else { "0 0 1" }),
+        None => format!("{line}\n"),
+    });
+    let colored: String = colored.collect();
+    std::fs::write(&model, colored).unwrap();
+    let said = simplify(folder.path(), &["a.obj", "-o", "b.obj", "--ratio", "50%"]);
+    assert_eq!((said.code, &*said.err), (0, ""));
+    let text = std::fs::read_to_string(out).unwrap();
+    let points: Vec<&str> = text.lines().filter(|line| line.starts_with("v ")).collect();
+    assert!(
+        points.len() > 50 && points.iter().all(|line| line.ends_with(" 1 0 0") || line.ends_with(" 0 0 1")),
+        "{text}"
+    );
+    assert!(!text.contains("usemtl"));
+}
+
 #[test]
 fn a_report_for_people_names_faces_seconds_and_errors() {
     let folder = tempfile::tempdir().unwrap();

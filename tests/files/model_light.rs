@@ -5,7 +5,6 @@ use firstlight::scene::{
     ColorValue, EnvironmentSource, LoadOptions, LoadedScene, SceneSource, file::LightPart, file::MaterialPart,
     file::ObjectPart, load,
 };
-use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -125,10 +124,10 @@ fn a_closed_room_is_lit_inside() {
     let at = json.windows(10).position(|part| part == b"\"camera\":0").unwrap();
     json[at..at + 10].copy_from_slice(b"\"kamera\":0");
     let outside = opened("a.glb", &json, None);
-    for (scene, position) in [(&inside, DVec3::new(0.0, 0.0, 0.9)), (&outside, DVec3::ZERO)] {
-        assert!(generated(scene).is_some() && says(scene, "a light is added there"), "{:?}", scene.warnings);
-        let [LightPart::Point { position: at, .. }] = &scene.file.lights[..] else { panic!("one light inside") };
-        assert!(at.abs_diff_eq(position, 0.01), "{at}");
+    for scene in [&inside, &outside] {
+        assert!(generated(scene).is_some() && says(scene, "a light is added inside"), "{:?}", scene.warnings);
+        let [LightPart::Point { position, .. }] = &scene.file.lights[..] else { panic!("one light inside") };
+        assert!(position.abs().max_element() < 0.9, "{position}");
         assert!(!says(scene, "hardly any light"), "{:?}", scene.warnings);
     }
     // A wall that is open needs none.

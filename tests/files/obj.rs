@@ -233,6 +233,8 @@ fn vertex_colours_replace_diffuse_colours_but_not_textures() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.obj");
     std::fs::write(folder.path().join("m.mtl"), "newmtl a\nKd 1 1 1\nmap_Kd a.png\nnewmtl b\nKd 0 1 0\n").unwrap();
+    let image = folder.path().join("a.png");
+    std::fs::write(&image, "").unwrap();
     let v = "mtllib m.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\n";
     let load = |faces: &str| {
         std::fs::write(&path, format!("{v}{faces}")).unwrap();
@@ -242,6 +244,10 @@ fn vertex_colours_replace_diffuse_colours_but_not_textures() {
     assert_eq!(both.mesh.colors, [Vec4::new(1., 0., 0., 1.), Vec4::new(1., 0., 0., 1.), Vec4::new(0., 0., 1., 1.)]);
     assert_eq!([both.materials[0].vertex_colors, both.materials[1].vertex_colors], [false, true]);
     assert!(load("usemtl a\nf 1 2 3\n").mesh.colors.is_empty());
+    // Where the texture is missing, they are all that there is.
+    std::fs::remove_file(&image).unwrap();
+    let without = load("usemtl a\nf 1 2 3\n");
+    assert!(without.materials[0].vertex_colors && without.material_warnings.iter().any(|it| it.contains("a.png")));
     let unnamed = load("vn 0 0 1\nf 1//1 2//1 3//1\n");
     assert_eq!((&*unnamed.materials[0].name, unnamed.mesh.colors.len()), ("vertex colors", 3));
     let mut dark = unnamed.mesh.clone();

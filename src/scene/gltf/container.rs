@@ -39,19 +39,18 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfProblem> {
     if version != 2 {
         return Err(GltfProblem::Version(version.to_string()));
     }
-    if (bytes.len() as u64) < u64::from(length) {
-        return Err(truncated("the GLB", u64::from(length)));
-    }
-    let end = length as usize;
+    // What is cut is read as far as it goes, if the JSON text is whole.
+    let end = bytes.len().min(length as usize);
     let (mut at, mut json, mut binary) = (HEADER, None, None);
     // The remaining bytes may be padding.
     while at + 8 <= end {
         let (Some(size), Some(kind)) = (number(at), number(at + 4)) else { break };
         let start = at + 8;
         let stop = start as u64 + u64::from(size);
-        if stop > end as u64 {
+        if stop > end as u64 && (kind != BIN || json.is_none()) {
             return Err(truncated("a chunk", stop));
         }
+        let stop = stop.min(end as u64);
         let range = start..stop as usize;
         match (kind, json.is_some()) {
             (JSON, false) => json = Some(range),
@@ -91,10 +90,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_anywhere_is_refused() {
+    fn a_file_may_be_cut_in_its_buffer_only() {
         let whole = glb(&[(JSON, b"{}  "), (BIN, b"1234")]);
-        for length in 0..whole.len() {
+        let end_of_json = 12 + 8 + 4;
+        for length in 0..end_of_json {
             assert!(chunks(&whole[..length]).is_err(), "{length}");
+        }
+        for length in end_of_json..whole.len() {
+            let found = chunks(&whole[..length]).unwrap();
+            assert_eq!(found.binary.map(|range| range.len()), length.checked_sub(end_of_json + 8), "{length}");
         }
         let mut liar = whole.clone();
         liar[12..16].copy_from_slice(&u32::MAX.to_le_bytes());

@@ -62,7 +62,11 @@ impl Document {
 
     /// Number of vertices and indices of a mesh, as its accessors state them.
     pub(in crate::scene) fn numbers_of(&self, mesh: u32) -> u64 {
-        let count = |accessor: u32| self.root.accessors.get(accessor as usize).map_or(0, |accessor| accessor.count);
+        let most = self.most_elements();
+        let count = |accessor: u32| {
+            // More than can be is told when it is read.
+            self.root.accessors.get(accessor as usize).map_or(0, |accessor| accessor.count.min(most))
+        };
         let primitives = self.root.meshes.get(mesh as usize).map_or(&[][..], |mesh| &mesh.primitives);
         let positions: HashSet<u32> =
             primitives.iter().filter_map(|it| it.attributes.get("POSITION").copied()).collect();

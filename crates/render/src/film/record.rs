@@ -291,7 +291,8 @@ impl Film {
         }
         film.round = record.layout.round(&film)?;
         film.caustic_plan = *caustics;
-        if film.caustic_plan.is_some_and(|plan| !plan.is_valid() || light_traced.is_some() && !plan.has_light_paths()) {
+        let is_wrong = |plan: CausticPlan| !plan.is_valid() || light_traced.is_some() && !plan.has_light_paths();
+        if film.caustic_plan.map_or(light_traced.is_some(), is_wrong) {
             return Err(RecordError::LightPaths);
         }
         if let (Some(traced), Some(plan)) = (light_traced, film.caustic_plan) {
