@@ -187,7 +187,7 @@ pub fn sample_ranges(samples: Range<u32>, count: u32) -> Vec<Range<u32>> {
         return vec![samples];
     }
     let count = count.min(n) as usize;
-    // The shortest longest part with which so many are enough.
+    // The smallest maximum size of a part for which `count` parts suffice.
     let (mut too_short, mut long_enough) = (n / count as u32 - 1, n);
     while long_enough - too_short > 1 {
         let length = too_short + (long_enough - too_short) / 2;

@@ -42,7 +42,7 @@ pub(super) struct GltfMoment {
 }
 
 impl GltfMotion {
-    /// Where everything that moves is at a moment; seconds. `None` for a moment that cannot be had.
+    /// Where everything that moves is at a moment; seconds. `None` for a moment at which a mesh cannot be built.
     pub(super) fn at(&self, seconds: f64) -> Option<GltfMoment> {
         let document = &self.opened.document;
         let posed = document.posed(Some(seconds));

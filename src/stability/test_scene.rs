@@ -16,7 +16,7 @@ pub struct TestScene {
     pub reference: ReferenceIntersector,
     /// Generates the ray of an index.
     pub rays: RaySet,
-    /// One of so many rays is checked against every primitive; 1 for all.
+    /// Every n-th ray is checked against every primitive; 1 for all.
     pub brute_every: u64,
 }
 

@@ -432,7 +432,6 @@ fn by_axis<S: KernelSimd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: 
 }
 
 /// Loads the first sixteen numbers, or all of them with `idle` in the remaining lanes.
-/// Loads the first sixteen numbers; `idle` where there are fewer.
 #[inline(always)]
 pub(super) fn load_some<S: KernelSimd>(s: S, from: &[f32], idle: f32) -> S::F {
     if let Some(all) = from.first_chunk() {

@@ -106,5 +106,5 @@ fn free_name(world: &mut World, name: &str) -> String {
     let taken = textures(world);
     let numbered = (2..).map(|i| format!("{name} {i}"));
     let mut names = std::iter::once(name.to_owned()).chain(numbered);
-    names.find(|name| taken.iter().all(|texture| texture.name != *name)).expect("numbers go on")
+    names.find(|name| taken.iter().all(|texture| texture.name != *name)).expect("the iterator is infinite")
 }

@@ -144,7 +144,7 @@ impl Scale {
             Property::FilmIor => ("film IOR", "index of refraction of the film", 1.0..=2.5),
             Property::FilmThickness => ("film thickness", "nanometres", 0.0..=1500.0),
             Property::FilmThinnest => ("film at least", "nanometres, where the map of the film is black", 0.0..=1500.0),
-            Property::Opacity => ("opacity", "share of the surface that is there", 0.0..=1.0),
+            Property::Opacity => ("opacity", "0: fully transparent, 1: opaque", 0.0..=1.0),
             Property::NormalScale => ("normal scale", "strength of the normal map", -2.0..=2.0),
             _ => return None,
         };
@@ -172,7 +172,7 @@ fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
     let property = Property::of_param(name)?;
     Some(match property {
         Property::ThinWalled => (property, "thin walled", "light passes straight, as through a pane"),
-        Property::TwoSided => (property, "two-sided", "off: the back is not there"),
+        Property::TwoSided => (property, "two-sided", "off: back faces are invisible"),
         _ => return None,
     })
 }
@@ -186,7 +186,7 @@ fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
     let mut set = |value: f64| {
         asked.edit(Edit::Set { id, property: Property::OpacityCutoff, value: DVec3::splat(value) });
     };
-    row_with_hint(ui, "cutoff", "where opacity is less, the surface is not there; off: opacity is a share", |ui| {
+    row_with_hint(ui, "cutoff", "the surface is invisible where opacity is less; off: opacity is a share", |ui| {
         ui.horizontal(|ui| {
             let mut on = cutoff.is_some();
             if ui.checkbox(&mut on, "").changed() {

@@ -12,7 +12,7 @@ use glam::UVec2;
 ///
 /// The result is independent of seed, number of threads, and part of the image.
 pub fn caustic_choice(snapshot: &Prepared, settings: &RenderSettings, (width, height): (u32, u32)) -> CausticChoice {
-    choose(snapshot, settings, UVec2::new(width, height), &|| false).expect("nobody stops it")
+    choose(snapshot, settings, UVec2::new(width, height), &|| false).expect("the stop flag is constant false")
 }
 
 /// Like [`caustic_choice`] if the choice is already known, as it is for every image with samples; `None` otherwise.

@@ -33,7 +33,7 @@ pub struct SurfaceGuides {
     pub normal: Vec<Vec3>,
     /// Metres along the view axis; infinite where nothing is hit.
     pub depth: Vec<f32>,
-    /// Whether a pixel shows an emitter, in part at least, and be it in a mirror or through glass.
+    /// Whether the pixel sees an emitter, even partly, directly or by specular reflection or refraction.
     pub emitters: Vec<bool>,
 }
 
@@ -112,9 +112,9 @@ impl GuideGatherer {
         &self.guides
     }
 
-    /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool; false if `stop`, which is
-    /// called often, returned true: then there are no samples any more. After the first sixteen, only pixels get more of
-    /// which they differ.
+    /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool. Returns false if `stop`, which
+    /// is called often, returned true; the samples are discarded then. After 16 samples, only pixels whose samples vary
+    /// are continued.
     ///
     /// - `snapshot`, `settings`: the same in all steps of a view.
     ///

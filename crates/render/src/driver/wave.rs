@@ -182,7 +182,7 @@ impl<'a> Pass<'a> {
 
     /// Returns the pass for an image, after choosing the plan for caustics if it is not known.
     pub fn planned(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
-        let choice = choose(snapshot, settings, size, &|| false).expect("nobody stops it");
+        let choice = choose(snapshot, settings, size, &|| false).expect("the stop flag is constant false");
         Self::new(snapshot, settings, size, choice.plan)
     }
 

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 /// There is not enough memory for an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an image of {width} x {height} would take {} of memory, and that much cannot be had: make it smaller", size(*.bytes))]
+#[error("an image of {width} x {height} needs {}, more than is available: choose a smaller size", size(*.bytes))]
 pub struct NoRoom {
     /// Width in pixels.
     pub width: u32,

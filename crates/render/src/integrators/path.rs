@@ -86,7 +86,7 @@ pub(crate) struct PathWave {
 fn class_of_first_shadows(rays: &RayBatch) -> RayClass {
     /// Mean difference of the directions in a packet, radians: where both take as long.
     const SPREAD: f32 = 0.1;
-    /// One packet in so many is looked at.
+    /// Every n-th packet is measured.
     const STEP: usize = 16 * LANES;
     let (mut sum, mut n) = (0.0, 0.0);
     for first in (0..rays.len()).step_by(STEP) {
