@@ -86,6 +86,11 @@ pub fn light_inside(file: &mut SceneFile, &Inside { position, distance }: &Insid
     file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
 }
 
+/// Whether it is the material of the light of [`light`].
+pub fn is_key_light(material: &str) -> bool {
+    material.starts_with(KEY_LIGHT)
+}
+
 /// Whether it is the light of [`light_inside`].
 pub fn is_inner(light: &LightPart) -> bool {
     light.name() == Some(INNER_LIGHT)

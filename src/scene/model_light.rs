@@ -7,12 +7,13 @@
 
 use super::bounds::MOST_STOPS;
 use super::components::Shape;
-use super::default_scene::{self, is_inner};
+use super::default_scene::{self, is_inner, is_key_light};
 use super::extract::Extraction;
 use super::file::{DisplayPart, LightPart, MaterialPart, ObjectPart};
 use super::inner_light::{middle_of_room, sees_anything};
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
+use super::own_materials::emits;
 use super::sources::EnvironmentSource;
 use super::warnings::Warning;
 use crate::render::{Film, RenderSettings, Techniques, advance, gather_features};
@@ -216,13 +217,18 @@ fn extraction(scene: &LoadedScene) -> Extraction {
 /// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
 fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
     /// Pixels of the image.
-    const PIXELS: f64 = 2304.0;
-    const SAMPLES: u32 = 8;
+    const PIXELS: f64 = 1024.0;
+    const SAMPLES: u32 = 4;
     /// Segments of paths: light that was reflected three times.
     const DEPTH: u32 = 5;
     /// What is darker may be noise of its texture.
     const LEAST_ALBEDO: f32 = 0.05;
 
+    let of_meshes =
+        scene.meshes.iter().flatten().flat_map(|mesh| mesh.slots.iter().map(|(name, part)| (&**name, part)));
+    let mut materials = scene.file.materials.iter().map(|(name, part)| (name, part)).chain(of_meshes);
+    // Unlit materials too. The key light is behind the camera.
+    let has_emission = materials.any(|(name, part)| emits(part) && !is_key_light(name));
     let scene = extraction(scene).prepared;
     let width = (PIXELS * aspect).sqrt().clamp(8.0, PIXELS / 8.0).round();
     let size = UVec2::new(width as u32, (PIXELS / width).round() as u32);
@@ -235,7 +241,8 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
         advance(&scene, &settings(max_depth), &mut film, SAMPLES, &|| false);
         film.means()
     };
-    let (all, emitted) = (image(DEPTH), image(1));
+    let all = image(DEPTH);
+    let emitted = if has_emission { image(1) } else { vec![Vec3::ZERO; all.len()] };
     let surfaces = gather_features(&scene, &settings(DEPTH), size, SAMPLES, &|| false)?;
     let level = |color: Vec3| color.element_sum() / 3.0;
     let reflects = |&i: &usize| surfaces.coverage[i] == 1.0 && level(emitted[i]) == 0.0;

@@ -22,10 +22,9 @@ pub fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
     let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
     let size = model.max - model.min;
     let has_no_base = |stand: Stand| !stand.stable && stand.support < POINTED;
-    let base = model.stand(2, Side::Lower);
+    let has_base = |stand: Stand| stand.stable && stand.support >= BROAD;
     let is_sure = size.z >= size.x.max(size.y)
-        && base.stable
-        && base.support >= BROAD
+        && has_base(model.stand(2, Side::Lower))
         && !model.stand(2, Side::Upper).stable
         && has_no_base(model.stand(1, Side::Lower))
         && has_no_base(model.stand(1, Side::Upper));
@@ -33,8 +32,8 @@ pub fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
 }
 
 /// What is needed to stand a model on its sides.
-struct Stands {
-    corners: Vec<DVec3>,
+struct Stands<'a> {
+    mesh: &'a Mesh,
     /// Centroid of the surface.
     center: DVec3,
     min: DVec3,
@@ -55,36 +54,38 @@ struct Stand {
     support: f64,
 }
 
-impl Stands {
+/// The corners of each triangle.
+fn triangles(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
+    mesh.triangles.iter().map(|corners| corners.map(|vertex| mesh.positions[vertex as usize].as_dvec3()))
+}
+
+impl<'a> Stands<'a> {
     /// `None` if the surface has no area.
-    fn of(mesh: &Mesh) -> Option<Self> {
-        let corners: Vec<DVec3> =
-            mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
-        let center = surface_center(&corners)?;
-        let (min, max) =
-            corners.iter().fold((center, center), |(min, max), &corner| (min.min(corner), max.max(corner)));
-        Some(Self { corners, center, min, max })
+    fn of(mesh: &'a Mesh) -> Option<Self> {
+        let center = surface_center(mesh)?;
+        let corners = triangles(mesh).flatten();
+        let (min, max) = corners.fold((center, center), |(min, max), corner| (min.min(corner), max.max(corner)));
+        Some(Self { mesh, center, min, max })
     }
 
     fn stand(&self, axis: usize, side: Side) -> Stand {
         let seen_from_below = |point: DVec3| DVec2::new(point[(axis + 1) % 3], point[(axis + 2) % 3]);
         let margin = 0.02 * (self.max[axis] - self.min[axis]);
-        let is_lowest = |corner: &&DVec3| match side {
+        let is_lowest = |corner: &DVec3| match side {
             Side::Lower => corner[axis] <= self.min[axis] + margin,
             Side::Upper => corner[axis] >= self.max[axis] - margin,
         };
-        let lowest = self.corners.iter().filter(is_lowest);
-        let hull = convex_hull(lowest.map(|&corner| seen_from_below(corner)).collect());
+        let lowest = triangles(self.mesh).flatten().filter(is_lowest);
+        let hull = convex_hull(lowest.map(seen_from_below).collect());
         let size = seen_from_below(self.max - self.min);
         Stand { stable: contains(&hull, seen_from_below(self.center)), support: area(&hull) / (size.x * size.y) }
     }
 }
 
 /// The centroid of the surface; `None` if its area is 0.
-fn surface_center(corners: &[DVec3]) -> Option<DVec3> {
+fn surface_center(mesh: &Mesh) -> Option<DVec3> {
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
-    for triangle in corners.chunks_exact(3) {
-        let (a, b, c) = (triangle[0], triangle[1], triangle[2]);
+    for [a, b, c] in triangles(mesh) {
         let area = (b - a).cross(c - a).length();
         sum += area * (a + b + c) / 3.0;
         total += area;

@@ -142,7 +142,10 @@ fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
         .map(|(name, _)| name.as_str().to_owned())
         .collect();
     let numbered = (2..).map(|i| format!("{name} {i}"));
-    std::iter::once(name.to_owned()).chain(numbered).find(|name| !taken.contains(name)).expect("the iterator is infinite")
+    std::iter::once(name.to_owned())
+        .chain(numbered)
+        .find(|name| !taken.contains(name))
+        .expect("the iterator is infinite")
 }
 
 fn next_ordinal(world: &mut World) -> Ordinal {

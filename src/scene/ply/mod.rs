@@ -65,8 +65,8 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         warn(format!("not modelled and ignored: {}", list(&unused)));
     }
     let told = |(place, problem): Located| ModelError::of(path, place, problem);
-    let stray = faces.leave_out(|vertex| vertex == NOWHERE);
     if let Some(first) = faces.stray.take() {
+        let stray = faces.leave_out(|vertex| vertex == NOWHERE);
         if faces.is_empty() {
             return Err(told(first));
         }
