@@ -81,8 +81,9 @@ pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
 
 /// Adds a light inside of a model that is closed: a point, which cannot be seen.
 pub fn light_inside(file: &mut SceneFile, &Inside { position, distance }: &Inside) {
-    // A white surface has the radiance 1 at this distance.
-    let intensity = Rgb(Vec3::splat((PI * distance * distance) as f32));
+    // Direct light on a white surface at this distance; walls reflect about twice as much again.
+    const RADIANCE: f64 = 0.3;
+    let intensity = Rgb(Vec3::splat((RADIANCE * PI * distance * distance) as f32));
     file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
 }
 

@@ -151,7 +151,7 @@ fn vertex_colours_are_kept() {
     let colored: String = colored.collect();
     std::fs::write(&model, colored).unwrap();
     let said = simplify(folder.path(), &["a.obj", "-o", "b.obj", "--ratio", "50%"]);
-    assert_eq!((said.code, &*said.err), (0, ""));
+    assert!(said.code == 0 && !said.err.contains("warning"), "{}", said.err);
     let text = std::fs::read_to_string(out).unwrap();
     let points: Vec<&str> = text.lines().filter(|line| line.starts_with("v ")).collect();
     assert!(
