@@ -68,12 +68,13 @@ impl Document {
             self.root.accessors.get(accessor as usize).map_or(0, |accessor| accessor.count.min(most))
         };
         let primitives = self.root.meshes.get(mesh as usize).map_or(&[][..], |mesh| &mesh.primitives);
-        let positions: HashSet<u32> =
-            primitives.iter().filter_map(|it| it.attributes.get("POSITION").copied()).collect();
-        let indices = primitives
-            .iter()
-            .filter_map(|primitive| primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied()));
-        positions.into_iter().chain(indices).map(count).fold(0, u64::saturating_add)
+        let position = |primitive: &json::Primitive| primitive.attributes.get("POSITION").copied();
+        let mut known = HashSet::new();
+        // Primitives with the same attributes share their vertices.
+        let vertices =
+            primitives.iter().filter(|it| known.insert((&it.attributes, &it.targets[..]))).filter_map(position);
+        let indices = primitives.iter().filter_map(|primitive| primitive.indices.or_else(|| position(primitive)));
+        vertices.chain(indices).map(count).fold(0, u64::saturating_add)
     }
 
     /// All triangles of a mesh. Broken primitives and attributes are left out.
