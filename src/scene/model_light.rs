@@ -226,7 +226,7 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
 
     let of_meshes =
         scene.meshes.iter().flatten().flat_map(|mesh| mesh.slots.iter().map(|(name, part)| (&**name, part)));
-    let mut materials = scene.file.materials.iter().map(|(name, part)| (name, part)).chain(of_meshes);
+    let mut materials = scene.file.materials.iter().chain(of_meshes);
     // Unlit materials too. The key light is behind the camera.
     let has_emission = materials.any(|(name, part)| emits(part) && !is_key_light(name));
     let scene = extraction(scene).prepared;
