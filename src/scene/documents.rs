@@ -86,8 +86,8 @@ impl Documents {
             return Ok(mesh.clone());
         }
         let limit = opened.document.most_own_numbers();
-        let numbers = opened.document.numbers_of(key.mesh);
-        if opened.made.fetch_add(numbers, Ordering::Relaxed) + numbers > limit {
+        let (built, kept) = opened.document.numbers_of(key.mesh);
+        if built > limit || opened.made.fetch_add(kept, Ordering::Relaxed).saturating_add(kept) > limit {
             return Err((String::new(), GltfProblem::TooLarge { limit }));
         }
         let posed = opened.posed(at);

@@ -321,6 +321,20 @@ fn part_name(target: &Path, number: Option<u32>) -> PathBuf {
     target.with_file_name(format!(".firstlight-{hash:016x}{number}.part"))
 }
 
+/// Whether the file has further hard links.
+fn has_other_names(file: &File) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        file.metadata().is_ok_and(|info| info.nlink() > 1)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        false
+    }
+}
+
 /// Creates or reuses the temporary file of that name, empty and locked; `None` if another process uses it.
 fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempFile>> {
     let name = part_name(target, number);
@@ -354,6 +368,8 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
             Err(error) => return Err(error),
         };
         match file.try_lock() {
+            // A file elsewhere that has this name too, as an archive can plant it: it only loses the name.
+            Ok(()) if is_at(&file, &name) && has_other_names(&file) => std::fs::remove_file(&name)?,
             Ok(()) if is_at(&file, &name) => {
                 file.set_len(0)?;
                 let mut file = Some(file);
@@ -433,6 +449,27 @@ mod tests {
         let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         names.sort();
         names
+    }
+
+    /// As an archive plants it: the temporary name is known, and another file has it as well.
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_has_the_temporary_name_too_stays_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, other) = (folder.path().join("a.exr"), folder.path().join("other"));
+        std::fs::write(&other, "mine").unwrap();
+        for number in [None, Some(0)] {
+            let _ = std::fs::remove_file(&target);
+            std::fs::hard_link(&other, part_name(&target, number)).unwrap();
+            let mut file = match number {
+                None => WholeFile::claim(&target, Replace::Anything).unwrap(),
+                Some(_) => WholeFile::begin(&target, Replace::Anything).unwrap(),
+            };
+            file.write_all(b"new").unwrap();
+            file.finish().unwrap();
+            assert_eq!(std::fs::read(&other).unwrap(), b"mine");
+            assert_eq!(std::fs::read(&target).unwrap(), b"new");
+        }
     }
 
     #[test]

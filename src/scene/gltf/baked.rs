@@ -38,7 +38,8 @@ impl Document {
         let (limit, mut room) = (self.most_numbers(), self.most_own_numbers());
         for placed in &assembly.meshes {
             if let Entry::Vacant(entry) = built.entry(placed.key) {
-                let left = room.checked_sub(self.numbers_of(placed.key.mesh));
+                let (built, kept) = self.numbers_of(placed.key.mesh);
+                let left = room.checked_sub(kept).filter(|_| built <= self.most_own_numbers());
                 room = left.ok_or_else(|| whole(GltfProblem::TooLarge { limit: self.most_own_numbers() }))?;
                 let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
                 let mesh = self.built_mesh(placed.key.mesh, node, &options.normals);

@@ -183,17 +183,22 @@ impl Document {
     /// to the same data many times.
     pub(in crate::scene) fn most_own_numbers(&self) -> u64 {
         /// Several for each byte, since skins share meshes and primitives share attributes.
-        const A_BYTE: u64 = 32;
-        const ALWAYS: u64 = 1 << 23;
+        const A_BYTE: u64 = 8;
+        const ALWAYS: u64 = 1 << 22;
         let decoded: u64 = self.decoded.values().map(|bytes| bytes.len() as u64).sum();
         (ALWAYS + A_BYTE * self.n_bytes + decoded).min(self.most_numbers())
+    }
+
+    /// Number of bytes of all buffers that were read.
+    pub(super) fn n_bytes(&self) -> u64 {
+        self.n_bytes
     }
 
     /// Maximum number of bytes of all compressed streams.
     pub(super) fn most_decoded(&self) -> u64 {
         /// More than any model is compressed.
-        const A_BYTE: u64 = 512;
-        const ALWAYS: u64 = 64 << 20;
+        const A_BYTE: u64 = 128;
+        const ALWAYS: u64 = 16 << 20;
         (ALWAYS + A_BYTE * self.n_bytes).min(self.options.max_bytes)
     }
 

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
 /// The extension object of a primitive.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Stream {
     buffer_view: u32,
@@ -31,53 +31,63 @@ struct Values {
     bytes: Vec<u8>,
 }
 
-/// The contents of a stream.
+/// The contents of a stream, and what was made of them.
 struct Decoded {
-    /// Three indices per triangle.
-    indices: Values,
-    attributes: Vec<(String, Values)>,
+    mesh: Mesh,
+    /// Accessor of the indices.
+    indices: Option<u32>,
+    /// Accessor of each attribute, by its id.
+    accessors: HashMap<u32, u32>,
 }
 
-/// The accessors of a stream.
-#[derive(Clone, Debug)]
-struct Shared {
-    indices: u32,
-    attributes: Vec<(String, u32)>,
+/// Bytes of the indices of a triangle.
+const FACE: u64 = 12;
+
+/// Bytes of streams that are decoded, per byte of the file.
+const MOST_READ: u64 = 4;
+
+impl Decoded {
+    /// Bytes of the indices and of four numbers per point, as positions with an attribute have.
+    fn n_bytes(&self) -> u64 {
+        FACE * self.mesh.num_faces() as u64 + 16 * self.mesh.num_points() as u64
+    }
 }
 
 impl Document {
     /// Decodes all streams and makes their primitives refer to the results; primitives of one stream share them. A
     /// primitive whose stream is damaged keeps its own accessors if it has some with data, else it loses its attributes.
     pub(super) fn decode_draco(&mut self) {
-        let mut streams: Vec<(Stream, String)> = Vec::new();
-        let mut known: HashMap<Stream, usize> = HashMap::new();
+        let mut streams: Vec<(u32, String)> = Vec::new();
+        let mut known: HashMap<u32, usize> = HashMap::new();
         let mut users = Vec::new();
         for (mesh, json) in self.root.meshes.iter_mut().enumerate() {
             for (primitive, json) in json.primitives.iter_mut().enumerate() {
                 let Some(extension) = json.extensions.remove(NAME) else { continue };
                 let stream = Stream::deserialize(extension)
                     .map_err(|error| (at(mesh, primitive), GltfProblem::Json(format!("{NAME}: {error}"))));
-                let number = stream.map(|stream| {
-                    *known.entry(stream.clone()).or_insert_with(|| {
-                        streams.push((stream, at(mesh, primitive)));
+                let use_of = stream.map(|stream| {
+                    let number = *known.entry(stream.buffer_view).or_insert_with(|| {
+                        streams.push((stream.buffer_view, at(mesh, primitive)));
                         streams.len() - 1
-                    })
+                    });
+                    (number, stream.attributes)
                 });
-                users.push((mesh, primitive, number));
+                users.push((mesh, primitive, use_of));
             }
         }
-        let decoded = self.decode_streams(&streams);
-        let mut shared: Vec<Result<Shared, Option<Located>>> =
-            decoded.into_iter().map(|decoded| decoded.map(|decoded| self.share(decoded)).map_err(Some)).collect();
-        for (mesh, primitive, number) in users {
-            let found = number.and_then(|number| match &mut shared[number] {
-                Ok(shared) => Ok(shared.clone()),
+        let mut decoded: Vec<Result<Decoded, Option<Located>>> =
+            self.decode_streams(&streams).into_iter().map(|decoded| decoded.map_err(Some)).collect();
+        for (mesh, primitive, use_of) in users {
+            let found = use_of.and_then(|(number, attributes)| match &mut decoded[number] {
+                Ok(decoded) => {
+                    self.accessors_of(decoded, &attributes).map_err(|problem| (at(mesh, primitive), problem))
+                }
                 Err(first) => Err(first.take().unwrap_or_else(|| {
                     let first = &streams[number].1;
                     (at(mesh, primitive), GltfProblem::Draco(format!("it is the stream of {first}, which is left out")))
                 })),
             });
-            let Some(Shared { indices, attributes }) = self.omissions.kept(&at(mesh, primitive), found) else {
+            let Some((indices, attributes)) = self.omissions.kept(&at(mesh, primitive), found) else {
                 let json = &self.root.meshes[mesh].primitives[primitive];
                 let position = json.attributes.get("POSITION").and_then(|&i| self.root.accessors.get(i as usize));
                 if position.is_none_or(|position| position.buffer_view.is_none()) {
@@ -97,22 +107,26 @@ impl Document {
         }
     }
 
-    /// Decodes streams, a few at a time: together they have a limit, and none is kept beyond it.
-    fn decode_streams(&self, streams: &[(Stream, String)]) -> Vec<Result<Decoded, Located>> {
+    /// Decodes streams, given by their views and first primitives, a few at a time: together they have a limit, and none
+    /// is kept beyond it.
+    fn decode_streams(&self, streams: &[(u32, String)]) -> Vec<Result<Decoded, Located>> {
         let most = self.most_decoded();
         let (mut room, mut all) = (most, Vec::with_capacity(streams.len()));
+        // Views may overlap: damaged ones must not take time without end.
+        let mut unread = MOST_READ * self.n_bytes();
         for some in streams.chunks(2 * rayon::current_num_threads()) {
-            let decode = |(stream, part): &(Stream, String)| {
-                let bytes = self.view(stream.buffer_view)?.0;
-                decoded(bytes, stream, room).map_err(|problem| (part.clone(), problem))
+            let decode = |(view, part): &(u32, String)| {
+                let bytes = self.view(*view)?.0;
+                if bytes.len() as u64 > unread {
+                    return Err((part.clone(), too_long(most)));
+                }
+                decoded(bytes, room).map_err(|problem| (part.clone(), problem))
             };
             let found: Vec<_> = some.par_iter().map(decode).collect();
-            for (decoded, (_, part)) in found.into_iter().zip(some) {
+            for (decoded, (view, part)) in found.into_iter().zip(some) {
+                unread = unread.saturating_sub(self.view(*view).map_or(0, |(bytes, _)| bytes.len() as u64));
                 all.push(decoded.and_then(|decoded| {
-                    let bytes: u64 = decoded.attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
-                    let too_long = || GltfProblem::Draco(format!("all streams together have more than {most} bytes"));
-                    let left = room.checked_sub(bytes + decoded.indices.bytes.len() as u64);
-                    room = left.ok_or_else(|| (part.clone(), too_long()))?;
+                    room = room.checked_sub(decoded.n_bytes()).ok_or_else(|| (part.clone(), too_long(most)))?;
                     Ok(decoded)
                 }));
             }
@@ -120,11 +134,31 @@ impl Document {
         all
     }
 
-    /// Adds the values of a stream as accessors.
-    fn share(&mut self, decoded: Decoded) -> Shared {
-        let indices = self.add(decoded.indices);
-        let attributes = decoded.attributes.into_iter().map(|(name, values)| (name, self.add(values))).collect();
-        Shared { indices, attributes }
+    /// The accessors of the indices and of these attributes of a stream, which are added on first use.
+    fn accessors_of(
+        &mut self,
+        decoded: &mut Decoded,
+        attributes: &BTreeMap<String, u32>,
+    ) -> Result<(u32, Vec<(String, u32)>), GltfProblem> {
+        let mut found = Vec::with_capacity(attributes.len());
+        for (name, &id) in attributes {
+            let accessor = match decoded.accessors.get(&id) {
+                Some(&accessor) => accessor,
+                None => {
+                    let attribute = decoded.mesh.attribute_by_unique_id(id);
+                    let attribute = attribute.ok_or_else(|| GltfProblem::Draco(format!("it has no attribute {id}")))?;
+                    let accessor = self.add(values(attribute, decoded.mesh.num_points())?);
+                    decoded.accessors.insert(id, accessor);
+                    accessor
+                }
+            };
+            found.push((name.clone(), accessor));
+        }
+        let indices = match decoded.indices {
+            Some(accessor) => accessor,
+            None => *decoded.indices.insert(self.add(indices(&decoded.mesh))),
+        };
+        Ok((indices, found))
     }
 
     /// The same accessor, normalized.
@@ -151,10 +185,12 @@ fn at(mesh: usize, primitive: usize) -> String {
     format!("{}.{}", place("meshes", mesh), place("primitives", primitive))
 }
 
+fn too_long(most: u64) -> GltfProblem {
+    GltfProblem::Draco(format!("all streams together have more than {most} bytes"))
+}
+
 /// - `most_bytes`: maximum size of the decoded attributes.
-fn decoded(bytes: &[u8], stream: &Stream, most_bytes: u64) -> Result<Decoded, GltfProblem> {
-    /// Bytes of the indices of a triangle.
-    const FACE: u64 = 12;
+fn decoded(bytes: &[u8], most_bytes: u64) -> Result<Decoded, GltfProblem> {
     let limits = DecodeLimits::default()
         .with_max_points(u64::from(u32::MAX))
         .with_max_faces(most_bytes / FACE)
@@ -162,18 +198,17 @@ fn decoded(bytes: &[u8], stream: &Stream, most_bytes: u64) -> Result<Decoded, Gl
     let mut mesh = Mesh::new();
     let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
     MeshDecoder::new().decode(&mut buffer, &mut mesh).map_err(|error| GltfProblem::Draco(error.to_string()))?;
-    let indices = Values {
+    Ok(Decoded { mesh, indices: None, accessors: HashMap::new() })
+}
+
+/// Three indices per triangle.
+fn indices(mesh: &Mesh) -> Values {
+    Values {
         component_type: 5125,
         kind: "SCALAR",
         count: 3 * mesh.num_faces() as u64,
         bytes: mesh.faces().iter().flatten().flat_map(|point| point.0.to_le_bytes()).collect(),
-    };
-    let attributes = stream.attributes.iter().map(|(name, &id)| {
-        let attribute = mesh.attribute_by_unique_id(id);
-        let attribute = attribute.ok_or_else(|| GltfProblem::Draco(format!("it has no attribute {id}")))?;
-        Ok((name.clone(), values(attribute, mesh.num_points())?))
-    });
-    Ok(Decoded { indices, attributes: attributes.collect::<Result<_, GltfProblem>>()? })
+    }
 }
 
 /// One element per point.

@@ -10,7 +10,7 @@ use super::error::{GltfProblem, Located, place};
 use super::json;
 use super::vertices::{Deformation, NO_UV, Vertices};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 /// Identity of a slot: its material, and its materials by variant.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -60,21 +60,29 @@ impl Document {
         self.root.meshes.get(index as usize).ok_or((place("meshes", index), problem))
     }
 
-    /// Number of vertices and indices of a mesh, as its accessors state them.
-    pub(in crate::scene) fn numbers_of(&self, mesh: u32) -> u64 {
+    /// Number of vertices and indices of a mesh, as its accessors state them: of those that are built, and of those that
+    /// remain, since vertices that no index uses are left out.
+    pub(in crate::scene) fn numbers_of(&self, mesh: u32) -> (u64, u64) {
         let most = self.most_elements();
-        let count = |accessor: u32| {
-            // More than can be is told when it is read.
-            self.root.accessors.get(accessor as usize).map_or(0, |accessor| accessor.count.min(most))
+        let count = |accessor: Option<u32>| {
+            // More than can be, and data that is missing, are told when they are read.
+            let accessor = accessor.and_then(|accessor| self.root.accessors.get(accessor as usize));
+            let accessor = accessor.filter(|accessor| accessor.buffer_view.is_none_or(|view| self.view(view).is_ok()));
+            accessor.map_or(0, |accessor| accessor.count.min(most))
         };
         let primitives = self.root.meshes.get(mesh as usize).map_or(&[][..], |mesh| &mesh.primitives);
-        let position = |primitive: &json::Primitive| primitive.attributes.get("POSITION").copied();
-        let mut known = HashSet::new();
         // Primitives with the same attributes share their vertices.
-        let vertices =
-            primitives.iter().filter(|it| known.insert((&it.attributes, &it.targets[..]))).filter_map(position);
-        let indices = primitives.iter().filter_map(|primitive| primitive.indices.or_else(|| position(primitive)));
-        vertices.chain(indices).map(count).fold(0, u64::saturating_add)
+        let mut sets: HashMap<_, (u64, u64)> = HashMap::new();
+        for primitive in primitives {
+            let vertices = count(primitive.attributes.get("POSITION").copied());
+            let indices = primitive.indices.map_or(vertices, |indices| count(Some(indices)));
+            let set = sets.entry((&primitive.attributes, &primitive.targets[..])).or_insert((vertices, 0));
+            set.1 = set.1.saturating_add(indices);
+        }
+        sets.into_values().fold((0, 0), |(built, kept), (vertices, indices)| {
+            let of = |vertices: u64| vertices.saturating_add(indices);
+            (built.saturating_add(of(vertices)), kept.saturating_add(of(vertices.min(indices))))
+        })
     }
 
     /// All triangles of a mesh. Broken primitives and attributes are left out.
