@@ -6,9 +6,7 @@
 
 use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
-use firstlight::render::{
-    CausticPlan, Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, Prepared, RenderSettings, advance,
-};
+use firstlight::render::{Film, FilmLayout, FilmRecord, N_CHANGE_PLANES, N_PLANES, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{ObjectPart, SceneFile};
 use firstlight::scene::model::{ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::{
@@ -165,9 +163,10 @@ pub fn film(bytes: &[u8]) {
         Ok(film) => {
             // The sums to the last bit, NaN included; what there is no light or no doubling for is not kept.
             let again = film.to_record();
-            // Light paths without a plan have the plan of films that do not tell it.
-            let FilmLayout { light_traced, caustics, .. } = &mut record.layout;
-            *caustics = caustics.or(light_traced.as_ref().map(|_| CausticPlan::UNKNOWN));
+            // What a block is due is of a round that allocates.
+            if record.layout.round.as_ref().is_none_or(|round| round.even) {
+                record.layout.tiles.iter_mut().flat_map(|tile| &mut tile.blocks).for_each(|block| block.due = None);
+            }
             assert_eq!(again.layout, record.layout);
             assert_eq!(format!("{:?}", &again.planes[..6]), format!("{:?}", &record.planes[..6]));
             go_on(film);

@@ -44,20 +44,25 @@ fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
     ObjectPart::Plane {
         name: Some(GROUND.to_owned()),
         // Below what lies on it, or has a floor of its own.
-        point: DVec3::new(center.x, min.y - GAP * (max - min).length(), center.z),
+        point: within(DVec3::new(center.x, min.y - GAP * (max - min).length(), center.z)),
         normal: DVec3::Y,
         material,
         transform: TransformPart::default(),
     }
 }
 
+/// The nearest point that a scene file may have: models may be larger.
+fn within(point: DVec3) -> DVec3 {
+    point.clamp(DVec3::splat(-SceneFile::MAX_COORDINATE), DVec3::splat(SceneFile::MAX_COORDINATE))
+}
+
 /// - `side`: signs of the direction of the front.
 fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> ObjectPart {
     let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).max(SceneFile::MIN_SIZE);
+    let radius = (0.5 * (max - min).length()).clamp(SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
     ObjectPart::Sphere {
         name: Some(KEY_LIGHT.to_owned()),
-        center: center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize(),
+        center: within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()),
         radius,
         material,
         transform: TransformPart::default(),
@@ -84,6 +89,7 @@ pub fn light_inside(file: &mut SceneFile, &Inside { position, distance }: &Insid
     // Direct light on a white surface at this distance; walls reflect about twice as much again.
     const RADIANCE: f64 = 0.3;
     let intensity = Rgb(Vec3::splat((RADIANCE * PI * distance * distance) as f32));
+    let position = within(position);
     file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
 }
 
