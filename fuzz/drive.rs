@@ -163,9 +163,10 @@ pub fn film(bytes: &[u8]) {
         Ok(film) => {
             // The sums to the last bit, NaN included; what there is no light or no doubling for is not kept.
             let again = film.to_record();
-            // What a block is due is of a round that allocates.
-            if record.layout.round.as_ref().is_none_or(|round| round.even) {
-                record.layout.tiles.iter_mut().flat_map(|tile| &mut tile.blocks).for_each(|block| block.due = None);
+            // What a block is due is written for rounds that allocate, and for these always.
+            let is_uneven = record.layout.round.as_ref().is_some_and(|round| !round.even);
+            for block in record.layout.tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
+                block.due = is_uneven.then(|| block.due.take().unwrap_or_default());
             }
             assert_eq!(again.layout, record.layout);
             assert_eq!(format!("{:?}", &again.planes[..6]), format!("{:?}", &record.planes[..6]));
