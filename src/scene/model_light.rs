@@ -189,7 +189,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
             "{title}: hardly any light reaches what the camera sees, which is enclosed or faces away: choose another view, \
              or add a light"
         ));
-    } else if light.reached() < Light::MOSTLY_REACHED {
+    } else if is_enough && light.reached() < Light::MOSTLY_REACHED {
         let share = 100.0 * light.reached();
         scene.warnings.push(Warning::notice(format!(
             "{title}: its lights reach {share:.0} % of what the camera sees: --env FILE adds light from all around"

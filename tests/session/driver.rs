@@ -1,6 +1,7 @@
 //! Runs the frames of a session, as a window does.
 
-use firstlight::frame::Session;
+use firstlight::frame::{Session, SessionOptions};
+use firstlight::scene::SceneSource;
 use std::time::{Duration, Instant};
 
 /// What has a session, and when that began.
@@ -27,5 +28,26 @@ pub trait Drive {
     #[track_caller]
     fn settle(&mut self) {
         self.run_until(|session| session.status().done && session.is_idle());
+    }
+}
+
+/// A session with a clock of its own.
+pub struct Driver {
+    pub session: Session,
+    pub start: Instant,
+}
+
+impl Drive for Driver {
+    fn session(&mut self) -> (&mut Session, Instant) {
+        (&mut self.session, self.start)
+    }
+}
+
+impl Driver {
+    /// Begins to open a scene.
+    pub fn new(options: SessionOptions, source: SceneSource) -> Self {
+        let mut session = Session::new(options).unwrap();
+        session.open(source);
+        Self { session, start: Instant::now() }
     }
 }

@@ -1,6 +1,6 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
-use crate::driver::Drive;
+use crate::driver::{Drive, Driver};
 use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
 use firstlight::scene::{
     ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
@@ -8,7 +8,7 @@ use firstlight::scene::{
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const ROOM: &str = r#"(
     // The room.
@@ -33,24 +33,11 @@ fn write_room(folder: &Path) -> SceneSource {
     SceneSource::Scene(folder.join("room.ron"))
 }
 
-struct Driver {
-    session: Session,
-    start: Instant,
-}
-
-impl Drive for Driver {
-    fn session(&mut self) -> (&mut Session, Instant) {
-        (&mut self.session, self.start)
-    }
-}
-
 impl Driver {
     fn open(source: SceneSource, threads: usize, spp: u32) -> Self {
         let target = Target { spp: Some(spp), ..Target::default() };
         let options = SessionOptions { width: 40, height: 30, threads: Some(threads), target, ..Default::default() };
-        let mut session = Session::new(options).unwrap();
-        session.open(source);
-        Self { session, start: Instant::now() }
+        Self::new(options, source)
     }
 
     fn said(&self, kind: MessageKind) -> Vec<String> {

@@ -3,7 +3,7 @@
 //!
 //! `FIRSTLIGHT_EDIT_ROUNDS`: how many rounds, instead of 50.
 
-use crate::driver::Drive;
+use crate::driver::{Drive, Driver};
 use crate::random::Random;
 use firstlight::frame::{
     Command, CurrentScene, Edit, MessageKind, NewThing, Print, Property, Session, SessionOptions, Target,
@@ -20,7 +20,6 @@ use firstlight::scene::{
 use glam::{DVec2, DVec3, Vec3};
 use std::error::Error;
 use std::path::Path;
-use std::time::Instant;
 
 const SIZE: (u32, u32) = (24, 16);
 const SPP: u32 = 2;
@@ -71,19 +70,8 @@ fn write_room(folder: &Path) -> SceneSource {
     SceneSource::Scene(folder.join("room.ron"))
 }
 
-struct Driver {
-    session: Session,
-    start: Instant,
-}
-
-impl Drive for Driver {
-    fn session(&mut self) -> (&mut Session, Instant) {
-        (&mut self.session, self.start)
-    }
-}
-
 impl Driver {
-    fn open(source: SceneSource) -> Self {
+    fn small(source: SceneSource) -> Self {
         let options = SessionOptions {
             width: SIZE.0,
             height: SIZE.1,
@@ -92,8 +80,7 @@ impl Driver {
             target: Target { spp: Some(SPP), ..Target::default() },
             ..SessionOptions::default()
         };
-        let mut driver = Self { session: Session::new(options).unwrap(), start: Instant::now() };
-        driver.session.open(source);
+        let mut driver = Self::new(options, source);
         driver.settle();
         driver
     }
@@ -272,12 +259,12 @@ fn edits_equal_reloads() {
     let builtin = |name: &str| SceneSource::Builtin(name.to_owned());
     let sources = [room.clone(), builtin("carousel"), room, builtin("glass-balls")];
     let mut failures = Vec::new();
-    let mut driver = Driver::open(sources[0].clone());
+    let mut driver = Driver::small(sources[0].clone());
     let mut done = Vec::new();
     for round in 0..rounds() {
         if round % 10 == 0 {
             let source = sources[round / 10 % sources.len()].clone();
-            driver = Driver::open(source.clone());
+            driver = Driver::small(source.clone());
             done = vec![source.title()];
         }
         let mut random = Random(round as u64);
@@ -289,7 +276,7 @@ fn edits_equal_reloads() {
         if let Err(problem) = check(&mut driver, path, round) {
             failures.push(format!("round {round}: {problem}\nafter {}", done.join("\n  ")));
             // What is wrong stays wrong.
-            driver = Driver::open(sources[0].clone());
+            driver = Driver::small(sources[0].clone());
             done = vec![sources[0].title()];
         }
     }
@@ -301,8 +288,8 @@ fn edits_equal_reloads() {
 fn a_scene_that_is_read_again_equals_one_that_is_opened() {
     let [ours, theirs] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let source = write_room(ours.path());
-    let mut editor = Driver::open(write_room(theirs.path()));
-    let mut driver = Driver::open(source.clone());
+    let mut editor = Driver::small(write_room(theirs.path()));
+    let mut driver = Driver::small(source.clone());
     let SceneSource::Scene(path) = &source else { unreachable!() };
     for round in 0..rounds().div_ceil(2) {
         let mut random = Random(0xF11E + round as u64);

@@ -54,8 +54,7 @@ impl HalfSteps {
 }
 
 impl Film {
-    /// The last steps of all pixels; `None` before the second sample per pixel, or if a part of the film was read from
-    /// a file of an older format and has not doubled since.
+    /// The last steps of all pixels; `None` before the second sample per pixel, or if those of some pixels are unknown.
     pub fn half_steps(&self) -> Option<HalfSteps> {
         let n_pixels = self.width() as usize * self.height() as usize;
         let (mut steps, mut late) = (vec![Vec3::ZERO; n_pixels], vec![Vec3::ZERO; n_pixels]);

@@ -27,7 +27,7 @@ pub struct FilmRecord {
     /// [`N_PLANES`] planes, each row by row from the top.
     pub planes: Vec<Vec<f64>>,
     /// [`N_CHANGE_PLANES`] planes of the last doubling, in the same order, 0 where there was none; `None` if they are not
-    /// known, as in films of older formats. Only the denoiser and the error of single pixels need them.
+    /// known, as after a doubling at once from fewer samples. Only the denoiser and the error of single pixels need them.
     pub changes: Option<Vec<Vec<f32>>>,
 }
 
