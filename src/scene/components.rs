@@ -142,11 +142,7 @@ pub const GREY: Material = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::spl
 /// The textures of a material.
 pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
     material.params().into_iter().filter_map(|(_, param)| match param {
-        Param::Reflectance(ColorParam::Texture(texture))
-        | Param::Radiance(ColorParam::Texture(texture))
-        | Param::Factor(ColorParam::Texture(texture))
-        | Param::Map(ColorParam::Texture(texture))
-        | Param::Share(ScalarParam::Texture(texture)) => Some(texture),
+        Param::Color(ColorParam::Texture(texture)) | Param::Scalar(ScalarParam::Texture(texture)) => Some(texture),
         _ => None,
     })
 }

@@ -4,7 +4,7 @@ use super::components::{ColorParam, InWorld, ScalarParam, SurfaceTexture};
 use super::file::{InFile, MaterialPart};
 use super::sources::TextureSource;
 use super::value::{ColorValue, ScalarValue};
-use crate::render::{MapParams, Material, Param};
+use crate::render::{Domain, MapParams, Param, Value};
 use bevy_ecs::prelude::Entity;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -14,30 +14,18 @@ use std::collections::HashMap;
 /// - `is_there`: whether a texture of this name exists.
 pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str) -> bool) -> MaterialPart {
     let mut part = part.clone();
-    let plain = Material::<InFile>::principled(ColorValue::grey(0.5));
-    let is_layered = part.kind() == plain.kind();
-    let lost_color = |color: &ColorValue| matches!(color, ColorValue::Texture(name) if !is_there(name));
-    for (name, param) in part.params_mut() {
+    let main = part.kind().main_property();
+    for (property, param) in part.params_mut() {
         match param {
-            Param::Reflectance(color) | Param::Radiance(color) | Param::Factor(color) | Param::Map(color)
-                if lost_color(color) =>
-            {
-                *color = ColorValue::grey(0.5);
-                if is_layered {
-                    let usual = plain.params().into_iter().find(|(usual, _)| *usual == name);
-                    if let Some((
-                        _,
-                        Param::Reflectance(usual) | Param::Radiance(usual) | Param::Factor(usual) | Param::Map(usual),
-                    )) = usual
-                    {
-                        *color = usual.clone();
-                    }
-                }
+            Param::Color(color) if matches!(&*color, ColorValue::Texture(name) if !is_there(name)) => {
+                *color = match property.default {
+                    Some(Value::Color(usual)) if Some(property.name) != main => usual.into(),
+                    _ => ColorValue::grey(0.5),
+                };
             }
-            Param::Share(scalar) if matches!(&*scalar, ScalarValue::Texture(name) if !is_there(name)) => {
-                let usual = plain.params().into_iter().find(|(usual, _)| is_layered && *usual == name);
-                *scalar = match usual {
-                    Some((_, Param::Share(usual))) => usual.clone(),
+            Param::Scalar(scalar) if matches!(&*scalar, ScalarValue::Texture(name) if !is_there(name)) => {
+                *scalar = match property.default {
+                    Some(Value::Number(usual)) => usual.into(),
                     _ => ScalarValue::Number(0.5),
                 };
             }
@@ -50,7 +38,10 @@ pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str)
 /// Whether a material is a light.
 pub(super) fn emits(part: &MaterialPart) -> bool {
     let params = part.params();
-    params.iter().any(|(_, param)| matches!(param, Param::Radiance(color) if **color != ColorValue::Rgb(Vec3::ZERO)))
+    params.iter().any(|(property, param)| {
+        matches!(param, Param::Color(color) if property.domain == Domain::Radiance
+            && **color != ColorValue::Rgb(Vec3::ZERO))
+    })
 }
 
 /// Names of the textures of a material.
@@ -67,11 +58,7 @@ pub(super) fn texture_names(part: &MaterialPart) -> Vec<String> {
 pub(super) fn rename_textures(part: &mut MaterialPart, mut to: impl FnMut(&str) -> String) {
     for (_, param) in part.params_mut() {
         match param {
-            Param::Reflectance(ColorValue::Texture(name))
-            | Param::Radiance(ColorValue::Texture(name))
-            | Param::Factor(ColorValue::Texture(name))
-            | Param::Map(ColorValue::Texture(name))
-            | Param::Share(ScalarValue::Texture(name)) => *name = to(name),
+            Param::Color(ColorValue::Texture(name)) | Param::Scalar(ScalarValue::Texture(name)) => *name = to(name),
             _ => {}
         }
     }
@@ -112,6 +99,7 @@ impl MapParams<InWorld, InFile> for ByTextureName<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Material;
 
     #[test]
     fn lost_textures_leave_a_surface_that_looks_usual() {

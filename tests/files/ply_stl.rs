@@ -334,6 +334,9 @@ fn bad_ply_files_are_refused_with_their_place() {
     assert_eq!(of("3", "1", &format!("{CORNERS}2 0 1\n")).1, PlyProblem::NoFaces, "all faces were short");
     let huge = problem(ModelFormat::Ply, &plain("3", "1", "0 0 0\n1e300 0 0\n0 1 0\n3 0 1 2\n")).1;
     assert!(matches!(huge, ModelProblem::Mesh(_)), "{huge}");
+    let bare = b"ply\nformat ascii 1.0\nelement vertex 3\nelement face 1\nproperty list uchar int vertex_indices\n\
+                 end_header\n3 0 1 2\n";
+    assert_eq!(ply_problem(bare), (Place::File, PlyProblem::NoPositions));
     assert_eq!(ply_problem(b""), (Place::Line(1), PlyProblem::NotPly));
 }
 

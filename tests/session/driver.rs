@@ -1,7 +1,7 @@
 //! Runs the frames of a session, as a window does.
 
-use firstlight::frame::{Session, SessionOptions};
-use firstlight::scene::SceneSource;
+use firstlight::frame::{Property, Session, SessionOptions};
+use firstlight::scene::{MaterialProperty, SceneSource};
 use std::time::{Duration, Instant};
 
 /// What has a session, and when that began.
@@ -50,4 +50,9 @@ impl Driver {
         session.open(source);
         Self { session, start: Instant::now() }
     }
+}
+
+/// A property of materials, by its name in scene files.
+pub fn of_material(name: &str) -> Property {
+    Property::Material(MaterialProperty::named(name).expect("it is in the table"))
 }

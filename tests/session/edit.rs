@@ -1,5 +1,6 @@
 //! Changing a scene through a session, without a window: selecting, editing, undoing, looking at it in other ways.
 
+use crate::driver::of_material;
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
@@ -119,7 +120,7 @@ fn a_material_stays_when_the_object_that_uses_it_is_deleted() {
     driver.edit([Edit::Add(NewThing::Sphere)]);
     let material = driver.get::<MaterialSlots>("ball").0[0];
     driver.edit([
-        Edit::Set { id: material.to_bits(), property: Property::Color, value: DVec3::new(0.1, 0.8, 0.2) },
+        Edit::Set { id: material.to_bits(), property: of_material("albedo"), value: DVec3::new(0.1, 0.8, 0.2) },
         Edit::Rename { id: material.to_bits(), name: "leaf green".to_owned() },
         Edit::Delete,
     ]);
@@ -144,7 +145,7 @@ fn every_edit_can_be_undone_and_done_again_to_the_bit() {
         Edit::Turn { axis: DVec3::Y, angle_deg: 30.0 },
         Edit::Scale { factors: DVec3::splat(1.5) },
         Edit::Set { id: ball, property: Property::Radius, value: DVec3::splat(0.4) },
-        Edit::Set { id: red, property: Property::Color, value: DVec3::new(0.1, 0.8, 0.2) },
+        Edit::Set { id: red, property: of_material("albedo"), value: DVec3::new(0.1, 0.8, 0.2) },
         Edit::SetKind { id: red, kind: MaterialKind::Glass },
         Edit::Assign { id: ball, material: red },
         Edit::OwnMaterial { id: ball },
@@ -250,7 +251,7 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     // Nonsense is refused, and nothing changes.
     let (material, id): (SurfaceMaterial, u64) = (driver.get("red"), driver.named("red").to_bits());
     for (property, value) in
-        [(Property::Color, DVec3::NAN), (Property::Ior, DVec3::ONE), (Property::Radius, DVec3::ONE)]
+        [(of_material("albedo"), DVec3::NAN), (of_material("ior"), DVec3::ONE), (Property::Radius, DVec3::ONE)]
     {
         driver.edit([Edit::Set { id, property, value }]);
     }
@@ -301,7 +302,11 @@ fn what_comes_back_is_selected_as_it_was_when_it_came() {
     assert_eq!(driver.selected().0, copy, "what was deleted is back, and selected");
     // Nothing came or went: the selection is nobody's business.
     let red = driver.named("red").to_bits();
-    driver.edit([Edit::Set { id: red, property: Property::Color, value: DVec3::ONE }, Edit::SelectNone, Edit::Undo]);
+    driver.edit([
+        Edit::Set { id: red, property: of_material("albedo"), value: DVec3::ONE },
+        Edit::SelectNone,
+        Edit::Undo,
+    ]);
     assert_eq!(driver.selected().0, []);
 }
 

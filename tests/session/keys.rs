@@ -1,6 +1,6 @@
 //! Keys that are set in a session: they are what was shown, can be undone, and are in the file that is saved.
 
-use crate::driver::Drive;
+use crate::driver::{Drive, of_material};
 use firstlight::frame::{Command, Edit, MessageKind, Property, Session, SessionOptions, Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::animation::{Interpolation, KeyValue, Shutter};
@@ -123,7 +123,7 @@ fn a_still_scene_gets_an_animation_by_moving_things_and_setting_keys() {
     let material = driver.inputs().materials[0].entity.to_bits();
     let sun = driver.inputs().lights[0].entity.to_bits();
     let set = |id, property, value: f64| Edit::Set { id, property, value: DVec3::splat(value) };
-    driver.edit([set(material, Property::Color, 0.7), set(sun, Property::Irradiance, 3.0), KEY]);
+    driver.edit([set(material, of_material("albedo"), 0.7), set(sun, Property::Irradiance, 3.0), KEY]);
     driver.session.send(Command::Orbit { yaw_deg: 30.0, pitch_deg: 5.0 });
     driver.edit([Edit::SelectNone, KEY]);
     let names: Vec<&str> = driver.tracks().iter().map(|(name, ..)| *name).collect();

@@ -1,5 +1,6 @@
 //! Lists of materials and lights, and what is done to all that share one, without a window.
 
+use crate::driver::of_material;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{Command, Edit, History, Property, Selection, Session, SessionOptions, Target, sky_strength};
 use firstlight::render::Environment;
@@ -114,7 +115,7 @@ fn a_shared_material_changes_on_all_that_share_it_and_they_can_be_selected() {
     // One edit and one undo for all three.
     let restarts = driver.session.status().restarts;
     let value = DVec3::new(0.1, 0.8, 0.1);
-    driver.edit(Edit::Set { id: clay.to_bits(), property: Property::Color, value });
+    driver.edit(Edit::Set { id: clay.to_bits(), property: of_material("albedo"), value });
     let color = |driver: &Driver| match SurfaceMaterial::of(driver.session.world(), clay) {
         Some(Material::Diffuse { albedo: ColorParam::Rgb(rgb) }) => *rgb,
         other => panic!("{other:?}"),

@@ -3,7 +3,7 @@
 //!
 //! `FIRSTLIGHT_EDIT_ROUNDS`: how many rounds, instead of 50.
 
-use crate::driver::{Drive, Driver};
+use crate::driver::{Drive, Driver, of_material};
 use crate::random::Random;
 use firstlight::frame::{
     Command, CurrentScene, Edit, MessageKind, NewThing, Print, Property, Session, SessionOptions, Target,
@@ -118,7 +118,7 @@ impl Driver {
         let kinds = [MaterialKind::Diffuse, MaterialKind::Metal, MaterialKind::Glass, MaterialKind::Mirror];
         let names = ["", "ball", "a \"quoted\" \\ name", "käse 球", "sphere 2", "\n"];
         let hows = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Held];
-        let of_material = [Property::Color, Property::Alpha, Property::Ior, Property::Weight, Property::Absorption];
+        let properties = ["albedo", "reflectance", "alpha", "ior", "weight", "absorption"].map(of_material);
         let of_sky = [Property::Zenith, Property::Horizon, Property::Ground, Property::SkyStrength];
         let share = 0.5 + 0.5 * three;
         match random.below(36) {
@@ -142,7 +142,7 @@ impl Driver {
             17 => edit(Edit::Delete),
             18 => edit(Edit::Duplicate),
             19 => vec![Command::Edit(Edit::Add(things[random.below(things.len())].clone()))],
-            20..22 => set(material, of_material[random.below(of_material.len())], share),
+            20..22 => set(material, properties[random.below(properties.len())], share),
             22 => vec![Command::Edit(Edit::SetKind { id: material, kind: kinds[random.below(kinds.len())] })],
             23 => vec![Command::Edit(Edit::Assign { id, material })],
             24 => vec![Command::Edit(Edit::OwnMaterial { id })],

@@ -23,11 +23,11 @@ pub use crate::core::delta_light::{Cone, DeltaLight};
 pub use crate::core::environment::Environment;
 pub use crate::core::filter::PixelFilter;
 pub use crate::core::material::{
-    ColorInput, Fresnel, InSnapshot, MAX_LOBES, MapParams, Material, MaterialId, ParamMut, ParamRef, Params,
-    ScalarInput,
+    ColorInput, Fresnel, InSnapshot, MAX_LOBES, MapParams, Material, MaterialId, MaterialKind, Param, ParamMut,
+    ParamRef, Params, ScalarInput,
 };
-pub use crate::core::material_kind::{MaterialKind, Param};
 pub use crate::core::material_queries::Emission;
+pub use crate::core::property::{Domain, Property, Value, ValueType};
 pub use crate::core::settings::{ErrorMetric, Integrator, RenderSettings, SampleAllocation, SettingsError};
 pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};
 pub use crate::core::techniques::Techniques;

@@ -3,7 +3,7 @@
 
 use super::property::Property;
 use super::{keys, sky};
-use crate::render::{Fresnel, MaterialKind, Param};
+use crate::render::MaterialKind;
 use crate::scene::{
     ColorParam, DirectionalLight, LightKind, Linear, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
 };
@@ -44,8 +44,9 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         LightKind::put(Some(with_property(light, property, value).ok_or_else(wrong)?), world, entity);
         return Ok(());
     }
+    let Property::Material(property) = property else { return Err(wrong()) };
     let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or_else(wrong)?;
-    set_in_material(&mut material.0, property, value).ok_or_else(wrong)?;
+    property.set(&mut material.0, value).ok_or_else(wrong)?;
     set_if_different(world, entity, material);
     Ok(())
 }
@@ -101,41 +102,6 @@ fn with_property(light: LightKind, property: Property, value: DVec3) -> Option<L
         }
         _ => return None,
     })
-}
-
-fn set_in_material(material: &mut Material, property: Property, value: DVec3) -> Option<()> {
-    let number = value.x as f32;
-    let share = number.clamp(0.0, 1.0);
-    if property == Property::Color {
-        let is_light = material.kind() == MaterialKind::Emissive;
-        let most = if is_light { DVec3::INFINITY } else { DVec3::ONE };
-        *material.color_mut()? = ColorParam::Rgb(value.clamp(DVec3::ZERO, most).as_vec3());
-        return Some(());
-    }
-    if let (Property::Schlick, Material::Metal { fresnel, .. }) = (property, &mut *material) {
-        *fresnel = if number == 0.0 { Fresnel::Constant } else { Fresnel::Schlick };
-        return Some(());
-    }
-    let mut params = material.params_mut().into_iter();
-    let (_, param) = params.find(|(name, _)| Property::of_param(name) == Some(property))?;
-    match param {
-        // A narrower lobe looks like a mirror.
-        Param::Share(width) if property == Property::Alpha => *width = number.clamp(1e-3, 1.0).into(),
-        Param::Share(scalar) => *scalar = share.into(),
-        Param::ConstantShare(old) => *old = share,
-        Param::Ior(ior) => *ior = number.clamp(0.1, 10.0),
-        Param::Exponent(exponent) => *exponent = number.clamp(1.0, 1e5),
-        Param::Absorption(absorption) => *absorption = value.max(DVec3::ZERO).as_vec3(),
-        Param::Dispersion(old) => *old = number.clamp(0.0, 40.0),
-        Param::Thickness(old) => *old = number.max(0.0),
-        Param::Number(old) => *old = number.clamp(-1e3, 1e3),
-        Param::Flag(old) => *old = number != 0.0,
-        Param::Reflectance(color) => *color = ColorParam::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3()),
-        Param::Radiance(color) | Param::Factor(color) => *color = ColorParam::Rgb(value.max(DVec3::ZERO).as_vec3()),
-        Param::Cutoff(old) => *old = (0.0..=1.0).contains(&number).then_some(number),
-        Param::Map(_) | Param::Part(_) => return None,
-    }
-    Some(())
 }
 
 /// Changes the kind of a material, keeping the colour if both have one.

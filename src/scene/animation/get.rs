@@ -1,10 +1,11 @@
 //! Reading of animated values from cameras, placements, lights and materials: the inverse of `set`.
 
 use super::key::KeyValue;
-use super::property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty, Quantity};
-use crate::render::Param;
+use super::property::{CameraProperty, LightProperty, ObjectProperty, Quantity};
+use crate::render::{Fresnel, Param};
 use crate::scene::components::{ColorParam, Material, ScalarParam};
 use crate::scene::light::LightKind;
+use crate::scene::material_property::MaterialProperty;
 use crate::scene::placement::{Linear, Placement};
 use crate::scene::view::{Lens, Projection, View};
 use glam::DVec3;
@@ -80,24 +81,18 @@ impl LightProperty {
 }
 
 impl MaterialProperty {
-    /// The value of a material; `None` if it has no such property, or a texture in its place.
-    pub(super) fn get(self, material: &Material) -> Option<DVec3> {
-        let (_, param) = material.params().into_iter().find(|(name, _)| *name == self.name())?;
+    /// The value for a material, a number in all three components; `None` if it has none, or a texture in its place.
+    pub fn get(self, material: &Material) -> Option<DVec3> {
+        let (_, param) = material.params().into_iter().find(|(property, _)| property.name == self.name())?;
         Some(match param {
-            Param::Reflectance(color) | Param::Radiance(color) | Param::Factor(color) => match color {
-                ColorParam::Rgb(rgb) => short_color(*rgb),
-                ColorParam::Texture(_) => return None,
-            },
-            Param::Share(ScalarParam::Number(number)) => DVec3::splat(short(*number)),
-            Param::ConstantShare(number)
-            | Param::Number(number)
-            | Param::Ior(number)
-            | Param::Exponent(number)
-            | Param::Dispersion(number)
-            | Param::Thickness(number) => DVec3::splat(short(*number)),
+            Param::Color(ColorParam::Rgb(rgb)) | Param::Rgb(rgb) => short_color(*rgb),
+            Param::Scalar(ScalarParam::Number(number)) | Param::Number(number) => DVec3::splat(short(*number)),
             Param::Cutoff(number) => DVec3::splat(short((*number)?)),
-            Param::Absorption(color) => short_color(*color),
-            Param::Share(_) | Param::Map(_) | Param::Flag(_) | Param::Part(_) => return None,
+            Param::Flag(on) => DVec3::splat(f64::from(u8::from(*on))),
+            Param::Fresnel(fresnel) => DVec3::splat(f64::from(u8::from(*fresnel == Fresnel::Schlick))),
+            Param::Color(ColorParam::Texture(_)) | Param::Scalar(ScalarParam::Texture(_)) | Param::Part(_) => {
+                return None;
+            }
         })
     }
 }
@@ -105,23 +100,13 @@ impl MaterialProperty {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{self, MaterialKind};
+    use crate::render::{self, MaterialKind, ValueType};
     use crate::scene::{DirectionalLight, PointLight, SpotLight};
     use glam::Vec3;
 
     #[test]
     fn what_is_set_is_read_again() {
         let value = DVec3::new(0.3, 0.4, 0.7);
-        for kind in MaterialKind::PLAIN {
-            let mut material: Material = render::Material::of_kind(kind, ColorParam::Rgb(Vec3::ONE)).unwrap();
-            let properties: Vec<MaterialProperty> = MaterialProperty::of(&material).collect();
-            for property in properties.into_iter().filter(|property| *property != MaterialProperty::IridescenceMap) {
-                property.set(&mut material, value).unwrap();
-                let got = property.get(&material).unwrap();
-                let wanted = if property.quantity() == Quantity::Color { value } else { DVec3::splat(0.3) };
-                assert_eq!(got, wanted, "{kind:?} {property:?}");
-            }
-        }
         let lights = [
             LightKind::Point(PointLight { intensity: Vec3::ONE, radius: 0.0 }),
             LightKind::Spot(SpotLight {
@@ -142,6 +127,29 @@ mod tests {
         }
         for &property in ObjectProperty::ALL {
             assert_eq!(property.get(&property.set(Placement::default(), value)), Some(value));
+        }
+    }
+
+    #[test]
+    fn what_is_set_is_read_again_within_the_limits() {
+        for kind in MaterialKind::plain() {
+            let mut material: Material = render::Material::of_kind(kind, ColorParam::Rgb(Vec3::ONE)).unwrap();
+            for property in MaterialProperty::of(&material).collect::<Vec<_>>() {
+                let value = DVec3::new(0.3, 0.4, 0.7);
+                property.set(&mut material, value).unwrap();
+                let expected = match (property.description().value, property.quantity()) {
+                    (ValueType::Flag | ValueType::Fresnel, _) => DVec3::ONE,
+                    (_, Quantity::Color) => value,
+                    _ => DVec3::splat(0.3),
+                };
+                assert_eq!(property.get(&material), Some(expected), "{kind:?} {property:?}");
+                property.set(&mut material, DVec3::splat(-7.0)).unwrap();
+                let limits = property.description().domain.limits();
+                match property.get(&material) {
+                    Some(value) => assert!(limits.contains(&(value.x as f32)), "{kind:?} {property:?} {value}"),
+                    None => assert_eq!(property.description().value, ValueType::Cutoff),
+                }
+            }
         }
     }
 

@@ -2,11 +2,12 @@
 
 use super::key::{Curve, Interpolation};
 use super::moment::{Moment, place, rest_camera};
-use super::property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty};
+use super::property::{CameraProperty, LightProperty, ObjectProperty};
 use super::{Animation, Channel, Shutter, Track};
 use crate::scene::camera::{camera, camera_part};
 use crate::scene::file::{AnimationPart, CameraPart};
 use crate::scene::inputs::{CameraInput, SceneInputs};
+use crate::scene::material_property::MaterialProperty;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -191,7 +192,7 @@ fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> 
         if old.material == material.material {
             continue;
         }
-        for &property in MaterialProperty::ALL {
+        for property in MaterialProperty::animatable(&material.material) {
             let channel = Channel::Material(material.entity, property);
             compare(channel, property.get(&old.material), property.get(&material.material));
         }
@@ -314,7 +315,7 @@ mod tests {
         let before = go_to(&mut world, 2.0);
         let (ball, material) = (before.objects[0].entity, before.objects[1].slots[0]);
         world.get_mut::<Placement>(ball).unwrap().translation.y = 3.0;
-        let property = MaterialProperty::Alpha;
+        let property = MaterialProperty::named("alpha").unwrap();
         property.set(&mut world.get_mut::<SurfaceMaterial>(material).unwrap().0, DVec3::splat(0.6)).unwrap();
         assert_eq!(set(&mut world, &before, &written, KeysOf::Changes(&[])), ["translate", "alpha"]);
         let moved = Channel::Object(ball, ObjectProperty::Translate);

@@ -1,4 +1,5 @@
-//! The properties that can be animated: of camera, objects, lights and materials, by their names in scene files.
+//! The properties that can be animated: of camera, objects and lights, by their names in scene files. Those of
+//! materials are in their table, see [`MaterialProperty`](crate::scene::MaterialProperty).
 
 use serde::{Deserialize, Serialize};
 
@@ -109,77 +110,5 @@ properties! {
         InnerAngle = "inner_angle": Number,
         /// Of a spot light, degrees from its axis.
         OuterAngle = "outer_angle": Number,
-    }
-}
-
-properties! {
-    /// A number or colour of a material.
-    MaterialProperty {
-        /// Of a diffuse material.
-        Albedo = "albedo": Color,
-        /// Of a mirror or a metal.
-        Reflectance = "reflectance": Color,
-        /// Width of a GGX lobe.
-        Alpha = "alpha": Number,
-        /// Index of refraction.
-        Ior = "ior": Number,
-        /// Of glass or a principled material: 20 divided by the Abbe number.
-        Dispersion = "dispersion": Number,
-        /// Per metre.
-        Absorption = "absorption": Color,
-        /// Of a classic material.
-        Diffuse = "diffuse": Color,
-        /// Of a classic material.
-        Ambient = "ambient": Number,
-        /// Of a classic or a principled material.
-        Specular = "specular": Number,
-        /// Of a classic material.
-        Shininess = "shininess": Number,
-        /// Of a classic material.
-        Transparency = "transparency": Number,
-        /// Of a principled material.
-        BaseColor = "base_color": Color,
-        /// Of a principled material.
-        Metallic = "metallic": Number,
-        /// Of a principled material.
-        Roughness = "roughness": Number,
-        /// Of a principled material.
-        SpecularColor = "specular_color": Color,
-        /// Of a principled material.
-        Transmission = "transmission": Number,
-        /// Of a principled material.
-        Anisotropy = "anisotropy": Number,
-        /// Of a principled material, degrees.
-        AnisotropyRotation = "anisotropy_rotation": Number,
-        /// Of a principled material.
-        SheenColor = "sheen_color": Color,
-        /// Of a principled material.
-        SheenRoughness = "sheen_roughness": Number,
-        /// Of a principled material.
-        Clearcoat = "clearcoat": Number,
-        /// Of a principled material.
-        ClearcoatRoughness = "clearcoat_roughness": Number,
-        /// Of a principled material.
-        Iridescence = "iridescence": Number,
-        /// Of a principled material.
-        IridescenceIor = "iridescence_ior": Number,
-        /// Of a principled material, nanometres.
-        IridescenceMin = "iridescence_min": Number,
-        /// Of a principled material, nanometres.
-        IridescenceMax = "iridescence_max": Number,
-        /// Of a principled material.
-        IridescenceMap = "iridescence_map": Number,
-        /// Of a principled material, W·sr⁻¹·m⁻².
-        Emission = "emission": Color,
-        /// Of a principled material.
-        Opacity = "opacity": Number,
-        /// Of a principled material.
-        OpacityCutoff = "opacity_cutoff": Number,
-        /// Of a principled material.
-        NormalScale = "normal_scale": Number,
-        /// Of a blend.
-        Weight = "weight": Number,
-        /// Of an emissive material, W·sr⁻¹·m⁻².
-        Radiance = "radiance": Color,
     }
 }

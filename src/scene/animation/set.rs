@@ -1,7 +1,6 @@
-//! Setting of animated values in cameras, placements, lights and materials.
+//! Setting of animated values in cameras, placements and lights.
 
-use super::property::{CameraProperty, LightProperty, MaterialProperty, ObjectProperty};
-use crate::render::{self, Param, Params};
+use super::property::{CameraProperty, LightProperty, ObjectProperty};
 use crate::scene::file::CameraPart;
 use crate::scene::light::LightKind;
 use crate::scene::placement::{Linear, Placement};
@@ -80,71 +79,5 @@ impl LightProperty {
         let mut light = *light;
         let has = move |property: &Self| property.set(&mut light, &mut Placement::default(), DVec3::ONE).is_some();
         Self::ALL.iter().copied().filter(has)
-    }
-}
-
-impl MaterialProperty {
-    /// Sets the value; `None` if materials of this kind do not have the property.
-    pub fn set<P: Params>(self, material: &mut render::Material<P>, value: DVec3) -> Option<()> {
-        let (number, color) = (value.x as f32, value.as_vec3());
-        let (_, param) = material.params_mut().into_iter().find(|(name, _)| *name == self.name())?;
-        match param {
-            Param::Reflectance(old) | Param::Radiance(old) | Param::Factor(old) => *old = color.into(),
-            Param::Share(old) => *old = number.into(),
-            Param::ConstantShare(old)
-            | Param::Number(old)
-            | Param::Ior(old)
-            | Param::Exponent(old)
-            | Param::Dispersion(old)
-            | Param::Thickness(old) => *old = number,
-            Param::Cutoff(old) => *old = Some(number),
-            Param::Absorption(old) => *old = color.into(),
-            Param::Map(_) | Param::Flag(_) | Param::Part(_) => return None,
-        }
-        Some(())
-    }
-
-    /// The properties of materials of this kind.
-    pub fn of<P: Params>(material: &render::Material<P>) -> impl Iterator<Item = Self> {
-        let names: Vec<&str> = material.params().into_iter().map(|(name, _)| name).collect();
-        Self::ALL.iter().copied().filter(move |property| names.contains(&property.name()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::property::Quantity;
-    use super::*;
-    use crate::render::{InSnapshot, MaterialKind};
-    use glam::Vec3;
-
-    #[test]
-    fn every_number_and_colour_of_every_material_can_change_in_time() {
-        let kinds = MaterialKind::PLAIN
-            .into_iter()
-            .filter_map(|kind| render::Material::<InSnapshot>::of_kind(kind, Vec3::splat(0.5).into()));
-        let blend = render::Material::Blend { weight: 0.5.into(), a: 0, b: 1 };
-        let mut met = Vec::new();
-        for mut material in kinds.chain([blend]) {
-            let names: Vec<(&str, bool)> = (material.params().into_iter())
-                .map(|(name, param)| (name, !matches!(param, Param::Map(_) | Param::Flag(_) | Param::Part(_))))
-                .collect();
-            for (name, is_quantity) in names {
-                let property = MaterialProperty::ALL.iter().find(|property| property.name() == name);
-                assert_eq!(property.is_some(), is_quantity, "{name}");
-                let Some(property) = property else { continue };
-                let is_color = material.params().into_iter().any(|(other, param)| {
-                    other == name
-                        && matches!(
-                            param,
-                            Param::Reflectance(_) | Param::Radiance(_) | Param::Factor(_) | Param::Absorption(_)
-                        )
-                });
-                assert_eq!(property.quantity() == Quantity::Color, is_color, "{name}");
-                assert!(property.set(&mut material, DVec3::splat(0.25)).is_some(), "{name}");
-                met.push(*property);
-            }
-        }
-        assert!(MaterialProperty::ALL.iter().all(|property| met.contains(property)));
     }
 }

@@ -1,9 +1,8 @@
 //! The section `animation` of a scene file.
 
 use super::camera::CameraPart;
-use crate::scene::animation::{
-    CameraProperty, Interpolation, Key, KeyValue, LightProperty, MaterialProperty, ObjectProperty,
-};
+use crate::scene::animation::{CameraProperty, Interpolation, Key, KeyValue, LightProperty, ObjectProperty};
+use crate::scene::material_property::MaterialProperty;
 use glam::DVec3;
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -2,7 +2,7 @@
 
 use super::camera::CameraPart;
 use super::parts::{InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
-use crate::render::{MAX_LOBES, Param, ParamRef};
+use crate::render::{MAX_LOBES, Param, ParamRef, Property};
 use crate::scene::bounds::{
     check_cone, check_film_size, check_light_radius, check_max_depth, coordinate_rule, is_coordinate, is_size, number,
     size_rule, triple,
@@ -147,8 +147,8 @@ impl Check<'_> {
 
     fn material(&mut self, name: &str, material: &MaterialPart) {
         let path = format!("materials/{name}");
-        for (field, param) in material.params() {
-            let path = format!("{path}/{field}");
+        for (property, param) in material.params() {
+            let path = format!("{path}/{}", property.name);
             if let Param::Part(part) = param {
                 self.material_name(&path, part);
                 if self.reaches(part, name) {
@@ -158,7 +158,7 @@ impl Check<'_> {
                     return;
                 }
             }
-            self.param(&path, field, param);
+            self.param(&path, property, param);
         }
         if let MaterialPart::Blend { weight, .. } = material {
             let (lobes, glowing) = self.lobes(name);
@@ -172,47 +172,29 @@ impl Check<'_> {
         }
     }
 
-    /// Checks a number or colour of a material.
-    pub(super) fn param(&mut self, path: &str, field: &str, param: ParamRef<'_, InFile>) {
+    fn param(&mut self, path: &str, property: &Property, param: ParamRef<'_, InFile>) {
         match param {
-            Param::Reflectance(color) | Param::Map(color) => self.share(path, field, color),
-            Param::Radiance(ColorValue::Rgb(rgb)) | Param::Factor(ColorValue::Rgb(rgb)) => {
-                self.light(path, Rgb(*rgb));
+            Param::Color(ColorValue::Texture(name)) | Param::Scalar(ScalarValue::Texture(name)) => {
+                self.texture_name(path, name);
             }
-            Param::Radiance(ColorValue::Texture(texture)) | Param::Factor(ColorValue::Texture(texture)) => {
-                self.texture_name(path, texture);
+            Param::Color(ColorValue::Rgb(rgb)) | Param::Rgb(Rgb(rgb)) => self.value(path, property, &rgb.to_array()),
+            Param::Scalar(ScalarValue::Number(number)) | Param::Number(number) | Param::Cutoff(Some(number)) => {
+                self.value(path, property, &[*number]);
             }
-            Param::Number(value) => self.finite(path, f64::from(*value)),
-            Param::Cutoff(Some(value)) if !(0.0..=1.0).contains(value) => {
-                self.wrong(path, format!("`{field}` is {value}, but must lie in 0..1"));
-            }
-            Param::Share(scalar) => self.scalar(path, field, scalar),
-            Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
-                self.wrong(path, format!("`{field}` is {value}, but must lie in 0..1"));
-            }
-            Param::Exponent(value) if !(value.is_finite() && *value >= 0.0) => {
-                let message = format!("`{field}` is {value}, but must be 0 or positive: 20 is dull, 200 sharp");
-                self.wrong(path, message);
-            }
-            Param::Thickness(value) if !(value.is_finite() && *value >= 0.0) => {
-                self.wrong(path, format!("`{field}` is {value}, but must be finite and at least 0"));
-            }
-            Param::Dispersion(value) if !(value.is_finite() && *value >= 0.0) => {
-                let message = format!("`{field}` is {value}, but must be finite and at least 0: 20 / Abbe number");
-                self.wrong(path, message);
-            }
-            Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
-                self.wrong(path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
-            }
-            Param::Absorption(absorption) => self.light(path, *absorption),
-            Param::Part(_)
-            | Param::ConstantShare(_)
-            | Param::Thickness(_)
-            | Param::Dispersion(_)
-            | Param::Exponent(_)
-            | Param::Ior(_)
-            | Param::Flag(_)
-            | Param::Cutoff(_) => {}
+            Param::Cutoff(None) | Param::Flag(_) | Param::Fresnel(_) | Param::Part(_) => {}
+        }
+    }
+
+    /// Checks a number, or the channels of a colour.
+    pub(super) fn value(&mut self, path: &str, property: &Property, channels: &[f32]) {
+        let limits = property.domain.limits();
+        if !channels.iter().all(|channel| limits.contains(channel)) {
+            let value = match channels {
+                [number] => number.to_string(),
+                [r, g, b] => format!("({r}, {g}, {b})"),
+                _ => unreachable!("a value has one channel or three"),
+            };
+            self.wrong(path, format!("`{}` is {value}, but must {}", property.name, property.domain.rule()));
         }
     }
 
@@ -461,28 +443,6 @@ impl Check<'_> {
                 }
             };
             self.wrong(path, format!("texture `{name}` is not defined; {hint}"));
-        }
-    }
-
-    /// Checks a reflectance: 0..1 per channel.
-    fn share(&mut self, path: &str, field: &str, color: &ColorValue) {
-        match color {
-            ColorValue::Texture(name) => self.texture_name(path, name),
-            ColorValue::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
-                let Vec3 { x, y, z } = rgb;
-                self.wrong(path, format!("`{field}` is ({x}, {y}, {z}), but is a share of light: between 0 and 1"));
-            }
-            ColorValue::Rgb(_) => {}
-        }
-    }
-
-    fn scalar(&mut self, path: &str, field: &str, scalar: &ScalarValue) {
-        match scalar {
-            ScalarValue::Texture(name) => self.texture_name(path, name),
-            ScalarValue::Number(value) if !(0.0..=1.0).contains(value) => {
-                self.wrong(path, format!("`{field}` is {value}, but must lie between 0 and 1"));
-            }
-            ScalarValue::Number(_) => {}
         }
     }
 

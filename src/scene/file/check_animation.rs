@@ -2,9 +2,7 @@
 
 use super::animation::TrackPart;
 use super::check::Check;
-use crate::scene::animation::{
-    Curve, Interpolation, Key, KeyValue, LightProperty, MaterialProperty, ObjectProperty, Quantity,
-};
+use crate::scene::animation::{Curve, Interpolation, Key, KeyValue, LightProperty, ObjectProperty, Quantity};
 use crate::scene::bad_value::BadValue;
 use crate::scene::bounds::{
     MOST_KEYS, check_fps, check_moment, check_shutter_seconds, check_shutter_share, check_span, coordinate_rule,
@@ -12,6 +10,7 @@ use crate::scene::bounds::{
 };
 use crate::scene::file::{ObjectPart, SceneFile};
 use crate::scene::light::LightKind;
+use crate::scene::material_property::MaterialProperty;
 use crate::scene::view::unit_direction;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -249,17 +248,17 @@ impl Check<'_> {
         let Some(&material) = self.materials.get(name) else {
             return self.material_name(&format!("{path}/name"), name);
         };
-        let mut material = material.clone();
-        if property.set(&mut material, track.keys()[0].1.three()).is_none() {
+        let properties = material.kind().properties();
+        let known: Vec<&str> = MaterialProperty::animatable(material).map(MaterialProperty::name).collect();
+        let description = properties.iter().find(|it| it.name == property.name() && known.contains(&it.name));
+        let Some(description) = description else {
             let what = format!("material `{name}` is {} and has no `{}`", material.kind().name(), property.name());
-            let known: Vec<&str> = MaterialProperty::of(&material).map(MaterialProperty::name).collect();
             return self.misnamed(&format!("{path}/property"), what, property.name(), known.into_iter());
-        }
+        };
         for (i, (_, value)) in track.keys().iter().enumerate() {
-            property.set(&mut material, value.three());
-            let params = material.params();
-            let (field, param) = params.iter().find(|(field, _)| *field == property.name()).expect("it has been set");
-            self.param(&format!("{path}/keys/{i}/1"), field, *param);
+            let channels = value.three().as_vec3().to_array();
+            let n = if property.quantity() == Quantity::Color { 3 } else { 1 };
+            self.value(&format!("{path}/keys/{i}/1"), description, &channels[..n]);
         }
     }
 

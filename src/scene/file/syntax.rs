@@ -72,7 +72,7 @@ fn wrong_brackets(error: &SpannedError, text: &str) -> Option<(usize, String)> {
 /// Position and message of a value in brackets that has no name, such as `diffuse(0.5)`.
 fn unnamed(text: &str, at: usize) -> Option<(usize, String)> {
     let before = text[..at].trim_end().strip_suffix('(')?.trim_end();
-    let kind = &before[before.rfind(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(0, |end| end + 1)..];
+    let kind = before.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let value: String = text[at..].chars().take_while(|c| !",)\n".contains(*c)).collect();
     if kind.is_empty() || value.contains(':') {
         return None;

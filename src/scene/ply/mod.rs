@@ -214,6 +214,9 @@ impl Contents {
         if count_of("face") == 0 && count_of("tristrips") == 0 {
             return Err(whole(PlyProblem::NoFaces));
         }
+        if element("vertex").is_some_and(|vertex| vertex.count > 0 && vertex.properties.is_empty()) {
+            return Err(whole(PlyProblem::NoPositions));
+        }
         if n_vertices > u64::from(u32::MAX) {
             return Err(whole(PlyProblem::TooManyVertices { count: n_vertices }));
         }

@@ -4,8 +4,8 @@ use super::list::{Listed, Which, list};
 use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
 use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
-use crate::render::Environment;
-use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, SurfaceMaterial};
+use crate::render::{Environment, MaterialKind};
+use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, MaterialProperty, SurfaceMaterial};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -79,7 +79,9 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     match SurfaceMaterial::of(world, material) {
         Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
             if let Some(value) = color(ui, *rgb, true) {
-                asked.edit(Edit::Set { id: material.to_bits(), property: Property::Color, value });
+                let main = MaterialProperty::main_color(MaterialKind::Emissive).expect("it has a radiance");
+                let property = Property::Material(main);
+                asked.edit(Edit::Set { id: material.to_bits(), property, value });
             }
         }
         Some(Material::Emissive { radiance: ColorParam::Texture(texture) }) => {

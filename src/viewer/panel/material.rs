@@ -6,14 +6,16 @@
 use super::Asked;
 use super::texture;
 use super::widgets::{color, row, row_with_hint, rows, slider, vector};
-use crate::frame::{Edit, Property, Session};
-use crate::render::{Fresnel, MaterialKind, Param};
-use crate::scene::{ColorParam, Inventory, Material, MaterialEntry, ObjectInput, ScalarParam, SurfaceMaterial};
+use crate::frame::{self, Edit, Session};
+use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
+use crate::scene::{
+    ColorParam, InWorld, Inventory, Material, MaterialEntry, MaterialProperty, ObjectInput, ScalarParam,
+    SurfaceMaterial,
+};
 use crate::viewer::status::thousands;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
 use glam::DVec3;
-use std::ops::RangeInclusive;
 
 /// The material of an object, with its editor.
 pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: &ObjectInput, asked: &mut Asked) {
@@ -70,7 +72,7 @@ pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Ent
                 MaterialKind::Blend => drop(ui.label(MaterialKind::Blend.name())),
                 kind => {
                     egui::ComboBox::from_id_salt("kind").selected_text(kind.name()).width(104.0).show_ui(ui, |ui| {
-                        for other in MaterialKind::PLAIN {
+                        for other in MaterialKind::plain() {
                             if ui.selectable_label(kind == other, other.name()).clicked() {
                                 asked.edit(Edit::SetKind { id, kind: other });
                             }
@@ -78,200 +80,126 @@ pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Ent
                     });
                 }
             });
-            paint(ui, session, id, material, asked);
-            numbers(ui, inventory, id, material, asked);
+            parts(ui, inventory, material);
+            let main = material.kind().main_property();
+            let (first, others): (Vec<_>, Vec<_>) =
+                material.params().into_iter().partition(|(property, _)| Some(property.name) == main);
+            for (property, param) in first {
+                property_row(ui, id, property, param, Some(session), asked);
+            }
+            if let Some(ColorParam::Texture(texture)) = material.color() {
+                texture::numbers(ui, id, &texture.part, asked);
+            }
+            for (property, param) in others {
+                property_row(ui, id, property, param, None, asked);
+            }
         });
     });
 }
 
-fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &mut Asked) {
-    let Some(paint) = material.color() else { return };
-    let is_light = matches!(material, Material::Emissive { .. });
-    row(ui, if is_light { "radiance" } else { "colour" }, |ui| {
-        ui.horizontal(|ui| {
-            match paint {
-                ColorParam::Rgb(rgb) => {
-                    if let Some(value) = color(ui, *rgb, is_light) {
-                        asked.edit(Edit::Set { id, property: Property::Color, value });
-                    }
-                }
-                ColorParam::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
-            }
-            texture::menu(ui, session, id, paint, asked);
-        })
+/// The materials of a blend.
+fn parts(ui: &mut Ui, inventory: &Inventory, material: &Material) {
+    let Material::Blend { a, b, .. } = material else { return };
+    let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
+    row(ui, "of", |ui| {
+        let text = format!("{} and {}", name(a), name(b));
+        ui.add(egui::Label::new(text).truncate()).on_hover_text("edit them in the list of materials");
     });
-    if let ColorParam::Texture(texture) = paint {
-        texture::numbers(ui, id, &texture.part, asked);
+}
+
+/// The row of one property; nothing for what cannot be changed here: textures of numbers, maps and parts.
+///
+/// - `texture_of`: offers the textures of this session for a colour.
+fn property_row(
+    ui: &mut Ui,
+    id: u64,
+    property: &Property,
+    param: ParamRef<'_, InWorld>,
+    texture_of: Option<&Session>,
+    asked: &mut Asked,
+) {
+    let Some(name) = MaterialProperty::named(property.name) else { return };
+    let set = |asked: &mut Asked, value: DVec3| {
+        asked.edit(Edit::Set { id, property: frame::Property::Material(name), value });
+    };
+    let labelled =
+        |ui: &mut Ui, contents: &mut dyn FnMut(&mut Ui)| row_with_hint(ui, property.label, property.help, contents);
+    match param {
+        Param::Color(paint) => {
+            let is_bright = matches!(property.domain, Domain::Radiance | Domain::Factor);
+            labelled(ui, &mut |ui| {
+                ui.horizontal(|ui| {
+                    match paint {
+                        ColorParam::Rgb(rgb) => {
+                            if let Some(value) = color(ui, *rgb, is_bright) {
+                                set(asked, value);
+                            }
+                        }
+                        ColorParam::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
+                    }
+                    if let Some(session) = texture_of {
+                        texture::menu(ui, session, id, frame::Property::Material(name), paint, asked);
+                    }
+                });
+            });
+        }
+        Param::Rgb(rgb) => labelled(ui, &mut |ui| {
+            if let Some(value) = vector(ui, rgb.as_dvec3(), 0.02) {
+                set(asked, value);
+            }
+        }),
+        Param::Scalar(ScalarParam::Number(number)) | Param::Number(number) => labelled(ui, &mut |ui| {
+            if let Some(value) = domain_slider(ui, property.domain, f64::from(*number)) {
+                set(asked, DVec3::splat(value));
+            }
+        }),
+        Param::Flag(on) => labelled(ui, &mut |ui| {
+            let mut on = *on;
+            if ui.checkbox(&mut on, "").changed() {
+                set(asked, DVec3::splat(f64::from(u8::from(on))));
+            }
+        }),
+        Param::Fresnel(fresnel) => labelled(ui, &mut |ui| {
+            let mut schlick = *fresnel == Fresnel::Schlick;
+            if ui.checkbox(&mut schlick, "Schlick").changed() {
+                set(asked, DVec3::splat(f64::from(u8::from(schlick))));
+            }
+        }),
+        Param::Cutoff(cutoff) => labelled(ui, &mut |ui| {
+            if let Some(value) = cutoff_slider(ui, *cutoff) {
+                set(asked, DVec3::splat(value));
+            }
+        }),
+        Param::Scalar(ScalarParam::Texture(_)) | Param::Part(_) => {}
     }
 }
 
-/// A scalar parameter with the name and the meaning shown to users.
-struct Scale {
-    name: &'static str,
-    hint: &'static str,
-    property: Property,
-    range: RangeInclusive<f64>,
-}
-
-/// Points.
+/// Points. The longest labels leave no more room.
 const SLIDER_WIDTH: f32 = 84.0;
 
-impl Scale {
-    /// `None` for properties that are not scalar.
-    fn of(property: Property) -> Option<Self> {
-        let (name, hint, range) = match property {
-            Property::Alpha => {
-                ("roughness", "0: mirror, 1: rough; its square is the width α of the GGX lobe", 0.032..=1.0)
-            }
-            Property::Ior => ("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", 1.0..=2.5),
-            Property::Dispersion => {
-                ("dispersion", "20 / Abbe number: glass 0.3 to 0.8, diamond 0.36; more exaggerates", 0.0..=10.0)
-            }
-            Property::Ambient => ("ambient", "ambient reflectance", 0.0..=1.0),
-            Property::Specular => ("specular", "specular reflectance", 0.0..=1.0),
-            Property::Shininess => ("shininess", "Phong exponent", 1.0..=10_000.0),
-            Property::Transparency => ("transparency", "transmittance", 0.0..=1.0),
-            Property::Weight => ("weight", "0: only the first, 1: only the second", 0.0..=1.0),
-            Property::Metallic => ("metallic", "0: dielectric, 1: metal", 0.0..=1.0),
-            Property::Roughness => ("roughness", "0: mirror, 1: rough", 0.0..=1.0),
-            Property::Transmission => ("transmission", "0: opaque, 1: glass", 0.0..=1.0),
-            Property::Anisotropy => ("anisotropy", "how much wider highlights are in one direction", 0.0..=1.0),
-            Property::AnisotropyRotation => ("anisotropy angle", "degrees from the tangent", -180.0..=180.0),
-            Property::SheenRoughness => ("sheen roughness", "0: sharp at the rim, 1: wide", 0.0..=1.0),
-            Property::Clearcoat => ("clearcoat", "strength of the coat", 0.0..=1.0),
-            Property::ClearcoatRoughness => ("coat roughness", "0: mirror, 1: rough", 0.0..=1.0),
-            Property::Iridescence => ("iridescence", "strength of the colours of a thin film", 0.0..=1.0),
-            Property::FilmIor => ("film IOR", "index of refraction of the film", 1.0..=2.5),
-            Property::FilmThickness => ("film thickness", "nanometres", 0.0..=1500.0),
-            Property::FilmThinnest => ("film at least", "nanometres, where the map of the film is black", 0.0..=1500.0),
-            Property::Opacity => ("opacity", "0: fully transparent, 1: opaque", 0.0..=1.0),
-            Property::NormalScale => ("normal scale", "strength of the normal map", -2.0..=2.0),
-            _ => return None,
-        };
-        Some(Self { name, hint, property, range })
-    }
-
-    fn show(self, ui: &mut Ui, id: u64, value: f64, asked: &mut Asked) {
-        let is_alpha = self.property == Property::Alpha;
-        // The displayed roughness is the root of the lobe's width.
-        let shown = if is_alpha { value.sqrt() } else { value };
-        let logarithmic = *self.range.end() > 10.0;
-        row_with_hint(ui, self.name, self.hint, |ui| {
-            // The longest names leave less room.
-            ui.spacing_mut().slider_width = SLIDER_WIDTH;
-            if let Some(new) = slider(ui, shown, self.range, logarithmic) {
-                let value = if is_alpha { new * new } else { new };
-                asked.edit(Edit::Set { id, property: self.property, value: DVec3::splat(value) });
-            }
-        });
+/// Returns the new value if it was changed.
+fn domain_slider(ui: &mut Ui, domain: Domain, value: f64) -> Option<f64> {
+    let range = domain.slider()?;
+    ui.spacing_mut().slider_width = SLIDER_WIDTH;
+    match domain {
+        // People know the root of the lobe's width as roughness.
+        Domain::Width => slider(ui, value.sqrt(), range, false).map(|roughness| roughness * roughness),
+        _ => slider(ui, value, range, domain.is_logarithmic()),
     }
 }
 
-/// A switch: its property, its label and its hint.
-fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
-    let property = Property::of_param(name)?;
-    Some(match property {
-        Property::ThinWalled => (property, "thin walled", "light passes straight, as through a pane"),
-        Property::TwoSided => (property, "two-sided", "off: back faces are invisible"),
-        _ => return None,
-    })
-}
-
-/// Whether opacity is a mask, and the opacity from which the surface exists.
-fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
+/// A number that may be absent; returns the new value if it was changed.
+fn cutoff_slider(ui: &mut Ui, cutoff: Option<f32>) -> Option<f64> {
     /// The default of glTF.
-    const DEFAULT: f32 = 0.5;
-    /// Out of range, which makes opacity a blend factor again.
+    const DEFAULT: f64 = 0.5;
+    /// Out of range: no cutoff.
     const NONE: f64 = 2.0;
-    let mut set = |value: f64| {
-        asked.edit(Edit::Set { id, property: Property::OpacityCutoff, value: DVec3::splat(value) });
-    };
-    row_with_hint(ui, "cutoff", "the surface is invisible where opacity is less; off: opacity is a share", |ui| {
-        ui.horizontal(|ui| {
-            let mut on = cutoff.is_some();
-            if ui.checkbox(&mut on, "").changed() {
-                set(if on { f64::from(DEFAULT) } else { NONE });
-            }
-            ui.spacing_mut().slider_width = SLIDER_WIDTH - 22.0;
-            if let Some(cutoff) = cutoff
-                && let Some(new) = slider(ui, f64::from(cutoff), 0.0..=1.0, false)
-            {
-                set(new);
-            }
-        });
-    });
-}
-
-fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
-    if let Material::Blend { a, b, .. } = material {
-        let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
-        row(ui, "of", |ui| {
-            let text = format!("{} and {}", name(a), name(b));
-            ui.add(egui::Label::new(text).truncate()).on_hover_text("edit them in the list of materials");
-        });
-    }
-    for (name, param) in material.params() {
-        let value = match param {
-            Param::Share(ScalarParam::Number(value))
-            | Param::Number(value)
-            | Param::Thickness(value)
-            | Param::Dispersion(value)
-            | Param::ConstantShare(value)
-            | Param::Ior(value)
-            | Param::Exponent(value) => *value,
-            Param::Absorption(absorption) => {
-                row_with_hint(ui, "absorption", "red, green and blue, per metre (Beer–Lambert)", |ui| {
-                    if let Some(value) = vector(ui, absorption.as_dvec3(), 0.02) {
-                        asked.edit(Edit::Set { id, property: Property::Absorption, value });
-                    }
-                });
-                continue;
-            }
-            Param::Flag(flag) => {
-                let Some((property, label, hint)) = switch(name) else { continue };
-                row(ui, label, |ui| {
-                    let mut on = *flag;
-                    if ui.checkbox(&mut on, "").on_hover_text(hint).changed() {
-                        let value = DVec3::splat(f64::from(u8::from(on)));
-                        asked.edit(Edit::Set { id, property, value });
-                    }
-                });
-                continue;
-            }
-            Param::Cutoff(cutoff) => {
-                cutoff_row(ui, id, *cutoff, asked);
-                continue;
-            }
-            Param::Reflectance(ColorParam::Rgb(rgb))
-            | Param::Radiance(ColorParam::Rgb(rgb))
-            | Param::Factor(ColorParam::Rgb(rgb)) => {
-                let property = Property::of_param(name);
-                let (Some(property), false) = (property, property == Some(Property::Color)) else { continue };
-                row(ui, &name.replace('_', " "), |ui| {
-                    let is_bright = matches!(property, Property::Emission | Property::SpecularColor);
-                    ui.horizontal(|ui| {
-                        if let Some(value) = color(ui, *rgb, is_bright) {
-                            asked.edit(Edit::Set { id, property, value });
-                        }
-                    })
-                });
-                continue;
-            }
-            // Colours have their own row; textures of scalars and parts are not editable here.
-            _ => continue,
-        };
-        if let Some(scale) = Property::of_param(name).and_then(Scale::of) {
-            scale.show(ui, id, f64::from(value), asked);
-        }
-    }
-    if let Material::Metal { fresnel, .. } = material {
-        row(ui, "Fresnel", |ui| {
-            let mut schlick = *fresnel == Fresnel::Schlick;
-            let hint = "brighter at grazing angles, by Schlick's approximation";
-            if ui.checkbox(&mut schlick, "Schlick").on_hover_text(hint).changed() {
-                let value = DVec3::splat(f64::from(u8::from(schlick)));
-                asked.edit(Edit::Set { id, property: Property::Schlick, value });
-            }
-        });
-    }
+    ui.horizontal(|ui| {
+        let mut on = cutoff.is_some();
+        let switched = ui.checkbox(&mut on, "").changed().then_some(if on { DEFAULT } else { NONE });
+        ui.spacing_mut().slider_width = SLIDER_WIDTH - 22.0;
+        let moved = cutoff.and_then(|cutoff| slider(ui, f64::from(cutoff), 0.0..=1.0, false));
+        switched.or(moved)
+    })
+    .inner
 }

@@ -10,7 +10,9 @@ use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
 /// A menu of textures that can replace a colour.
-pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: &mut Asked) {
+///
+/// - `property`: of the colour.
+pub fn menu(ui: &mut Ui, session: &Session, id: u64, property: Property, paint: &ColorParam, asked: &mut Asked) {
     let mut names: Vec<&str> = (session.inputs().materials.iter())
         .filter_map(|material| match material.material.color()? {
             ColorParam::Texture(texture) => Some(texture.name.as_str()),
@@ -39,8 +41,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
             ui.close();
         }
         if matches!(paint, ColorParam::Texture(_)) && ui.button("constant colour").clicked() {
-            let value = DVec3::splat(0.5);
-            asked.edit(Edit::Set { id, property: Property::Color, value });
+            asked.edit(Edit::Set { id, property, value: DVec3::splat(0.5) });
             ui.close();
         }
     });

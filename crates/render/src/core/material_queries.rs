@@ -1,7 +1,6 @@
 //! Properties of materials in a snapshot for the renderer: transmissive, specular, emissive.
 
-use super::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
-use super::material_kind::Param;
+use super::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
 use crate::core::texture::{Texture, TextureId};
 use glam::Vec3;
 
@@ -141,11 +140,7 @@ impl Material {
 
     fn any_texture(&self, materials: &[Self], is_so: &mut impl FnMut(TextureId) -> bool) -> bool {
         self.params().into_iter().any(|(_, param)| match param {
-            Param::Reflectance(ColorInput::Texture(id))
-            | Param::Radiance(ColorInput::Texture(id))
-            | Param::Factor(ColorInput::Texture(id))
-            | Param::Map(ColorInput::Texture(id))
-            | Param::Share(ScalarInput::Texture(id)) => is_so(*id),
+            Param::Color(ColorInput::Texture(id)) | Param::Scalar(ScalarInput::Texture(id)) => is_so(*id),
             Param::Part(part) => materials[*part as usize].any_texture(materials, is_so),
             _ => false,
         })

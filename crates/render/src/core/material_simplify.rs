@@ -78,6 +78,7 @@ fn is_diffuse(metallic: f32, transmission: f32, specular: ScalarInput) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::material::Param;
     use super::*;
 
     #[test]
@@ -120,9 +121,8 @@ mod tests {
 
     fn set(material: &mut Material, name: &str, value: f32) {
         let mut params = material.params_mut().into_iter();
-        let Some((_, crate::core::material_kind::Param::Share(scalar))) = params.find(|(found, _)| *found == name)
-        else {
-            panic!("no share is called {name}");
+        let Some((_, Param::Scalar(scalar))) = params.find(|(property, _)| property.name == name) else {
+            panic!("no number is called {name}");
         };
         *scalar = ScalarInput::Constant(value);
     }

@@ -10,6 +10,7 @@
 mod scalar;
 
 use crate::core::counts::RayCounts;
+use crate::core::material::MaterialKind;
 use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
@@ -101,7 +102,7 @@ fn class_of_first_shadows(rays: &RayBatch) -> RayClass {
 
 /// Index of misses in [`SortedHits::of_kind`]; materials have [`Material::kind`](crate::core::material::Material::kind) + 1.
 const MISSES: usize = 0;
-const EMITTERS: usize = 1;
+const EMITTERS: usize = MaterialKind::Emissive as usize + 1;
 
 impl PathWave {
     /// Sets the media in which the paths of an image start, see [`crate::prepare::bodies::Bodies::around`]; must be

@@ -17,7 +17,7 @@ pub(crate) const CANDIDATES: u32 = 4;
 
 /// Whether the lights of surfaces of a kind are resampled: of rough metal, which has a lobe and nothing else.
 ///
-/// - `kind`: see [`MaterialKind`](crate::core::material_kind::MaterialKind).
+/// - `kind`: see [`MaterialKind`](crate::core::material::MaterialKind).
 #[inline(always)]
 pub(crate) fn is_resampled(techniques: &Techniques, kind: usize) -> bool {
     techniques.resampling && kind == METAL

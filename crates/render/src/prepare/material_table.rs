@@ -1,7 +1,7 @@
 //! Data by material, as arrays for SIMD.
 
+use crate::core::material::MaterialKind;
 use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
-use crate::core::material_kind::MaterialKind;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::arrays::push;

@@ -1,7 +1,7 @@
 //! Hits sorted by kind of material, so that consecutive hits take the same branches.
 
 use crate::core::material::MaterialId;
-use crate::core::material_kind::MaterialKind;
+use crate::core::material::MaterialKind;
 use crate::prepare::material_table::{Kinds, SEVERAL};
 use crate::prepare::prepared::Prepared;
 use crate::shading::vertex::material_of;

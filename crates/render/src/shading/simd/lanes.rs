@@ -1,6 +1,6 @@
 //! Helpers of the code for sixteen hits.
 
-use crate::core::material_kind::MaterialKind;
+use crate::core::material::MaterialKind;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector};
