@@ -9,30 +9,14 @@
 
 use super::rig::Rig;
 use super::selection::Selection;
+use crate::scene::entity_state::{EntityState, SceneChanges, put};
 use crate::scene::{
-    Animation, CameraInput, DirectionalLight, Lens, LightKind, MaterialSlots, MeshOrigin, Moment, Ordinal, Placement,
-    PointLight, Projection, SceneEnvironment, SceneInputs, Shape, SpotLight, SurfaceMaterial, View, WithLight,
+    Animation, CameraInput, Lens, Moment, Ordinal, Placement, Projection, SceneEnvironment, SceneInputs, Shape,
+    SurfaceMaterial, View, WithLight,
 };
-use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{
-    Changed, Component, DetectChanges, Entity, Local, Mut, Or, Query, RemovedComponents, Res, ResMut, Resource, With,
-    World,
-};
+use bevy_ecs::prelude::{DetectChanges, Entity, Local, Mut, Or, Res, ResMut, Resource, With, World};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// All components of one entity that make it part of the scene.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct EntityState {
-    name: Option<Name>,
-    ordinal: Option<Ordinal>,
-    shape: Option<Shape>,
-    placement: Option<Placement>,
-    slots: Option<MaterialSlots>,
-    material: Option<SurfaceMaterial>,
-    light: Option<LightKind>,
-    origin: Option<MeshOrigin>,
-}
 
 /// Everything that can be undone.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -194,7 +178,7 @@ impl History {
         for light in &mut now.lights {
             if let Some(state) = state(light.entity) {
                 light.placement = state.placement.unwrap_or(light.placement);
-                light.light = state.light.unwrap_or(light.light);
+                light.light = state.light().unwrap_or(light.light);
             }
         }
         for material in &mut now.materials {
@@ -291,50 +275,23 @@ impl History {
     }
 }
 
-type UndoParts = Or<(
-    Changed<Name>,
-    Changed<Ordinal>,
-    Changed<Shape>,
-    Changed<Placement>,
-    Changed<MaterialSlots>,
-    Changed<SurfaceMaterial>,
-    Changed<PointLight>,
-    Changed<SpotLight>,
-    Changed<DirectionalLight>,
-    Changed<MeshOrigin>,
-)>;
-
 /// Records that something may have changed, without reading the scene.
 ///
 /// Reads change ticks; writes [`History`].
-#[allow(clippy::too_many_arguments, clippy::type_complexity)] // A system says what it reads.
 pub fn notice(
-    parts: Query<(), UndoParts>,
-    camera: Query<(), Or<(Changed<View>, Changed<Projection>, Changed<Lens>)>>,
-    mut shapes: RemovedComponents<Shape>,
-    mut materials: RemovedComponents<SurfaceMaterial>,
-    mut point_lights: RemovedComponents<PointLight>,
-    mut spot_lights: RemovedComponents<SpotLight>,
-    mut directional_lights: RemovedComponents<DirectionalLight>,
-    mut names: RemovedComponents<Name>,
+    mut changes: SceneChanges,
     environment: Option<Res<SceneEnvironment>>,
     (moment, animation): (Option<Res<Moment>>, Option<Res<Animation>>),
     (mut had_environment, mut had_animation): (Local<bool>, Local<bool>),
     mut history: ResMut<History>,
 ) {
-    let lights = point_lights.read().count() + spot_lights.read().count() + directional_lights.read().count();
-    let removed = shapes.read().count() + materials.read().count() + lights + names.read().count();
     let environment_changed = environment.as_ref().is_some_and(|environment| environment.is_changed())
         || std::mem::replace(&mut *had_environment, environment.is_some()) != environment.is_some();
     let moment_changed = moment.is_some_and(|moment| moment.is_changed());
     let animation_changed = animation.as_ref().is_some_and(|animation| animation.is_changed())
         || std::mem::replace(&mut *had_animation, animation.is_some()) != animation.is_some();
-    if removed > 0 || environment_changed || moment_changed || animation_changed || !parts.is_empty() {
-        history.touched = true;
-    }
-    if !camera.is_empty() {
-        history.camera_touched = true;
-    }
+    history.touched |= changes.of_content() || environment_changed || moment_changed || animation_changed;
+    history.camera_touched |= changes.of_cameras();
 }
 
 /// Reads what was touched, and stores a step if it has changed.
@@ -376,16 +333,7 @@ fn read_entities(
     type UndoPart = Or<(With<Shape>, With<SurfaceMaterial>, WithLight)>;
     let entities: Vec<Entity> = world.query_filtered::<Entity, UndoPart>().iter(world).collect();
     let read = |entity: Entity| {
-        let state = EntityState {
-            name: world.get(entity).cloned(),
-            ordinal: world.get(entity).copied(),
-            shape: world.get(entity).cloned(),
-            placement: world.get(entity).copied(),
-            slots: world.get(entity).cloned(),
-            material: world.get(entity).cloned(),
-            light: LightKind::of(world, entity),
-            origin: world.get(entity).cloned(),
-        };
+        let state = EntityState::of(world, entity);
         match old.get(&entity) {
             Some(known) if **known == state => (entity, known.clone()),
             _ => (entity, Arc::new(state)),
@@ -408,14 +356,7 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         if world.get_entity(entity).is_err() {
             continue;
         }
-        put(world, entity, &target.placement);
-        put(world, entity, &target.slots);
-        put(world, entity, &target.shape);
-        put(world, entity, &target.material);
-        LightKind::put(target.light, world, entity);
-        put(world, entity, &target.origin);
-        put(world, entity, &target.ordinal);
-        put(world, entity, &target.name);
+        target.put(world, entity);
     }
     if let Some(environment) = &wanted.environment
         && wanted.environment != now.environment
@@ -432,18 +373,16 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         }
     }
     if let Some((entity, rig)) = wanted.camera.filter(|_| wanted.camera != now.camera) {
-        put(world, entity, &Some(rig.view));
-        put(world, entity, &Some(rig.projection));
-        put(world, entity, &Some(rig.lens));
+        put(world, entity, Some(&rig.view));
+        put(world, entity, Some(&rig.projection));
+        put(world, entity, Some(&rig.lens));
     }
 }
 
 /// Selects entities that were added, as after their first addition. If entities were only removed, restores the
 /// selection `selected`.
 fn select_what_came(world: &mut World, now: &State, wanted: &State, selected: &[Entity]) {
-    let is_thing = |state: &State, entity: &Entity| {
-        state.entities.get(entity).is_some_and(|state| state.shape.is_some() || state.light.is_some())
-    };
+    let is_thing = |state: &State, entity: &Entity| state.entities.get(entity).is_some_and(|state| state.is_thing());
     let missing = |of: &State, other: &State| -> Vec<Entity> {
         of.entities.keys().copied().filter(|entity| is_thing(of, entity) && !is_thing(other, entity)).collect()
     };
@@ -452,19 +391,6 @@ fn select_what_came(world: &mut World, now: &State, wanted: &State, selected: &[
         world.resource_mut::<Selection>().0 = came;
     } else if !selected.is_empty() && !missing(now, wanted).is_empty() {
         world.resource_mut::<Selection>().0 = selected.to_vec();
-    }
-}
-
-fn put<T: Component<Mutability = bevy_ecs::component::Mutable> + Clone + PartialEq>(
-    world: &mut World,
-    entity: Entity,
-    value: &Option<T>,
-) {
-    let Ok(mut entity) = world.get_entity_mut(entity) else { return };
-    match value {
-        Some(value) if entity.get::<T>() != Some(value) => drop(entity.insert(value.clone())),
-        None if entity.contains::<T>() => drop(entity.remove::<T>()),
-        _ => {}
     }
 }
 
@@ -494,7 +420,7 @@ fn what_changed_in_entities(
     let (mut label, mut merge, mut n) = (String::new(), None, 0);
     let both: std::collections::BTreeSet<&Entity> = old.keys().chain(new.keys()).collect();
     for entity in both {
-        let is_object = |state: &&Arc<EntityState>| state.shape.is_some() || state.light.is_some();
+        let is_object = |state: &&Arc<EntityState>| state.is_thing();
         let (before, after) = (old.get(entity), new.get(entity));
         let what = match (before, after) {
             (Some(a), Some(b)) if a == b => continue,
@@ -514,7 +440,7 @@ fn what_changed_in_entities(
                     format!("material {label}")
                 } else if a.slots != b.slots {
                     format!("material of {label}")
-                } else if a.light != b.light {
+                } else if a.light() != b.light() {
                     format!("light {label}")
                 } else if a.shape != b.shape {
                     format!("shape of {label}")

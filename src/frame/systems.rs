@@ -11,71 +11,11 @@ use super::scene_bounds::SceneBounds;
 use super::status::{MessageKind, Picture, Status};
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
+use crate::scene::entity_state::SceneChanges;
 use crate::scene::{
-    Animation, CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, MaterialSlots, Moment, Ordinal,
-    Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees,
-    View,
+    Animation, CameraInput, DisplaySettings, Extraction, Moment, Rendering, SceneInputs, SceneQueries, Shape, Trees,
 };
-use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
-use bevy_ecs::system::SystemParam;
-
-/// Detects whether any component that the image depends on was changed, added or removed since the last frame.
-#[derive(SystemParam)]
-pub struct Touched<'w, 's> {
-    #[allow(clippy::type_complexity)]
-    touched: Query<
-        'w,
-        's,
-        (),
-        Or<(
-            Changed<Shape>,
-            Changed<Placement>,
-            Changed<MaterialSlots>,
-            Changed<SurfaceMaterial>,
-            Changed<PointLight>,
-            Changed<SpotLight>,
-            Changed<DirectionalLight>,
-            Changed<View>,
-            Changed<Projection>,
-            Changed<Lens>,
-            Changed<Ordinal>,
-            Changed<Name>,
-        )>,
-    >,
-    shapes: RemovedComponents<'w, 's, Shape>,
-    placements: RemovedComponents<'w, 's, Placement>,
-    slots: RemovedComponents<'w, 's, MaterialSlots>,
-    materials: RemovedComponents<'w, 's, SurfaceMaterial>,
-    point_lights: RemovedComponents<'w, 's, PointLight>,
-    spot_lights: RemovedComponents<'w, 's, SpotLight>,
-    directional_lights: RemovedComponents<'w, 's, DirectionalLight>,
-    views: RemovedComponents<'w, 's, View>,
-    projections: RemovedComponents<'w, 's, Projection>,
-    lenses: RemovedComponents<'w, 's, Lens>,
-    ordinals: RemovedComponents<'w, 's, Ordinal>,
-    /// Names are not visible in the image, but in messages and lists.
-    names: RemovedComponents<'w, 's, Name>,
-}
-
-impl Touched<'_, '_> {
-    /// Whether anything was touched. Drains the readers of removals, so that each is reported once.
-    pub fn any(&mut self) -> bool {
-        let removed = self.shapes.read().count()
-            + self.placements.read().count()
-            + self.slots.read().count()
-            + self.materials.read().count()
-            + self.point_lights.read().count()
-            + self.spot_lights.read().count()
-            + self.directional_lights.read().count()
-            + self.views.read().count()
-            + self.projections.read().count()
-            + self.lenses.read().count()
-            + self.ordinals.read().count()
-            + self.names.read().count();
-        removed > 0 || !self.touched.is_empty()
-    }
-}
+use bevy_ecs::prelude::{DetectChanges, Res, ResMut, World};
 
 /// Applies finished background work to the world, for example replaces the scene by one that was loaded.
 ///
@@ -111,7 +51,7 @@ pub fn edit(world: &mut World) {
 /// Reads everything that the image depends on; writes [`RenderState`], [`FrameChanges`], [`SceneBounds`], [`Status`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn rebuild(
-    mut touched: Touched,
+    mut scene_changes: SceneChanges,
     queries: SceneQueries,
     rendering: Option<Res<Rendering>>,
     time: (Option<Res<Animation>>, Option<Res<Moment>>),
@@ -151,7 +91,11 @@ pub fn rebuild(
     let other_exposure = shown.exposure != exposure || has_new_keys && exposure.is_some();
     // Touched values are often equal to the previous ones; only differences count.
     let environment_changed = queries.environment() != shown.inputs.environment;
-    if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
+    if (scene_changes.of_content() | scene_changes.of_cameras())
+        || environment_changed
+        || std::mem::take(&mut shown.waiting)
+        || shown.extraction.is_none()
+    {
         let mut inputs = queries.collect();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
             status.say(clock.0, MessageKind::Error, format!("the camera was not changed: {bad}"));

@@ -15,6 +15,7 @@ mod components;
 mod default_scene;
 mod describe;
 mod documents;
+pub(crate) mod entity_state;
 mod error;
 mod extent;
 mod extract;

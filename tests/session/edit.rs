@@ -8,6 +8,7 @@ use firstlight::frame::{
     Selection, Session, SessionOptions, Target, wanted_mesh,
 };
 use firstlight::render::{Inspection, Integrator, MaterialKind};
+use firstlight::scene::animation::LightProperty;
 use firstlight::scene::{
     ColorParam, DirectionalLight, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight,
     Rgb, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
@@ -144,7 +145,7 @@ fn every_edit_can_be_undone_and_done_again_to_the_bit() {
         Edit::Move { by: DVec3::new(0.5, 0.25, -1.0) },
         Edit::Turn { axis: DVec3::Y, angle_deg: 30.0 },
         Edit::Scale { factors: DVec3::splat(1.5) },
-        Edit::Set { id: ball, property: Property::Radius, value: DVec3::splat(0.4) },
+        Edit::Set { id: ball, property: Property::SphereRadius, value: DVec3::splat(0.4) },
         Edit::Set { id: red, property: of_material("albedo"), value: DVec3::new(0.1, 0.8, 0.2) },
         Edit::SetKind { id: red, kind: MaterialKind::Glass },
         Edit::Assign { id: ball, material: red },
@@ -225,16 +226,24 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     assert_ne!(driver.session.world().get::<MaterialSlots>(Entity::from_bits(id)), Some(&driver.get("ball")));
     driver.edit([Edit::Add(NewThing::PointLight)]);
     let id = driver.named("point light").to_bits();
-    driver.edit([Edit::Set { id, property: Property::Intensity, value: DVec3::new(3.0, 2.0, 1.0) }]);
+    driver.edit([Edit::Set {
+        id,
+        property: Property::Light(LightProperty::Intensity),
+        value: DVec3::new(3.0, 2.0, 1.0),
+    }]);
     assert_eq!(driver.get::<PointLight>("point light").intensity, Vec3::new(3.0, 2.0, 1.0));
-    driver.edit([Edit::Set { id, property: Property::Radius, value: DVec3::ZERO }]);
+    driver.edit([Edit::Set { id, property: Property::Light(LightProperty::Radius), value: DVec3::ZERO }]);
     assert_eq!(driver.get::<PointLight>("point light").radius, 0.0, "a point");
     driver.edit([Edit::Add(NewThing::SpotLight)]);
     let id = driver.named("spot light").to_bits();
-    for (property, x) in [(Property::InnerAngle, 28.0), (Property::OuterAngle, 25.0), (Property::Intensity, 7.0)] {
+    for (property, x) in [
+        (Property::Light(LightProperty::InnerAngle), 28.0),
+        (Property::Light(LightProperty::OuterAngle), 25.0),
+        (Property::Light(LightProperty::Intensity), 7.0),
+    ] {
         driver.edit([Edit::Set { id, property, value: DVec3::splat(x) }]);
     }
-    driver.edit([Edit::Set { id, property: Property::Direction, value: DVec3::X }]);
+    driver.edit([Edit::Set { id, property: Property::Light(LightProperty::Direction), value: DVec3::X }]);
     let spot: SpotLight = driver.get("spot light");
     assert_eq!((spot.inner_angle_deg, spot.outer_angle_deg), (25.0, 25.0), "the inner cone stays within the outer");
     assert_eq!((spot.intensity, spot.direction), (Vec3::splat(7.0), DVec3::X));
@@ -242,8 +251,8 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     assert_eq!(driver.get::<SpotLight>("spot light 2"), spot);
     driver.edit([Edit::Add(NewThing::DirectionalLight)]);
     let id = driver.named("directional light").to_bits();
-    driver.edit([Edit::Set { id, property: Property::Irradiance, value: DVec3::splat(2.0) }]);
-    driver.edit([Edit::Set { id, property: Property::Direction, value: DVec3::ZERO }]);
+    driver.edit([Edit::Set { id, property: Property::Light(LightProperty::Irradiance), value: DVec3::splat(2.0) }]);
+    driver.edit([Edit::Set { id, property: Property::Light(LightProperty::Direction), value: DVec3::ZERO }]);
     let sun: DirectionalLight = driver.get("directional light");
     assert!(sun.irradiance == Vec3::splat(2.0) && sun.direction != DVec3::ZERO, "{sun:?}");
     driver.edit([Edit::Delete, Edit::Undo]);
@@ -251,7 +260,7 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     // Nonsense is refused, and nothing changes.
     let (material, id): (SurfaceMaterial, u64) = (driver.get("red"), driver.named("red").to_bits());
     for (property, value) in
-        [(of_material("albedo"), DVec3::NAN), (of_material("ior"), DVec3::ONE), (Property::Radius, DVec3::ONE)]
+        [(of_material("albedo"), DVec3::NAN), (of_material("ior"), DVec3::ONE), (Property::SphereRadius, DVec3::ONE)]
     {
         driver.edit([Edit::Set { id, property, value }]);
     }

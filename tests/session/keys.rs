@@ -3,7 +3,7 @@
 use crate::driver::{Drive, of_material};
 use firstlight::frame::{Command, Edit, MessageKind, Property, Session, SessionOptions, Target, render_offline};
 use firstlight::render::Film;
-use firstlight::scene::animation::{Interpolation, KeyValue, Shutter};
+use firstlight::scene::animation::{Interpolation, KeyValue, LightProperty, Shutter};
 use firstlight::scene::{Animation, Extraction, LoadOptions, Moment, Rendering, SceneInputs, SceneSource, load};
 use glam::DVec3;
 use std::path::Path;
@@ -123,7 +123,11 @@ fn a_still_scene_gets_an_animation_by_moving_things_and_setting_keys() {
     let material = driver.inputs().materials[0].entity.to_bits();
     let sun = driver.inputs().lights[0].entity.to_bits();
     let set = |id, property, value: f64| Edit::Set { id, property, value: DVec3::splat(value) };
-    driver.edit([set(material, of_material("albedo"), 0.7), set(sun, Property::Irradiance, 3.0), KEY]);
+    driver.edit([
+        set(material, of_material("albedo"), 0.7),
+        set(sun, Property::Light(LightProperty::Irradiance), 3.0),
+        KEY,
+    ]);
     driver.session.send(Command::Orbit { yaw_deg: 30.0, pitch_deg: 5.0 });
     driver.edit([Edit::SelectNone, KEY]);
     let names: Vec<&str> = driver.tracks().iter().map(|(name, ..)| *name).collect();
@@ -206,7 +210,7 @@ fn keys_that_no_file_could_hold_are_refused() {
     let mut driver = Driver::open(folder.path(), "s.ron", STILL);
     driver.go_to(1.0);
     let sun = driver.inputs().lights[0].entity.to_bits();
-    driver.edit([Edit::Set { id: sun, property: Property::Direction, value: DVec3::Y }, KEY]);
+    driver.edit([Edit::Set { id: sun, property: Property::Light(LightProperty::Direction), value: DVec3::Y }, KEY]);
     let said = driver.said(MessageKind::Warning);
     assert!(said.contains("`direction` is opposite to the key before"), "{said}");
     assert!(driver.animation().is_none());

@@ -10,7 +10,7 @@ use firstlight::frame::{
     render_offline,
 };
 use firstlight::render::{Film, MaterialKind, SampleAllocation};
-use firstlight::scene::animation::Interpolation;
+use firstlight::scene::animation::{Interpolation, LightProperty};
 use firstlight::scene::file::SceneFile;
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
@@ -147,7 +147,7 @@ impl Driver {
             23 => vec![Command::Edit(Edit::Assign { id, material })],
             24 => vec![Command::Edit(Edit::OwnMaterial { id })],
             25 => vec![Command::Edit(Edit::Rename { id, name: names[random.below(names.len())].to_owned() })],
-            26 => set(id, Property::Intensity, 20.0 * share),
+            26 => set(id, Property::Light(LightProperty::Intensity), 20.0 * share),
             27 => set(0, of_sky[random.below(of_sky.len())], share),
             28 => vec![Command::Edit(Edit::SetKeys { camera: a > 0.0 })],
             29 => edit(Edit::SetKeys { camera: false }),

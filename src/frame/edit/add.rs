@@ -6,6 +6,7 @@
 use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
 use crate::mesh::procedural;
+use crate::scene::entity_state::EntityState;
 use crate::scene::{
     ColorParam, DirectionalLight, GREY, LightKind, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource,
     Ordinal, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
@@ -155,16 +156,8 @@ fn next_ordinal(world: &mut World) -> Ordinal {
 
 pub fn delete(world: &mut World) {
     for entity in std::mem::take(&mut world.resource_mut::<Selection>().0) {
-        bury(world, entity);
+        EntityState::default().put(world, entity);
     }
-}
-
-/// Removes all components that make the entity part of the scene.
-pub fn bury(world: &mut World, entity: Entity) {
-    if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.remove::<(Shape, Placement, MaterialSlots, SurfaceMaterial, MeshOrigin, Ordinal, Name)>();
-    }
-    LightKind::put(None, world, entity);
 }
 
 pub fn duplicate(world: &mut World) {
@@ -172,21 +165,13 @@ pub fn duplicate(world: &mut World) {
     let step = spot::find(world).size;
     let mut copies = Vec::new();
     for entity in selected {
-        let name = world.get::<Name>(entity).map_or("copy".to_owned(), |name| plain_name(name.as_str()).to_owned());
-        let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
+        let mut state = EntityState::of(world, entity);
+        let name = state.name.as_ref().map_or("copy", |name| plain_name(name.as_str()));
+        (state.name, state.ordinal) = (Some(Name::new(free_name(world, name, false))), Some(next_ordinal(world)));
         // Offset, because the copy would otherwise be invisible.
-        placement.translation.x += step;
-        let copy = spawn(world, &name, placement);
-        if let Some(shape) = world.get::<Shape>(entity).cloned() {
-            let slots = world.get::<MaterialSlots>(entity).cloned().unwrap_or_default();
-            let origin = world.get::<MeshOrigin>(entity).cloned();
-            let mut copy = world.entity_mut(copy);
-            copy.insert((shape, slots));
-            if let Some(origin) = origin {
-                copy.insert(origin);
-            }
-        }
-        LightKind::put(LightKind::of(world, entity), world, copy);
+        state.placement.get_or_insert_default().translation.x += step;
+        let copy = world.spawn_empty().id();
+        state.put(world, copy);
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;

@@ -1,29 +1,18 @@
 //! Properties that can be set one at a time.
 
 use crate::scene::MaterialProperty;
+use crate::scene::animation::{LightProperty, ObjectProperty};
 use serde::{Deserialize, Serialize};
 
-/// The property of [`super::Edit::Set`]. A scalar uses the `x` component of the value only.
+/// The property of [`super::Edit::Set`]. A number uses the `x` component of the value only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Property {
-    /// Position, metres.
-    Translation,
-    /// Rotation, degrees about X, then Y, then Z.
-    Rotation,
-    /// Scale factors along the axes of the object, positive.
-    Scale,
-    /// Radius of a sphere or a point light in metres; 0 is allowed for a point light.
-    Radius,
-    /// Radiant intensity of a point light or a spot light, W·sr⁻¹.
-    Intensity,
-    /// Irradiance of a directional light, W·m⁻².
-    Irradiance,
-    /// Direction of a spot light or a directional light before its rotation, any length except 0.
-    Direction,
-    /// Inner angle of a spot light, degrees from its axis; limited to the outer angle.
-    InnerAngle,
-    /// Outer angle of a spot light, degrees from its axis; limits the inner angle.
-    OuterAngle,
+    /// Placement of an object; scale factors are positive.
+    Object(ObjectProperty),
+    /// A number, a colour or the placement of a light that is no object; limited to the values that it may have.
+    Light(LightProperty),
+    /// Radius of a sphere, metres.
+    SphereRadius,
     /// A number, colour or choice of a material; limited to the values that it may have.
     Material(MaterialProperty),
     /// Radiance of a constant environment.

@@ -4,9 +4,8 @@
 use super::property::Property;
 use super::{keys, sky};
 use crate::render::MaterialKind;
-use crate::scene::{
-    ColorParam, DirectionalLight, LightKind, Linear, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
-};
+use crate::scene::animation::{LightProperty, ObjectProperty};
+use crate::scene::{ColorParam, LightKind, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
@@ -25,29 +24,42 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
     let entity = entity.filter(|&entity| world.get_entity(entity).is_ok());
     let entity = entity.ok_or("the object no longer exists")?;
     let wrong = || format!("this object has no {property:?}");
-    if let Some(placement) = world.get::<Placement>(entity).copied()
-        && let Some(placement) = with_placement(placement, property, value)
-    {
-        set_if_different(world, entity, placement);
-        return Ok(());
+    match property {
+        Property::Object(property) => {
+            let old = *world.get::<Placement>(entity).ok_or_else(wrong)?;
+            if property == ObjectProperty::Scale && !(value.min_element() > 0.0) {
+                return Err("scale factors must be above 0".to_owned());
+            }
+            set_if_different(world, entity, property.set(old, value));
+        }
+        Property::SphereRadius => {
+            if !matches!(world.get::<Shape>(entity), Some(Shape::Sphere { .. })) {
+                return Err(wrong());
+            }
+            if !(value.x > 0.0) {
+                return Err("a radius must be above 0".to_owned());
+            }
+            set_if_different(world, entity, Shape::Sphere { radius: value.x });
+        }
+        Property::Light(property) => {
+            let mut light = LightKind::of(world, entity).ok_or_else(wrong)?;
+            let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
+            if property == LightProperty::Direction && value == DVec3::ZERO {
+                return Err("a direction must have a length".to_owned());
+            }
+            let [least, most] = property.info().range;
+            let value = value.clamp(DVec3::splat(least), DVec3::splat(most));
+            property.set(&mut light, &mut placement, value).ok_or_else(wrong)?;
+            LightKind::put(Some(limited(light)), world, entity);
+            set_if_different(world, entity, placement);
+        }
+        Property::Material(property) => {
+            let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or_else(wrong)?;
+            property.set(&mut material.0, value).ok_or_else(wrong)?;
+            set_if_different(world, entity, material);
+        }
+        _ => unreachable!("properties of the environment and the animation belong to no entity"),
     }
-    let light = LightKind::of(world, entity);
-    let may_be_none = matches!(light, Some(LightKind::Point(_))) && value.x == 0.0;
-    if property == Property::Radius && !(value.x > 0.0 || may_be_none) {
-        return Err("a radius must be above 0".to_owned());
-    }
-    if let (Some(Shape::Sphere { .. }), Property::Radius) = (world.get::<Shape>(entity), property) {
-        set_if_different(world, entity, Shape::Sphere { radius: value.x });
-        return Ok(());
-    }
-    if let Some(light) = light {
-        LightKind::put(Some(with_property(light, property, value).ok_or_else(wrong)?), world, entity);
-        return Ok(());
-    }
-    let Property::Material(property) = property else { return Err(wrong()) };
-    let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or_else(wrong)?;
-    property.set(&mut material.0, value).ok_or_else(wrong)?;
-    set_if_different(world, entity, material);
     Ok(())
 }
 
@@ -61,47 +73,17 @@ pub(super) fn set_if_different<T: bevy_ecs::component::Component + PartialEq>(
     }
 }
 
-/// Returns the changed placement; `None` if the property does not belong to a placement. A placement given as a matrix
-/// keeps its linear part.
-fn with_placement(placement: Placement, property: Property, value: DVec3) -> Option<Placement> {
-    let Placement { translation, linear } = placement;
-    Some(match (property, linear) {
-        (Property::Translation, linear) => Placement { translation: value, linear },
-        (Property::Rotation, Linear::Turned { scale, .. }) => {
-            Placement { translation, linear: Linear::Turned { rotation_deg: value, scale } }
+/// The light that a number makes: the inner angle of a cone is at most the outer one, and a radius too small for a
+/// sphere makes a point.
+fn limited(light: LightKind) -> LightKind {
+    match light {
+        LightKind::Spot(light) => {
+            let inner_angle_deg = light.inner_angle_deg.min(light.outer_angle_deg);
+            LightKind::Spot(SpotLight { inner_angle_deg, ..light })
         }
-        (Property::Scale, Linear::Turned { rotation_deg, .. }) if value.min_element() > 0.0 => {
-            Placement { translation, linear: Linear::Turned { rotation_deg, scale: value } }
-        }
-        (Property::Rotation | Property::Scale, _) => placement,
-        _ => return None,
-    })
-}
-
-/// Returns the changed light; `None` if it does not have the property, or its direction would be zero.
-fn with_property(light: LightKind, property: Property, value: DVec3) -> Option<LightKind> {
-    /// Smallest cone in degrees; a narrower one has no power in `f32`.
-    const LEAST_CONE_DEG: f64 = 0.1;
-    Some(match (light, property) {
-        (LightKind::Point(_) | LightKind::Spot(_), Property::Intensity)
-        | (LightKind::Directional(_), Property::Irradiance) => light.with_strength(value.max(DVec3::ZERO).as_vec3()),
-        (LightKind::Point(light), Property::Radius) => LightKind::Point(PointLight { radius: value.x, ..light }),
-        (LightKind::Spot(light), Property::Direction) if value != DVec3::ZERO => {
-            LightKind::Spot(SpotLight { direction: value, ..light })
-        }
-        (LightKind::Directional(light), Property::Direction) if value != DVec3::ZERO => {
-            LightKind::Directional(DirectionalLight { direction: value, ..light })
-        }
-        (LightKind::Spot(light), Property::InnerAngle) => {
-            LightKind::Spot(SpotLight { inner_angle_deg: value.x.clamp(0.0, light.outer_angle_deg), ..light })
-        }
-        (LightKind::Spot(light), Property::OuterAngle) => {
-            let outer_angle_deg = value.x.clamp(LEAST_CONE_DEG, 90.0);
-            let inner_angle_deg = light.inner_angle_deg.min(outer_angle_deg);
-            LightKind::Spot(SpotLight { inner_angle_deg, outer_angle_deg, ..light })
-        }
-        _ => return None,
-    })
+        LightKind::Point(light) if light.radius < 1e-9 => LightKind::Point(PointLight { radius: 0.0, ..light }),
+        light => light,
+    }
 }
 
 /// Changes the kind of a material, keeping the colour if both have one.

@@ -51,7 +51,7 @@ impl CameraProperty {
 
 impl ObjectProperty {
     /// The value of a placement; `None` for a rotation and a scale that are given as a matrix.
-    pub(super) fn get(self, placement: &Placement) -> Option<DVec3> {
+    pub fn get(self, placement: &Placement) -> Option<DVec3> {
         match (self, placement.linear) {
             (Self::Translate, _) => Some(placement.translation),
             (Self::Rotate, Linear::Turned { rotation_deg, .. }) => Some(rotation_deg),
@@ -63,7 +63,7 @@ impl ObjectProperty {
 
 impl LightProperty {
     /// The value of a light; `None` if lights of this kind do not have the property.
-    pub(super) fn get(self, light: &LightKind, placement: &Placement) -> Option<DVec3> {
+    pub fn get(self, light: &LightKind, placement: &Placement) -> Option<DVec3> {
         Some(match (self, light) {
             (Self::Position, LightKind::Point(_) | LightKind::Spot(_)) => placement.translation,
             (Self::Rotate, LightKind::Spot(_) | LightKind::Directional(_)) => ObjectProperty::Rotate.get(placement)?,

@@ -25,7 +25,7 @@ pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys}
 pub(super) use model::ModelMotion;
 pub(super) use moment::show_first;
 pub use moment::{Moment, camera_follows, show_moment};
-pub use property::{CameraProperty, LightProperty, ObjectProperty, Quantity};
+pub use property::{CameraProperty, LightProperty, ObjectProperty, PropertyInfo, Quantity};
 pub(super) use written::{Entities, of_part};
 
 use super::file::CameraPart;

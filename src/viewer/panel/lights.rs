@@ -5,6 +5,7 @@ use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_d
 use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::{Environment, MaterialKind};
+use crate::scene::animation::LightProperty;
 use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, MaterialProperty, SurfaceMaterial};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
@@ -71,7 +72,11 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     ui.spacing_mut().interact_size.x = 30.0;
     if let Some(light) = LightKind::of(world, entry.entity) {
         if let Some(value) = color(ui, light.strength(), true) {
-            asked.edit(Edit::Set { id: entry.entity.to_bits(), property: strength_of(&light).1, value });
+            let property = match light {
+                LightKind::Point(_) | LightKind::Spot(_) => LightProperty::Intensity,
+                LightKind::Directional(_) => LightProperty::Irradiance,
+            };
+            asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Light(property), value });
         }
         return;
     }
@@ -88,14 +93,6 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
             drop(ui.weak(&*crate::printable::name(&texture.name)))
         }
         _ => {}
-    }
-}
-
-/// Label of a light's strength, and the property that sets it.
-pub fn strength_of(light: &LightKind) -> (&'static str, Property) {
-    match light {
-        LightKind::Point(_) | LightKind::Spot(_) => ("intensity", Property::Intensity),
-        LightKind::Directional(_) => ("irradiance", Property::Irradiance),
     }
 }
 
