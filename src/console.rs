@@ -4,7 +4,7 @@
 //! What is said is a [`Message`], whose lines are known: a line end within a line came from a foreign name, and is
 //! escaped like anything else that does not print. JSON goes out as it is. `tests/source/gates.rs` looks for any other way.
 
-use crate::printable;
+use crate::files::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::fmt;

@@ -25,15 +25,17 @@
 //! | `cluster` (feature `cli`) | parts of an image on many machines: what a set of films has, job files of engines |
 //! | `report`, `stability` (feature `cli`) | error against time; counts of hard cases |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
-//! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
-//! | `oidn` (feature `cli`) | Open Image Denoise, loaded at run time where it is installed |
-//! | [`printable`], `console` (feature `cli`) | escaping of foreign text; output to a terminal |
+//! | [`scene`] | the world: components, loading, saving, animation, extraction of the snapshot |
+//! | [`import`] | OBJ, PLY, STL and glTF as meshes and parts of a scene file |
+//! | [`format`] | the scene file: values, checks and their limits, placements, lights, keys |
+//! | [`files`], `console` (feature `cli`) | bounded reading, whole-file writing, escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
 //! | [`kdtree`], [`geometry`] | closest-hit and any-hit queries; rays, boxes, robust arithmetic |
 
 pub use bevy_ecs;
 pub use embed::{Error, Image, RenderOptions, Scene};
+pub use files::printable;
 pub use firstlight_kdtree::{self as kdtree, geometry};
 pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
@@ -48,13 +50,11 @@ pub mod cluster;
 #[allow(missing_docs)]
 pub mod console;
 pub mod embed;
+pub mod files;
+pub mod format;
 pub mod frame;
-// Hidden like `console`.
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod oidn;
+pub mod import;
 pub mod prelude;
-pub mod printable;
 // Hidden like `console`.
 #[cfg(feature = "cli")]
 #[doc(hidden)]

@@ -1,14 +1,14 @@
 //! Numbered images: `firstlight render --frames A..B` of an animation, `--turntable N`, and `--bookmarks 1,2,3 --frames N`.
 
-use super::console::{inform, remark};
-use super::failure::Failure;
-use super::frames::FramesArg;
-use super::job::RenderJob;
-use super::progress::Progress;
-use super::render_args::RenderArgs;
-use super::sequence::{Motion, Sequence};
-use super::stop::Stop;
-use super::video;
+use crate::cli::console::{inform, remark};
+use crate::cli::failure::Failure;
+use crate::cli::frames::FramesArg;
+use crate::cli::job::RenderJob;
+use crate::cli::progress::Progress;
+use crate::cli::render_args::RenderArgs;
+use crate::cli::sequence::{Motion, Sequence};
+use crate::cli::stop::Stop;
+use crate::cli::video;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{SettingsStore, Target, along, read_film_summary, turntable, write_film_with_features};
 use firstlight::render::GuideGatherer;

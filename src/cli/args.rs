@@ -1,8 +1,8 @@
 //! Arguments shared by several commands.
 
-use super::console::{remark, tell};
-use super::failure::Failure;
-use super::number::{parse_seconds, parse_shutter};
+use crate::cli::console::{remark, tell};
+use crate::cli::failure::Failure;
+use crate::cli::number::{parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
 use firstlight::cluster::unpack::{UnpackError, Unpacked, is_archive, unpack};
 use firstlight::frame::check_film_source;

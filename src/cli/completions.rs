@@ -1,9 +1,8 @@
 //! `firstlight completions SHELL`: prints a script that completes commands, options and built-in scenes.
 
-use super::CommandLine;
-use super::console::print_bytes;
-use super::failure::Failure;
-use clap::{Args, CommandFactory};
+use crate::cli::console::print_bytes;
+use crate::cli::failure::Failure;
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 #[derive(Args, Clone, Debug)]
@@ -13,8 +12,9 @@ pub struct CompletionsArgs {
     shell: Shell,
 }
 
-pub fn run(args: &CompletionsArgs) -> Result<(), Failure> {
+/// - `program`: all commands.
+pub fn run(args: &CompletionsArgs, mut program: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut CommandLine::command(), "firstlight", &mut script);
+    clap_complete::generate(args.shell, &mut program, "firstlight", &mut script);
     print_bytes(&script)
 }

@@ -1,7 +1,7 @@
 //! Output of commands: results on standard output, remarks on standard error. Closed pipes and full disks cause no
 //! panic.
 
-use super::failure::Failure;
+use crate::cli::failure::Failure;
 use firstlight::console::is_verbose;
 pub use firstlight::console::{Bar, Message, inform, lines, prints_to_terminal, remark};
 use firstlight::scene::{Severity, Warning, Warnings};

@@ -1,9 +1,9 @@
 //! `--denoise` and `--denoiser`: which denoiser, and whether it can be had.
 
-use super::failure::Failure;
+use crate::cli::failure::Failure;
 use clap::{Args, ValueEnum};
 use firstlight::frame::DenoiseFilter;
-use firstlight::oidn::Oidn;
+use firstlight::frame::oidn::Oidn;
 use firstlight::render::{DenoiseSource, Denoised, Film, SurfaceGuides, denoise_source};
 
 #[derive(Args, Clone, Copy, Debug, Default)]

@@ -1,9 +1,9 @@
 //! `firstlight explain SCENE --pixel X,Y`: explains the value of a pixel, without a window.
 
-use super::args::SceneArgs;
-use super::console::{print, tell};
-use super::failure::Failure;
-use super::number::{between, parse_size, three_digits};
+use crate::cli::args::SceneArgs;
+use crate::cli::console::{print, tell};
+use crate::cli::failure::Failure;
+use crate::cli::number::{between, parse_size, three_digits};
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
 use firstlight::printable;

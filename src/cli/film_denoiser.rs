@@ -3,12 +3,12 @@
 //! A film holds light, not the surfaces that guide the denoiser. They come from its scene, which is opened as for
 //! `render --resume`.
 
-use super::denoising::DenoiserArg;
-use super::failure::Failure;
-use super::job::RenderJob;
-use super::progress::Progress;
-use super::render::Command;
-use super::render_args::RenderArgs;
+use crate::cli::denoising::DenoiserArg;
+use crate::cli::failure::Failure;
+use crate::cli::job::RenderJob;
+use crate::cli::progress::Progress;
+use crate::cli::render::Command;
+use crate::cli::render_args::RenderArgs;
 use firstlight::render::{Denoised, Film, GuideGatherer};
 use firstlight::scene::{Files, ImageMetadata};
 use std::path::{Path, PathBuf};

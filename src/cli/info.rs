@@ -1,11 +1,11 @@
 //! `firstlight info SCENE`: contents of a scene, features in use, unsupported features, memory.
 
-use super::args::{SceneArgs, ScenesArgs, check_scenes};
-use super::console;
-use super::console::print;
-use super::failure::Failure;
-use super::info_objects::ObjectList;
-use super::number::{counted, two_digits};
+use crate::cli::args::{SceneArgs, ScenesArgs, check_scenes};
+use crate::cli::console;
+use crate::cli::console::print;
+use crate::cli::failure::Failure;
+use crate::cli::info_objects::ObjectList;
+use crate::cli::number::{counted, two_digits};
 use clap::Args;
 use firstlight::frame::{DenoiseFilter, PictureLayer, f_number, f_stop};
 use firstlight::printable;
@@ -51,7 +51,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     let extraction = Extraction::new(&inputs, &scene.trees);
     console::tell(&extraction.problems.iter().cloned().collect());
     if args.tree {
-        return super::trees::run(&inputs, &extraction, args.json);
+        return crate::cli::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
     let prepared = &extraction.prepared;

@@ -1,6 +1,6 @@
 //! The objects of a scene as a readable list: instances of one mesh in one line, with counts and sizes.
 
-use super::number::{counted, three_digits};
+use crate::cli::number::{counted, three_digits};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::scene::{ExtentCache, ObjectInput, SceneInputs, Shape};

@@ -1,11 +1,11 @@
 //! A scene that is rendered without a window, and its images.
 
-use super::console::{inform, print_bytes, remark, tell};
-use super::denoising::Denoiser;
-use super::failure::Failure;
-use super::progress::Progress;
-use super::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
-use super::sequence::DEFAULT_FPS;
+use crate::cli::console::{inform, print_bytes, remark, tell};
+use crate::cli::denoising::Denoiser;
+use crate::cli::failure::Failure;
+use crate::cli::progress::Progress;
+use crate::cli::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
+use crate::cli::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{

@@ -1,7 +1,7 @@
 //! `--layers`: additional layers of an EXR image.
 
-use super::console::remark;
-use super::failure::Failure;
+use crate::cli::console::remark;
+use crate::cli::failure::Failure;
 use clap::{Args, ValueEnum};
 use firstlight::frame::{FeatureLayers, PictureLayer};
 use firstlight::render::Film;

@@ -1,9 +1,8 @@
 //! `firstlight man [FOLDER]`: prints the manual page, or writes a page per command.
 
-use super::CommandLine;
-use super::console::{inform, print_bytes};
-use super::failure::Failure;
-use clap::{Args, Command, CommandFactory};
+use crate::cli::console::{inform, print_bytes};
+use crate::cli::failure::Failure;
+use clap::{Args, Command};
 use clap_mangen::Man;
 use firstlight::scene::whole_file::write_whole;
 use std::path::PathBuf;
@@ -15,8 +14,9 @@ pub struct ManArgs {
     folder: Option<PathBuf>,
 }
 
-pub fn run(args: &ManArgs) -> Result<(), Failure> {
-    let mut main = CommandLine::command().disable_help_subcommand(true);
+/// - `program`: all commands.
+pub fn run(args: &ManArgs, program: Command) -> Result<(), Failure> {
+    let mut main = program.disable_help_subcommand(true);
     main.build();
     let Some(folder) = &args.folder else {
         return print_bytes(&page(&main)?);

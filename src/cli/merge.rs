@@ -3,17 +3,17 @@
 //! First the metadata of all films is read: whether they belong together, and which samples are duplicate or missing.
 //! Then the films are added one by one, with memory for two, however many there are.
 
-use super::args::{OverwriteArgs, replaced};
-use super::console::{inform, print, remark};
-use super::denoising::DenoiserArg;
-use super::failure::Failure;
-use super::film_denoiser::FilmDenoiser;
-use super::layers::LayerArgs;
-use super::number::percent;
-use super::part::numbered;
-use super::progress::Progress;
-use super::render_args::parse_range;
-use super::stop::Stop;
+use crate::cli::args::{OverwriteArgs, replaced};
+use crate::cli::console::{inform, print, remark};
+use crate::cli::denoising::DenoiserArg;
+use crate::cli::failure::Failure;
+use crate::cli::film_denoiser::FilmDenoiser;
+use crate::cli::layers::LayerArgs;
+use crate::cli::number::percent;
+use crate::cli::part::numbered;
+use crate::cli::progress::Progress;
+use crate::cli::render_args::parse_range;
+use crate::cli::stop::Stop;
 use clap::Args;
 use firstlight::cluster::coverage::{Coverage, Duplicate, groups, in_words};
 use firstlight::cluster::part::Part;

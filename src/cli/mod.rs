@@ -42,16 +42,16 @@ mod waiting;
 mod words;
 mod work;
 
-use clap::{Parser, Subcommand, ValueEnum};
-use console::{lines, remark};
-use failure::Failure;
+use crate::cli::console::{lines, remark};
+use crate::cli::failure::Failure;
+use crate::cli::stop::Stop;
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
 use firstlight::scene::Limits;
 use std::io::ErrorKind;
 use std::process::ExitCode;
-use stop::Stop;
 
 /// Interactive, progressive path tracer: open a model, fly through it, watch it converge.
 #[derive(Parser)]
@@ -146,8 +146,8 @@ impl CliCommand {
             Self::Scenes(args) => scenes::run(args),
             Self::Explain(args) => explain::run(args),
             Self::Simplify(args) => simplify::run(args, stop),
-            Self::Completions(args) => completions::run(args),
-            Self::Man(args) => man::run(args),
+            Self::Completions(args) => completions::run(args, CommandLine::command()),
+            Self::Man(args) => man::run(args, CommandLine::command()),
         }
     }
 }
@@ -158,7 +158,7 @@ pub fn main() -> ExitCode {
     if let Some(warning) = Limits::misunderstood() {
         remark(format_args!("warning: {warning}"));
     }
-    let line = match CommandLine::try_parse_from(words::typed()) {
+    let line = match CommandLine::try_parse_from(words::typed(&CommandLine::command())) {
         Ok(line) => line,
         Err(error) => return not_understood(error),
     };
@@ -171,7 +171,7 @@ pub fn main() -> ExitCode {
     }
     let result = line.simd.map_or(Ok(()), SimdArg::choose).and_then(|()| match line.command {
         Some(command) => Stop::obeyed_by(move |stop| command.run(stop)),
-        None => match words::mistyped_command() {
+        None => match words::mistyped_command(&CommandLine::command()) {
             Some(message) => Err(Failure::Usage(message)),
             None => show::run(&line.show),
         },
@@ -209,13 +209,15 @@ fn not_understood(error: clap::Error) -> ExitCode {
             _ => ExitCode::SUCCESS,
         };
     }
-    if let Some(message) = words::mistyped_command().or_else(words::second_scene) {
+    if let Some(message) =
+        words::mistyped_command(&CommandLine::command()).or_else(|| words::second_scene(&CommandLine::command()))
+    {
         remark(format_args!("error: {message}"));
         return ExitCode::from(2);
     }
     // The message quotes the arguments, and a line break in them would begin a new line: they are parsed again with
     // such characters escaped, which gives the same message without line breaks.
-    let words = words::typed();
+    let words = words::typed(&CommandLine::command());
     let shown: Vec<String> = words.iter().map(|word| printable::name(&word.to_string_lossy()).into_owned()).collect();
     let error = match words.iter().zip(&shown).all(|(word, shown)| word == shown.as_str()) {
         true => error,

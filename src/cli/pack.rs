@@ -1,8 +1,8 @@
 //! `firstlight pack SCENE -o scene.zip`: packs a scene with all of its files, for other machines.
 
-use super::args::{OverwriteArgs, SceneArgs, replaced};
-use super::console::{inform, remark};
-use super::failure::Failure;
+use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
+use crate::cli::console::{inform, remark};
+use crate::cli::failure::Failure;
 use clap::Args;
 use firstlight::cluster::pack::{PackError, Package};
 use firstlight::scene::whole_file::Replace;

@@ -3,14 +3,14 @@
 //! A complete part is recognised and skipped; an interrupted one is resumed from its last film, which is saved every
 //! minute by default. Exit status: 0 done, 75 try again, 2 wrong input.
 
-use super::animate::animate;
-use super::console::{inform, remark};
-use super::failure::Failure;
-use super::job::RenderJob;
-use super::progress::Progress;
-use super::render_args::{PartBy, RenderArgs};
-use super::sequence::Sequence;
-use super::stop::Stop;
+use crate::cli::animate::animate;
+use crate::cli::console::{inform, remark};
+use crate::cli::failure::Failure;
+use crate::cli::job::RenderJob;
+use crate::cli::progress::Progress;
+use crate::cli::render_args::{PartBy, RenderArgs};
+use crate::cli::sequence::Sequence;
+use crate::cli::stop::Stop;
 use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::part::Part;
 use firstlight::frame::{

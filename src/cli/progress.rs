@@ -1,7 +1,7 @@
 //! Progress of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
 
-use super::console::Bar;
-use super::waiting::Waiting;
+use crate::cli::console::Bar;
+use crate::cli::waiting::Waiting;
 
 /// Ends when it is dropped.
 pub struct Progress {

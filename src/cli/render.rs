@@ -1,18 +1,18 @@
 //! `firstlight render SCENE -o out.png`: renders an image without a window, and a film from which it can be resumed.
 
-use super::animate::animate;
-use super::args::replaced;
-use super::console::{inform, print, prints_to_terminal, remark};
-use super::denoising::ErrorOf;
-use super::failure::Failure;
-use super::job::{RenderJob, room_to_write};
-use super::number::{percent, samples_per_pixel};
-use super::part;
-use super::progress::Progress;
-use super::render_args::{RenderArgs, RenderCommand};
-use super::sequence::Sequence;
-use super::stop::Stop;
-use super::video;
+use crate::cli::animate::animate;
+use crate::cli::args::replaced;
+use crate::cli::console::{inform, print, prints_to_terminal, remark};
+use crate::cli::denoising::ErrorOf;
+use crate::cli::failure::Failure;
+use crate::cli::job::{RenderJob, room_to_write};
+use crate::cli::number::{percent, samples_per_pixel};
+use crate::cli::part;
+use crate::cli::progress::Progress;
+use crate::cli::render_args::{RenderArgs, RenderCommand};
+use crate::cli::sequence::Sequence;
+use crate::cli::stop::Stop;
+use crate::cli::video;
 use firstlight::frame::{
     OfflineReport, Progress as Measured, Target, read_film_file, render_measured_until, render_offline_until,
     render_region_until, write_errors, write_film_with_features,
@@ -59,7 +59,7 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     }
     let jobs = command.jobs()?;
     // An error in the last argument should be reported before the others are rendered.
-    super::args::check_scenes(jobs.iter().map(|job| &job.scene))?;
+    crate::cli::args::check_scenes(jobs.iter().map(|job| &job.scene))?;
     for job in &jobs {
         job.picture_format()?;
     }

@@ -1,11 +1,11 @@
 //! Arguments of `firstlight render`.
 
-use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
-use super::denoising::DenoiseArgs;
-use super::failure::Failure;
-use super::frames::{FramesArg, parse_frames};
-use super::layers::LayerArgs;
-use super::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
+use crate::cli::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
+use crate::cli::denoising::DenoiseArgs;
+use crate::cli::failure::Failure;
+use crate::cli::frames::{FramesArg, parse_frames};
+use crate::cli::layers::LayerArgs;
+use crate::cli::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
 use clap::{Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;

@@ -1,12 +1,12 @@
 //! `firstlight report [SCENES]`: error versus time, as an HTML page, a table and a few lines of text.
 
-use super::args::{OverwriteArgs, SceneArgs};
-use super::console::{Bar, inform, lines, print, remark};
-use super::failure::Failure;
-use super::number::{between, parse_positive, parse_size};
-use super::stop::Stop;
+use crate::cli::args::{OverwriteArgs, SceneArgs};
+use crate::cli::console::{Bar, inform, lines, print, remark};
+use crate::cli::failure::Failure;
+use crate::cli::number::{between, parse_positive, parse_size};
+use crate::cli::stop::Stop;
 use clap::Args;
-use firstlight::oidn::{Oidn, OidnError};
+use firstlight::frame::oidn::{Oidn, OidnError};
 use firstlight::render::{
     ErrorMetric, GuideGatherer, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
 };

@@ -1,8 +1,8 @@
 //! `firstlight save SCENE -o out.ron`: saves a model, a built-in scene or the scene of an image as a scene file.
 
-use super::args::{OverwriteArgs, SceneArgs, replaced};
-use super::console::inform;
-use super::failure::Failure;
+use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
+use crate::cli::console::inform;
+use crate::cli::failure::Failure;
 use clap::Args;
 use firstlight::scene::save_scene;
 use std::path::PathBuf;

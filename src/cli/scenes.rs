@@ -1,7 +1,7 @@
 //! `firstlight scenes`: lists the built-in scenes.
 
-use super::console::print;
-use super::failure::Failure;
+use crate::cli::console::print;
+use crate::cli::failure::Failure;
 use clap::Args;
 use firstlight::scene::BUILTIN_SCENES;
 

@@ -1,8 +1,8 @@
 //! Which frames a sequence has, and what moves from one to the next.
 
-use super::failure::Failure;
-use super::frames::FramesArg;
-use super::render_args::RenderArgs;
+use crate::cli::failure::Failure;
+use crate::cli::frames::FramesArg;
+use crate::cli::render_args::RenderArgs;
 use firstlight::scene::SceneSource;
 use firstlight::scene::model::ModelFormat;
 use std::ffi::OsStr;

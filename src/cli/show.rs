@@ -1,13 +1,13 @@
 //! `firstlight [SCENE|MODEL]`: opens a window, or renders an image if there is no display.
 
-use super::args::{OverwriteArgs, SceneArgs, replaced};
-use super::console::{inform, remark};
-use super::denoising::DenoiseArgs;
-use super::failure::Failure;
-use super::number::{between, counted, samples_per_pixel};
-use super::render;
-use super::render_args::{RenderArgs, free_name};
-use super::stop::Stop;
+use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
+use crate::cli::console::{inform, remark};
+use crate::cli::denoising::DenoiseArgs;
+use crate::cli::failure::Failure;
+use crate::cli::number::{between, counted, samples_per_pixel};
+use crate::cli::render;
+use crate::cli::render_args::{RenderArgs, free_name};
+use crate::cli::stop::Stop;
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
@@ -19,7 +19,7 @@ pub struct ShowArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Size of the window in pixels; of the image if there is no display.
-    #[arg(long, value_name = "WxH", value_parser = super::number::parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = crate::cli::number::parse_size)]
     size: Option<(u32, u32)>,
     /// Number of worker threads [default: all cores].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
@@ -66,8 +66,8 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
 
 #[cfg(feature = "viewer")]
 fn open_window(args: &ShowArgs) -> Result<(), Failure> {
-    use super::arenas;
-    use super::console::lines;
+    use crate::cli::arenas;
+    use crate::cli::console::lines;
     use firstlight::frame::{SettingsStore, check_recordable};
     use firstlight::viewer::{ViewerError, ViewerOptions, run};
     arenas::limit();

@@ -1,11 +1,11 @@
 //! `firstlight simplify IN -o OUT.obj`: reduces the number of triangles and measures the error.
 
-use super::args::{OverwriteArgs, replaced};
-use super::console::{inform, print, remark, tell};
-use super::failure::Failure;
-use super::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent, three_digits};
-use super::stop::Stop;
-use super::waiting::Waiting;
+use crate::cli::args::{OverwriteArgs, replaced};
+use crate::cli::console::{inform, print, remark, tell};
+use crate::cli::failure::Failure;
+use crate::cli::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent, three_digits};
+use crate::cli::stop::Stop;
+use crate::cli::waiting::Waiting;
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};

@@ -1,9 +1,9 @@
 //! `firstlight stability`: runs the hard cases and prints the counts, as a table or as JSON. Fails if there are
 //! findings.
 
-use super::console::{Bar, lines, print};
-use super::failure::Failure;
-use super::number::between;
+use crate::cli::console::{Bar, lines, print};
+use crate::cli::failure::Failure;
+use crate::cli::number::between;
 use clap::Args;
 use firstlight::render::worker_threads;
 use firstlight::report::cpu_seconds;

@@ -1,10 +1,10 @@
 //! `firstlight status FOLDER`: shows the progress of a job from the files in its folder.
 
-use super::console::{inform, print, remark};
-use super::failure::Failure;
-use super::merge::{FilmSet, note_of};
-use super::number::percent;
-use super::work::ALL;
+use crate::cli::console::{inform, print, remark};
+use crate::cli::failure::Failure;
+use crate::cli::merge::{FilmSet, note_of};
+use crate::cli::number::percent;
+use crate::cli::work::ALL;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::job::{Job, Round, Rounds};

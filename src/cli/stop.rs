@@ -6,7 +6,7 @@
 //! Code that runs before there is anything to save, such as third-party parsers, therefore need not support
 //! cancellation.
 
-use super::failure::Failure;
+use crate::cli::failure::Failure;
 use firstlight::console::{Bar, clear_line};
 use firstlight::scene::whole_file;
 use std::panic::resume_unwind;

@@ -1,14 +1,14 @@
 //! `firstlight submit ENGINE SCENE --parts N`: creates the folder of a job with all of its files and submits its first
 //! round to an engine.
 
-use super::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
-use super::console::inform;
-use super::failure::Failure;
-use super::frames::{FramesArg, parse_frames};
-use super::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
-use super::render::Command;
-use super::render_args::file_stem;
-use super::work::render_words;
+use crate::cli::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
+use crate::cli::console::inform;
+use crate::cli::failure::Failure;
+use crate::cli::frames::{FramesArg, parse_frames};
+use crate::cli::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
+use crate::cli::render::Command;
+use crate::cli::render_args::file_stem;
+use crate::cli::work::render_words;
 use clap::{Args, ValueEnum};
 use firstlight::cluster::engine::{EngineOptions, SlurmOption, files, job_name, shell_word};
 use firstlight::cluster::job::{Engine, Job};
@@ -167,7 +167,7 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
     check_is_free(&folder)?;
     let spp = args.spp.unwrap_or(match args.error {
         Some(_) => Job::first_round(args.parts, args.max_spp),
-        None => super::render_args::DEFAULT_SPP,
+        None => crate::cli::render_args::DEFAULT_SPP,
     });
     let frames = args.frames.map(FramesArg::range);
     if let Some(n) = frames.as_ref().map(ExactSizeIterator::len).filter(|&n| args.parts as usize > n) {
@@ -280,7 +280,7 @@ fn package(scene: &SceneArgs) -> Result<Result<Package, String>, Failure> {
     }
     let loaded = scene.load(None, &mut Files::default(), &|_| ())?;
     let package = Package::of(&loaded, &source)?;
-    super::pack::tell_outside(&package);
+    crate::cli::pack::tell_outside(&package);
     Ok(Ok(package))
 }
 

@@ -1,7 +1,7 @@
 //! `firstlight info --tree SCENE|MODEL`: build and traversal costs of each split method for each mesh.
 
-use super::console::{inform, lines, print};
-use super::failure::Failure;
+use crate::cli::console::{inform, lines, print};
+use crate::cli::failure::Failure;
 use firstlight::kdtree::{self, BuildPreset};
 use firstlight::mesh::Mesh;
 use firstlight::printable;

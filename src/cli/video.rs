@@ -1,6 +1,6 @@
 //! A video of numbered images, encoded by `ffmpeg` where that is installed: its standard input gets raw RGB.
 
-use super::failure::Failure;
+use crate::cli::failure::Failure;
 use firstlight::scene::input_file::{FileKind, InputFile};
 use firstlight::scene::whole_file::{Replace, check_writable};
 use std::io::{BufReader, Write};
@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 const PROGRAM: &str = "ffmpeg";
 
 /// Whether there can be a video: before the first frame is rendered.
-pub fn check(args: &super::render_args::RenderArgs) -> Result<(), Failure> {
+pub fn check(args: &crate::cli::render_args::RenderArgs) -> Result<(), Failure> {
     let Some(path) = &args.video else { return Ok(()) };
     if path.extension().is_none() {
         let message = "the name of a video needs an extension that says its format, such as .mp4 or .webm";

@@ -1,6 +1,6 @@
 //! Reports of long work: a line every few seconds, on a terminal or not.
 
-use super::console::inform;
+use crate::cli::console::inform;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};

@@ -1,33 +1,31 @@
 //! Preprocessing of the command line: global options before a command, and mistyped commands.
 
-use super::CommandLine;
-use clap::CommandFactory;
+use clap::Command;
 use firstlight::printable;
 use firstlight::scene::{BUILTIN_SCENES, SceneSource, suggestion};
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 /// The arguments, with global options before a command moved behind it: `--quiet render` becomes `render --quiet`.
-pub fn typed() -> Vec<OsString> {
-    ordered(std::env::args_os().collect(), &commands())
+pub fn typed(program: &Command) -> Vec<OsString> {
+    ordered(std::env::args_os().collect(), &commands(program))
 }
 
 /// An error message if the first argument that is not an option cannot be opened and resembles a command.
-pub fn mistyped_command() -> Option<String> {
-    let words = typed();
-    mistyped(words.get(1 + n_leading_options(&words))?, &commands())
+pub fn mistyped_command(program: &Command) -> Option<String> {
+    let words = typed(program);
+    mistyped(words.get(1 + n_leading_options(&words))?, &commands(program))
 }
 
 /// An error message if a second scene or a command follows the first scene.
-pub fn second_scene() -> Option<String> {
-    let words = typed();
+pub fn second_scene(program: &Command) -> Option<String> {
+    let words = typed(program);
     let n = n_leading_options(&words);
-    second(words.get(1 + n)?, words.get(2 + n)?, &commands())
+    second(words.get(1 + n)?, words.get(2 + n)?, &commands(program))
 }
 
-fn commands() -> Vec<String> {
-    let names = CommandLine::command();
-    names.get_subcommands().map(|command| command.get_name().to_owned()).chain(["help".to_owned()]).collect()
+fn commands(program: &Command) -> Vec<String> {
+    program.get_subcommands().map(|command| command.get_name().to_owned()).chain(["help".to_owned()]).collect()
 }
 
 /// Number of arguments after the program name that belong to global options.

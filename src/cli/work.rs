@@ -1,13 +1,13 @@
 //! `firstlight work FOLDER`: run by engines in the folder of a job created by `firstlight submit`: renders a part of a
 //! round, merges a round, or prints the number of the next round.
 
-use super::console::{inform, print};
-use super::failure::Failure;
-use super::merge::{FilmSet, note_of};
-use super::number::{at_least_one, between, percent};
-use super::part;
-use super::render::Command;
-use super::stop::Stop;
+use crate::cli::console::{inform, print};
+use crate::cli::failure::Failure;
+use crate::cli::merge::{FilmSet, note_of};
+use crate::cli::number::{at_least_one, between, percent};
+use crate::cli::part;
+use crate::cli::render::Command;
+use crate::cli::stop::Stop;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::job::{Job, JobError, ROUNDS, Round, Rounds};

@@ -5,7 +5,7 @@
 //! scene or a folder stands for itself whatever is in it. Files stay simple enough to be changed by hand:
 //! which samples a part has, whether it is done, and whether another round follows, is decided by the program.
 
-use super::job::{Engine, Job};
+use crate::cluster::job::{Engine, Job};
 use std::str::FromStr;
 
 /// A file of a job.

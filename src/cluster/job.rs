@@ -11,9 +11,9 @@
 //! Without a target error there is one round. With one, each round at most doubles the samples, so that all powers of two
 //! are ends of rounds; after each merge the error estimate decides whether another follows.
 
-use super::job_option::JobOption;
-use super::part::Part;
-use crate::scene::whole_file::write_whole;
+use crate::cluster::job_option::JobOption;
+use crate::cluster::part::Part;
+use crate::files::whole_file::write_whole;
 use crate::scene::{FileKind, InputFile, ReadError, WriteError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -311,8 +311,8 @@ impl Rounds {
 
 #[cfg(test)]
 mod tests {
-    use super::super::job_option::OptionName;
     use super::*;
+    use crate::cluster::job_option::OptionName;
 
     fn job(error: Option<f64>) -> Job {
         Job {

@@ -50,7 +50,7 @@ pub enum OptionName {
 
 /// Why a text is no option of a job.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{}` is no option that `firstlight submit` gives a job", crate::printable::name(.0))]
+#[error("`{}` is no option that `firstlight submit` gives a job", crate::files::printable::name(.0))]
 pub struct NoOption(String);
 
 impl OptionName {

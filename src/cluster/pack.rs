@@ -7,10 +7,12 @@
 //! is rewritten: a scene from elsewhere that an image shows goes beside the image. Only what was read as what it is named
 //! for is packed. The package of the same files has the same bytes. Start reading at [`Package::of`].
 
-use super::names::{Names, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to};
-use crate::printable;
-use crate::scene::file::SceneFile;
-use crate::scene::whole_file::{WholeFile, unwritable, write_whole};
+use crate::cluster::names::{
+    Names, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to,
+};
+use crate::files::printable;
+use crate::files::whole_file::{WholeFile, unwritable, write_whole};
+use crate::format::SceneFile;
 use crate::scene::{
     FileKind, ImageMetadata, ImageScene, InputFile, LoadedScene, ReadError, ReadFiles, SceneError, SceneSource,
     WriteError, builtin_text, each_path, path_to_text, text_to_path,
@@ -226,7 +228,7 @@ impl Package {
                 let no_folder = |source| WriteError::NoFolder { folder: parent.to_path_buf(), source };
                 std::fs::create_dir_all(parent).map_err(no_folder)?;
             }
-            let mut out = WholeFile::begin(&path, crate::scene::whole_file::Replace::Anything)?;
+            let mut out = WholeFile::begin(&path, crate::files::whole_file::Replace::Anything)?;
             let sum = content.copy(&mut out, &path)?;
             out.finish()?;
             sums += &checksum_line(&sum, name);

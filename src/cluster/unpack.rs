@@ -3,11 +3,11 @@
 //! Every file must be in the list of checksums and have its sum, and no name may lead out of the folder. The folder is
 //! named after the archive's own checksum; one in which a file has changed since is left alone, and another one is made.
 
-use super::names::is_portable;
-use super::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
-use crate::printable;
-use crate::scene::model::ModelFormat;
-use crate::scene::whole_file::lock_file;
+use crate::cluster::names::is_portable;
+use crate::cluster::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
+use crate::files::printable;
+use crate::files::whole_file::lock_file;
+use crate::format::model_format::ModelFormat;
 use crate::scene::{FileKind, InputFile, Limits, ReadError, WriteError, path_to_text, text_to_path};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -147,7 +147,7 @@ fn extract(
         let path = part.path().join(text_to_path(&name));
         let parent = path.parent().unwrap_or(part.path());
         std::fs::create_dir_all(parent).map_err(no_folder(&told(parent)))?;
-        let failed = |error| crate::scene::whole_file::unwritable(&told(&path), error);
+        let failed = |error| crate::files::whole_file::unwritable(&told(&path), error);
         let mut out = std::fs::File::create_new(&path).map_err(failed)?;
         // No more than what the archive says is written.
         let size = file.size();

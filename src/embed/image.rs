@@ -1,9 +1,9 @@
 //! A rendered image, as numbers or as a file.
 
-use super::Error;
+use crate::embed::Error;
+use crate::files::whole_file::Replace;
 use crate::frame::{OfflineReport, Print};
 use crate::render::{Display, ErrorEstimate, Film};
-use crate::scene::whole_file::Replace;
 use crate::scene::{ImageSamples, MetadataDraft, Warning, Warnings};
 use std::path::Path;
 
@@ -72,7 +72,7 @@ impl Image {
     }
 
     /// Saves the image: `.png` in 8 bits with exposure and tone curve applied, `.exr` as unmodified 32-bit floats. The
-    /// file carries the scene and the camera, so [`Scene::open`](super::Scene::open) can open it again. An existing
+    /// file carries the scene and the camera, so [`Scene::open`](crate::embed::Scene::open) can open it again. An existing
     /// file of that name is replaced, unless it is a film.
     ///
     /// # Errors

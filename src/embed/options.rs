@@ -1,6 +1,6 @@
 //! Options of a rendering: size, light model, target, callbacks.
 
-use super::Error;
+use crate::embed::Error;
 use crate::frame::{Progress, Target};
 use crate::render::{ErrorMetric, Integrator, PixelFilter, RenderSettings, SampleAllocation};
 use crate::scene::{check_film_size, check_max_depth};
@@ -99,7 +99,7 @@ impl RenderOptions {
     }
 
     /// Sets the stops added to the scene's exposure; affects PNG files only, never
-    /// [`Image::pixels`](super::Image::pixels).
+    /// [`Image::pixels`](crate::embed::Image::pixels).
     pub fn exposure(mut self, stops: f32) -> Self {
         self.exposure = stops;
         self

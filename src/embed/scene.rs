@@ -1,6 +1,6 @@
 //! A scene that a program can change and render.
 
-use super::{Error, Image, RenderOptions};
+use crate::embed::{Error, Image, RenderOptions};
 use crate::frame::{check_film_source, render_offline_until};
 use crate::render::{Film, NoRoom, worker_threads};
 use crate::scene::{

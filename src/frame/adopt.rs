@@ -1,15 +1,15 @@
 //! Replaces the open scene by one that was loaded: another scene, the same after a change of its files, or the same
 //! model at another time of its animations.
 
-use super::focus::Focus;
-use super::history::History;
-use super::navigation;
-use super::reset::SCENE_OPENED;
-use super::resources::{CurrentScene, RenderState, SceneGeneration};
-use super::saving::SavedAs;
-use super::scene_bounds::SceneBounds;
-use super::status::{MessageKind, Status};
-use super::views::ViewTrail;
+use crate::frame::core::reset::SCENE_OPENED;
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::focus::Focus;
+use crate::frame::navigation;
+use crate::frame::saving::SavedAs;
+use crate::frame::scene_bounds::SceneBounds;
+use crate::frame::state::history::History;
+use crate::frame::state::resources::{CurrentScene, RenderState, SceneGeneration};
+use crate::frame::views::ViewTrail;
 use crate::scene::{
     Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
     camera_follows,
@@ -29,8 +29,8 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<History>().forget();
     world.resource_mut::<ViewTrail>().forget();
     world.insert_resource(Focus::default());
-    world.insert_resource(super::Selection::default());
-    world.resource_mut::<super::Explaining>().forget();
+    world.insert_resource(crate::frame::state::selection::Selection::default());
+    world.resource_mut::<crate::frame::state::explain::Explaining>().forget();
     let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(scene.trees.clone());
     shown.adopted = Some(SCENE_OPENED.to_owned());

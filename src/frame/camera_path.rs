@@ -1,6 +1,7 @@
 //! Camera paths, one view per frame: a turntable, or an interpolation of bookmarks.
 
-use super::navigation::{Rig, Turning, orbit};
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::navigation::orbit;
 use crate::scene::{Lens, Projection, View};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::TAU;

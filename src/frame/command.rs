@@ -4,8 +4,10 @@
 //! command depends on a clock: the sender multiplies a rate by the time that a key is held and sends the amount, so the
 //! same list of commands always gives the same image.
 
-use super::rig::Rig;
-use super::{Bookmarks, DenoiseFilter, Denoising, Edit, Target};
+use crate::frame::core::denoising::{DenoiseFilter, Denoising};
+use crate::frame::core::offline::Target;
+use crate::frame::core::rig::Rig;
+use crate::frame::{Bookmarks, Edit};
 use crate::render::{Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
 use bevy_ecs::message::Message;
@@ -25,7 +27,7 @@ pub enum Command {
         /// Degrees upwards.
         pitch_deg: f64,
     },
-    /// Move along the view's axes, in strides (see [`super::navigation::stride`]), which scale with the scene's size.
+    /// Move along the view's axes, in strides (see [`crate::frame::navigation::stride`]), which scale with the scene's size.
     Fly {
         /// Strides to the right.
         right: f64,

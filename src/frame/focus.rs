@@ -1,8 +1,8 @@
 //! Focus: the zone of acceptable sharpness, and a focal plane that follows a point.
 
-use super::navigation::focus_at;
-use super::resources::{PictureSize, RenderState};
-use super::selection::pick_along;
+use crate::frame::navigation::focus_at;
+use crate::frame::state::resources::{PictureSize, RenderState};
+use crate::frame::state::selection::pick_along;
 use crate::scene::{Lens, Ordinal, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;

@@ -3,7 +3,7 @@
 //!
 //! A drag is measured from its start, so its result depends on the current mouse position only.
 
-use super::selection::Projector;
+use crate::frame::state::selection::Projector;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
@@ -237,7 +237,7 @@ fn is_inside(point: DVec2, corners: &[DVec2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::navigation::Rig;
+    use crate::frame::core::rig::Rig;
     use crate::scene::View;
 
     fn projector() -> Projector {

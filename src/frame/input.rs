@@ -1,23 +1,25 @@
 //! Executes commands: they become changes of components and resources.
 
-use super::Command;
-use super::background::BackgroundTasks;
-use super::edit::EditQueue;
-use super::explain::Explaining;
-use super::focus::{Focus, FocusTarget};
-use super::navigation::{self, Rig, Turning};
-use super::resources::{
+use crate::format::bounds::MOST_STOPS;
+use crate::frame::Command;
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::EditQueue;
+use crate::frame::focus::{Focus, FocusTarget};
+use crate::frame::navigation;
+use crate::frame::saving::Saving;
+use crate::frame::scene_bounds::SceneBounds;
+use crate::frame::scene_cameras::{beside, cameras_of};
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::explain::Explaining;
+use crate::frame::state::resources::{
     Clock, CurrentScene, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt,
     Threads, ViewMode, WantedMoment,
 };
-use super::saving::Saving;
-use super::scene_bounds::SceneBounds;
-use super::scene_cameras::{beside, cameras_of};
-use super::selection::{Picked, Selection, pick};
-use super::status::{MessageKind, Status};
-use super::views::{Bookmarks, ViewTrail};
+use crate::frame::state::selection::{Picked, Selection, pick};
+use crate::frame::steer::steer;
+use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::render::{Inspection, ToneCurve};
-use crate::scene::bounds::MOST_STOPS;
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -85,7 +87,7 @@ impl CommandParams<'_, '_> {
         }
         let surroundings = self.around.surroundings(self.size.aspect());
         if let Some(rig) = self.rig()
-            && let Some(steered) = navigation::steer(&rig, &command, &surroundings)
+            && let Some(steered) = steer(&rig, &command, &surroundings)
         {
             // Limits that also hold for recordings: cameras that cannot be rendered are rejected.
             if steered.check().is_err() {
@@ -129,24 +131,24 @@ impl CommandParams<'_, '_> {
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {
-                let look = super::ViewOptions { inspection, ..self.looking.0 };
+                let look = crate::frame::ViewOptions { inspection, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::SetDenoising(denoising) => {
-                let look = super::ViewOptions { denoising, ..self.looking.0 };
+                let look = crate::frame::ViewOptions { denoising, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::SetDenoiseFilter(filter) => {
-                let look = super::ViewOptions { filter, ..self.looking.0 };
+                let look = crate::frame::ViewOptions { filter, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::NextDenoising => {
                 let denoising = self.looking.0.denoising.next();
-                let look = super::ViewOptions { inspection: Inspection::Picture, denoising, ..self.looking.0 };
+                let look = crate::frame::ViewOptions { inspection: Inspection::Picture, denoising, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::SetSharpZone { shown } => {
-                let look = super::ViewOptions { sharp_zone: shown, ..self.looking.0 };
+                let look = crate::frame::ViewOptions { sharp_zone: shown, ..self.looking.0 };
                 self.looking.set_if_neq(ViewMode(look));
             }
             Command::ExplainAt { x, y } => self.explaining.wanted = Some((x, y)),

@@ -5,10 +5,10 @@
 //! and sums on no order, so a replay gives the same image, bit for bit, with any number of threads; times are stored
 //! for information only.
 
-use super::command::Command;
-use super::input::CommandQueue;
-use super::resources::{Clock, CurrentScene, SceneGeneration};
-use super::status::MessageKind;
+use crate::frame::command::Command;
+use crate::frame::core::status::MessageKind;
+use crate::frame::input::CommandQueue;
+use crate::frame::state::resources::{Clock, CurrentScene, SceneGeneration};
 use crate::scene::{FileKind, InputFile, ReadError, WriteError, check_film_size};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub fn record(
     clock: Res<Clock>,
     current: Option<Res<CurrentScene>>,
     mut recorder: ResMut<Recorder>,
-    mut status: ResMut<super::Status>,
+    mut status: ResMut<crate::frame::core::status::Status>,
 ) {
     if recorder.out.is_none() {
         return;

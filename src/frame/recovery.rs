@@ -4,7 +4,7 @@
 //! Each window has its own scene file and holds a lock on a file beside it. A scene whose lock is free is an orphan.
 //! Nothing here knows a window.
 
-use crate::scene::whole_file::lock_file;
+use crate::files::whole_file::lock_file;
 use crate::scene::{Description, FileKind, InputFile, LoadOptions, SceneSource, load, save_scene};
 use bevy_ecs::prelude::World;
 use std::fs::File;
@@ -63,7 +63,7 @@ impl Recovery {
         };
         let title = title.to_owned();
         let work = move || -> Result<(), String> {
-            crate::scene::whole_file::write_whole(&scene.with_extension(TITLE), title.as_bytes())?;
+            crate::files::whole_file::write_whole(&scene.with_extension(TITLE), title.as_bytes())?;
             description.save_draft(&scene)?;
             Ok(())
         };

@@ -3,16 +3,16 @@
 //! moved it. A file that cannot be read gives a message, and the current scene stays. Another time of a model's
 //! animations is loaded in the same way.
 
-use super::Waker;
-use super::adopt::{adopt_again, set_moment};
-use super::background::BackgroundTasks;
-use super::history::History;
-use super::input::ModelUp;
-use super::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment};
-use super::saving::SavedAs;
-use super::status::{MessageKind, Status};
-use super::watch::Watch;
-use crate::scene::bounds::MOST_SECONDS;
+use crate::format::bounds::MOST_SECONDS;
+use crate::frame::Waker;
+use crate::frame::adopt::{adopt_again, set_moment};
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::input::ModelUp;
+use crate::frame::saving::SavedAs;
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::history::History;
+use crate::frame::state::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment};
+use crate::frame::watch::Watch;
 use crate::scene::{
     Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
 };

@@ -1,11 +1,13 @@
 //! Recording and replaying sessions.
 
-use super::background::BackgroundTasks;
-use super::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
-use super::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
-use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
+use crate::files::whole_file::{Replace, WholeFile, unwritable};
+use crate::frame::core::offline::{Target, render_offline_until};
+use crate::frame::core::status::MessageKind;
+use crate::frame::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
+use crate::frame::{Command, Session, SessionOptions};
 use crate::render::{ErrorMetric, Film, Room, SampleAllocation};
-use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use crate::scene::{
     DisplaySettings, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path, text_to_path,
 };

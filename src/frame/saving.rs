@@ -1,10 +1,10 @@
 //! Saves the open scene in the background: the world is described within the frame, and written on another thread.
 
-use super::Waker;
-use super::background::BackgroundTasks;
-use super::history::{Content, History};
-use super::resources::{Clock, CurrentScene};
-use super::status::{MessageKind, Status};
+use crate::frame::Waker;
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::history::{Content, History};
+use crate::frame::state::resources::{Clock, CurrentScene};
 use crate::scene::{Description, Fingerprint, SavedScene, SceneContent, WriteError};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;

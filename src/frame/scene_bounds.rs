@@ -1,6 +1,7 @@
 //! Size and home position of the scene, for navigation.
 
-use super::navigation::{Rig, Surroundings, Turning};
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::navigation::Surroundings;
 use crate::scene::Extent;
 use bevy_ecs::prelude::Resource;
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! The cameras of the open scene, one after the other.
 
-use super::navigation::Rig;
-use crate::printable;
+use crate::files::printable;
+use crate::frame::core::rig::Rig;
 use crate::scene::LoadedScene;
 
 /// A camera of the scene, and its name; the one that a scene opens with may have none.
@@ -23,7 +23,7 @@ impl SceneCamera {
 /// Returns the cameras of a scene: the one that it opens with, unless it is one of the others, then the others in the
 /// order of the file.
 pub(super) fn cameras_of(scene: &LoadedScene) -> Vec<SceneCamera> {
-    let rig = |part: &crate::scene::file::CameraPart| {
+    let rig = |part: &crate::format::CameraPart| {
         let (view, projection, lens) = part.components().ok()?;
         Some(Rig { view, projection, lens })
     };

@@ -1,28 +1,30 @@
 //! A session: one scene, its image, and the threads that render it. The interface for a window or a script.
 
-use super::adopt::adopt;
-use super::background::BackgroundTasks;
-use super::edit::{EditQueue, edit_scene};
-use super::explain::{Explaining, explain_pixel};
-use super::feature_layers::FeatureNames;
-use super::focus::{Focus, hold_focus};
-use super::history::{History, notice, remember};
-use super::input::{CommandQueue, ModelUp, input};
-use super::navigation::{Rig, Turning};
-use super::recording::{Recorder, record};
-use super::reload::{HotReload, reload};
-use super::resources::{
+use crate::frame::Command;
+use crate::frame::adopt::adopt;
+use crate::frame::core::latency::LatencyHistogram;
+use crate::frame::core::offline::Target;
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::core::status::{Picture, Status};
+use crate::frame::edit::{EditQueue, edit_scene};
+use crate::frame::focus::{Focus, hold_focus};
+use crate::frame::image::feature_layers::FeatureNames;
+use crate::frame::input::{CommandQueue, ModelUp, input};
+use crate::frame::recording::{Recorder, record};
+use crate::frame::reload::{HotReload, reload};
+use crate::frame::saving::{SavedAs, Saving, save};
+use crate::frame::scene_bounds::SceneBounds;
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::explain::{Explaining, explain_pixel};
+use crate::frame::state::history::{History, notice, remember};
+use crate::frame::state::resources::{
     Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer,
     SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
-use super::saving::{SavedAs, Saving, save};
-use super::scene_bounds::SceneBounds;
-use super::selection::{OwnBox, Selection};
-use super::status::{Picture, Status};
-use super::systems::{accumulate, develop, edit, present, rebuild, reset};
-use super::views::{Bookmarks, ViewTrail};
-use super::worker::{Waker, Worker};
-use super::{Command, LatencyHistogram, Target};
+use crate::frame::state::selection::{OwnBox, Selection};
+use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
+use crate::frame::views::{Bookmarks, ViewTrail};
+use crate::frame::worker::{Waker, Worker};
 use crate::render::{Film, Prepared, RenderSettings, SampleAllocation};
 use crate::scene::{
     BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
@@ -345,7 +347,7 @@ impl Session {
 
     /// The box around an object or a light, along its own axes.
     pub fn box_of(&mut self, entity: Entity) -> Option<OwnBox> {
-        super::selection::box_of(&mut self.world, entity)
+        crate::frame::state::selection::box_of(&mut self.world, entity)
     }
 
     /// Memory of all trees in bytes.

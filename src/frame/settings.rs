@@ -1,10 +1,10 @@
 //! Persistent settings, and the bookmarks of each scene: small RON files in the platform's folder for settings. A file
 //! that cannot be read is renamed and reported, and never stops the program.
 
-use super::denoising::{DenoiseFilter, Denoising};
-use super::navigation::Rig;
-use crate::scene::file::DisplayPart;
-use crate::scene::whole_file::write_whole;
+use crate::files::whole_file::write_whole;
+use crate::format::DisplayPart;
+use crate::frame::core::denoising::{DenoiseFilter, Denoising};
+use crate::frame::core::rig::Rig;
 use crate::scene::{
     BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, WriteError, absolute, check_film_size,
     path_to_text, unpacked_folder,

@@ -1,17 +1,17 @@
 //! The systems of a frame in the order of execution. Each states what it reads and writes.
 
-use super::adopt::{adopt, adopt_moment};
-use super::background::{BackgroundTasks, Finished};
-use super::navigation;
-use super::reset::{Changes, Level, compare, compare_displays, compare_settings};
-use super::resources::{
+use crate::frame::adopt::{adopt, adopt_moment};
+use crate::frame::core::reset::{Changes, Level, compare, compare_displays, compare_settings};
+use crate::frame::core::status::{MessageKind, Picture, Status};
+use crate::frame::navigation;
+use crate::frame::scene_bounds::SceneBounds;
+use crate::frame::state::background::{BackgroundTasks, Finished};
+use crate::frame::state::resources::{
     Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
 };
-use super::scene_bounds::SceneBounds;
-use super::status::{MessageKind, Picture, Status};
-use super::worker::{Job, Orders};
+use crate::frame::worker::{Job, Orders};
 use crate::render::RenderSettings;
-use crate::scene::entity_state::SceneChanges;
+use crate::scene::world::entity_state::SceneChanges;
 use crate::scene::{
     Animation, CameraInput, DisplaySettings, Extraction, Moment, Rendering, SceneInputs, SceneQueries, Shape, Trees,
 };
@@ -24,8 +24,8 @@ pub fn edit(world: &mut World) {
     let now = world.resource::<Clock>().0;
     for finished in world.resource::<BackgroundTasks>().take() {
         match finished {
-            Finished::Mesh(remade) => super::remesh::take(world, *remade),
-            Finished::Picture { entity, part, result } => super::edit::take_picture(world, entity, part, result),
+            Finished::Mesh(remade) => crate::frame::edit::remesh::take(world, *remade),
+            Finished::Picture { entity, part, result } => crate::frame::edit::take_picture(world, entity, part, result),
             Finished::Trees(trees) => {
                 let mut shown = world.resource_mut::<RenderState>();
                 let hasty = shown.trees.hasty().len();

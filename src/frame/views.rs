@@ -1,6 +1,6 @@
 //! Stored views: bookmarks, and the positions at which the camera rested.
 
-use super::rig::Rig;
+use crate::frame::core::rig::Rig;
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

@@ -3,7 +3,8 @@
 //! Sizes and modification times are polled several times per second: that needs no operating system service, works on
 //! every file system, and detects files that editors replace.
 
-use crate::scene::{Stamp, stamp};
+use crate::files::stamp::stamp;
+use crate::scene::Stamp;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};

@@ -1,10 +1,10 @@
 //! Convergence curve: one scene at 1, 2, 4 … samples per pixel, with the cost and the error of each step.
 
-use super::curve::{Seconds, seconds_at, seconds_to, slope};
-use super::{Distance, LinearPicture};
 use crate::render::{
     DenoiseSource, Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance, compute_tables,
 };
+use crate::report::curve::{Seconds, seconds_at, seconds_to, slope};
+use crate::report::{Distance, LinearPicture};
 use std::time::{Duration, Instant};
 
 /// Where a curve ends: at the last power of two within both limits, but never before the first step.

@@ -1,9 +1,9 @@
 //! The steps of a convergence curve, denoised: by firstlight, and by Open Image Denoise where it is installed.
 
-use super::curve::{Seconds, seconds_to};
-use super::{CurveStep, Distance, LinearPicture, cpu_seconds};
-use crate::oidn::{Oidn, OidnError};
+use crate::frame::core::oidn::{Oidn, OidnError};
 use crate::render::{Denoised, Display, SurfaceGuides, denoise_source, guide_samples};
+use crate::report::curve::{Seconds, seconds_to};
+use crate::report::{CurveStep, Distance, LinearPicture, cpu_seconds};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ pub struct DenoisedCurve {
 pub struct DenoisedStep {
     pub spp: u32,
     /// Until the image is there: samples, feature buffers, and denoising once. CPU seconds per thread, as
-    /// [`Spent::seconds`](super::Spent::seconds).
+    /// [`Spent::seconds`](crate::report::Spent::seconds).
     pub seconds: f64,
     pub distance: Distance,
     /// The error that it tells of itself with its 95 % interval; `None` for a filter alone, which tells none.

@@ -1,8 +1,8 @@
 //! Error metrics of an image against a reference.
 
-use super::LinearPicture;
-use super::flip::flip;
 use crate::render::Display;
+use crate::report::LinearPicture;
+use crate::report::flip::flip;
 use glam::DVec3;
 
 /// Added to the square of the reference, so that black pixels do not dominate: the usual 0.01.

@@ -7,7 +7,7 @@
 //! foreign if its sum exceeds that bound and a tenth of its own light. Images of the same scene almost never fail this
 //! test, and noisy references, which raise √Σd² as well, are safe.
 
-use super::{LinearPicture, RELATIVE_FLOOR};
+use crate::report::{LinearPicture, RELATIVE_FLOOR};
 use glam::DVec3;
 
 /// Pixels along a square.

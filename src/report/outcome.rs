@@ -1,7 +1,7 @@
 //! Results of a report for one scene.
 
-use super::{ConvergenceCurve, DenoisedCurve, LinearPicture, Made, is_another_scene};
 use crate::render::Display;
+use crate::report::{ConvergenceCurve, DenoisedCurve, LinearPicture, Made, is_another_scene};
 use std::path::PathBuf;
 
 /// All measurements of one scene.
@@ -20,7 +20,7 @@ pub struct SceneOutcome {
     /// How an own reference was made; `None` for a given one.
     pub reference_made: Option<Made>,
     pub reference_path: Option<PathBuf>,
-    /// Share of the image that differs from a given reference by more than noise can ([`super::foreign_share`]); `None`
+    /// Share of the image that differs from a given reference by more than noise can ([`crate::report::foreign_share`]); `None`
     /// for an own reference.
     pub foreign_share: Option<f64>,
     /// Image at 4 samples per pixel, or fewer if there are no more: its quality while framing a shot.

@@ -1,11 +1,11 @@
 //! The report as one self-contained HTML page with plots, tables and images.
 
-use super::curve::Seconds;
-use super::outcome::{Ablation, SceneOutcome};
-use super::plot::{Band, Plot, Series, Style, escape, number};
-use super::{ConvergenceCurve, DenoisedCurve, LinearPicture};
-use crate::printable;
+use crate::files::printable;
 use crate::render::{Display, develop_pixel};
+use crate::report::curve::Seconds;
+use crate::report::outcome::{Ablation, SceneOutcome};
+use crate::report::plot::{Band, Plot, Series, Style, escape, number};
+use crate::report::{ConvergenceCurve, DenoisedCurve, LinearPicture};
 use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fmt::Write;
@@ -322,7 +322,7 @@ fn denoised_table(outcome: &SceneOutcome) -> String {
 fn ablation_table(outcome: &SceneOutcome) -> String {
     let mut rows = String::new();
     let all = outcome.curve.last();
-    let row = |name: &str, step: &super::Step, cost: String| {
+    let row = |name: &str, step: &crate::report::Step, cost: String| {
         format!(
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{cost}</td></tr>\n",
             escape(name),

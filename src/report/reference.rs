@@ -3,10 +3,10 @@
 //! Own renders are stored in a folder, by scene, size and settings, so that the next report starts at once. A stored
 //! file is reused if it has at least the required samples.
 
-use super::LinearPicture;
+use crate::files::whole_file::write_whole;
 use crate::frame::write_film;
 use crate::render::{Display, Film, Prepared, RenderSettings, SampleAllocation, advance};
-use crate::scene::whole_file::write_whole;
+use crate::report::LinearPicture;
 use crate::scene::{FileKind, Fingerprint, InputFile};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

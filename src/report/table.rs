@@ -1,6 +1,6 @@
 //! All steps of all scenes as one CSV file (RFC 4180), for further analysis.
 
-use super::{ConvergenceCurve, DenoisedCurve, Distance, SceneOutcome, Step};
+use crate::report::{ConvergenceCurve, DenoisedCurve, Distance, SceneOutcome, Step};
 use std::fmt::Write;
 
 const HEADER: &str = "scene,width,height,without,denoiser,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\

@@ -1,15 +1,16 @@
 //! What a model gets that is opened by itself: a camera that frames it, ground, environment, key light.
 
-use super::file::{DisplayPart, FilmPart, LightPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
-use super::framing::Framing;
-use super::inner_light::Inside;
-use super::meshes::LoadedMesh;
-use super::orientation::faces_away;
-use super::source::UpAxis;
-use super::sources::{EnvironmentSource, MeshShading, MeshSource};
-use super::up_axis::{guess_up, guess_up_of_obj};
-use super::value::{ColorValue, Rgb};
+use crate::format::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart, SceneFile, TransformPart};
+use crate::format::source::UpAxis;
+use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
+use crate::format::value::Named;
+use crate::format::value::{ColorValue, Rgb};
+use crate::import::framing::Framing;
+use crate::import::meshes::LoadedMesh;
+use crate::import::orientation::faces_away;
+use crate::import::up_axis::{guess_up, guess_up_of_obj};
 use crate::render::Integrator;
+use crate::scene::inner_light::Inside;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
 

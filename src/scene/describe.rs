@@ -5,27 +5,32 @@
 //! program are listed sphere by sphere; surfaces without a material get a grey one. Comments and formatting of the
 //! original file are lost.
 
-use super::animation::{Animation, Moment, Moved};
-use super::camera::camera_part;
-use super::components::{
-    Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
-    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
+use crate::files::relative::path_to_text;
+use crate::format::camera_components::camera_part;
+use crate::format::film_size::FilmSize;
+use crate::format::material_textures::without_lost_textures;
+use crate::format::names::Names;
+use crate::format::parts::{
+    DisplayPart, FilmPart, InFile, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart,
 };
-use super::file::{
-    DisplayPart, FilmPart, InFile, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile, TransformPart,
-};
-use super::inputs::SceneInputs;
-use super::loaded::LoadedScene;
-use super::meshes::LoadedMesh;
-use super::names::Names;
-use super::own_materials::{ByTextureName, without_lost_textures};
-use super::placement::Placement;
-use super::relative::path_to_text;
-use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
-use super::units::radians;
-use super::value::{ColorValue, Rgb, ScalarValue, hex_color};
+use crate::format::placement::Placement;
+use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::format::units::radians;
+use crate::format::value::Named;
+use crate::format::value::{ColorValue, Rgb, ScalarValue, hex_color};
+use crate::import::meshes::LoadedMesh;
 use crate::mesh::Mesh;
 use crate::render::{Environment, MapParams};
+use crate::scene::animation::Animation;
+use crate::scene::animation::described::Moved;
+use crate::scene::animation::moment::Moment;
+use crate::scene::loaded::LoadedScene;
+use crate::scene::texture_names::ByTextureName;
+use crate::scene::world::components::{
+    Balls, ColorParam, DisplaySettings, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
+};
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
@@ -146,7 +151,7 @@ impl<'a> Writer<'a> {
     }
 
     fn objects(&self, world: &mut World, inputs: &SceneInputs, moved: &Moved) -> Vec<Item> {
-        let item = |object: &super::inputs::ObjectInput| {
+        let item = |object: &crate::scene::world::inputs::ObjectInput| {
             let origin = world.get::<MeshOrigin>(object.entity).cloned();
             let own = origin.as_ref().is_some_and(|origin| origin.own_materials)
                 && !object.slots.iter().any(|&slot| moved.has_material(slot))

@@ -3,20 +3,20 @@
 //! Placements are `f64`; the snapshot is `f32` relative to an [`origin`](Extraction::origin) near the camera. Each part
 //! is rebuilt on its own ([`SnapshotPart`]), and the kd-trees of meshes and groups of spheres are cached ([`Trees`]).
 
-use super::animation::Animation;
-use super::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
-use super::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
-use super::light::LightKind;
-use super::placement::Placement;
-use super::trees::{Trees, address};
-use super::units::radians;
-use super::view::{Lens, Projection, View};
+use crate::format::light::LightKind;
+use crate::format::placement::Placement;
+use crate::format::units::radians;
+use crate::format::view::{Lens, Projection, View};
 use crate::kdtree::{self};
 use crate::mesh::Mesh;
 use crate::render::{
     self, Camera, ColorInput, Cone, DeltaLight, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object,
     Prepared, ScalarInput, Shading, Snapshot, TextureId,
 };
+use crate::scene::animation::Animation;
+use crate::scene::world::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
+use crate::scene::world::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
+use crate::scene::world::trees::{Trees, address};
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
 use std::collections::HashMap;

@@ -1,61 +1,36 @@
 //! A hash that tells whether two loaded scenes have the same contents.
 
-use super::components::{Shape, SurfaceTexture, textures_of};
-use super::describe::Description;
-use super::file::{CameraPart, DisplayPart, FilmPart, ObjectPart, SceneFile};
-use super::inputs::SceneInputs;
-use super::loaded::LoadedScene;
-use super::sources::{EnvironmentSource, MeshSource, TextureSource};
+use crate::files::hash::Fingerprint;
+use crate::format::camera::CameraPart;
+use crate::format::parts::{DisplayPart, FilmPart, ObjectPart, SceneFile};
+use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::mesh::Mesh;
 use crate::render::{Environment, ImageTexture, Integrator, Texels, TexturePattern};
+use crate::scene::describe::Description;
+use crate::scene::loaded::LoadedScene;
+use crate::scene::world::components::{Shape, SurfaceTexture, textures_of};
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::prelude::World;
 use bytemuck::cast_slice;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::Arc;
-use xxhash_rust::xxh3::xxh3_128;
 
-/// 128-bit hash of all inputs of a scene's image: the scene itself, its meshes and its images.
-///
-/// The same in every run and on every little-endian machine; detects changes, but is not cryptographic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Fingerprint(pub u128);
-
-impl fmt::Display for Fingerprint {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{:032x}", self.0)
-    }
+fn of_mesh(mesh: &Mesh) -> Fingerprint {
+    let Mesh { positions, center, triangles, normals, uvs, slots, uvs2, colors, tangents } = mesh;
+    let lists = [cast_slice(normals), cast_slice(uvs), cast_slice(slots), cast_slice(uvs2), cast_slice(colors)];
+    let shape = Fingerprint::of(cast_slice(positions)).with(bytemuck::bytes_of(center)).with(cast_slice(triangles));
+    lists.into_iter().chain([cast_slice(tangents)]).fold(shape, Fingerprint::with)
 }
 
-impl Fingerprint {
-    /// XXH3 (Collet 2019), 128 bits.
-    pub fn of(bytes: &[u8]) -> Self {
-        Self(xxh3_128(bytes))
-    }
-
-    /// Of this one and of these bytes after it; other splits into parts give another one.
-    #[must_use]
-    pub fn with(self, bytes: &[u8]) -> Self {
-        Self::of(bytemuck::bytes_of(&[self.0, Self::of(bytes).0]))
-    }
-
-    fn of_mesh(mesh: &Mesh) -> Self {
-        let Mesh { positions, center, triangles, normals, uvs, slots, uvs2, colors, tangents } = mesh;
-        let lists = [cast_slice(normals), cast_slice(uvs), cast_slice(slots), cast_slice(uvs2), cast_slice(colors)];
-        let shape = Self::of(cast_slice(positions)).with(bytemuck::bytes_of(center)).with(cast_slice(triangles));
-        lists.into_iter().chain([cast_slice(tangents)]).fold(shape, Self::with)
-    }
-
-    fn of_picture(picture: &ImageTexture) -> Self {
-        let texels = match &picture.texels {
-            Texels::U8 { channels, data } => Self::of(&[1, *channels as u8]).with(data),
-            Texels::U16 { channels, data } => Self::of(&[2, *channels as u8]).with(cast_slice(data)),
-            Texels::F32(data) => Self::of(&[4, 3]).with(cast_slice(data)),
-        };
-        texels.with(cast_slice(&[picture.width, picture.height]))
-    }
+fn of_picture(picture: &ImageTexture) -> Fingerprint {
+    let texels = match &picture.texels {
+        Texels::U8 { channels, data } => Fingerprint::of(&[1, *channels as u8]).with(data),
+        Texels::U16 { channels, data } => Fingerprint::of(&[2, *channels as u8]).with(cast_slice(data)),
+        Texels::F32(data) => Fingerprint::of(&[4, 3]).with(cast_slice(data)),
+    };
+    texels.with(cast_slice(&[picture.width, picture.height]))
 }
 
 /// The fingerprint of each of these, which may be shared: each is read once, in parallel.
@@ -74,13 +49,13 @@ impl LoadedScene {
         let mut print = Fingerprint::of(self.file.to_ron().as_bytes());
         let meshes: Vec<_> = self.meshes.iter().flatten().collect();
         let shared: Vec<_> = meshes.iter().map(|mesh| mesh.mesh.clone()).collect();
-        for (mesh, of_mesh) in meshes.iter().zip(of_each(&shared, Fingerprint::of_mesh)) {
+        for (mesh, of_mesh) in meshes.iter().zip(of_each(&shared, of_mesh)) {
             print = print.with(bytemuck::bytes_of(&of_mesh.0)).with(format!("{:?}", mesh.slots).as_bytes());
         }
         let mut pictures: Vec<_> = self.pictures.iter().collect();
         pictures.sort_by_key(|(name, _)| *name);
         let shared: Vec<_> = pictures.iter().map(|(_, picture)| (*picture).clone()).collect();
-        for ((name, _), of_picture) in pictures.iter().zip(of_each(&shared, Fingerprint::of_picture)) {
+        for ((name, _), of_picture) in pictures.iter().zip(of_each(&shared, of_picture)) {
             print = print.with(name.as_bytes()).with(bytemuck::bytes_of(&of_picture.0));
         }
         print
@@ -154,8 +129,8 @@ impl SceneContent {
 
     /// Reads each vertex and each texel once, however often they are used.
     pub fn fingerprint(&self) -> Fingerprint {
-        let parts = of_each(&self.meshes, Fingerprint::of_mesh).into_iter();
-        let parts = parts.chain(of_each(&self.pictures, Fingerprint::of_picture));
+        let parts = of_each(&self.meshes, of_mesh).into_iter();
+        let parts = parts.chain(of_each(&self.pictures, of_picture));
         let file = Fingerprint::of(self.file.to_ron().as_bytes());
         parts.fold(file, |print, part| print.with(bytemuck::bytes_of(&part.0)))
     }
@@ -163,8 +138,10 @@ impl SceneContent {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LoadOptions, SceneSource, load};
     use super::*;
+    use crate::format::source::SceneSource;
+    use crate::scene::load;
+    use crate::scene::load::LoadOptions;
 
     #[test]
     fn the_split_into_parts_matters() {
@@ -178,7 +155,7 @@ mod tests {
     fn every_texel_counts() {
         let of = |data: &[u8], channels, width, height| {
             let texels = Texels::U8 { channels, data: data.to_vec() };
-            Fingerprint::of_picture(&ImageTexture { width, height, texels })
+            of_picture(&ImageTexture { width, height, texels })
         };
         let all = [
             of(&[1, 2, 3, 4], 4, 1, 1),

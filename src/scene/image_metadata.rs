@@ -4,14 +4,16 @@
 //! relative to the image. It also holds a fingerprint of the scene, so that later changes of the scene are noticed; a
 //! scene with unsaved changes is stored in the metadata as a whole.
 
-use super::archive_cache::unpacked_folder;
-use super::bounds::{check_film_size, check_max_depth};
-use super::camera::camera;
-use super::file::{CameraPart, DisplayPart, FilmPart, SceneFile};
-use super::input_file::{FileKind, InputFile, ReadError};
-use super::limits::Limits;
-use super::relative::{absolute, relative_path, text_to_path};
-use super::source::{SceneSource, UpAxis};
+use crate::files::archive_cache::unpacked_folder;
+use crate::files::input_file::{FileKind, InputFile, ReadError};
+use crate::files::limits::Limits;
+use crate::files::relative::{absolute, relative_path, text_to_path};
+use crate::files::write_error::WriteError;
+use crate::format::bounds::{check_film_size, check_max_depth};
+use crate::format::camera::CameraPart;
+use crate::format::camera_components::camera;
+use crate::format::parts::{DisplayPart, FilmPart, SceneFile};
+use crate::format::source::{SceneSource, UpAxis};
 use crate::render::{Film, Integrator, SampleAllocation};
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
@@ -23,8 +25,7 @@ use std::path::{Path, PathBuf};
 /// Name of the metadata in an image: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
 
-/// The attribute that marks an EXR image as a film.
-pub const FILM_KEY: &str = "firstlight.film";
+pub use crate::files::whole_file::FILM_KEY;
 
 /// Format version; increased by incompatible changes.
 pub(super) const FORMAT: u32 = 1;
@@ -63,6 +64,12 @@ pub enum MetadataError {
     /// The scene was unpacked from an archive, and has been deleted since.
     #[error("its scene {} was in an archive, whose unpacked files are gone: open the archive again", .0.display())]
     NoArchive(PathBuf),
+}
+
+impl From<MetadataError> for WriteError {
+    fn from(error: MetadataError) -> Self {
+        Self::Metadata(Box::new(error))
+    }
 }
 
 impl From<MetadataError> for String {

@@ -1,8 +1,8 @@
 //! Where a light inside of a closed model shows most of what the camera sees: in the middle of its widest room.
 
-use super::extract::Extraction;
 use crate::geometry::Ray;
 use crate::render::{RenderSettings, gather_features};
+use crate::scene::extract::Extraction;
 use glam::{DVec3, UVec2, Vec3};
 
 /// Points of the image that are looked at.

@@ -1,29 +1,31 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
-use super::bounds::{check_moment, check_shutter_share};
-use super::builtin::{BUILTIN_SCENES, builtin_text};
-use super::choice::ModelChoice;
-use super::components::{Balls, Shape};
-use super::default_scene;
-use super::documents::Documents;
-use super::error::{Problem, SceneError, suggestion};
-use super::file::{ObjectPart, RadiiPart, SceneFile, TrackPart, ball_grid, locate};
-use super::gltf::images::part_of_model;
-use super::gltf_scene;
-use super::image_metadata::{ImageMetadata, MetadataError};
-use super::input_file::{FileKind, InputFile};
-use super::loaded::LoadedScene;
-use super::meshes::{LoadedMesh, load_mesh};
-use super::model::ModelFormat;
-use super::model_light::{Model, light_as_in, light_model};
-use super::own_materials::{emits, without_lost_textures};
-use super::relative::{absolute, path_to_text, relative_path, text_to_path};
-use super::source::{SceneSource, UpAxis};
-use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
-use super::stamp::{Stamp, stamp};
-use super::value::Rgb;
-use super::warnings::Warnings;
+use crate::files::input_file::{FileKind, InputFile};
+use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
+use crate::files::stamp::{Stamp, stamp};
+use crate::files::warnings::Warnings;
+use crate::format::animation::TrackPart;
+use crate::format::bounds::{check_moment, check_shutter_share};
+use crate::format::builtin::{BUILTIN_SCENES, builtin_text};
+use crate::format::choice::ModelChoice;
+use crate::format::error::{Problem, SceneError, suggestion};
+use crate::format::locate;
+use crate::format::material_textures::{emits, without_lost_textures};
+use crate::format::model_format::ModelFormat;
+use crate::format::parts::{ObjectPart, RadiiPart, SceneFile, ball_grid};
+use crate::format::source::{SceneSource, UpAxis};
+use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::format::value::Rgb;
+use crate::import::documents::Documents;
+use crate::import::gltf::images::part_of_model;
+use crate::import::gltf_scene;
+use crate::import::meshes::{LoadedMesh, load_mesh};
 use crate::render::ImageTexture;
+use crate::scene::default_scene;
+use crate::scene::image_metadata::{ImageMetadata, MetadataError};
+use crate::scene::loaded::LoadedScene;
+use crate::scene::model_light::{Model, light_as_in, light_model};
+use crate::scene::world::components::{Balls, Shape};
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -41,7 +43,7 @@ pub struct LoadOptions<'a> {
     pub aspect: Option<f64>,
     /// Camera, time and variant of a glTF model.
     pub choice: Option<&'a ModelChoice>,
-    /// Whether large meshes first get trees that are faster to build ([`super::trees::Trees::hasty`]), for a quick
+    /// Whether large meshes first get trees that are faster to build ([`crate::scene::world::trees::Trees::hasty`]), for a quick
     /// first image.
     pub hasty: bool,
     /// The previous state of the scene: files that have not changed on disk are not read again.
@@ -407,7 +409,7 @@ impl LoadedScene {
         let Some(wanted) = &choice.camera else { return Ok(()) };
         let Some((_, camera)) = self.file.cameras.iter().find(|(name, _)| name == wanted) else {
             let hint = suggestion(wanted, self.file.cameras.names());
-            let wanted = crate::printable::name(wanted);
+            let wanted = crate::files::printable::name(wanted);
             return Err(SceneError::in_file(self.source.title(), format!("there is no camera `{wanted}`{hint}")));
         };
         self.file.camera = camera.clone();

@@ -1,17 +1,17 @@
 //! A scene that was read, with all data that it refers to.
 
-use super::choice::ModelChoice;
-use super::components::Balls;
-use super::file::SceneFile;
-use super::gltf::GltfFacts;
-use super::gltf_motion::GltfMotion;
-use super::image_metadata::ImageMetadata;
-use super::meshes::LoadedMesh;
-use super::source::{SceneSource, UpAxis};
-use super::stamp::Stamp;
-use super::trees::Trees;
-use super::warnings::Warnings;
+use crate::files::stamp::Stamp;
+use crate::files::warnings::Warnings;
+use crate::format::choice::ModelChoice;
+use crate::format::parts::SceneFile;
+use crate::format::source::{SceneSource, UpAxis};
+use crate::import::gltf::facts::GltfFacts;
+use crate::import::gltf_motion::GltfMotion;
+use crate::import::meshes::LoadedMesh;
 use crate::render::ImageTexture;
+use crate::scene::image_metadata::ImageMetadata;
+use crate::scene::world::components::Balls;
+use crate::scene::world::trees::Trees;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,13 +1,14 @@
 //! The metadata of an image that is not finished yet.
 
-use super::describe::Description;
-use super::file::{DisplayPart, FilmPart, SceneFile};
-use super::fingerprint::{Fingerprint, SceneContent};
-use super::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
-use super::loaded::LoadedScene;
-use super::relative::{absolute, relative_path};
-use super::source::{SceneSource, UpAxis};
+use crate::files::hash::Fingerprint;
+use crate::files::relative::{absolute, relative_path};
+use crate::format::parts::{DisplayPart, FilmPart, SceneFile};
+use crate::format::source::{SceneSource, UpAxis};
 use crate::render::SampleAllocation;
+use crate::scene::describe::Description;
+use crate::scene::fingerprint::SceneContent;
+use crate::scene::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
+use crate::scene::loaded::LoadedScene;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -38,7 +39,10 @@ impl MetadataDraft {
     /// From the contents of `world`; `loaded`: the scene that was opened into it.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let description = Description::of(world, loaded);
-        let settings = world.get_resource::<super::Rendering>().map(|rendering| rendering.0).unwrap_or_default();
+        let settings = world
+            .get_resource::<crate::scene::world::components::Rendering>()
+            .map(|rendering| rendering.0)
+            .unwrap_or_default();
         Self {
             source: loaded.map(|loaded| loaded.source.clone()),
             up: loaded.and_then(|loaded| loaded.up),

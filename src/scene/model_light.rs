@@ -5,18 +5,19 @@
 //! of what it shows. That is how bright a white surface would be there, so dark models are not taken for unlit ones. The
 //! result is a function of model and camera.
 
-use super::bounds::MOST_STOPS;
-use super::components::Shape;
-use super::default_scene::{self, is_inner, is_key_light};
-use super::extract::Extraction;
-use super::file::{DisplayPart, LightPart, MaterialPart, ObjectPart};
-use super::inner_light::{middle_of_room, sees_anything};
-use super::inputs::SceneInputs;
-use super::loaded::LoadedScene;
-use super::own_materials::emits;
-use super::sources::EnvironmentSource;
-use super::warnings::Warning;
+use crate::files::warnings::Warning;
+use crate::format::bounds::MOST_STOPS;
+use crate::format::material_textures::emits;
+use crate::format::parts::{DisplayPart, LightPart, MaterialPart, ObjectPart};
+use crate::format::sources::EnvironmentSource;
 use crate::render::{Film, RenderSettings, Techniques, advance, gather_features};
+use crate::scene::default_scene;
+use crate::scene::default_scene::{is_inner, is_key_light};
+use crate::scene::extract::Extraction;
+use crate::scene::inner_light::{middle_of_room, sees_anything};
+use crate::scene::loaded::LoadedScene;
+use crate::scene::world::components::Shape;
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::world::World;
 use glam::{DVec3, UVec2, Vec3};
 

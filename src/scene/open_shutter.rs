@@ -2,11 +2,12 @@
 //!
 //! Nothing is computed in advance: the renderer asks for the snapshot at the time of each sample ([`Extraction::at`]).
 
-use super::animation::{Animation, Moment};
-use super::extract::Extraction;
-use super::inputs::SceneInputs;
-use super::trees::Trees;
 use crate::render::{Moments, Prepared};
+use crate::scene::animation::Animation;
+use crate::scene::animation::moment::Moment;
+use crate::scene::extract::Extraction;
+use crate::scene::world::inputs::SceneInputs;
+use crate::scene::world::trees::Trees;
 use bevy_ecs::prelude::World;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -57,8 +58,12 @@ impl Extraction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::animation::{Shutter, show_moment};
-    use crate::scene::{LoadOptions, Placement, SceneSource, load};
+    use crate::format::placement::Placement;
+    use crate::format::source::SceneSource;
+    use crate::scene::animation::Shutter;
+    use crate::scene::animation::moment::show_moment;
+    use crate::scene::load;
+    use crate::scene::load::LoadOptions;
 
     const SCENE: &str = r#"(
         camera: (eye: (0, 0, 5), look_at: (0, 0, 0)),

@@ -3,11 +3,11 @@
 //! Only what was read as the kind of file that its name stands for: a texture that could not be decoded, or a library
 //! without a material, may be any file of the computer.
 
-use super::file::ObjectPart;
-use super::gltf::images::part_of_model;
-use super::loaded::LoadedScene;
-use super::relative::text_to_path;
-use super::sources::{EnvironmentSource, TextureSource};
+use crate::files::relative::text_to_path;
+use crate::format::parts::ObjectPart;
+use crate::format::sources::{EnvironmentSource, TextureSource};
+use crate::import::gltf::images::part_of_model;
+use crate::scene::loaded::LoadedScene;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

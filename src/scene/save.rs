@@ -1,16 +1,16 @@
 //! Saving: writes the world as a scene file that reads back as exactly this world.
 
-use super::describe::Description;
-use super::file::{ObjectPart, SceneFile};
-use super::input_file::{FileKind, InputFile};
-use super::loaded::LoadedScene;
-use super::obj::{NewObj, ObjExtras, save_new_obj};
-use super::paths::move_paths;
-use super::relative::{path_to_text, text_to_path};
-use super::sources::MeshSource;
-use super::unpacked_files::keep_unpacked;
-use super::whole_file::write_whole;
-use super::write_error::WriteError;
+use crate::files::input_file::{FileKind, InputFile};
+use crate::files::relative::{path_to_text, text_to_path};
+use crate::files::whole_file::write_whole;
+use crate::files::write_error::WriteError;
+use crate::format::parts::{ObjectPart, SceneFile};
+use crate::format::paths::move_paths;
+use crate::format::sources::MeshSource;
+use crate::import::obj::write::{NewObj, ObjExtras, save_new_obj};
+use crate::scene::describe::Description;
+use crate::scene::loaded::LoadedScene;
+use crate::scene::unpacked_files::keep_unpacked;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 
@@ -53,7 +53,7 @@ impl Description {
 }
 
 fn save(mut description: Description, path: &Path, keeps_files: bool) -> Result<SavedScene, WriteError> {
-    let failed = |source| WriteError::Scene { path: path.to_path_buf(), source };
+    let failed = |error| WriteError::Scene { path: path.to_path_buf(), source: Box::new(error) };
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);

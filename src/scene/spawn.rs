@@ -1,22 +1,28 @@
 //! From a loaded scene to entities.
 
-use super::animation::{Animation, Edited, Entities, ModelMotion, Moment, of_part, show_first};
-use super::camera::{camera, unit};
-use super::components::{
-    ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
-    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
-};
-use super::file::{AnimationPart, InFile, MaterialPart, ObjectPart};
-use super::inputs::WithLight;
-use super::light::LightKind;
-use super::loaded::LoadedScene;
-use super::own_materials::without_lost_textures;
-use super::placement::Placement;
-use super::sources::{EnvironmentSource, MeshSource, TextureSource};
-use super::units::radians;
-use super::value::{ColorValue, ScalarValue};
-use super::view::View;
+use crate::format::animation::AnimationPart;
+use crate::format::camera_components::{camera, unit};
+use crate::format::film_size::FilmSize;
+use crate::format::light::LightKind;
+use crate::format::material_textures::without_lost_textures;
+use crate::format::parts::{InFile, MaterialPart, ObjectPart};
+use crate::format::placement::Placement;
+use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
+use crate::format::units::radians;
+use crate::format::value::{ColorValue, ScalarValue};
+use crate::format::view::View;
 use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
+use crate::scene::animation::Animation;
+use crate::scene::animation::edited::Edited;
+use crate::scene::animation::model::ModelMotion;
+use crate::scene::animation::moment::{Moment, show_first};
+use crate::scene::animation::written::{Entities, of_part};
+use crate::scene::loaded::LoadedScene;
+use crate::scene::world::components::{
+    ColorParam, DisplaySettings, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam, SceneEnvironment,
+    Shape, SurfaceMaterial, SurfaceTexture,
+};
+use crate::scene::world::inputs::WithLight;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};

@@ -1,13 +1,13 @@
 //! A scene of an archive that is saved elsewhere takes copies of its files along: where they are unpacked they may be
 //! deleted at any time.
 
-use super::archive_cache::unpacked_folder;
-use super::file::SceneFile;
-use super::input_file::{FileKind, InputFile};
-use super::paths::each_path;
-use super::relative::{absolute, path_to_text, text_to_path};
-use super::whole_file::{Replace, WholeFile, unwritable};
-use super::write_error::WriteError;
+use crate::files::archive_cache::unpacked_folder;
+use crate::files::input_file::{FileKind, InputFile};
+use crate::files::relative::{absolute, path_to_text, text_to_path};
+use crate::files::whole_file::{Replace, WholeFile, unwritable};
+use crate::files::write_error::WriteError;
+use crate::format::parts::SceneFile;
+use crate::format::paths::each_path;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 

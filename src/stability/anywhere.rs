@@ -1,13 +1,13 @@
 //! Translation and scale invariance: one scene at the origin and elsewhere, scaled and in map coordinates, loaded from
 //! the text of the scene file.
 
-use super::random::Random;
-use super::tally::{Energy, Tally};
-use super::test_scene::{describe, towards};
 use crate::kdtree::Hit;
 use crate::mesh::procedural;
 use crate::render::{Film, Prepared, RenderSettings, advance};
 use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
+use crate::stability::random::Random;
+use crate::stability::tally::{Energy, Tally};
+use crate::stability::test_scene::{describe, towards};
 use bevy_ecs::world::World;
 use glam::{DVec3, dvec3};
 use std::fmt::Write;

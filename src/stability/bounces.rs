@@ -1,11 +1,11 @@
 //! Long paths of diffuse bounces in closed boxes: none may escape, not even in a corner.
 
-use super::random::Random;
-use super::tally::Tally;
-use super::test_scene::describe;
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use crate::mesh::procedural;
+use crate::stability::random::Random;
+use crate::stability::tally::Tally;
+use crate::stability::test_scene::describe;
 use glam::{Affine3A, DVec3, Quat, Vec3, vec3};
 use rayon::prelude::*;
 use std::sync::Arc;

@@ -4,11 +4,11 @@
 //! fails: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at
 //! every level, both integrators, with and without SIMD. [`random`] has randomly generated scenes.
 
-use super::light::{LightCase, camera, diffuse, grey, prepared};
-use super::random::Random;
 use crate::kdtree::{BuildPreset, MeshTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
 use crate::render::{Camera, Environment, Fresnel, Integrator, Material, Object, RenderSettings, ScalarInput};
+use crate::stability::light::{LightCase, camera, diffuse, grey, prepared};
+use crate::stability::random::Random;
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::sync::Arc;
 

@@ -1,12 +1,12 @@
 //! Cases that render: difficult materials, lights, lenses and long sums in scenes with a known radiance.
 
-use super::replay::{Replay, ReplayValue};
-use super::tally::{Energy, Tally};
 use crate::kdtree::Shape;
 use crate::render::{
     BadSample, Camera, ColorInput, Environment, Film, Fresnel, Geometry, Material, Object, Prepared, RenderSettings,
     ScalarInput, Shading, Snapshot, advance, replay_sample,
 };
+use crate::stability::replay::{Replay, ReplayValue};
+use crate::stability::tally::{Energy, Tally};
 use glam::{UVec2, Vec3, vec3};
 
 /// One small scene with a known image.

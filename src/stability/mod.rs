@@ -20,8 +20,8 @@ pub use reference::{CheckResult, ReferenceIntersector, TEST_ERROR};
 pub use replay::{Replay, ReplayError, ReplayValue};
 pub use tally::{Energy, Tally, Worst};
 
-use light::LightCase;
-use surfaces::Plan;
+use crate::stability::light::LightCase;
+use crate::stability::surfaces::Plan;
 
 /// One stability case.
 #[derive(Clone, Copy)]

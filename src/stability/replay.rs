@@ -1,8 +1,8 @@
 //! Full description of one ray of a case: labelled lines for people, the same names and numbers for machines.
 
-use super::reference::CheckResult;
 use crate::geometry::Ray;
 use crate::kdtree::Hit;
+use crate::stability::reference::CheckResult;
 use glam::Vec3;
 use std::fmt;
 

@@ -1,11 +1,11 @@
 //! Cases for intersection: rays against closed meshes, needles, flat objects, and the surfaces that rays leave.
 
-use super::random::Random;
-use super::reference::ReferenceIntersector;
-use super::test_scene::{Probe, RaySet, TestScene, towards};
 use crate::geometry::Ray;
 use crate::kdtree::{BuildPreset, MeshTree, SceneTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
+use crate::stability::random::Random;
+use crate::stability::reference::ReferenceIntersector;
+use crate::stability::test_scene::{Probe, RaySet, TestScene, towards};
 use glam::{Affine3A, DVec3, EulerRot, Quat, Vec3, vec3};
 use std::sync::Arc;
 

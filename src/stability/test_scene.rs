@@ -1,11 +1,11 @@
 //! A test scene: geometry, difficult rays, and checks of the hits.
 
-use super::random::Random;
-use super::reference::{CheckResult, ReferenceIntersector, Solid};
-use super::replay::{Replay, ReplayValue};
-use super::tally::{Tally, hex, hex3};
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass, SceneTree};
+use crate::stability::random::Random;
+use crate::stability::reference::{CheckResult, ReferenceIntersector, Solid};
+use crate::stability::replay::{Replay, ReplayValue};
+use crate::stability::tally::{Tally, hex, hex3};
 use glam::Vec3;
 use rayon::prelude::*;
 

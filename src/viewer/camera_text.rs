@@ -1,7 +1,7 @@
 //! A view as the camera block of a scene file.
 
+use crate::format::CameraPart;
 use crate::frame::navigation::Rig;
-use crate::scene::file::CameraPart;
 
 /// Returns the camera block of this view; the pivot becomes `look_at`.
 pub fn camera_text(rig: &Rig) -> String {
@@ -41,7 +41,7 @@ fn rounded(value: f64, scale: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::file::SceneFile;
+    use crate::format::SceneFile;
     use crate::scene::{Lens, Projection, View};
     use glam::DVec3;
 

@@ -4,8 +4,8 @@
 //! code than the whole window, for something that dropping a file on the window does as well. A thread waits for it, so
 //! that rendering continues.
 
+use crate::format::model_format::ModelFormat;
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
-use crate::scene::model::ModelFormat;
 use crate::scene::{MeshSource, TextureSource};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

@@ -129,7 +129,7 @@ impl Handles {
         let half = 0.5 * (galley.size().x * way.x.abs() + galley.size().y * way.y.abs());
         let at = (tip - (24.0 + half) * way).clamp(room.min, room.max);
         let rect = Rect::from_center_size(at, galley.size());
-        painter.rect_filled(rect.expand(4.0), 3.0, super::overlay::GLASS);
+        painter.rect_filled(rect.expand(4.0), 3.0, crate::viewer::overlay::GLASS);
         painter.galley(rect.min, galley, Color32::WHITE);
     }
 
@@ -181,7 +181,7 @@ impl Handles {
             let at = pos(*from) + egui::vec2(14.0, -22.0);
             let galley = painter.layout_no_wrap(text, FontId::monospace(12.5), Color32::WHITE);
             let rect = Align2::LEFT_BOTTOM.anchor_size(at, galley.size());
-            painter.rect_filled(rect.expand(4.0), 3.0, super::overlay::GLASS);
+            painter.rect_filled(rect.expand(4.0), 3.0, crate::viewer::overlay::GLASS);
             painter.galley(rect.min, galley, Color32::WHITE);
         }
     }

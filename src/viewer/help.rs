@@ -3,9 +3,9 @@
 //! While the list is open no key runs a command. `/`, Tab, Ctrl+F or a click begin a search, and then letters belong to
 //! the search field, H among them; before that, H closes the list that it opened.
 
-use super::keys::{Action, Binding, action_of, finds, shown};
-use super::overlay::{KEY, TEXT_SIZE};
 use crate::frame::Navigation;
+use crate::viewer::keys::{Action, Binding, action_of, finds, shown};
+use crate::viewer::overlay::{KEY, TEXT_SIZE};
 use egui::{Align2, Context, Id, RichText, Vec2};
 use winit::keyboard::{Key, ModifiersState, NamedKey, PhysicalKey};
 

@@ -1,8 +1,8 @@
 //! Overlays on the image: the status line, messages, and the legend of an inspection.
 
-use super::toasts::{Toast, Tone};
-use crate::printable;
+use crate::files::printable;
 use crate::render::{Legend, scale_color};
+use crate::viewer::toasts::{Toast, Tone};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
 /// Background of panels and lists, nearly opaque because they are read for longer.

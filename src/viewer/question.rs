@@ -1,7 +1,7 @@
 //! Questions before something is lost: a small modal dialog, answered by mouse or by key.
 
-use super::overlay::style_key;
 use crate::frame::{Command, LeftBehind};
+use crate::viewer::overlay::style_key;
 use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
 use winit::keyboard::{Key, NamedKey};
 

@@ -1,7 +1,7 @@
 //! The region tool: a rectangle dragged over the image, which gets all samples.
 
-use super::overlay::GLASS;
 use crate::frame::Status;
+use crate::viewer::overlay::GLASS;
 use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke, StrokeKind};
 
 const COLOR: Color32 = Color32::from_rgb(120, 220, 255);

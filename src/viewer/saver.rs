@@ -1,5 +1,6 @@
 //! Saves images on separate threads, so that the window stays responsive.
 
+use crate::format::check_film_size;
 use crate::frame::{
     DenoiseFilter, FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
     render_offline_until,
@@ -8,7 +9,6 @@ use crate::render::{
     DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, guide_samples,
     worker_threads,
 };
-use crate::scene::file::check_film_size;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
 use glam::{UVec2, Vec3};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Short messages over the image that disappear by themselves. Times are passed in, for tests.
 
-use crate::printable;
+use crate::files::printable;
 use std::time::{Duration, Instant};
 
 /// Kind of a message.

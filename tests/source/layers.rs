@@ -1,7 +1,7 @@
 //! Imports point down: from package to package, from folder to folder, and without cycles between the files of one package.
 //!
-//! Reads the `use` lines outside of tests, and paths that begin with `crate::`; re-exports lead to the file that they stand
-//! for. ARCHITECTURE.md draws the layers.
+//! Reads the `use` lines outside of tests, and all paths in the code; re-exports lead to the file that they stand for.
+//! ARCHITECTURE.md draws the layers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,16 +18,17 @@ const INTEGRATORS: &str = "crates/render/src/integrators";
 const FILM: &str = "crates/render/src/film";
 const DENOISE: &str = "crates/render/src/denoise";
 const DRIVER: &str = "crates/render/src/driver";
-const OIDN: &str = "src/oidn";
-const PRINTABLE: &str = "src/printable";
+const FILES: &str = "src/files";
 const CONSOLE: &str = "src/console";
+const FORMAT: &str = "src/format";
+const IMPORT: &str = "src/import";
 const SCENE: &str = "src/scene";
 const FRAME: &str = "src/frame";
 const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 26] = [
+const LAYERS: [(&str, &[&str]); 27] = [
     (SIMD, &[]),
     (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -43,20 +44,21 @@ const LAYERS: [(&str, &[&str]); 26] = [
     (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM, DENOISE]),
     // `lib.rs`, which shows what the folders have.
     ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),
-    (OIDN, &[]),
-    (PRINTABLE, &[]),
-    (CONSOLE, &[PRINTABLE]),
-    (SCENE, &[PRINTABLE, CONSOLE]),
-    (FRAME, &[OIDN, PRINTABLE, CONSOLE, SCENE]),
-    ("src/cluster", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
-    ("src/report", &[OIDN, PRINTABLE, CONSOLE, SCENE, FRAME]),
-    ("src/stability", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
-    (EMBED, &[SCENE, FRAME]),
+    (FILES, &[]),
+    (CONSOLE, &[FILES]),
+    (FORMAT, &[FILES]),
+    (IMPORT, &[FILES, FORMAT]),
+    (SCENE, &[FILES, CONSOLE, FORMAT, IMPORT]),
+    (FRAME, &[FILES, CONSOLE, FORMAT, IMPORT, SCENE]),
+    ("src/cluster", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME]),
+    ("src/report", &[FILES, CONSOLE, SCENE, FRAME]),
+    ("src/stability", &[FILES, CONSOLE, SCENE, FRAME]),
+    (EMBED, &[FILES, FORMAT, SCENE, FRAME]),
     ("src/prelude", &[SCENE, FRAME, EMBED]),
-    ("src/viewer", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
+    ("src/viewer", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME]),
     // A program of its own, that sees the rest as the library `firstlight`.
     ("src/cli", &[]),
-    ("src", &[PRINTABLE, CONSOLE, SCENE, FRAME, EMBED]),
+    ("src", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME, EMBED]),
 ];
 
 /// The folders in which no files may import each other in a circle.
@@ -143,6 +145,37 @@ fn use_lines(code: &str) -> Vec<(usize, bool, String)> {
     found
 }
 
+/// The code with its `use` lines left out.
+fn without_use(code: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = code;
+    while let Some(at) = rest.match_indices("use ").map(|(at, _)| at).find(|&at| {
+        let line = rest[..at].rsplit('\n').next().unwrap_or_default().trim_start();
+        line.is_empty() || line.starts_with("pub")
+    }) {
+        kept += &rest[..at];
+        rest = rest[at..].split_once(';').map_or("", |(_, after)| after);
+    }
+    kept + rest
+}
+
+/// All paths in code, such as `super::ray::Ray::new`.
+fn inline_paths(code: &str) -> Vec<String> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let mut rest = code;
+    while let Some(at) = rest.find("::") {
+        let start = rest[..at].rfind(|c| !is_name(c)).map_or(0, |i| i + 1);
+        let before = &rest[..start];
+        let end = rest[start..].find(|c| !is_name(c) && c != ':').map_or(rest.len(), |i| start + i);
+        if start < at && !before.ends_with('$') && !before.ends_with("(in ") {
+            found.push(rest[start..end].trim_end_matches(':').to_owned());
+        }
+        rest = &rest[end..];
+    }
+    found
+}
+
 impl Package {
     fn read(name: &str) -> Self {
         Self::read_folder(&root().join(name))
@@ -167,7 +200,20 @@ impl Package {
                 let path = package.rooted(module, &path)?;
                 Some(Import { path, is_public })
             });
-            let imports = imports.collect();
+            let mut imports: Vec<Import> = imports.collect();
+            for path in inline_paths(&without_use(&code)) {
+                let (first, below) = path.split_once("::").unwrap_or((&path, ""));
+                let of_import = imports.iter().find(|import| {
+                    import.path.last().is_some_and(|name| name == first) && package.files.contains_key(&import.path)
+                });
+                let path = match of_import {
+                    Some(import) => {
+                        Some([import.path.clone(), below.split("::").map(str::to_owned).collect()].concat())
+                    }
+                    None => package.rooted(module, &path),
+                };
+                imports.extend(path.map(|path| Import { path, is_public: false }));
+            }
             package.imports.insert(module.clone(), imports);
         }
         package
@@ -223,7 +269,8 @@ impl Package {
                 let home = self.home(&import.path)?;
                 // A folder shows what is in it: that makes nothing depend on it.
                 let shows_its_own = import.is_public && home.starts_with(module);
-                (home != *module && !shows_its_own).then_some(home)
+                // `lib.rs` holds nothing: what leads there is another package.
+                (home != *module && !home.is_empty() && !shows_its_own).then_some(home)
             });
             imports.collect()
         };
@@ -245,6 +292,25 @@ impl Package {
             reached[module].iter().filter(|&other| reached[other].contains(module)).cloned().collect()
         };
         arrows.keys().map(knot).max_by_key(Vec::len).unwrap_or_default()
+    }
+}
+
+impl Package {
+    /// The folders that import from each other, with an arrow each way.
+    fn mutual_folders(&self) -> Vec<String> {
+        let folder = |module: &Module| self.files[module].parent().map(Path::to_owned).unwrap_or_default();
+        let mut between: BTreeMap<(PathBuf, PathBuf), String> = BTreeMap::new();
+        for (module, others) in self.arrows() {
+            for other in others {
+                let (from, to) = (folder(&module), folder(&other));
+                if from != to {
+                    let arrow = format!("{} → {}", module.join("/"), other.join("/"));
+                    between.entry((from, to)).or_insert(arrow);
+                }
+            }
+        }
+        let both = between.iter().filter(|((a, b), _)| a < b);
+        both.filter_map(|((a, b), there)| Some(format!("{there}, {}", between.get(&(b.clone(), a.clone()))?))).collect()
     }
 }
 
@@ -321,7 +387,13 @@ fn no_files_import_each_other_in_a_circle() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A circle through a name that a folder shows, and one through `super`.
+#[test]
+fn no_folders_import_from_each_other() {
+    let wrong: Vec<String> = PACKAGES.iter().flat_map(|name| Package::read(name).mutual_folders()).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A circle through a name that a folder shows, one through `super`, and one through paths in the code.
 #[test]
 fn a_circle_is_found() {
     let folder = tempfile::tempdir().unwrap();
@@ -339,6 +411,14 @@ fn a_circle_is_found() {
     write("ray.rs", "pub struct Ray;\n");
     write("tree/leaf.rs", "use super::node::Node;\npub struct Leaf;\n");
     assert_eq!(names(Package::read_folder(folder.path()).largest_knot()), ["tree/leaf", "tree/node"]);
+    write("tree/leaf.rs", "pub struct Leaf(super::node::Node);\n");
+    assert_eq!(names(Package::read_folder(folder.path()).largest_knot()), ["tree/leaf", "tree/node"]);
+    write("tree/leaf.rs", "use super::node;\npub fn leaf() { node::grow::<u8>(); }\n");
+    assert_eq!(names(Package::read_folder(folder.path()).largest_knot()), ["tree/leaf", "tree/node"]);
+    assert!(Package::read_folder(folder.path()).mutual_folders().is_empty());
+    write("tree/node.rs", "pub fn grow() { crate::ray::cast() }\n");
+    write("ray.rs", "pub fn cast() { crate::tree::node::grow() }\n");
+    assert_eq!(Package::read_folder(folder.path()).mutual_folders(), ["ray → tree/node, tree/node → ray"]);
 }
 
 #[test]

@@ -62,6 +62,6 @@ pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};
 pub use film::surfaces::PixelSurface;
 pub use film::tiles::Film;
-pub use integrators::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
+pub use integrators::common::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
 pub use prepare::light::LightTable;
 pub use prepare::{Exposed, Features, Moments, Prepared, moment_of_sample};

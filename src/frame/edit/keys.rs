@@ -2,15 +2,15 @@
 //!
 //! An animation that a scene file could not hold is not taken: every change is checked as a file is.
 
-use super::property::Property;
-use crate::frame::history::History;
-use crate::frame::resources::{Clock, CurrentScene};
-use crate::frame::selection::Selection;
-use crate::frame::status::{MessageKind, Status};
+use crate::format::CameraPart;
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::property::Property;
+use crate::frame::state::history::History;
+use crate::frame::state::resources::{Clock, CurrentScene};
+use crate::frame::state::selection::Selection;
 use crate::scene::animation::{
     Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, set_keys,
 };
-use crate::scene::file::CameraPart;
 use crate::scene::{Animation, Description, LoadedScene, Moment, SceneInputs};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};

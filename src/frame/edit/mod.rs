@@ -1,7 +1,7 @@
 //! Edits of the scene: the list of edits, and their execution.
 //!
 //! Every edit is data, so that a window, a script and a recording can request it, and every edit changes ordinary
-//! components, so that the smallest reset follows by change detection. Nothing here implements undo: [`super::history`]
+//! components, so that the smallest reset follows by change detection. Nothing here implements undo: [`crate::frame::state::history`]
 //! detects what has changed and stores the previous state.
 //!
 //! | file | contents |
@@ -12,28 +12,30 @@
 //! | `texture` | textures in place of colours |
 //! | `place` | moving, rotating and scaling the selection |
 //! | `keys` | keys and settings of the animation |
-//! | `add`, `spot` | new objects and their positions, copies, removal |
+//! | `add`, `new_entity`, `spot` | new objects, their names and positions, copies, removal |
+//! | `remesh` | meshes made again in the background |
 
 mod add;
 mod keys;
+pub(crate) mod new_entity;
 mod place;
 mod property;
+pub(crate) mod remesh;
 mod set;
 mod sky;
 mod spot;
 mod texture;
 
 pub use add::NewThing;
-pub(super) use add::{clay, spawn};
 pub use property::Property;
 pub use sky::strength as sky_strength;
 pub(super) use texture::take as take_picture;
 pub use texture::textures;
 
-use super::history::History;
-use super::resources::{Clock, PictureSize, RenderState};
-use super::selection::{Selection, pick};
-use super::status::{MessageKind, Status};
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::state::history::History;
+use crate::frame::state::resources::{Clock, PictureSize, RenderState};
+use crate::frame::state::selection::{Selection, pick};
 use crate::render::MaterialKind;
 use crate::scene::animation::Interpolation;
 use crate::scene::{MaterialSlots, MeshShading, TextureSource, users_of};
@@ -48,7 +50,7 @@ pub type Id = u64;
 /// One change of the scene, or of the selection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Edit {
-    /// Select what is at this position in the image, fractions as in [`super::Command`]. With `add`, adds to the
+    /// Select what is at this position in the image, fractions as in [`crate::frame::Command`]. With `add`, adds to the
     /// selection, or removes from it.
     PickAt {
         /// Fraction of the width of the image, from the left.
@@ -237,7 +239,9 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
         Edit::Undo => {
-            super::remesh::take_back(world).or_else(|| History::step_back(world)).ok_or("nothing to undo")?;
+            crate::frame::edit::remesh::take_back(world)
+                .or_else(|| History::step_back(world))
+                .ok_or("nothing to undo")?;
         }
         Edit::Redo => History::step_on(world).ok_or("nothing to redo")?,
         Edit::Delete => add::delete(world),
@@ -281,7 +285,9 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::SetKeys { camera } => keys::set(world, camera)?,
         Edit::DeleteKeys => keys::delete(world)?,
         Edit::Interpolate { how } => keys::interpolate(world, how)?,
-        Edit::Remesh { id, shading, ratio } => super::remesh::start(world, thing(world, id)?, shading, ratio)?,
+        Edit::Remesh { id, shading, ratio } => {
+            crate::frame::edit::remesh::start(world, thing(world, id)?, shading, ratio)?
+        }
     }
     Ok(())
 }

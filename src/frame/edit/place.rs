@@ -1,10 +1,10 @@
 //! Moving, rotating and scaling the selection.
 //!
-//! Amounts are relative to the start of a change ([`super::Edit::Begin`]), not to the previous frame, so that a long
+//! Amounts are relative to the start of a change ([`crate::frame::edit::Edit::Begin`]), not to the previous frame, so that a long
 //! drag rounds no more than a short one, and dragging back restores the same bits.
 
-use crate::frame::history::History;
-use crate::frame::selection::{OwnBox, Selection, box_of};
+use crate::frame::state::history::History;
+use crate::frame::state::selection::{OwnBox, Selection, box_of};
 use crate::scene::{Linear, Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DQuat, DVec3, EulerRot};

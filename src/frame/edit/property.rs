@@ -4,7 +4,7 @@ use crate::scene::MaterialProperty;
 use crate::scene::animation::{LightProperty, ObjectProperty};
 use serde::{Deserialize, Serialize};
 
-/// The property of [`super::Edit::Set`]. A number uses the `x` component of the value only.
+/// The property of [`crate::frame::edit::Edit::Set`]. A number uses the `x` component of the value only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Property {
     /// Placement of an object; scale factors are positive.

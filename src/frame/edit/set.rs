@@ -1,8 +1,8 @@
-//! Sets properties of materials, lights and shapes; those of the environment are in [`super::sky`], those of the animation in
-//! [`super::keys`].
+//! Sets properties of materials, lights and shapes; those of the environment are in [`crate::frame::edit::sky`], those of the animation in
+//! [`crate::frame::edit::keys`].
 
-use super::property::Property;
-use super::{keys, sky};
+use crate::frame::edit::property::Property;
+use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
 use crate::scene::animation::{LightProperty, ObjectProperty};
 use crate::scene::{ColorParam, LightKind, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial};

@@ -1,8 +1,8 @@
 //! Environment: its colours, their common strength, and the rotation of its image.
 
-use super::property::Property;
+use crate::format::units::radians;
+use crate::frame::edit::property::Property;
 use crate::render::Environment;
-use crate::scene::units::radians;
 use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};

@@ -5,8 +5,8 @@
 //! axis, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
-use crate::frame::resources::{PictureSize, RenderState};
-use crate::frame::selection::pick;
+use crate::frame::state::resources::{PictureSize, RenderState};
+use crate::frame::state::selection::pick;
 use crate::geometry::Ray;
 use crate::scene::{Extraction, View};
 use bevy_ecs::prelude::World;

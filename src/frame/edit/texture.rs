@@ -1,9 +1,9 @@
 //! Textures in place of a material's colour: existing ones, a new checker, or an image file.
 
-use super::set::set_if_different;
-use crate::frame::background::BackgroundTasks;
-use crate::frame::resources::{Clock, CurrentScene};
-use crate::frame::status::{MessageKind, Status};
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::set::set_if_different;
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::resources::{Clock, CurrentScene};
 use crate::render::{ImageTexture, TexturePattern};
 use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of};
 use bevy_ecs::prelude::{Entity, World};

@@ -3,7 +3,7 @@
 //! There are two modes of turning: on a turntable, which preserves the roll and stops short of straight up and down,
 //! and freely about the image axes.
 
-use crate::frame::rig::{Rig, Turning};
+use crate::frame::core::rig::{Rig, Turning};
 use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;

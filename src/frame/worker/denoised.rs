@@ -1,15 +1,16 @@
 //! When the film is denoised, and which denoised image is displayed.
 //!
 //! Images of a moving camera are smoothed at once, by the render thread. At full resolution the settled filter runs
-//! beside the samples ([`super::denoiser`]) on a copy of the film, as soon as that has guides and a few samples, and then
+//! beside the samples ([`crate::frame::worker::denoiser`]) on a copy of the film, as soon as that has guides and a few samples, and then
 //! each time that the film has a quarter more and there was time for them; sooner if the raw image is about to become
 //! the better one. Until the first result, images are smoothed; while the raw image is the better one, it is mixed with
 //! the latest result.
 
-use super::denoiser::{Request, ToDenoise};
-use super::thread::Loop;
-use super::views::{Settled, ViewKey};
-use super::{Denoising, lock};
+use crate::frame::core::denoising::Denoising;
+use crate::frame::worker::denoiser::{Request, ToDenoise};
+use crate::frame::worker::shared::lock;
+use crate::frame::worker::thread::Loop;
+use crate::frame::worker::views::{Settled, ViewKey};
 use crate::render::{
     DenoiseSource, Film, Inspection, MovingFilter, develop, develop_colors, guide_samples, smooth_film,
 };

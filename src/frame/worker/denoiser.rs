@@ -5,9 +5,9 @@
 //! as much of the processor as samples do; other images get less. Another view makes the thread drop what it is at within
 //! some rows. Start reading at [`Denoiser::start`].
 
-use super::views::{Settled, ViewKey};
-use super::{DENOISE, DENOISE_NICENESS, NICENESS, lock, make_pool};
-use crate::frame::denoising::DenoiseFilter;
+use crate::frame::core::denoising::DenoiseFilter;
+use crate::frame::worker::shared::{DENOISE, DENOISE_NICENESS, NICENESS, lock, make_pool};
+use crate::frame::worker::views::{Settled, ViewKey};
 use crate::render::{DenoiseSource, GuideGatherer, Prepared, RenderSettings};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

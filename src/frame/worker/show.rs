@@ -1,9 +1,10 @@
 //! From the film to the displayed image: developed or inspected, scaled to the window size, with overlays.
 
-use super::denoised::Developed;
-use super::thread::Loop;
-use super::views::ViewKey;
-use super::{Denoising, Stats, lock};
+use crate::frame::core::denoising::Denoising;
+use crate::frame::worker::denoised::Developed;
+use crate::frame::worker::shared::{Stats, lock};
+use crate::frame::worker::thread::Loop;
+use crate::frame::worker::views::ViewKey;
 use crate::render::{Inspected, Inspection, depths, inspect, tint_sharp_zone};
 use glam::UVec2;
 use std::sync::atomic::Ordering;

@@ -1,11 +1,15 @@
 //! The loop of the render thread: reads messages, executes the scheduler's next step, hands over images, and sleeps.
 
-use super::denoiser::Denoiser;
-use super::idle::IdleFilms;
-use super::views::Views;
-use super::{Answer, BESIDE, Denoising, Job, NICENESS, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
-use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
-use crate::frame::{Picture, Target};
+use crate::frame::core::denoising::Denoising;
+use crate::frame::core::offline::Target;
+use crate::frame::core::scheduler::{RenderStep, Scheduler, StepReport};
+use crate::frame::core::status::Picture;
+use crate::frame::worker::denoiser::Denoiser;
+use crate::frame::worker::idle::IdleFilms;
+use crate::frame::worker::shared::{
+    Answer, BESIDE, Job, NICENESS, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool,
+};
+use crate::frame::worker::views::Views;
 use crate::render::{
     Display, Film, MovingFilter, Region, SampleAllocation, advance_region, explain, known_caustic_choice, seen_surface,
 };

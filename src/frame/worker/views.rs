@@ -1,6 +1,6 @@
 //! Cached results computed from the film or the scene.
 
-use crate::frame::denoising::DenoiseFilter;
+use crate::frame::core::denoising::DenoiseFilter;
 use crate::render::{Denoised, Inspected, Inspection};
 use glam::UVec2;
 use std::time::{Duration, Instant};

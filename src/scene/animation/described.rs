@@ -1,12 +1,12 @@
 //! The animation of a world as part of a scene file: names of the animated entities, and what cannot be expressed.
 
-use super::written::to_part;
-use super::{Animation, Channel};
-use crate::scene::camera::camera_part;
-use crate::scene::components::SurfaceMaterial;
-use crate::scene::file::{AnimationPart, EditedPart};
-use crate::scene::inputs::SceneInputs;
-use crate::scene::placement::{Linear, Placement};
+use crate::format::animation::{AnimationPart, EditedPart};
+use crate::format::camera_components::camera_part;
+use crate::format::placement::{Linear, Placement};
+use crate::scene::animation::written::to_part;
+use crate::scene::animation::{Animation, Channel};
+use crate::scene::world::components::SurfaceMaterial;
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
@@ -141,7 +141,7 @@ impl Moved {
 
 /// Whether the property of the channel can be set; `None` if its entity does not exist.
 fn has_property(channel: Channel, world: &World, inputs: &SceneInputs) -> Option<bool> {
-    use super::ObjectProperty::{Rotate, Scale};
+    use crate::format::property::ObjectProperty::{Rotate, Scale};
     Some(match channel {
         Channel::Camera(_) => true,
         Channel::Object(entity, property) => {

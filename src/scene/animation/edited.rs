@@ -3,12 +3,14 @@
 //! It stays as it is until another time is shown, and stands still during the exposure. Scene files and images hold it
 //! ([`EditedPart`]), so that they show what was seen.
 
-use super::moment::rest_camera;
-use super::written::{Entities, of_part};
-use super::{Animation, Channel};
-use crate::scene::camera::camera;
-use crate::scene::file::{CameraPart, EditedPart, SceneFile};
-use crate::scene::inputs::SceneInputs;
+use crate::format::animation::EditedPart;
+use crate::format::camera::CameraPart;
+use crate::format::camera_components::camera;
+use crate::format::parts::SceneFile;
+use crate::scene::animation::moment::rest_camera;
+use crate::scene::animation::written::{Entities, of_part};
+use crate::scene::animation::{Animation, Channel};
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::prelude::Entity;
 use std::collections::HashSet;
 

@@ -1,13 +1,14 @@
 //! Setting and deleting keys: the present state of a world becomes keys at its current time.
 
-use super::key::{Curve, Interpolation};
-use super::moment::{Moment, place, rest_camera};
-use super::property::{CameraProperty, LightProperty, ObjectProperty};
-use super::{Animation, Channel, Shutter, Track};
-use crate::scene::camera::{camera, camera_part};
-use crate::scene::file::{AnimationPart, CameraPart};
-use crate::scene::inputs::{CameraInput, SceneInputs};
-use crate::scene::material_property::MaterialProperty;
+use crate::format::animation::AnimationPart;
+use crate::format::camera::CameraPart;
+use crate::format::camera_components::{camera, camera_part};
+use crate::format::key::{Curve, Interpolation};
+use crate::format::material_property::MaterialProperty;
+use crate::format::property::{CameraProperty, LightProperty, ObjectProperty};
+use crate::scene::animation::moment::{Moment, place, rest_camera};
+use crate::scene::animation::{Animation, Channel, Shutter, Track};
+use crate::scene::world::inputs::{CameraInput, SceneInputs};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -263,9 +264,15 @@ fn keys_of_camera(animation: &mut Animation, now: &CameraInput, seconds: f64) ->
 
 #[cfg(test)]
 mod tests {
-    use super::super::KeyValue;
     use super::*;
-    use crate::scene::{Description, LoadOptions, Placement, SceneSource, SurfaceMaterial, View, load};
+    use crate::format::key::KeyValue;
+    use crate::format::placement::Placement;
+    use crate::format::source::SceneSource;
+    use crate::format::view::View;
+    use crate::scene::describe::Description;
+    use crate::scene::load;
+    use crate::scene::load::LoadOptions;
+    use crate::scene::world::components::SurfaceMaterial;
 
     const SCENE: &str = r#"(
         camera: (eye: (0, 1, 5), look_at: (0, 0, 0)),
@@ -301,7 +308,7 @@ mod tests {
     }
 
     fn go_to(world: &mut World, seconds: f64) -> SceneInputs {
-        crate::scene::show_moment(world, seconds);
+        crate::scene::animation::moment::show_moment(world, seconds);
         SceneInputs::of(world)
     }
 
@@ -358,7 +365,7 @@ mod tests {
             let entity = before.camera.unwrap().entity;
             let view = View::look_at(DVec3::new(4.0, 1.0, 3.0), DVec3::ZERO, DVec3::Y);
             *world.get_mut::<View>(entity).unwrap() = view.unwrap();
-            world.get_mut::<crate::scene::Projection>(entity).unwrap().vfov_deg = 20.0;
+            world.get_mut::<crate::format::view::Projection>(entity).unwrap().vfov_deg = 20.0;
             assert_eq!(set(&mut world, &before, &written, KeysOf::Camera), ["eye", aim, "vfov"], "{aim}");
             let half = go_to(&mut world, 1.0).camera.unwrap();
             assert!(half.view.eye.distance(DVec3::new(2.0, 1.0, 4.0)) < 1e-12, "{half:?}");
@@ -366,7 +373,7 @@ mod tests {
             // Without keys the camera stays where it is.
             let there = go_to(&mut world, 2.0).camera;
             delete_keys(&mut world, &[]);
-            crate::scene::show_moment(&mut world, 0.0);
+            crate::scene::animation::moment::show_moment(&mut world, 0.0);
             delete_keys(&mut world, &[]);
             assert!(!world.resource::<Animation>().moves() && there.is_some());
         }

@@ -7,29 +7,21 @@
 //! [`Curve`] implements the interpolation, [`Channel`] lists the properties that can be animated, and [`set_keys`] turns
 //! the state of a world into keys.
 
-mod described;
-mod edited;
-mod get;
-mod key;
-mod keying;
-mod model;
-mod moment;
-mod property;
-mod set;
-mod written;
+pub(crate) mod described;
+pub(crate) mod edited;
+pub(crate) mod keying;
+pub(crate) mod model;
+pub(crate) mod moment;
+pub(crate) mod written;
 
-pub(super) use described::Moved;
-pub(super) use edited::Edited;
-pub use key::{Curve, Interpolation, Key, KeyValue};
+pub use crate::format::key::{Curve, Interpolation, Key, KeyValue};
+pub use crate::format::property::{CameraProperty, LightProperty, ObjectProperty, PropertyInfo, Quantity};
 pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys};
 pub(super) use model::ModelMotion;
-pub(super) use moment::show_first;
 pub use moment::{Moment, camera_follows, show_moment};
-pub use property::{CameraProperty, LightProperty, ObjectProperty, PropertyInfo, Quantity};
-pub(super) use written::{Entities, of_part};
 
-use super::file::CameraPart;
-use super::material_property::MaterialProperty;
+use crate::format::camera::CameraPart;
+use crate::format::material_property::MaterialProperty;
 use bevy_ecs::prelude::{Entity, Resource};
 use std::ops::RangeInclusive;
 

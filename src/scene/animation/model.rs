@@ -1,12 +1,12 @@
 //! The animations of a glTF file on the entities of the scene that was made from it.
 
-use super::set::put;
-use crate::scene::components::{MeshOrigin, Shape};
-use crate::scene::file::CameraPart;
-use crate::scene::gltf_motion::GltfMotion;
-use crate::scene::inputs::SceneInputs;
-use crate::scene::light::LightKind;
-use crate::scene::sources::{MeshSource, Seconds};
+use crate::format::camera::CameraPart;
+use crate::format::light::LightKind;
+use crate::format::property_set::put;
+use crate::format::sources::{MeshSource, Seconds};
+use crate::import::gltf_motion::GltfMotion;
+use crate::scene::world::components::{MeshOrigin, Shape};
+use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::prelude::{Entity, World};
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;

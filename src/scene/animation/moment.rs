@@ -1,14 +1,16 @@
 //! The state of a scene at a given time.
 
-use super::set::put;
-use super::{Animation, CameraProperty, Channel, ModelMotion};
-use crate::scene::camera::{camera, camera_part};
-use crate::scene::components::{Shape, SurfaceMaterial};
-use crate::scene::file::CameraPart;
-use crate::scene::inputs::{CameraInput, SceneInputs};
-use crate::scene::light::LightKind;
-use crate::scene::placement::Placement;
-use crate::scene::view::{Lens, Projection, View};
+use crate::format::camera::CameraPart;
+use crate::format::camera_components::{camera, camera_part};
+use crate::format::light::LightKind;
+use crate::format::placement::Placement;
+use crate::format::property::CameraProperty;
+use crate::format::property_set::put;
+use crate::format::view::{Lens, Projection, View};
+use crate::scene::animation::model::ModelMotion;
+use crate::scene::animation::{Animation, Channel};
+use crate::scene::world::components::{Shape, SurfaceMaterial};
+use crate::scene::world::inputs::{CameraInput, SceneInputs};
 use bevy_ecs::prelude::{Entity, Mut, Resource, World};
 use std::collections::HashMap;
 

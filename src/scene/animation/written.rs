@@ -1,8 +1,10 @@
 //! Conversion between the section `animation` of a scene file, which uses names, and the tracks of a world, which use
 //! entities.
 
-use super::{Animation, Channel, Curve, Shutter, Track};
-use crate::scene::file::{AnimationPart, CameraPart, TrackPart};
+use crate::format::animation::{AnimationPart, TrackPart};
+use crate::format::camera::CameraPart;
+use crate::format::key::Curve;
+use crate::scene::animation::{Animation, Channel, Shutter, Track};
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
 

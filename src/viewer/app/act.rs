@@ -1,11 +1,11 @@
 //! Actions of keys and of the panel.
 
-use super::App;
 use crate::console;
 use crate::frame::{
     Command, Denoising, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
 };
 use crate::render::{Inspection, Integrator};
+use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
 use crate::viewer::saver::{DenoiseWith, Larger, Saved, Shown, new_scene_file};

@@ -1,9 +1,9 @@
 //! Drawing of the image and the overlays to the window.
 
-use super::{App, REPAINT_DELAY, WIDGET_REPAINT_DELAY};
 use crate::frame::{Explaining, Projector, SceneBounds, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
+use crate::viewer::app::{App, REPAINT_DELAY, WIDGET_REPAINT_DELAY};
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::{help as key_list, overlay, panel, status, story};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Window events: most of them are only recorded, and executed by the next tick.
 
-use super::{App, FRAME, Wake};
 use crate::frame::{Command, Edit};
+use crate::viewer::app::{App, FRAME, Wake};
 use crate::viewer::help::{Help, ListKey};
 use crate::viewer::question::Question;
 use crate::viewer::toasts::Tone;

@@ -1,8 +1,8 @@
 //! Unsaved edits: stored in the settings folder some seconds after they are made, confirmed when the window closes, and
 //! offered at the next start if the window could not ask.
 
-use super::{App, short_name};
 use crate::frame::Command;
+use crate::viewer::app::{App, short_name};
 use crate::viewer::question::{Answer, Question};
 use crate::viewer::saver::new_scene_file;
 use crate::viewer::toasts::Tone;

@@ -21,27 +21,28 @@ mod leave;
 mod leaving;
 mod memory;
 
-use super::dialog::Dialog;
-use super::display::{self, DisplayServer};
-use super::handles::Handles;
-use super::help::Help;
-use super::input::Input;
-use super::overlay;
-use super::panel::PanelState;
-use super::presenter::{PresentError, Presenter};
-use super::reaction::Reaction;
-use super::region_tool::RegionTool;
-use super::saver::Saver;
-use super::story::PathFilter;
-use super::toasts::{Toasts, Tone};
 use crate::frame::{
     Command, Explaining, Focus, FocusTarget, LatencyHistogram, MessageKind, Session, SessionOptions, Target, Waker,
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::scene::{ModelChoice, SceneSource, UpAxis};
+use crate::viewer::app::leaving::Leaving;
+use crate::viewer::app::memory::Memory;
+use crate::viewer::dialog::Dialog;
+use crate::viewer::display;
+use crate::viewer::display::DisplayServer;
+use crate::viewer::handles::Handles;
+use crate::viewer::help::Help;
+use crate::viewer::input::Input;
+use crate::viewer::overlay;
+use crate::viewer::panel::PanelState;
+use crate::viewer::presenter::{PresentError, Presenter};
+use crate::viewer::reaction::Reaction;
+use crate::viewer::region_tool::RegionTool;
+use crate::viewer::saver::Saver;
+use crate::viewer::story::PathFilter;
+use crate::viewer::toasts::{Toasts, Tone};
 use bevy_ecs::prelude::Entity;
-use leaving::Leaving;
-use memory::Memory;
 use serde_json::json;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
@@ -523,7 +524,7 @@ fn title(scene: &str, unsaved: bool) -> String {
     if name.is_empty() {
         "firstlight".to_owned()
     } else {
-        format!("firstlight — {mark}{}", crate::printable::name(&name))
+        format!("firstlight — {mark}{}", crate::files::printable::name(&name))
     }
 }
 

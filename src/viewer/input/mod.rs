@@ -7,10 +7,10 @@ mod sum;
 #[cfg(test)]
 mod tests;
 
-use super::keys::{Action, Motion, action_of, motion_of};
 use crate::frame::{Command, Edit, Navigation};
+use crate::viewer::input::sum::{Sum, add};
+use crate::viewer::keys::{Action, Motion, action_of, motion_of};
 use std::time::{Duration, Instant};
-use sum::{Sum, add};
 use winit::event::MouseButton;
 use winit::keyboard::{Key, ModifiersState, PhysicalKey};
 

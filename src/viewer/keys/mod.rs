@@ -4,128 +4,20 @@
 //! generated from them, so they cannot disagree. Movement keys are physical (WASD is the same block of keys on every
 //! layout); all others are identified by the character that the key types.
 
+mod binding;
 mod page;
 mod presets;
 mod table;
 mod words;
 
+pub use binding::{Action, Binding, Chord, KeyGroup, Motion, Trigger, Typed};
 pub use page::markdown;
 pub use presets::shown;
 pub use table::BINDINGS;
 pub use words::finds;
 
-use crate::frame::{Command, Navigation, gizmo};
-use crate::render::Inspection;
-use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
-
-/// A line of the table: triggers and their effect.
-pub struct Binding {
-    pub triggers: &'static [Trigger],
-    pub effect: &'static str,
-}
-
-impl Binding {
-    /// The text that a search looks in.
-    pub fn line(&self, title: &str) -> String {
-        format!("{title} {} {}", self.keys(), self.effect)
-    }
-}
-
-/// A heading and its lines.
-pub struct KeyGroup {
-    pub title: &'static str,
-    pub bindings: &'static [Binding],
-}
-
-pub enum Trigger {
-    /// Moves for as long as the key is down.
-    Hold(KeyCode, Motion),
-    /// Triggers once per press, and again on keyboard repeat.
-    Press(Chord, Action),
-    /// One of the keys 1 to 9, whatever it types.
-    Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
-    /// A gesture, described in words; `input` implements it.
-    Mouse(&'static str),
-}
-
-/// A key with its modifiers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Chord {
-    pub key: Typed,
-    pub ctrl: bool,
-    /// `None` if typing the character may or may not need Shift.
-    pub shift: Option<bool>,
-}
-
-/// The result of typing a key.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Typed {
-    Text(&'static str),
-    Named(NamedKey),
-}
-
-/// The movement of a held key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    Forward,
-    Back,
-    Left,
-    Right,
-    Up,
-    Down,
-    OrbitLeft,
-    OrbitRight,
-    OrbitUp,
-    OrbitDown,
-    RollLeft,
-    RollRight,
-}
-
-/// The action of a pressed key.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    Send(Command),
-    TogglePause,
-    ToggleIntegrator,
-    /// Saves the displayed image (PNG), or linear radiance (EXR).
-    Screenshot {
-        linear: bool,
-    },
-    /// Saves as a scene file: the open one, or a new one.
-    SaveScene {
-        new: bool,
-    },
-    PrintView,
-    /// Toggles between this inspection and the image.
-    Inspect(Inspection),
-    /// Explains the pixel under the mouse.
-    Explain,
-    /// The next drag selects a rectangle that gets all samples.
-    Brush,
-    ClearRegion,
-    ToggleSharpZone,
-    /// Cycles through move, rotate, scale and none.
-    NextGizmo,
-    /// Shows these handles, or hides them if they are shown already.
-    Gizmo(Option<gizmo::Mode>),
-    /// Starts or stops the turntable.
-    ToggleSpin,
-    /// Toggles whether a drag looks around or orbits the pivot.
-    ToggleDrag,
-    /// Captures the mouse, so that it moves the view without a button, or releases it.
-    CaptureMouse,
-    /// Toggles whether focus follows the mouse.
-    FocusFollows,
-    /// Shows a dialog to choose a file to open.
-    OpenDialog,
-    TogglePanel,
-    ToggleHelp,
-    ToggleOverlays,
-    ToggleFullscreen,
-    /// Closes the help, or clears the selection, or closes the window.
-    Leave,
-    Quit,
-}
+use crate::frame::Navigation;
+use winit::keyboard::{Key, KeyCode, ModifiersState, PhysicalKey};
 
 fn triggers() -> impl Iterator<Item = &'static Trigger> {
     BINDINGS.iter().flat_map(|group| group.bindings).flat_map(|binding| binding.triggers)
@@ -137,13 +29,6 @@ pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
         Trigger::Hold(code, motion) if key == PhysicalKey::Code(*code) => Some(*motion),
         _ => None,
     })
-}
-
-impl Motion {
-    /// Whether it moves the camera along its own axes.
-    pub fn flies(self) -> bool {
-        matches!(self, Self::Forward | Self::Back | Self::Left | Self::Right | Self::Up | Self::Down)
-    }
 }
 
 /// The action of a key under a preset; digits are physical, because Shift changes what they type.
@@ -173,31 +58,12 @@ fn digit_of(key: PhysicalKey) -> Option<u8> {
     (1..).zip(keys).find_map(|(digit, code)| (key == PhysicalKey::Code(code)).then_some(digit))
 }
 
-impl Chord {
-    /// Whether one press may match both.
-    fn overlaps(&self, other: &Self) -> bool {
-        let apart = self.shift.is_some() && other.shift.is_some() && self.shift != other.shift;
-        self.key == other.key && self.ctrl == other.ctrl && !apart
-    }
-
-    fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
-        let same_key = match (self.key, key) {
-            // With Shift or Caps Lock the letter is reported as a capital.
-            (Typed::Text(text), Key::Character(typed)) => text.eq_ignore_ascii_case(typed),
-            (Typed::Named(name), Key::Named(typed)) => name == *typed,
-            _ => false,
-        };
-        same_key
-            && self.ctrl == modifiers.control_key()
-            && self.shift.is_none_or(|shift| shift == modifiers.shift_key())
-            && !modifiers.super_key()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Edit;
+    use crate::frame::{Command, Edit};
+    use crate::render::Inspection;
+    use winit::keyboard::NamedKey;
 
     #[test]
     fn the_list_tells_of_every_part_of_the_panel() {

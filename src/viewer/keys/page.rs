@@ -1,8 +1,9 @@
 //! The table in readable form: names of keys, and `docs/keys.md`.
 
-use super::presets::groups_of;
-use super::{BINDINGS, Binding, Chord, Trigger, Typed};
 use crate::frame::Navigation;
+use crate::viewer::keys::binding::{Binding, Chord, Trigger, Typed};
+use crate::viewer::keys::presets::groups_of;
+use crate::viewer::keys::table::BINDINGS;
 use std::fmt::Write as _;
 use winit::keyboard::{KeyCode, NamedKey};
 

@@ -1,9 +1,9 @@
 //! Presets with keys and gestures of other programs. The bindings of a preset take precedence over those of the
-//! [`table`](super::table) with the same key, and its first groups replace the table's [`REPLACED`] groups.
+//! [`table`](crate::viewer::keys::table) with the same key, and its first groups replace the table's [`REPLACED`] groups.
 
-use super::table::{BINDINGS, edit, named, send, shifted, text};
-use super::{Action, Binding, KeyGroup, Trigger, Typed};
 use crate::frame::{Command, Edit, Navigation, gizmo};
+use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
+use crate::viewer::keys::table::{BINDINGS, edit, named, send, shifted, text};
 use winit::keyboard::NamedKey;
 
 /// Groups of the table that presets replace.
@@ -126,7 +126,7 @@ pub fn shown(navigation: Navigation) -> Vec<(&'static str, Vec<&'static Binding>
     own.iter().map(|group| (group.title, group.bindings.iter().collect())).chain(rest).collect()
 }
 
-fn chords_of(binding: &Binding) -> impl Iterator<Item = &super::Chord> {
+fn chords_of(binding: &Binding) -> impl Iterator<Item = &crate::viewer::keys::Chord> {
     binding.triggers.iter().filter_map(|trigger| match trigger {
         Trigger::Press(chord, _) => Some(chord),
         _ => None,
@@ -135,8 +135,9 @@ fn chords_of(binding: &Binding) -> impl Iterator<Item = &super::Chord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Typed, action_of};
     use super::*;
+    use crate::viewer::keys::action_of;
+    use crate::viewer::keys::binding::Typed;
     use winit::keyboard::{Key, KeyCode, ModifiersState, PhysicalKey};
 
     fn pressed(navigation: Navigation, key: &str, modifiers: ModifiersState) -> Option<Action> {

@@ -1,8 +1,8 @@
 //! The table of keys and gestures.
 
-use super::{Action, Binding, Chord, KeyGroup, Motion, Trigger, Typed};
 use crate::frame::{Command, Edit};
 use crate::render::Inspection;
+use crate::viewer::keys::binding::{Action, Binding, Chord, KeyGroup, Motion, Trigger, Typed};
 use winit::keyboard::{KeyCode, NamedKey};
 
 const fn hold(key: KeyCode, motion: Motion) -> Trigger {

@@ -94,11 +94,11 @@ fn matches_synonym(line: &str, word: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::BINDINGS;
     use super::*;
+    use crate::viewer::keys::BINDINGS;
 
     fn lines() -> Vec<String> {
-        let line = |title: &str, binding: &super::super::Binding| binding.line(title);
+        let line = |title: &str, binding: &crate::viewer::keys::Binding| binding.line(title);
         BINDINGS.iter().flat_map(|group| group.bindings.iter().map(move |one| line(group.title, one))).collect()
     }
 

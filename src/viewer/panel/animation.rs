@@ -1,10 +1,10 @@
 //! The time line: which moment of an animation is shown, whether it plays, its keys and its shutter.
 
-use super::widgets::{number, row_with_hint, rows, slider};
-use super::{Around, Asked};
 use crate::frame::{Command, CurrentScene, Edit, Property, Selection, Session};
 use crate::scene::animation::{Interpolation, Shutter, Track};
 use crate::scene::{Animation, Moment};
+use crate::viewer::panel::state::{Around, Asked};
+use crate::viewer::panel::widgets::{number, row_with_hint, rows, slider};
 use egui::Ui;
 use glam::DVec3;
 

@@ -1,13 +1,13 @@
 //! Camera pose, lens, and saved views.
 
-use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
-use super::{Around, Asked};
+use crate::files::printable;
 use crate::frame::{
     Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop,
     radius_of_f_stop, sharp_zone,
 };
-use crate::printable;
 use crate::scene::{Lens, Projection, View};
+use crate::viewer::panel::state::{Around, Asked};
+use crate::viewer::panel::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use crate::viewer::status::metres;
 use egui::Ui;
 

@@ -1,12 +1,12 @@
 //! The list of everything that emits light, and the environment.
 
-use super::list::{Listed, Which, list};
-use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
-use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::{Environment, MaterialKind};
 use crate::scene::animation::LightProperty;
 use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, MaterialProperty, SurfaceMaterial};
+use crate::viewer::panel::list::{Listed, Which, list};
+use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -90,7 +90,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
             }
         }
         Some(Material::Emissive { radiance: ColorParam::Texture(texture) }) => {
-            drop(ui.weak(&*crate::printable::name(&texture.name)))
+            drop(ui.weak(&*crate::files::printable::name(&texture.name)))
         }
         _ => {}
     }

@@ -3,15 +3,15 @@
 //! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
 //! objects ([`shared_by`]).
 
-use super::Asked;
-use super::texture;
-use super::widgets::{color, row, row_with_hint, rows, slider, vector};
 use crate::frame::{self, Edit, Session};
 use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
 use crate::scene::{
     ColorParam, InWorld, Inventory, Material, MaterialEntry, MaterialProperty, ObjectInput, ScalarParam,
     SurfaceMaterial,
 };
+use crate::viewer::panel::state::Asked;
+use crate::viewer::panel::texture;
+use crate::viewer::panel::widgets::{color, row, row_with_hint, rows, slider, vector};
 use crate::viewer::status::thousands;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
@@ -135,7 +135,7 @@ fn property_row(
                                 set(asked, value);
                             }
                         }
-                        ColorParam::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
+                        ColorParam::Texture(texture) => drop(ui.label(&*crate::files::printable::name(&texture.name))),
                     }
                     if let Some(session) = texture_of {
                         texture::menu(ui, session, id, frame::Property::Material(name), paint, asked);

@@ -1,12 +1,12 @@
 //! The list of materials, with the editor of the chosen one.
 
-use super::list::{Listed, Which, list};
-use super::material::{editor, shared_by};
-use super::swatch::swatch;
-use super::widgets::{choice, name_field};
-use super::{Asked, PanelState};
 use crate::frame::{Edit, Selection, Session};
 use crate::scene::{Inventory, MaterialEntry, SurfaceMaterial};
+use crate::viewer::panel::list::{Listed, Which, list};
+use crate::viewer::panel::material::{editor, shared_by};
+use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::swatch::swatch;
+use crate::viewer::panel::widgets::{choice, name_field};
 use crate::viewer::status::thousands;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;

@@ -1,10 +1,10 @@
 //! The mesh of the selection: faces, normals, and simplification.
 
-use super::widgets::{row, rows};
-use super::{Asked, PanelState};
 use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
 use crate::scene::{MeshOrigin, MeshShading, Shape};
 use crate::viewer::change::Difference;
+use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::widgets::{row, rows};
 use crate::viewer::status::{metres, percent, thousands};
 use egui::Ui;
 

@@ -13,6 +13,7 @@
 //! | `materials`, `lights` | the lists of materials and of lights; the environment |
 //! | `material`, `texture` | the editor of a material |
 //! | `statistics`, `messages` | figures; what was said |
+//! | `state` | what it remembers, shows and asks for |
 //! | `list`, `swatch`, `widgets` | building blocks |
 
 mod animation;
@@ -26,124 +27,16 @@ mod messages;
 mod picture;
 mod scene;
 mod selected;
+mod state;
 mod statistics;
 mod swatch;
 mod texture;
 mod widgets;
 
-use super::change::PictureChange;
-use super::dialog::DialogPurpose;
-use super::reaction::Reaction;
-use crate::frame::{Command, DenoiseFilter, Edit, Navigation, Session, gizmo};
-use crate::scene::Inventory;
-use bevy_ecs::prelude::Entity;
+pub use state::{Around, Asked, PanelState};
+
+use crate::frame::{Command, Edit, Session};
 use egui::{Context, RichText, Ui};
-use list::ListState;
-use std::rc::Rc;
-
-/// State of the panel.
-pub struct PanelState {
-    pub shown: bool,
-    /// The handles over the selection.
-    pub gizmo: Option<gizmo::Mode>,
-    change: PictureChange,
-    /// Path of a file to be added.
-    mesh_path: String,
-    /// Size of saved images, as a multiple of the window's.
-    pub scale: u32,
-    /// The mouse was pressed in the panel and has not been released.
-    pressed: bool,
-    /// Lists of the scene's items, with the revision of the scene.
-    inventory: Option<(u64, Rc<Inventory>)>,
-    object_list: ListState,
-    material_list: ListState,
-    light_list: ListState,
-    /// The material whose editor is open in the list.
-    material: Option<Entity>,
-}
-
-impl PanelState {
-    /// Returns the inventory, rebuilt only if it is shown and the scene has changed.
-    fn inventory(&mut self, session: &Session) -> Rc<Inventory> {
-        let revision = session.revision();
-        let known = self.inventory.take().filter(|(of, _)| *of == revision);
-        let (_, inventory) = self.inventory.insert(known.unwrap_or_else(|| (revision, Rc::new(session.inventory()))));
-        inventory.clone()
-    }
-
-    /// What the list of objects calls an object or a light; `None` if it is not there.
-    pub fn label_of(&mut self, session: &Session, entity: Entity) -> Option<String> {
-        let inventory = self.inventory(session);
-        inventory.objects.iter().find(|entry| entry.entity == entity).map(|entry| entry.label.clone())
-    }
-}
-
-impl Default for PanelState {
-    fn default() -> Self {
-        Self {
-            shown: false,
-            gizmo: None,
-            change: PictureChange::default(),
-            mesh_path: String::new(),
-            scale: 1,
-            pressed: false,
-            inventory: None,
-            object_list: ListState::default(),
-            material_list: ListState::default(),
-            light_list: ListState::default(),
-            material: None,
-        }
-    }
-}
-
-/// Values shown besides the session.
-pub struct Around<'a> {
-    pub reaction: &'a Reaction,
-    pub speed: f64,
-    pub spinning: bool,
-    /// Whether the animation plays.
-    pub playing: bool,
-    /// Whether a drag orbits the pivot.
-    pub orbits: bool,
-    /// The preset of keys and gestures.
-    pub navigation: Navigation,
-    /// The mouse position as a fraction of the image.
-    pub place: [f64; 2],
-    /// Memory of the process in bytes, if known.
-    pub memory: Option<u64>,
-    /// Whether the next drag selects a rectangle.
-    pub brush: bool,
-    /// Recent scenes, the latest first.
-    pub recent: &'a [String],
-}
-
-/// Requests of the panel.
-#[derive(Default)]
-pub struct Asked {
-    pub commands: Vec<Command>,
-    pub speed: Option<f64>,
-    pub toggle_spin: bool,
-    pub toggle_play: bool,
-    pub toggle_drag: bool,
-    pub navigation: Option<Navigation>,
-    pub screenshot: Option<bool>,
-    pub save_layers: bool,
-    /// The filter of denoised images, which may not be installed.
-    pub filter: Option<DenoiseFilter>,
-    pub toggle_brush: bool,
-    /// A file dialog to show, with its purpose.
-    pub dialog: Option<DialogPurpose>,
-}
-
-impl Asked {
-    fn send(&mut self, command: Command) {
-        self.commands.push(command);
-    }
-
-    fn edit(&mut self, edit: Edit) {
-        self.commands.push(Command::Edit(edit));
-    }
-}
 
 /// The sections of the panel, from the top; the list of keys mentions each.
 pub const SECTIONS: [&str; 16] = [
@@ -171,7 +64,7 @@ const FOOT: i8 = 30;
 
 /// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
-    let frame = egui::Frame::NONE.fill(super::overlay::PANE).inner_margin(egui::Margin {
+    let frame = egui::Frame::NONE.fill(crate::viewer::overlay::PANE).inner_margin(egui::Margin {
         left: 10,
         right: 4,
         top: 8,

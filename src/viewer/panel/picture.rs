@@ -1,10 +1,10 @@
 //! Rendering and display settings.
 
-use super::widgets::{number, row, row_with_hint, rows, slider, whole};
-use super::{Around, Asked};
 use crate::frame::{Command, DenoiseFilter, Denoising, Session, StopAt, Target, ViewMode};
 use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::Rendering;
+use crate::viewer::panel::state::{Around, Asked};
+use crate::viewer::panel::widgets::{number, row, row_with_hint, rows, slider, whole};
 use crate::viewer::status::tone_curve;
 use egui::Ui;
 

@@ -1,12 +1,12 @@
 //! The scene: the list of objects, adding objects, and opening other scenes.
 
-use super::list::{Listed, Which, list};
-use super::widgets::choice;
-use super::{Asked, PanelState};
+use crate::files::printable;
 use crate::frame::{Command, Edit, NewThing, Selection, Session};
-use crate::printable;
 use crate::scene::{MeshSource, ObjectEntry};
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::panel::list::{Listed, Which, list};
+use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::widgets::choice;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use std::path::Path;

@@ -1,10 +1,11 @@
 //! Name, placement, material and light of the selection.
 
-use super::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
-use super::{Asked, PanelState, material};
 use crate::frame::{Edit, Property, Selection, Session, gizmo};
 use crate::scene::animation::{LightProperty, ObjectProperty, PropertyInfo, Quantity};
 use crate::scene::{LightInput, Shape};
+use crate::viewer::panel::material;
+use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
 use egui::Ui;
 use glam::DVec3;
 

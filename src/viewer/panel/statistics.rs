@@ -1,9 +1,9 @@
 //! Figures: speed, error, sizes, latency.
 
-use super::Around;
-use super::widgets::{row, rows};
 use crate::frame::{History, LatencyHistogram, Session};
 use crate::scene::Shape;
+use crate::viewer::panel::state::Around;
+use crate::viewer::panel::widgets::{row, rows};
 use crate::viewer::status::{bytes, percent, seconds, thousands};
 use egui::Ui;
 

@@ -1,11 +1,11 @@
 //! The texture of a material: its source and its parameters.
 
-use super::Asked;
-use super::widgets::{color, number, row};
 use crate::frame::{Edit, Property, Session};
 use crate::render::Wrap;
 use crate::scene::{ColorParam, Rgb, TextureSource};
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::panel::state::Asked;
+use crate::viewer::panel::widgets::{color, number, row};
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
@@ -23,7 +23,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, property: Property, paint: 
     names.dedup();
     ui.menu_button("texture", |ui| {
         for name in names {
-            if ui.button(&*crate::printable::name(name)).clicked() {
+            if ui.button(&*crate::files::printable::name(name)).clicked() {
                 asked.edit(Edit::SetTexture { id, name: name.to_owned() });
                 ui.close();
             }

@@ -3,9 +3,9 @@
 //! Each returns the new value if the user has changed it, and `None` otherwise. Typing takes effect at the end,
 //! dragging at once.
 
-use super::Asked;
+use crate::files::printable;
 use crate::frame::Edit;
-use crate::printable;
+use crate::viewer::panel::state::Asked;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
 

@@ -2,10 +2,10 @@
 //!
 //! The table shows luminance for readability; `firstlight explain` has the three channels.
 
-use super::{PathFilter, SEGMENTS};
 use crate::frame::{PixelStory, brightness};
 use crate::viewer::overlay::GLASS;
 use crate::viewer::status::percent;
+use crate::viewer::story::filter::{PathFilter, SEGMENTS};
 use egui::{Align2, Color32, Context, FontId, Frame, Margin, Order, RichText, Sense, Ui};
 use glam::DVec3;
 
@@ -25,7 +25,8 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut PathFilter) {
                 let (x, y, n) = (story.pixel.x, story.pixel.y, story.samples.len());
                 text(ui, format!("pixel {x}, {y}: {n} samples, luminance {all:.4}"), true);
                 if let Some(seen) = &story.seen {
-                    let [object, material] = [&seen.object, &seen.material].map(|name| crate::printable::name(name));
+                    let [object, material] =
+                        [&seen.object, &seen.material].map(|name| crate::files::printable::name(name));
                     let side = if seen.front { "front" } else { "back" };
                     text(ui, format!("{object}, material {material}, {side}"), false);
                     if all == 0.0 {
@@ -40,7 +41,7 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut PathFilter) {
                     ui.end_row();
                     for light in story.lights.iter().take(LIGHTS_SHOWN) {
                         let chosen = shown.light.as_ref() == Some(&light.name);
-                        if row(ui, &crate::printable::name(&light.name), light.parts(), all, Some(chosen)) {
+                        if row(ui, &crate::files::printable::name(&light.name), light.parts(), all, Some(chosen)) {
                             shown.light = (!chosen).then(|| light.name.clone());
                         }
                     }

@@ -6,12 +6,12 @@ use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
 const GRAMMAR: [(&str, &[&str]); 12] = [
-    ("src/scene/file/parts.rs", &[]),
-    ("src/scene/file/camera.rs", &[]),
-    ("src/scene/file/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
-    ("src/scene/animation/key.rs", &["Interpolation"]),
-    ("src/scene/animation/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
-    ("src/scene/sources.rs", &[]),
+    ("src/format/parts.rs", &[]),
+    ("src/format/camera.rs", &[]),
+    ("src/format/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
+    ("src/format/key.rs", &["Interpolation"]),
+    ("src/format/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
+    ("src/format/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
     ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
     ("crates/render/src/core/image_texture.rs", &["Encoding"]),

@@ -7,6 +7,7 @@
 mod commands;
 mod coverage;
 mod links;
+mod materials;
 pub mod page;
 mod scenes;
 mod words;

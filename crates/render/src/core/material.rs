@@ -5,12 +5,12 @@
 //! kind of material or a parameter, start at the table here: files, checks, edits, animation, the window and the
 //! reference pages read it.
 
-pub use super::fresnel::Fresnel;
-pub use super::material_params::{
+pub use crate::core::fresnel::Fresnel;
+pub use crate::core::material_params::{
     ColorInput, InSnapshot, MapParams, MaterialId, Param, ParamMut, ParamRef, Params, ScalarInput,
 };
-use super::material_table::{initial, mapped, materials, value_of};
-use super::property::{Domain, Property, Value, ValueType};
+use crate::core::material_table::{initial, mapped, materials, value_of};
+use crate::core::property::{Domain, Property, Value, ValueType};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -80,7 +80,7 @@ materials! {
         emission: P::Color, Color(Radiance) = Vec3::ZERO, "emission";
         /// coverage: 1 is opaque, 0 is a hole
         opacity: P::Scalar, Scalar(Share) = 1.0, "opacity";
-        /// opaque where `opacity` is at least this, a hole elsewhere; without it, `opacity` is a share
+        /// opaque where `opacity` is at least this, a hole elsewhere
         opacity_cutoff: Option<f32>, Cutoff(Share) = None, "cutoff";
         /// tangent-space normals: 0…1 for −1…1
         normal_map: P::Color, Color(Map) = Vec3::new(0.5, 0.5, 1.0), "normals";

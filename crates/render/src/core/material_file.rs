@@ -1,9 +1,9 @@
 //! Materials in files: the kind, and the parameters by name. What has its default is left out.
 
-use super::fresnel::Fresnel;
-use super::material::{Material, MaterialKind};
-use super::material_params::{Param, Params, has_value};
-use super::property::Property;
+use crate::core::fresnel::Fresnel;
+use crate::core::material::{Material, MaterialKind};
+use crate::core::material_params::{Param, Params, has_value};
+use crate::core::property::Property;
 use glam::Vec3;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, VariantAccess, Visitor};
 use serde::ser::{Serialize, SerializeStructVariant, Serializer};

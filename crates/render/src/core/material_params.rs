@@ -1,8 +1,8 @@
 //! The types of a material's parameters: in a snapshot, and by reference in any scene.
 
-use super::fresnel::Fresnel;
-use super::property::Value;
-use super::texture::TextureId;
+use crate::core::fresnel::Fresnel;
+use crate::core::property::Value;
+use crate::core::texture::TextureId;
 use glam::Vec3;
 use std::fmt::Debug;
 
@@ -121,7 +121,7 @@ pub(super) fn has_value<P: Params>(param: &ParamRef<'_, P>, value: Value) -> boo
     }
 }
 
-/// Conversion of a material's references; see [`Material::map`](super::material::Material::map).
+/// Conversion of a material's references; see [`Material::map`](crate::core::material::Material::map).
 pub trait MapParams<From: Params, To: Params> {
     /// Converts a colour.
     fn color(&mut self, color: &From::Color) -> To::Color;

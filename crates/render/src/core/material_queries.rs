@@ -1,6 +1,6 @@
 //! Properties of materials in a snapshot for the renderer: transmissive, specular, emissive.
 
-use super::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
 use crate::core::texture::{Texture, TextureId};
 use glam::Vec3;
 

@@ -1,6 +1,6 @@
 //! Replaces principled materials by equivalent simpler ones, which are shaded faster and support more techniques.
 
-use super::material::{ColorInput, Fresnel, Material, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Fresnel, Material, SMALLEST_ALPHA, ScalarInput};
 use glam::Vec3;
 
 impl Material {
@@ -78,8 +78,8 @@ fn is_diffuse(metallic: f32, transmission: f32, specular: ScalarInput) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::material::Param;
     use super::*;
+    use crate::core::material::Param;
 
     #[test]
     fn only_what_says_no_more_becomes_simpler() {

@@ -1,9 +1,9 @@
-//! Makes the types of materials from the table in [`super::material`].
+//! Makes the types of materials from the table in [`crate::core::material`].
 //!
 //! A row of the table is `name: type, Param(Domain) = default, "label";` below its help. `Param` is the variant of
-//! [`Param`](super::material_params::Param) for that type; without `= default`, scene files must give a value.
+//! [`Param`](crate::core::material_params::Param) for that type; without `= default`, scene files must give a value.
 
-/// A default as a [`Value`](super::property::Value).
+/// A default as a [`Value`](crate::core::property::Value).
 macro_rules! value_of {
     () => {
         None

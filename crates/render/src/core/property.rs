@@ -1,11 +1,11 @@
 //! The description of a property of a scene: its name, its values and its meaning, for everything that reads, checks,
 //! writes, animates, shows or documents it.
 
-use super::fresnel::Fresnel;
+use crate::core::fresnel::Fresnel;
 use glam::Vec3;
 use std::ops::RangeInclusive;
 
-/// One property, as in the table of its owner; see [`MaterialKind::properties`](super::material::MaterialKind::properties).
+/// One property, as in the table of its owner; see [`MaterialKind::properties`](crate::core::material::MaterialKind::properties).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Property {
     /// Name in scene files.

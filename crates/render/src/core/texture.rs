@@ -1,6 +1,6 @@
 //! Textures: colours that vary over a surface.
 
-pub use super::image_texture::{Encoding, ImageTexture, Texels};
+pub use crate::core::image_texture::{Encoding, ImageTexture, Texels};
 use firstlight_simd::{Elementary, Real};
 use glam::{Mat2, Vec2, Vec3, Vec4};
 use serde::{Deserialize, Serialize};

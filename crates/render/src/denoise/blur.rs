@@ -1,7 +1,7 @@
 //! Box filters.
 
-use super::input::DenoiseInput;
-use super::{Stop, each, fill};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::parallel::{Stop, each, fill};
 use bytemuck::zeroed_vec;
 
 /// Radius in pixels of the two box filters that average variance and difference of raw and filtered image.

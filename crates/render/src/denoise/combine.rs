@@ -8,12 +8,13 @@
 //! Squared difference and variance are local means over few pixels with one or three degrees of freedom each, and as
 //! uncertain as that: what exceeds the variance counts as bias as far as it is significant.
 
-use super::blur::{Apart, RADIUS};
-use super::energy::given_back;
-use super::input::DenoiseInput;
-use super::noise::{Filtered, Noise, squared_bias};
-use super::risk::error_of;
-use super::{Denoised, Stop, each};
+use crate::denoise::blur::{Apart, RADIUS};
+use crate::denoise::denoised::Denoised;
+use crate::denoise::energy::given_back;
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::noise::{Filtered, Noise, squared_bias};
+use crate::denoise::parallel::{Stop, each};
+use crate::denoise::risk::error_of;
 use glam::Vec3;
 
 /// Returns `None` if `stop` returned true.

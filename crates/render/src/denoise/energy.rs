@@ -1,14 +1,14 @@
-//! Light that the limit for fireflies takes away ([`super::limit`]), given back as a wide blur.
+//! Light that the limit for fireflies takes away ([`crate::denoise::limit`]), given back as a wide blur.
 //!
 //! A single firefly says little about the light of its neighbourhood, and its light is better left out. Where many
 //! pixels have lost light, its mean is known, and without it the image would be too dark: scenes whose light comes from
 //! rare bright samples lose up to a quarter with two samples per pixel. So as much of the mean is given back as is
 //! significant, and little of it where it exceeds the filtered light: there it comes from a highlight nearby.
 
-use super::blur::{Apart, n_averaged};
-use super::input::DenoiseInput;
-use super::noise::{Filtered, Noise};
-use super::{LEAST_ALBEDO, Stop, each};
+use crate::denoise::blur::{Apart, n_averaged};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::noise::{Filtered, Noise};
+use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use glam::Vec3;
 
 /// Radius in pixels of the two box filters that average what was taken away.

@@ -1,8 +1,10 @@
 //! The best linear function of the features in one window, and its error.
 
-use super::moments::{Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product};
-use super::noise::significant_part;
-use super::{Stop, each};
+use crate::denoise::moments::{
+    Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product,
+};
+use crate::denoise::noise::significant_part;
+use crate::denoise::parallel::{Stop, each};
 use bytemuck::Zeroable;
 use glam::Vec3;
 

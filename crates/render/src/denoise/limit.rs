@@ -8,10 +8,10 @@
 //! the samples where it does not. A pixel is changed by no more than half of the distance between its halves, which
 //! vanishes with more samples: so the limit of the combined image is still that of the raw one.
 
-use super::blur::Apart;
-use super::input::DenoiseInput;
-use super::moments::Samples;
-use super::{AT_ONCE, Stop, each, fill};
+use crate::denoise::blur::Apart;
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::moments::Samples;
+use crate::denoise::parallel::{AT_ONCE, Stop, each, fill};
 use bytemuck::zeroed_vec;
 use glam::Vec3;
 

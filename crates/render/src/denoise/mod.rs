@@ -7,6 +7,7 @@
 
 mod blur;
 mod combine;
+mod denoised;
 mod energy;
 mod fit;
 mod input;
@@ -14,29 +15,16 @@ mod limit;
 mod moments;
 mod moving;
 mod noise;
+mod parallel;
 mod regression;
 mod risk;
 
+pub use denoised::Denoised;
 pub use input::{DenoiseInput, Guides};
 pub use moving::{MovingFilter, MovingInput};
 
-use bytemuck::{Zeroable, zeroed_vec};
 use glam::Vec3;
-use rayon::prelude::*;
-
-/// A denoised image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Denoised {
-    /// Radiance of each pixel, raw and filtered combined, row by row from the top; W·m⁻²·sr⁻¹.
-    pub color: Vec<Vec3>,
-    /// Filtered share of each pixel, 0..1; it goes to zero as the raw image becomes better than the filter.
-    pub share: Vec<f32>,
-    /// Estimated root of relMSE, like [`ErrorEstimate::relative`](crate::film::estimate::ErrorEstimate::relative) of
-    /// the raw image.
-    pub error: f64,
-    /// Bounds of an interval that contains the true error with a probability of about 95 %.
-    pub error_95: [f64; 2],
-}
+use parallel::Stop;
 
 /// Denoises an image, on the current rayon pool; `None` if `stop`, which is called often, returned true.
 ///
@@ -48,42 +36,6 @@ pub fn denoise(input: &DenoiseInput, stop: Stop) -> Option<Denoised> {
     let filtered = regression::pick(input, &candidates, &noise, stop)?;
     drop(candidates);
     combine::combine(input, &noise, &filtered, stop)
-}
-
-/// Lower limit of the albedo as a divisor, so that light that dark surfaces reflect independently of it is not
-/// amplified.
-const LEAST_ALBEDO: f32 = 0.04;
-
-/// Whether to give up what is being done.
-type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
-
-/// Number of values between two calls of `stop`: some tenths of a millisecond at most.
-const AT_ONCE: usize = 256;
-
-/// What `of` returns for 0 up to `n`, in parallel; `None` if `stop` returned true.
-fn each<T: Zeroable + Send>(n: usize, stop: Stop, of: impl Fn(usize) -> T + Sync) -> Option<Vec<T>> {
-    // The system gives zeroed memory when it is written first: what is given up early costs nothing.
-    let mut all = zeroed_vec(n);
-    fill(&mut all, AT_ONCE, stop, |part, values| {
-        values.iter_mut().enumerate().for_each(|(i, value)| *value = of(part * AT_ONCE + i));
-    })?;
-    Some(all)
-}
-
-/// Calls `of` with the number and the values of each part, in parallel; `None` if `stop` returned true.
-///
-/// - `length`: of a part; the last one may be shorter.
-fn fill<T: Send>(all: &mut [T], length: usize, stop: Stop, of: impl Fn(usize, &mut [T]) + Sync) -> Option<()> {
-    all.par_chunks_mut(length).enumerate().try_for_each(|(part, values)| {
-        go_on(stop)?;
-        of(part, values);
-        Some(())
-    })
-}
-
-/// `None` if `stop` returned true.
-fn go_on(stop: Stop) -> Option<()> {
-    (!stop()).then_some(())
 }
 
 /// Like [`denoise`], with another filter in place of the regression: it gets the radiance of each pixel and returns the

@@ -6,7 +6,7 @@
 //! Pixel positions are relative to the centre of the block, which avoids cancellation; they are shifted where blocks
 //! are added.
 
-use super::{Stop, each};
+use crate::denoise::parallel::{Stop, each};
 use glam::Vec3;
 
 /// Features per pixel: normal (3), nearness, position in the image (2), mean albedo.

@@ -1,8 +1,8 @@
 //! The noise of the raw image, and how much of it a filter passes on.
 
-use super::blur::{RADIUS, n_averaged};
-use super::input::DenoiseInput;
-use super::{Stop, each};
+use crate::denoise::blur::{RADIUS, n_averaged};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::parallel::{Stop, each};
 use crate::sampling::hash_u32;
 use glam::Vec3;
 
@@ -12,7 +12,7 @@ pub(super) struct Noise {
     pub variance: Vec<Vec3>,
     /// Whether a pixel or a neighbour shows an emitter.
     pub at_emitters: Vec<bool>,
-    /// What fireflies have more of than usual samples, radiance of each pixel; see [`super::limit`].
+    /// What fireflies have more of than usual samples, radiance of each pixel; see [`crate::denoise::limit`].
     pub excess: Vec<Vec3>,
 }
 

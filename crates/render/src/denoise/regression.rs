@@ -9,13 +9,13 @@
 //! windows dominate where light is smooth, small ones at the edges of shadows, and windows that an edge does not cross
 //! dominate over those that it does.
 
-use super::blur::blur;
-use super::fit::Fits;
-use super::input::DenoiseInput;
-use super::limit::limit;
-use super::moments::{Blocks, N_FEATURES, Samples};
-use super::noise::{Filtered, Noise};
-use super::{LEAST_ALBEDO, Stop, each};
+use crate::denoise::blur::blur;
+use crate::denoise::fit::Fits;
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::limit::limit;
+use crate::denoise::moments::{Blocks, N_FEATURES, Samples};
+use crate::denoise::noise::{Filtered, Noise};
+use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use bytemuck::Zeroable;
 use glam::Vec3;
 

@@ -13,10 +13,10 @@
 //! - The variance of the raw value is averaged over a wide neighbourhood, and larger where it is mixed with the filtered
 //!   one: the narrow neighbourhood has decided the shares, which are raw where its variance is too small at random.
 
-use super::blur::{Apart, RADIUS};
-use super::input::DenoiseInput;
-use super::noise::{Filtered, Noise, squared_bias};
-use super::{Stop, each};
+use crate::denoise::blur::{Apart, RADIUS};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::noise::{Filtered, Noise, squared_bias};
+use crate::denoise::parallel::{Stop, each};
 use glam::Vec3;
 use rayon::prelude::*;
 

@@ -7,9 +7,9 @@
 use crate::core::settings::{Integrator, RenderSettings};
 use crate::driver::wave::Pass;
 use crate::film::block::BLOCK_SIZE;
+use crate::integrators::common::work::Work;
 use crate::integrators::path::{CameraPath, PathWave};
 use crate::integrators::simd::camera::CameraRays;
-use crate::integrators::work::Work;
 use crate::sampling::Sampler;
 use crate::shading::paths::PathBatch;
 use glam::{UVec2, Vec3};

@@ -1,4 +1,4 @@
-//! A film as the denoiser takes it: a copy of its means and half steps. Its guides are in [`super::guides`].
+//! A film as the denoiser takes it: a copy of its means and half steps. Its guides are in [`crate::driver::guides`].
 
 use crate::denoise::{DenoiseInput, Denoised, denoise, denoise_with};
 use crate::driver::guides::SurfaceGuides;

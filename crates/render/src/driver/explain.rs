@@ -1,6 +1,6 @@
 //! Explains the value of a pixel: traces some of its samples again and records every contribution.
 //!
-//! The same waves are traced as for the image, with the same random numbers ([`crate::integrators::record::Record`]
+//! The same waves are traced as for the image, with the same random numbers ([`crate::integrators::common::record::Record`]
 //! only observes), so the recorded values are those in the film, bit for bit: per light and per bounce, in parts that
 //! sum to the whole. Start reading at [`explain`].
 
@@ -11,7 +11,7 @@ use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
 use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::caustics::plan::choose;
-use crate::integrators::record::{FoundBy, LightSource, Place, TracedPath};
+use crate::integrators::common::record::{FoundBy, LightSource, Place, TracedPath};
 use crate::prepare::exposed::Exposed;
 use glam::{DVec3, UVec2};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! What guides the denoiser: albedo, normal and depth of the first surface that is not specular, and the light that it
 //! emits.
 //!
-//! Gathered like [feature buffers](super::features), by camera rays alone, but only as sums of what the denoiser reads.
+//! Gathered like [feature buffers](crate::driver::features), by camera rays alone, but only as sums of what the denoiser reads.
 //! They can be extended: the first samples of a view give guides at once, and more samples better ones. The noise of the
 //! guides stays in the denoised image, at edges, in textures and in glass above all: pixels whose first samples differ
 //! get more than the others. Start reading at [`GuideGatherer`].
@@ -10,7 +10,7 @@ use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
 use crate::denoise::Guides;
 use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, PART_PIXELS, Part, PartTracer};
-use crate::integrators::seen::Seen;
+use crate::integrators::common::seen::Seen;
 use crate::integrators::simd::camera::Pixels;
 use crate::prepare::prepared::Prepared;
 use bytemuck::{Zeroable, zeroed_vec};

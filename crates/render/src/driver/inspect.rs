@@ -9,7 +9,7 @@ use crate::driver::single::mean_bounces;
 use crate::film::develop::encode_srgb;
 use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;
-use crate::shading::albedo::surface_albedo;
+use crate::shading::surface::albedo::surface_albedo;
 use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};

@@ -12,7 +12,7 @@ use crate::film::surfaces::SurfaceSums;
 use crate::film::tile::FilmTile;
 use crate::film::tiles::Film;
 use crate::integrators::caustics::pilot::prepare_guide;
-use crate::integrators::survival::at_depth;
+use crate::integrators::common::survival::at_depth;
 use crate::prepare::exposed::Exposed;
 use crate::prepare::prepared::Prepared;
 use crate::shading::precomputed;

@@ -5,7 +5,7 @@ use crate::core::settings::RenderSettings;
 use crate::driver::report::BadSample;
 use crate::driver::wave::{Pass, WAVE_SIZE, Wave};
 use crate::integrators::caustics::pilot::prepare_guide;
-use crate::integrators::record::{Record, TracedPath};
+use crate::integrators::common::record::{Record, TracedPath};
 use crate::integrators::simd::camera::Pixels;
 use crate::prepare::exposed::Exposed;
 use crate::prepare::prepared::Prepared;

@@ -5,10 +5,10 @@
 
 use crate::core::counts::RayCounts;
 use crate::film::exact_sum::ExactSum;
-use crate::integrators::caustics::batches::Batches;
 use crate::integrators::caustics::lens_connections::Splat;
-use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::trace::LightWave;
+use crate::integrators::common::batches::Batches;
+use crate::integrators::common::caustics_pass::CausticPass;
 use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 use std::ops::Range;

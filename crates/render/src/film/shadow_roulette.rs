@@ -12,12 +12,12 @@
 
 use crate::film::block::Block;
 use crate::film::tile::FilmTile;
-use crate::integrators::work::SHADOW_RAY;
+use crate::integrators::common::work::SHADOW_RAY;
 
 /// Returns the threshold relative to the level of a pixel.
 ///
 /// - `variance`: of one sample, relative to the squared level.
-/// - `cost`: of one sample, in the unit of [`Work`](crate::integrators::work::Work).
+/// - `cost`: of one sample, in the unit of [`Work`](crate::integrators::common::work::Work).
 pub(crate) fn share_of(variance: f64, cost: f64) -> f32 {
     (variance * SHADOW_RAY / cost).sqrt() as f32
 }

@@ -1,10 +1,10 @@
 //! What the first samples of each pixel see of surfaces, where an image is to be denoised while the camera moves.
 //!
-//! Gathered by the very paths that bring light ([`crate::integrators::first_surfaces`]), so it is there with the first
+//! Gathered by the very paths that bring light ([`crate::integrators::path::first_surfaces`]), so it is there with the first
 //! sample and costs no ray of its own. Feature buffers that are saved are made with more care
 //! ([`crate::film::features`]).
 
-use crate::integrators::seen::Seen;
+use crate::integrators::common::seen::Seen;
 use glam::Vec3;
 
 /// Sums over the first samples of a pixel.

@@ -7,7 +7,7 @@ use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
 use crate::film::region::Region;
 use crate::film::surfaces::SurfaceSums;
-use crate::integrators::seen::Seen;
+use crate::integrators::common::seen::Seen;
 use glam::{DVec3, UVec2, Vec3};
 use std::collections::TryReserveError;
 

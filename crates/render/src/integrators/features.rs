@@ -12,12 +12,11 @@
 
 use crate::core::material::{Material, MaterialId};
 use crate::core::settings::RenderSettings;
-use crate::integrators::seen::Seen;
+use crate::integrators::common::seen::Seen;
 use crate::integrators::simd::first_hits::{DiffuseHits, see_diffuse};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
-use crate::shading::albedo::visible_albedo;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, first_dimension};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
@@ -26,6 +25,7 @@ use crate::shading::principled::at::principled_at;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use crate::shading::sides::Sides;
 use crate::shading::simd::lanes::DIFFUSE;
+use crate::shading::surface::albedo::visible_albedo;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::geometry::Ray;

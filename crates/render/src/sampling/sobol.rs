@@ -12,7 +12,7 @@
 //! which makes the remaining noise fine-grained (the idea is that of Ahmed and Wonka 2020, "Screen-Space Blue-Noise
 //! Diffusion", made progressive: the number of samples need not be known).
 
-use super::hash::{hash_combine, hash_combine_all, hash_u32};
+use crate::sampling::hash::{hash_combine, hash_combine_all, hash_u32};
 use firstlight_simd::{Bits, Float, Simd, Truth, Word};
 use glam::Vec2;
 use std::sync::LazyLock;

@@ -187,7 +187,7 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
-    use crate::shading::blend::{Blend, Part};
+    use crate::shading::surface::blend::{Blend, Part};
 
     fn metal(alpha: f32, compensate: bool) -> Lobe {
         Lobe::Metal { alpha, reflectance: Vec3::ONE, fresnel: Fresnel::Constant, compensate }

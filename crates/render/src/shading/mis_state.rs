@@ -30,7 +30,7 @@ impl MisState {
         Self { ratio, caster, gain }
     }
 
-    /// See [`crate::integrators::caustics::pass::CausticPass::follow`]; NaN if no light path can be the path so far.
+    /// See [`crate::integrators::common::caustics_pass::CausticPass::follow`]; NaN if no light path can be the path so far.
     #[inline(always)]
     pub fn ratio(&self) -> f32 {
         self.ratio

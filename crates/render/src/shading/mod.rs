@@ -1,8 +1,6 @@
 //! Scattering at surfaces and transport between them: for one hit at a time here, for sixteen in [`simd`].
 
-pub(crate) mod albedo;
 pub(crate) mod anisotropic_albedo;
-pub(crate) mod blend;
 pub(crate) mod bsdf;
 pub(crate) mod cutouts;
 pub(crate) mod dielectric;

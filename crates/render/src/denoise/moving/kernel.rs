@@ -1,6 +1,6 @@
 //! The formula of the moving filter: a row of a level, for one or sixteen pixels at a time.
 
-use super::planes::MARGIN;
+use crate::denoise::moving::planes::MARGIN;
 use firstlight_simd::{Float, LANES, Real, Simd};
 
 /// Planes of a row of moments: the mean over channels, and its square.

@@ -13,11 +13,11 @@
 mod kernel;
 mod planes;
 
+use crate::denoise::moving::kernel::{Job, N_LIGHT, smooth_light, smooth_moments};
+use crate::denoise::moving::planes::{MARGIN, Planes};
 use crate::film::surfaces::PixelSurface;
 use firstlight_simd::{InstructionSet, dispatch};
 use glam::Vec3;
-use kernel::{Job, N_LIGHT, smooth_light, smooth_moments};
-use planes::{MARGIN, Planes};
 use rayon::prelude::*;
 
 /// An image to be smoothed.

@@ -4,11 +4,13 @@
 //! a time.
 
 mod curve;
+mod pixels;
 mod scale;
 mod srgb;
 
+use crate::film::develop::pixels::write_pixels;
 use crate::film::tiles::Film;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, Word, dispatch};
+use firstlight_simd::{Float, InstructionSet, LANES, Real, Simd, Vector, Word, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -131,14 +133,6 @@ fn develop_row<S: Simd>(s: S, row: &[Vec<f32>; 3], display: Display, rgba: &mut 
 fn exposed<S: Simd>(s: S, radiance: &[f32], exposure: f32) -> Float<S> {
     let radiance = radiance.first_chunk().expect("chunks are of sixteen");
     (Float::load(s, radiance) * exposure).at_least(0.0)
-}
-
-/// Writes the first pixels, as many as fit; red is the lowest byte.
-#[inline(always)]
-fn write_pixels<S: Simd>(pixels: Bits<S>, rgba: &mut [u8]) {
-    for (pixel, to) in pixels.to_array().iter().zip(rgba.chunks_exact_mut(4)) {
-        to.copy_from_slice(&pixel.to_le_bytes());
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Bilinear scaling of RGBA images, for previews during motion.
 
-use crate::film::develop::write_pixels;
+use crate::film::develop::pixels::write_pixels;
 use firstlight_simd::{Bits, InstructionSet, LANES, Simd, Word, dispatch, padded};
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Sample dimensions of light paths, and their Russian roulette.
 
-use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
+use crate::integrators::common::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 

@@ -19,7 +19,7 @@ pub(crate) struct MeasuredSplat {
     pub film: Vec2,
     /// Contribution before MIS weighting.
     pub light: Vec3,
-    /// Pdf of the light path over that of the same camera path, see [`super::weight`].
+    /// Pdf of the light path over that of the same camera path, see [`crate::integrators::common::caustics_weight`].
     pub ratio: f32,
     /// Probability with which the path survived Russian roulette.
     pub kept: f32,
@@ -82,7 +82,7 @@ impl LensConnections {
         (Vec2::new(self.film[0][i], self.film[1][i]), get(&self.light, i))
     }
 
-    /// Returns the data of a ray if [`super::pass::CausticPass::is_measured`].
+    /// Returns the data of a ray if [`crate::integrators::common::caustics_pass::CausticPass::is_measured`].
     pub fn measured(&self, i: usize) -> MeasuredSplat {
         let (film, light) = self.get(i);
         MeasuredSplat { film, light, ratio: self.ratio[i], kept: self.kept[i] }

@@ -11,12 +11,9 @@
 //! Scenes without specular surfaces or without finite lights have no [`crate::prepare::casters::CasterTable`], and no
 //! cost. Start reading at [`pass::CausticPass`].
 
-pub(crate) mod batches;
 pub(crate) mod dimensions;
 pub(crate) mod lens_connections;
-pub(crate) mod pass;
 pub(crate) mod pilot;
 pub(crate) mod plan;
 pub(crate) mod simd;
 pub(crate) mod trace;
-pub(crate) mod weight;

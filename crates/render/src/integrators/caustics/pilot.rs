@@ -1,8 +1,8 @@
 //! Pilot light paths, which fill the guiding cache.
 
 use crate::core::techniques::Techniques;
-use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::trace::LightWave;
+use crate::integrators::common::caustics_pass::CausticPass;
 use crate::prepare::guide::Guide;
 use rayon::prelude::*;
 

@@ -7,7 +7,7 @@
 //!
 //! The variance of a caustic for camera paths alone cannot be measured by camera paths: few find it, and those few are
 //! the variance. Light paths measure it. Let a light path contribute c to a pixel, as one of as many paths as there are
-//! pixels, and let r be its pdf over that of the same camera path (see [`super::weight`]). Sums over light paths of
+//! pixels, and let r be its pdf over that of the same camera path (see [`crate::integrators::common::caustics_weight`]). Sums over light paths of
 //!
 //! - c² r w² are the second moment of the contributions of camera paths with weight w,
 //! - c² w² / φ that of φ light paths per pixel with weight w,
@@ -19,11 +19,11 @@ use crate::core::caustic_plan::{CausticChoice, CausticPlan};
 use crate::core::filter::PixelFilter;
 use crate::core::settings::RenderSettings;
 use crate::integrators::caustics::lens_connections::MeasuredSplat;
-use crate::integrators::caustics::pass::{CausticPass, casters_of};
 use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::caustics::trace::LightWave;
+use crate::integrators::common::caustics_pass::{CausticPass, casters_of};
+use crate::integrators::common::work::Work;
 use crate::integrators::path::{CameraPath, PathWave};
-use crate::integrators::work::Work;
 use crate::prepare::plan_cache::PlanKey;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;

@@ -6,8 +6,8 @@
 use crate::core::camera::{Camera, Connection};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::integrators::caustics::lens_connections::LensConnections;
-use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::caustics::weight::etendue_gain;
+use crate::integrators::common::caustics_pass::CausticPass;
+use crate::integrators::common::caustics_weight::etendue_gain;
 use crate::integrators::simd::shade::{knows, scatters};
 use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;

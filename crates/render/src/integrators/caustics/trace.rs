@@ -10,17 +10,16 @@ use crate::core::filter::PixelFilter;
 use crate::core::material::{Material, MaterialId};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, VERTEX_DIMENSIONS, most_kept};
 use crate::integrators::caustics::lens_connections::{LensConnections, MeasuredSplat, Splat};
-use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::simd;
 use crate::integrators::caustics::simd::LightHits;
-use crate::integrators::caustics::weight::{MisBounce, etendue_gain_at, etendue_scale, is_reversible};
+use crate::integrators::common::caustics_pass::CausticPass;
+use crate::integrators::common::caustics_weight::{MisBounce, etendue_gain_at, etendue_scale, is_reversible};
+use crate::integrators::common::work::Work;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
-use crate::integrators::work::Work;
 use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
 use crate::prepare::guide::Trace;
 use crate::sampling::{Sampler, hash_u32};
-use crate::shading::blend::Blend;
 use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::{Interface, MediumId};
@@ -29,6 +28,7 @@ use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch};
 use crate::shading::scatter::{BsdfSample, Scatter};
 use crate::shading::sides::Sides;
+use crate::shading::surface::blend::Blend;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
@@ -44,7 +44,7 @@ const PILOT_REFLECTION: f32 = 0.25;
 struct LightPath {
     /// Flux over pdf.
     throughput: Vec3,
-    /// Pdf over that of the same camera path, up to the next vertex; see [`crate::integrators::caustics::weight`].
+    /// Pdf over that of the same camera path, up to the next vertex; see [`crate::integrators::common::caustics_weight`].
     ratio: f32,
     sampler: Sampler,
     /// The caster to be hit first; [`NO_CASTER`](crate::prepare::casters::NO_CASTER) afterwards.

@@ -1,15 +1,14 @@
 //! Shading of hits one at a time: of all materials without SIMD code, and of all others as the reference of tests.
 
-use super::PathWave;
 use crate::core::material::{Material, MaterialId};
 use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
-use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::caustics::weight::MisBounce;
-use crate::integrators::resampling::{CANDIDATES, is_resampled, worth};
-use crate::integrators::survival::{ROULETTE_GRACE, Survival};
+use crate::integrators::common::caustics_pass::CausticPass;
+use crate::integrators::common::caustics_weight::MisBounce;
+use crate::integrators::common::resampling::{CANDIDATES, is_resampled, worth};
+use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
+use crate::integrators::path::PathWave;
 use crate::prepare::prepared::Prepared;
-use crate::shading::blend::Blend;
 use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{
     DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension, resampling_dimension, shadow_roulette_dimension,
@@ -22,6 +21,7 @@ use crate::shading::principled::layers::Principled;
 use crate::shading::scatter::Scatter;
 use crate::shading::sides::Sides;
 use crate::shading::simd::lights::choose_light_points;
+use crate::shading::surface::blend::Blend;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::{Vertex, mesh_texture_point};
 use firstlight_kdtree::Hit;
@@ -294,7 +294,7 @@ struct PathStep<'a> {
     /// Number of segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
-    /// Number of light samples of which one is chosen, see [`crate::integrators::resampling`].
+    /// Number of light samples of which one is chosen, see [`crate::integrators::common::resampling`].
     n_candidates: u32,
     /// Whether directions are sampled with guiding.
     is_told: bool,

@@ -12,19 +12,20 @@
 //! Unlike [`crate::integrators::path`], it leaves out light from one diffuse surface to another, and caustics. Start
 //! reading at [`PhongWave::trace`].
 
+mod classic;
 mod finish;
 pub(crate) mod lobe;
 pub(crate) mod shadow;
 
 use crate::core::counts::RayCounts;
 use crate::core::settings::RenderSettings;
+use crate::integrators::common::survival::{ENDLESS_SURVIVAL, endless_depth};
+use crate::integrators::phong::classic::ClassicGroup;
 use crate::integrators::phong::finish::{Finish, Shiny};
 use crate::integrators::phong::lobe::*;
 use crate::integrators::phong::shadow::Shadows;
-use crate::integrators::simd::classic::ClassicGroup;
+use crate::integrators::simd::misses;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
-use crate::integrators::simd::{classic, misses};
-use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::prepared::Prepared;
 use crate::shading::dielectric::{fresnel, refract};
 use crate::shading::interface::Interface;

@@ -1,7 +1,7 @@
 //! Direct light of sixteen hits: points on lights, and shadow rays to them.
 
 use crate::core::techniques::Techniques;
-use crate::integrators::resampling::{CANDIDATES, is_resampled, worth};
+use crate::integrators::common::resampling::{CANDIDATES, is_resampled, worth};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::SamplerLanes;
 use crate::shading::dimensions::{first_dimension, resampling_dimension, shadow_roulette_dimension};
@@ -104,7 +104,7 @@ impl<S: Simd> LitLanes<'_, S> {
         Candidate { found, infinite: points.infinite, target: points.target, wi, light }
     }
 
-    /// Chooses one of several light samples; see [`crate::integrators::resampling`].
+    /// Chooses one of several light samples; see [`crate::integrators::common::resampling`].
     #[inline(always)]
     fn resampled<const KIND: usize>(&self, s: S) -> Candidate<S> {
         let zero = Float::splat(s, 0.0);

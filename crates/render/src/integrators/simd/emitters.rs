@@ -1,6 +1,6 @@
 //! Hits on emitters, sixteen at a time.
 
-use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::simd::shade::KindHits;
 use crate::shading::lights::bounce_weight;
 use crate::shading::simd::lane_group::LaneGroup;

@@ -1,6 +1,6 @@
 //! Features of camera rays that hit diffuse surfaces, sixteen at a time; see [`crate::integrators::features`].
 
-use crate::integrators::seen::Seen;
+use crate::integrators::common::seen::Seen;
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::bounce::colors_of;

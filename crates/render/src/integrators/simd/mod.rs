@@ -7,7 +7,6 @@
 //! Start reading at [`shade::shade`].
 
 pub(crate) mod camera;
-pub(crate) mod classic;
 pub(crate) mod direct;
 pub(crate) mod emitters;
 pub(crate) mod first_hits;

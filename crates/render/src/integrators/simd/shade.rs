@@ -1,11 +1,11 @@
 //! Hits on one kind of material: direct light, and the continuation of paths.
 
 use crate::core::techniques::Techniques;
-use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::resampling::{CANDIDATES, is_resampled};
+use crate::integrators::common::caustics_pass::CausticPass;
+use crate::integrators::common::resampling::{CANDIDATES, is_resampled};
+use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
 use crate::integrators::simd::direct::LitLanes;
 use crate::integrators::simd::track::BounceMisStates;
-use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;

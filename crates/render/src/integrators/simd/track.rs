@@ -1,9 +1,9 @@
-//! MIS states of sixteen paths against light paths; see [`crate::integrators::caustics::pass::CausticPass::follow`].
+//! MIS states of sixteen paths against light paths; see [`crate::integrators::common::caustics_pass::CausticPass::follow`].
 
 use crate::core::camera::Camera;
 use crate::core::material::Material;
-use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::caustics::weight::etendue_gain;
+use crate::integrators::common::caustics_pass::CausticPass;
+use crate::integrators::common::caustics_weight::etendue_gain;
 use crate::prepare::casters::NO_CASTER;
 use crate::sampling::cosine_hemisphere_pdf;
 use crate::shading::interface::MediumId;

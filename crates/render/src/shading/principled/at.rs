@@ -1,11 +1,11 @@
 //! Parameters of a layered material at a surface point.
 
-use super::iridescence::Film;
-use super::layers::{Inside, Principled, Transmission};
 use crate::core::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lookups::Lookups;
+use crate::shading::principled::iridescence::Film;
+use crate::shading::principled::layers::{Inside, Principled, Transmission};
 use crate::shading::sheen;
 use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;

@@ -23,10 +23,10 @@ mod seen;
 mod viewed;
 
 use crate::shading::interface::Interface;
+use crate::shading::principled::layers::Principled;
+use crate::shading::principled::seen::Seen;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use glam::{Vec2, Vec3};
-use layers::Principled;
-use seen::Seen;
 
 impl Scatter for Principled {
     fn has_non_specular(&self) -> bool {

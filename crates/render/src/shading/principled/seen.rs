@@ -1,6 +1,5 @@
 //! A layered surface seen along one direction.
 
-use super::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::core::color::luminance;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
@@ -8,6 +7,7 @@ use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_a
 use crate::shading::interface::Interface;
 use crate::shading::layer_albedo::{SchlickAlbedo, bounded_sheen, cosine_mean, hemisphere_mean, sheen_albedo};
 use crate::shading::metal::{mean_reflectance, with_further_bounces};
+use crate::shading::principled::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::shading::rough_glass::RoughGlass;
 use crate::shading::scatter::BsdfSample;
 use firstlight_kdtree::geometry::Frame;

@@ -1,8 +1,8 @@
 //! A layered surface asked several times about one viewer.
 
-use super::layers::Principled;
-use super::seen::Seen;
 use crate::shading::interface::Interface;
+use crate::shading::principled::layers::Principled;
+use crate::shading::principled::seen::Seen;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use glam::{Vec2, Vec3};
 

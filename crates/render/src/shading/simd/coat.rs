@@ -1,7 +1,7 @@
 //! Surfaces of two parts, sixteen at a time: diffuse under a rough or mirroring coat, as in blends and classic
 //! materials.
 //!
-//! The formulas are those of [`crate::shading::blend::Blend`]: light sampling evaluates both parts, BSDF sampling
+//! The formulas are those of [`crate::shading::surface::blend::Blend`]: light sampling evaluates both parts, BSDF sampling
 //! selects one and weights over both.
 
 use crate::core::color::luminance_of;

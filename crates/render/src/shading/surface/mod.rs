@@ -1,0 +1,163 @@
+//! The BSDF of the material at a vertex: one lobe, or a blend.
+
+pub(crate) mod albedo;
+pub(crate) mod blend;
+
+use crate::core::material::{MAX_LOBES, Material, MaterialId};
+use crate::prepare::prepared::Prepared;
+use crate::shading::bsdf::Lobe;
+use crate::shading::principled::at::principled_at;
+use crate::shading::principled::layers::Principled;
+use crate::shading::rough_glass;
+use crate::shading::sides::Sides;
+use crate::shading::surface::blend::{Blend, Part};
+use crate::shading::vertex::Vertex;
+use glam::{Vec2, Vec3};
+
+/// Returns the lobes of a blend at a vertex; `None` if all of it is black.
+///
+/// - `sides`: required by transparent parts; without it they may be distinguished from others, but not sampled.
+pub(crate) fn blend_at(
+    scene: &Prepared,
+    id: MaterialId,
+    vertex: &Vertex,
+    mut sides: Option<&mut Sides>,
+) -> Option<Blend> {
+    let mut parts = Parts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
+    collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
+    (parts.n > 0).then(|| Blend::new(&parts.parts[..parts.n], parts.layers))
+}
+
+/// The parts of a blend so far, with their weights.
+struct Parts {
+    parts: [(Part, f32); MAX_LOBES],
+    n: usize,
+    layers: Vec<Principled>,
+}
+
+impl Parts {
+    fn push(&mut self, lobe: Lobe, weight: f32) {
+        self.push_part(Part::Lobe(lobe), weight);
+    }
+
+    fn push_layers(&mut self, layers: Principled, weight: f32) {
+        self.push_part(Part::Layers(self.layers.len() as u8), weight);
+        self.layers.push(layers);
+    }
+
+    fn push_part(&mut self, part: Part, weight: f32) {
+        self.parts[self.n] = (part, weight);
+        self.n += 1;
+    }
+}
+
+/// - `n_leaves`: number of transparent parts so far, of any weight: counted like in [`crate::prepare::bodies::Bodies`].
+fn collect(
+    scene: &Prepared,
+    id: MaterialId,
+    vertex: &Vertex,
+    sides: &mut Option<&mut Sides>,
+    n_leaves: &mut u32,
+    weight: f32,
+    parts: &mut Parts,
+) {
+    let material = &scene.shading.materials[id as usize];
+    let leaf = *n_leaves;
+    *n_leaves += u32::from(material.is_clear());
+    match material {
+        Material::Blend { weight: share, a, b } => {
+            let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
+            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), parts);
+            collect(scene, *b, vertex, sides, n_leaves, weight * share, parts);
+        }
+        _ if weight == 0.0 => {}
+        Material::Phong { diffuse, specular, transparency, .. } => {
+            let specular = specular.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
+            let opaque = weight * (1.0 - transparency);
+            if opaque * (1.0 - specular) > 0.0 {
+                parts.push(
+                    Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.texture_point) },
+                    opaque * (1.0 - specular),
+                );
+            }
+            if opaque * specular > 0.0 {
+                parts.push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
+            }
+            if *transparency > 0.0 {
+                parts.push(clear_lobe(scene, sides, leaf), weight * transparency);
+            }
+        }
+        Material::Principled { .. } => {
+            if let Some(layers) = principled_at(scene, id, vertex, sides, leaf, false) {
+                parts.push_layers(layers, weight);
+            }
+        }
+        Material::Glass { .. } => parts.push(clear_lobe(scene, sides, leaf), weight),
+        Material::RoughGlass { alpha, compensate, .. } => {
+            parts.push(
+                rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.texture_point), *compensate),
+                weight,
+            );
+        }
+        _ => {
+            if let Some(lobe) = lobe_at(scene, id, vertex, None) {
+                parts.push(lobe, weight);
+            }
+        }
+    }
+}
+
+#[inline]
+fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lobe {
+    match sides {
+        Some(sides) => Lobe::Glass(sides.interface(scene, leaf)),
+        None => Lobe::CLEAR,
+    }
+}
+
+/// Replaces smooth glass by rough glass, if microfacets of this width change directions.
+#[inline]
+fn rough_lobe(smooth: Lobe, alpha: f32, compensate: bool) -> Lobe {
+    match smooth {
+        Lobe::Glass(interface) if !rough_glass::is_smooth(alpha, interface.eta) => {
+            Lobe::RoughGlass { interface, alpha: alpha.min(1.0), compensate }
+        }
+        _ => smooth,
+    }
+}
+
+/// Returns the alpha of a metal, otherwise 0.
+pub(crate) fn scalar_at(scene: &Prepared, id: MaterialId, uv: Vec2) -> f32 {
+    match &scene.shading.materials[id as usize] {
+        Material::Metal { alpha, .. } => alpha.eval(scene, uv).clamp(0.0, 1.0),
+        _ => 0.0,
+    }
+}
+
+/// Returns the lobe of a plain material; `None` if the surface is black. `sides` as in [`blend_at`].
+#[inline]
+pub(crate) fn lobe_at(
+    scene: &Prepared,
+    id: MaterialId,
+    vertex: &Vertex,
+    mut sides: Option<&mut Sides>,
+) -> Option<Lobe> {
+    let uv = vertex.texture_point;
+    match &scene.shading.materials[id as usize] {
+        Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),
+        Material::Mirror { reflectance } => Some(Lobe::Mirror { reflectance: reflectance.eval(scene, uv) }),
+        Material::Metal { alpha, reflectance, fresnel, compensate } => Some(Lobe::Metal {
+            alpha: alpha.eval(scene, uv).clamp(0.0, 1.0),
+            reflectance: reflectance.eval(scene, uv),
+            fresnel: *fresnel,
+            compensate: *compensate,
+        }),
+        Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
+        Material::RoughGlass { alpha, compensate, .. } => {
+            Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *compensate))
+        }
+        Material::Emissive { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Blend { .. } => {
+            None
+        }
+    }
+}

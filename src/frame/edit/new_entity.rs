@@ -1,0 +1,71 @@
+//! New entities: unique names, the last place in the order of the scene file.
+
+use crate::scene::{ColorParam, Material, Ordinal, Placement, SurfaceMaterial};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, Has, World};
+use glam::{DVec3, Vec3};
+
+/// Scales a placement uniformly.
+pub fn sized(placement: Placement, factor: f64) -> Placement {
+    let linear = crate::scene::Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
+    Placement { linear, ..placement }
+}
+
+/// Spawns an entity with a unique name, last in the order of the scene file.
+pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundle) -> Entity {
+    let (name, ordinal) = (free_name(world, name, false), next_ordinal(world));
+    world.spawn((bundle, Name::new(name), ordinal)).id()
+}
+
+pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity {
+    let (name, ordinal) = (free_name(world, name, true), next_ordinal(world));
+    world.spawn((SurfaceMaterial(material), Name::new(name), ordinal)).id()
+}
+
+/// Returns `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among everything else.
+pub fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
+    let mut named = world.query::<(&Name, Has<SurfaceMaterial>)>();
+    let taken: std::collections::HashSet<String> = (named.iter(world))
+        .filter(|(_, is_material)| *is_material == of_materials)
+        .map(|(name, _)| name.as_str().to_owned())
+        .collect();
+    let numbered = (2..).map(|i| format!("{name} {i}"));
+    std::iter::once(name.to_owned())
+        .chain(numbered)
+        .find(|name| !taken.contains(name))
+        .expect("the iterator is infinite")
+}
+
+pub fn next_ordinal(world: &mut World) -> Ordinal {
+    let last = world.query::<&Ordinal>().iter(world).map(|ordinal| ordinal.0).max();
+    Ordinal(last.map_or(0, |last| last.saturating_add(1)))
+}
+
+/// Removes the number that [`free_name`] has appended.
+pub fn plain_name(name: &str) -> &str {
+    match name.rsplit_once(' ') {
+        Some((plain, number)) if !plain.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()) => plain,
+        _ => name,
+    }
+}
+
+/// Creates a material for objects that come without one.
+pub fn clay(world: &mut World) -> Entity {
+    let clay = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
+    new_material(world, "clay", clay)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_numbered_and_copies_do_not_pile_up_numbers() {
+        let mut world = World::new();
+        for expected in ["ball", "ball 2", "ball 3"] {
+            let entity = spawn(&mut world, "ball", Placement::default());
+            assert_eq!(world.get::<Name>(entity).unwrap().as_str(), expected);
+        }
+        assert_eq!([plain_name("ball 17"), plain_name("tall ball"), plain_name("7")], ["ball", "tall ball", "7"]);
+    }
+}

@@ -1,0 +1,98 @@
+//! Makes meshes in the background: simplified, with other normals, or loaded for the first time.
+//!
+//! The new mesh is made from its source by the same code that opens a scene, so that a saved scene opens with the same
+//! triangles.
+
+use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::new_entity::{clay, spawn};
+use crate::frame::state::background::BackgroundTasks;
+use crate::frame::state::history::History;
+use crate::frame::state::remake::{ForWhom, Remade, Remake};
+use crate::frame::state::resources::{Clock, CurrentScene, Renderer};
+use crate::frame::state::selection::Selection;
+use crate::scene::{Linear, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, Shape};
+use bevy_ecs::prelude::{Entity, World};
+use glam::DVec3;
+
+/// Starts to make an object's mesh again. An unfinished request for the same object is dropped.
+pub fn start(world: &mut World, entity: Entity, shading: MeshShading, ratio: f64) -> Result<(), String> {
+    if !(ratio > 0.0 && ratio <= 1.0) {
+        return Err(format!("the ratio of faces to keep is {ratio}, but must be above 0 and at most 1"));
+    }
+    let origin = world.get::<MeshOrigin>(entity).ok_or("the source of this mesh is unknown")?;
+    let source = origin.source.clone();
+    // A control that repeats the present or the pending value has no effect.
+    if wanted_mesh(world, entity) != Some((shading, ratio)) {
+        run(world, ForWhom::Object(entity), source, shading, ratio);
+    }
+    Ok(())
+}
+
+/// Starts to load a mesh that will become a new object.
+pub fn start_new(world: &mut World, source: MeshSource, place: DVec3, size: f64) {
+    run(world, ForWhom::NewObject { place, size }, source, MeshShading::Auto, 1.0);
+}
+
+fn run(world: &mut World, for_whom: ForWhom, source: MeshSource, shading: MeshShading, ratio: f64) {
+    let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
+    let revision = History::revision(world);
+    let job = Remake { for_whom, source, shading, ratio, revision, folder };
+    let pool = world.resource::<Renderer>().0.pool();
+    world.resource::<BackgroundTasks>().remake(job, pool);
+}
+
+/// The shading and the share of faces of an object's mesh, as present or pending; `None` if its source is unknown.
+pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShading, f64)> {
+    let origin = world.get::<MeshOrigin>(entity)?;
+    let pending = world.resource::<BackgroundTasks>().wanted(entity);
+    Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
+}
+
+/// Drops a pending mesh, if nothing was changed after its request: undo affects the newest change first.
+pub fn take_back(world: &mut World) -> Option<()> {
+    let revision = History::revision(world);
+    let job = world.resource::<BackgroundTasks>().forget_mesh(revision)?;
+    let now = world.resource::<Clock>().0;
+    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{}: stopped", job.title()));
+    Some(())
+}
+
+/// Puts a finished mesh into the world.
+pub fn take(world: &mut World, remade: Remade) {
+    let Remade { job, result } = remade;
+    let (mesh, measure) = match result {
+        Ok(made) => made,
+        Err(error) => {
+            let now = world.resource::<Clock>().0;
+            for problem in &error.problems {
+                world.resource_mut::<Status>().say(now, MessageKind::Error, problem.to_string());
+            }
+            return;
+        }
+    };
+    let simplify = (job.ratio < 1.0).then_some(job.ratio);
+    match job.for_whom {
+        ForWhom::Object(entity) => {
+            let Some(origin) = world.get::<MeshOrigin>(entity).cloned() else { return };
+            let origin = MeshOrigin { shading: job.shading, simplify, ..origin };
+            world.entity_mut(entity).insert((Shape::Mesh(mesh), origin, measure));
+        }
+        ForWhom::NewObject { place, size } => {
+            let material = clay(world);
+            let bounds = mesh.bounds();
+            let extent = f64::from((bounds.max - bounds.min).max_element()).max(f64::MIN_POSITIVE);
+            let factor = 2.0 * size / extent;
+            // Its lowest point is at the position.
+            let foot = mesh.center + 0.5 * (bounds.min + bounds.max).as_dvec3().with_y(2.0 * f64::from(bounds.min.y));
+            let linear = Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
+            let placement = Placement { translation: place - factor * foot, linear };
+            let origin =
+                MeshOrigin { source: job.source.clone(), shading: job.shading, simplify, own_materials: false };
+            let name = job.source.name();
+            let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+            let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);
+            let entity = spawn(world, &stem.unwrap_or_else(|| name.to_owned()), bundle);
+            world.resource_mut::<Selection>().choose(entity, false);
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Size of a scene: what "frame all" frames, and the scale of the flying speed.
+
+use crate::scene::world::components::{Material, Shape};
+use crate::scene::world::inputs::{ObjectInput, SceneInputs};
+use glam::DVec3;
+use std::collections::{HashMap, HashSet};
+
+/// A sphere around the finite objects of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extent {
+    /// Centre of the sphere in the world, metres.
+    pub center: DVec3,
+    /// Metres; 0 if nothing is finite.
+    pub radius: f64,
+}
+
+/// Bounding boxes of meshes and groups of spheres in object space, cached.
+#[derive(Clone, Debug, Default)]
+pub struct ExtentCache(HashMap<usize, (Shape, (DVec3, DVec3))>);
+
+impl ExtentCache {
+    /// The extent of the visible objects, without outliers; light sources count only if there is nothing else.
+    pub fn extent(&mut self, inputs: &SceneInputs) -> Extent {
+        let boxes = self.near_boxes(inputs);
+        let around =
+            boxes.into_iter().reduce(|(min, max), (other_min, other_max)| (min.min(other_min), max.max(other_max)));
+        match around {
+            Some((min, max)) => Extent { center: 0.5 * min + 0.5 * max, radius: 0.5 * (max - min).length() },
+            None => Extent::default(),
+        }
+    }
+
+    /// Corners of the boxes that [`Self::extent`] includes, for framing.
+    pub fn corners(&mut self, inputs: &SceneInputs) -> Vec<DVec3> {
+        self.near_boxes(inputs).into_iter().flat_map(|(min, max)| corners_of(min, max)).collect()
+    }
+
+    /// Corners of the world-space box of one object; empty for infinite and invalid ones.
+    pub fn corners_of(&mut self, object: &ObjectInput) -> Vec<DVec3> {
+        self.world_box(object).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default()
+    }
+
+    fn near_boxes(&mut self, inputs: &SceneInputs) -> Vec<(DVec3, DVec3)> {
+        let used: HashSet<usize> = inputs.objects.iter().filter_map(|object| key(&object.shape)).collect();
+        self.0.retain(|key, _| used.contains(key));
+        let glowing: HashSet<_> = (inputs.materials.iter())
+            .filter(|material| matches!(material.material, Material::Emissive { .. }))
+            .map(|material| material.entity)
+            .collect();
+        let is_light =
+            |object: &&ObjectInput| !object.slots.is_empty() && object.slots.iter().all(|slot| glowing.contains(slot));
+        let (lights, things): (Vec<_>, Vec<_>) = inputs.objects.iter().partition(is_light);
+        let mut boxes = |objects: Vec<&ObjectInput>| -> Vec<(DVec3, DVec3)> {
+            objects.into_iter().filter_map(|object| self.world_box(object)).collect()
+        };
+        let mut near = boxes(things);
+        if near.is_empty() {
+            near = boxes(lights);
+        }
+        leave_out_far(&mut near);
+        near
+    }
+
+    /// The world-space bounding box of an object, metres; `None` for infinite and invalid ones.
+    pub fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
+        let (min, max) = self.own_box(&object.shape)?;
+        let world = object.placement.affine();
+        let corners = corners_of(min, max).map(|corner| world.transform_point3(corner));
+        box_of(corners).filter(|(min, max)| min.is_finite() && max.is_finite())
+    }
+
+    /// The object-space bounding box of a shape; `None` for infinite and invalid ones.
+    pub fn own_box(&mut self, shape: &Shape) -> Option<(DVec3, DVec3)> {
+        match shape {
+            Shape::Plane { .. } => None,
+            Shape::Sphere { radius } => Some((DVec3::splat(-radius), DVec3::splat(*radius))),
+            Shape::Quad { edge_u, edge_v } => box_of([DVec3::ZERO, *edge_u, *edge_v, edge_u + edge_v]),
+            Shape::Triangle { vertices } => box_of(*vertices),
+            shape @ (Shape::Mesh(_) | Shape::Spheres(_)) => {
+                let key = key(shape)?;
+                match self.0.get(&key) {
+                    Some((_, known)) => Some(*known),
+                    None => {
+                        let own = own_box(shape)?;
+                        self.0.insert(key, (shape.clone(), own));
+                        Some(own)
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Removes the boxes that reach more than twice as far from the median centre as the median box: distant single objects
+/// and very large grounds.
+fn leave_out_far(boxes: &mut Vec<(DVec3, DVec3)>) {
+    let median = |mut values: Vec<f64>| {
+        values.sort_unstable_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let middle =
+        DVec3::from_array([0, 1, 2].map(|axis| median(boxes.iter().map(|(a, b)| 0.5 * (a[axis] + b[axis])).collect())));
+    let reach = |(min, max): &(DVec3, DVec3)| (0.5 * (*min + *max) - middle).length() + 0.5 * (*max - *min).length();
+    let limit = 2.0 * median(boxes.iter().map(reach).collect());
+    boxes.retain(|bounds| reach(bounds) <= limit);
+}
+
+fn key(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Mesh(mesh) => Some(std::sync::Arc::as_ptr(mesh) as usize),
+        Shape::Spheres(balls) => Some(std::sync::Arc::as_ptr(balls) as usize),
+        _ => None,
+    }
+}
+
+fn own_box(shape: &Shape) -> Option<(DVec3, DVec3)> {
+    let (center, (min, max)) = match shape {
+        Shape::Mesh(mesh) => {
+            let used = mesh.triangles.iter().flatten().filter_map(|&v| mesh.positions.get(v as usize));
+            (mesh.center, box_of(used.map(|position| position.as_dvec3()))?)
+        }
+        Shape::Spheres(balls) => {
+            let ends = balls.centers.iter().zip(&balls.radii).flat_map(|(center, &radius)| {
+                let (center, radius) = (center.as_dvec3(), DVec3::splat(radius.into()));
+                [center - radius, center + radius]
+            });
+            (balls.center, box_of(ends)?)
+        }
+        _ => return None,
+    };
+    Some((min + center, max + center))
+}
+
+fn corners_of(min: DVec3, max: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|i| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    })
+}
+
+fn box_of(points: impl IntoIterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    points.into_iter().map(|point| (point, point)).reduce(|(min, max), (point, _)| (min.min(point), max.max(point)))
+}

@@ -1,0 +1,188 @@
+//! All data that the image depends on, copied from the world in a fixed order.
+
+use crate::format::bad_value::BadValue;
+use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
+use crate::format::placement::Placement;
+use crate::format::view::{Lens, Projection, View};
+use crate::scene::world::components::{Material, MaterialSlots, Ordinal, SceneEnvironment, Shape, SurfaceMaterial};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, Or, Query, Res, With, World};
+use bevy_ecs::system::{SystemParam, SystemState};
+use std::collections::HashSet;
+
+/// All inputs of a snapshot. Cheap to clone: meshes, groups of spheres and images are shared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneInputs {
+    /// All objects.
+    pub objects: Vec<ObjectInput>,
+    /// The materials that the objects use, directly or in a blend.
+    pub materials: Vec<MaterialInput>,
+    /// All lights that are not objects.
+    pub lights: Vec<LightInput>,
+    /// The first camera.
+    pub camera: Option<CameraInput>,
+    /// The environment and the absorption of the air.
+    pub environment: SceneEnvironment,
+}
+
+/// The data of an object that the image depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectInput {
+    /// The entity in the world.
+    pub entity: Entity,
+    /// Its `Name`, if it has one.
+    pub name: Option<String>,
+    /// Its surface in object space.
+    pub shape: Shape,
+    /// From object space to the world.
+    pub placement: Placement,
+    /// Its material entities, by slot.
+    pub slots: Vec<Entity>,
+}
+
+/// The data of a material that the image depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialInput {
+    /// The entity in the world.
+    pub entity: Entity,
+    /// Its `Name`, if it has one.
+    pub name: Option<String>,
+    /// The material itself.
+    pub material: Material,
+}
+
+/// The data of a light that the image depends on; for lights that are not objects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightInput {
+    /// The entity in the world.
+    pub entity: Entity,
+    /// Its `Name`, if it has one.
+    pub name: Option<String>,
+    /// Kind and parameters.
+    pub light: LightKind,
+    /// Its position and orientation in the world.
+    pub placement: Placement,
+}
+
+/// The data of a camera that the image depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraInput {
+    /// The entity in the world.
+    pub entity: Entity,
+    /// Its position and orientation.
+    pub view: View,
+    /// Its field of view.
+    pub projection: Projection,
+    /// Its aperture and focus.
+    pub lens: Lens,
+}
+
+impl CameraInput {
+    /// # Errors
+    /// If one of its components is invalid.
+    pub fn check(&self) -> Result<(), BadValue> {
+        self.view.check()?;
+        self.projection.check()?;
+        self.lens.check()
+    }
+}
+
+type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
+
+type LightParts = (Option<&'static PointLight>, Option<&'static SpotLight>, Option<&'static DirectionalLight>);
+
+/// Matches lights that are not objects.
+pub type WithLight = Or<(With<PointLight>, With<SpotLight>, With<DirectionalLight>)>;
+
+/// Read access to all data that the image depends on.
+#[derive(SystemParam)]
+pub struct SceneQueries<'w, 's> {
+    objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
+    materials: Query<'w, 's, Ranked<'static, &'static SurfaceMaterial>>,
+    lights: Query<'w, 's, Ranked<'static, (LightParts, &'static Placement)>, WithLight>,
+    cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
+    environment: Option<Res<'w, SceneEnvironment>>,
+}
+
+impl SceneQueries<'_, '_> {
+    /// Copies all data that the image depends on, in the order of the scene file.
+    pub fn collect(&self) -> SceneInputs {
+        let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
+        let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
+            entity,
+            name: text(name),
+            shape: shape.clone(),
+            placement: *placement,
+            slots: slots.0.clone(),
+        });
+        let used = self.used_materials(&objects);
+        let materials = self.materials.iter().filter(|(entity, ..)| used.contains(entity));
+        SceneInputs {
+            materials: in_order(materials, |entity, name, material| MaterialInput {
+                entity,
+                name: text(name),
+                material: material.0.clone(),
+            }),
+            objects,
+            lights: in_order(self.lights.iter(), |entity, name, ((point, spot, directional), placement)| LightInput {
+                entity,
+                name: text(name),
+                light: LightKind::first(point, spot, directional).expect("the query asks for one of them"),
+                placement: *placement,
+            }),
+            camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(
+                |(entity, _, _, (view, projection, lens))| CameraInput {
+                    entity,
+                    view: *view,
+                    projection: *projection,
+                    lens: *lens,
+                },
+            ),
+            environment: self.environment(),
+        }
+    }
+
+    /// The environment; the default if the resource is missing.
+    pub fn environment(&self) -> SceneEnvironment {
+        self.environment.as_deref().cloned().unwrap_or_default()
+    }
+
+    /// The materials of the objects, and the parts of their blends.
+    fn used_materials(&self, objects: &[ObjectInput]) -> HashSet<Entity> {
+        let mut used = HashSet::new();
+        let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
+        while let Some(entity) = open.pop() {
+            if used.insert(entity)
+                && let Ok((.., SurfaceMaterial(Material::Blend { a, b, .. }))) = self.materials.get(entity)
+            {
+                open.extend([*a, *b]);
+            }
+        }
+        used
+    }
+}
+
+impl SceneInputs {
+    /// Reads a world outside of a schedule.
+    pub fn of(world: &mut World) -> Self {
+        SystemState::<SceneQueries>::new(world)
+            .get(world)
+            .expect("queries of optional things are always valid")
+            .collect()
+    }
+}
+
+/// By the order in the file, then by entity: deterministic across processes.
+fn order(rank: Option<&Ordinal>, entity: Entity) -> (u32, Entity) {
+    (rank.map_or(u32::MAX, |rank| rank.0), entity)
+}
+
+fn in_order<'a, T, U>(
+    items: impl Iterator<Item = Ranked<'a, T>>,
+    make: impl Fn(Entity, Option<&'a Name>, T) -> U,
+) -> Vec<U> {
+    let mut ranked: Vec<_> =
+        items.map(|(entity, rank, name, item)| (order(rank, entity), make(entity, name, item))).collect();
+    ranked.sort_by_key(|(key, _)| *key);
+    ranked.into_iter().map(|(_, item)| item).collect()
+}

@@ -1,0 +1,173 @@
+//! Cache of the kd-trees of meshes and of the trees of groups of spheres.
+
+use crate::kdtree::{BuildPreset, MeshTree, SphereTree};
+use crate::mesh::Mesh;
+use crate::scene::world::components::{Balls, Shape};
+use crate::scene::world::inputs::SceneInputs;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+/// Trees by the address of the mesh or group of spheres they were built from.
+#[derive(Clone, Debug, Default)]
+pub struct Trees {
+    pub(crate) meshes: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
+    pub(crate) balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
+    /// Shapes without a tree because they are invalid, and why.
+    unfit: HashMap<usize, (Shape, String)>,
+    /// Meshes with a tree of the quick preset: equal hits, slower traversal.
+    hasty: HashSet<usize>,
+}
+
+impl Trees {
+    /// Whether nothing has to be built for this shape.
+    pub fn has(&self, shape: &Shape) -> bool {
+        if shared(shape).is_some_and(|key| self.unfit.contains_key(&key)) {
+            return true;
+        }
+        match shape {
+            Shape::Mesh(mesh) => self.meshes.contains_key(&address(mesh)),
+            Shape::Spheres(balls) => self.balls.contains_key(&address(balls)),
+            _ => true,
+        }
+    }
+
+    /// Builds the tree of a mesh or a group of spheres, unless it has one.
+    ///
+    /// # Errors
+    /// If the mesh has no triangles, an index out of range or a coordinate that is not finite.
+    pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
+        self.add_by(shape, BuildPreset::Best)
+    }
+
+    /// Like [`Self::add`], but for a quick first image: the tree of a large mesh is built several times as fast and
+    /// gives the same hits with slower traversal. [`Self::hasty`] lists such meshes.
+    ///
+    /// # Errors
+    /// Like [`Self::add`].
+    pub fn add_hastily(&mut self, shape: &Shape) -> Result<(), String> {
+        /// Below this, the best tree is built within a frame or two.
+        const LARGE: usize = 10_000;
+        let is_large = matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() >= LARGE);
+        self.add_by(shape, if is_large { BuildPreset::Quick } else { BuildPreset::Best })
+    }
+
+    fn add_by(&mut self, shape: &Shape, preset: BuildPreset) -> Result<(), String> {
+        if self.has(shape) {
+            return Ok(());
+        }
+        match shape {
+            Shape::Mesh(mesh) => {
+                check_mesh(mesh)?;
+                let tree = MeshTree::build(&mesh.positions, &mesh.triangles, preset);
+                self.meshes.insert(address(mesh), (mesh.clone(), Arc::new(tree)));
+                if preset == BuildPreset::Quick {
+                    self.hasty.insert(address(mesh));
+                }
+            }
+            Shape::Spheres(balls) => {
+                check_balls(balls)?;
+                let tree = SphereTree::build(&balls.centers, &balls.radii);
+                self.balls.insert(address(balls), (balls.clone(), Arc::new(tree)));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The meshes with a tree of the quick preset, in ascending order of size.
+    pub fn hasty(&self) -> Vec<Shape> {
+        let meshes = self.meshes.iter().filter(|(key, _)| self.hasty.contains(key));
+        let mut meshes: Vec<Arc<Mesh>> = meshes.map(|(_, (mesh, _))| mesh.clone()).collect();
+        // The largest takes the longest to rebuild.
+        meshes.sort_by_key(|mesh| mesh.triangles.len());
+        meshes.into_iter().map(Shape::Mesh).collect()
+    }
+
+    /// Records that no tree can be built, so that it is not tried again.
+    pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
+        if let Some(key) = shared(shape) {
+            self.unfit.insert(key, (shape.clone(), reason));
+        }
+    }
+
+    /// Why this shape has no tree.
+    pub(crate) fn reason(&self, shape: &Shape) -> String {
+        let reason = shared(shape).and_then(|key| self.unfit.get(&key));
+        reason.map_or("its kd-tree is not built yet".to_owned(), |(_, reason)| reason.clone())
+    }
+
+    /// Memory of all trees, bytes; for groups of spheres, of the spheres only.
+    pub fn bytes(&self) -> usize {
+        self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
+            + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
+    }
+
+    /// Adds all trees of `other`, except quick ones for which there already is a tree.
+    pub fn extend(&mut self, other: Self) {
+        self.unfit.extend(other.unfit);
+        for (key, tree) in other.meshes {
+            if !other.hasty.contains(&key) {
+                self.hasty.remove(&key);
+            } else if self.meshes.contains_key(&key) {
+                continue;
+            } else {
+                self.hasty.insert(key);
+            }
+            self.meshes.insert(key, tree);
+        }
+        self.balls.extend(other.balls);
+    }
+
+    /// Removes the trees of shapes that no object uses.
+    pub fn keep_used(&mut self, inputs: &SceneInputs) {
+        let used: HashSet<usize> = inputs.objects.iter().filter_map(|o| shared(&o.shape)).collect();
+        self.meshes.retain(|key, _| used.contains(key));
+        self.balls.retain(|key, _| used.contains(key));
+        self.unfit.retain(|key, _| used.contains(key));
+        self.hasty.retain(|key| used.contains(key));
+    }
+}
+
+pub(crate) fn address<T>(shared: &Arc<T>) -> usize {
+    Arc::as_ptr(shared) as usize
+}
+
+fn shared(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Mesh(mesh) => Some(address(mesh)),
+        Shape::Spheres(balls) => Some(address(balls)),
+        _ => None,
+    }
+}
+
+fn check_mesh(mesh: &Mesh) -> Result<(), String> {
+    let n = mesh.positions.len();
+    if mesh.triangles.is_empty() {
+        return Err("the mesh has no triangles".to_owned());
+    }
+    if let Some(i) = mesh.triangles.iter().position(|corners| corners.iter().any(|&v| v as usize >= n)) {
+        return Err(format!("triangle {i} uses vertex {:?}, but the mesh has {n}", mesh.triangles[i].iter().max()));
+    }
+    if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(format!("vertex {i} of the mesh is not finite"));
+    }
+    let per_vertex = |len: usize| len == 0 || len == n;
+    let attributes = [mesh.normals.len(), mesh.uvs.len(), mesh.uvs2.len(), mesh.colors.len(), mesh.tangents.len()];
+    if !attributes.into_iter().all(per_vertex) {
+        return Err("the mesh needs one value of each attribute per vertex, or none".to_owned());
+    }
+    if !mesh.slots.is_empty() && mesh.slots.len() != mesh.triangles.len() {
+        return Err("the mesh needs one material slot per triangle, or none".to_owned());
+    }
+    Ok(())
+}
+
+fn check_balls(balls: &Balls) -> Result<(), String> {
+    if balls.centers.is_empty() || balls.centers.len() != balls.radii.len() {
+        return Err(format!("there are {} centres and {} radii", balls.centers.len(), balls.radii.len()));
+    }
+    match balls.centers.iter().zip(&balls.radii).position(|(c, r)| !(c.is_finite() && r.is_finite() && *r > 0.0)) {
+        Some(i) => Err(format!("sphere {i} needs a finite centre and a positive radius")),
+        None => Ok(()),
+    }
+}

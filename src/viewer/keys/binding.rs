@@ -1,0 +1,142 @@
+//! Triggers and what they do: the types of the table.
+
+use crate::frame::{Command, gizmo};
+use crate::render::Inspection;
+use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey};
+
+/// A line of the table: triggers and their effect.
+pub struct Binding {
+    pub triggers: &'static [Trigger],
+    pub effect: &'static str,
+}
+
+impl Binding {
+    /// The text that a search looks in.
+    pub fn line(&self, title: &str) -> String {
+        format!("{title} {} {}", self.keys(), self.effect)
+    }
+}
+
+/// A heading and its lines.
+pub struct KeyGroup {
+    pub title: &'static str,
+    pub bindings: &'static [Binding],
+}
+
+pub enum Trigger {
+    /// Moves for as long as the key is down.
+    Hold(KeyCode, Motion),
+    /// Triggers once per press, and again on keyboard repeat.
+    Press(Chord, Action),
+    /// One of the keys 1 to 9, whatever it types.
+    Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
+    /// A gesture, described in words; `input` implements it.
+    Mouse(&'static str),
+}
+
+/// A key with its modifiers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chord {
+    pub key: Typed,
+    pub ctrl: bool,
+    /// `None` if typing the character may or may not need Shift.
+    pub shift: Option<bool>,
+}
+
+/// The result of typing a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Typed {
+    Text(&'static str),
+    Named(NamedKey),
+}
+
+/// The movement of a held key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    Forward,
+    Back,
+    Left,
+    Right,
+    Up,
+    Down,
+    OrbitLeft,
+    OrbitRight,
+    OrbitUp,
+    OrbitDown,
+    RollLeft,
+    RollRight,
+}
+
+/// The action of a pressed key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    Send(Command),
+    TogglePause,
+    ToggleIntegrator,
+    /// Saves the displayed image (PNG), or linear radiance (EXR).
+    Screenshot {
+        linear: bool,
+    },
+    /// Saves as a scene file: the open one, or a new one.
+    SaveScene {
+        new: bool,
+    },
+    PrintView,
+    /// Toggles between this inspection and the image.
+    Inspect(Inspection),
+    /// Explains the pixel under the mouse.
+    Explain,
+    /// The next drag selects a rectangle that gets all samples.
+    Brush,
+    ClearRegion,
+    ToggleSharpZone,
+    /// Cycles through move, rotate, scale and none.
+    NextGizmo,
+    /// Shows these handles, or hides them if they are shown already.
+    Gizmo(Option<gizmo::Mode>),
+    /// Starts or stops the turntable.
+    ToggleSpin,
+    /// Toggles whether a drag looks around or orbits the pivot.
+    ToggleDrag,
+    /// Captures the mouse, so that it moves the view without a button, or releases it.
+    CaptureMouse,
+    /// Toggles whether focus follows the mouse.
+    FocusFollows,
+    /// Shows a dialog to choose a file to open.
+    OpenDialog,
+    TogglePanel,
+    ToggleHelp,
+    ToggleOverlays,
+    ToggleFullscreen,
+    /// Closes the help, or clears the selection, or closes the window.
+    Leave,
+    Quit,
+}
+
+impl Motion {
+    /// Whether it moves the camera along its own axes.
+    pub fn flies(self) -> bool {
+        matches!(self, Self::Forward | Self::Back | Self::Left | Self::Right | Self::Up | Self::Down)
+    }
+}
+
+impl Chord {
+    /// Whether one press may match both.
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        let apart = self.shift.is_some() && other.shift.is_some() && self.shift != other.shift;
+        self.key == other.key && self.ctrl == other.ctrl && !apart
+    }
+
+    pub(super) fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
+        let same_key = match (self.key, key) {
+            // With Shift or Caps Lock the letter is reported as a capital.
+            (Typed::Text(text), Key::Character(typed)) => text.eq_ignore_ascii_case(typed),
+            (Typed::Named(name), Key::Named(typed)) => name == *typed,
+            _ => false,
+        };
+        same_key
+            && self.ctrl == modifiers.control_key()
+            && self.shift.is_none_or(|shift| shift == modifiers.shift_key())
+            && !modifiers.super_key()
+    }
+}

@@ -1,0 +1,114 @@
+//! What the panel remembers, what it is shown beside the session, and what it asks for.
+
+use crate::frame::{Command, DenoiseFilter, Edit, Navigation, Session, gizmo};
+use crate::scene::Inventory;
+use crate::viewer::change::PictureChange;
+use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::panel::list::ListState;
+use crate::viewer::reaction::Reaction;
+use bevy_ecs::prelude::Entity;
+use std::rc::Rc;
+
+/// State of the panel.
+pub struct PanelState {
+    pub shown: bool,
+    /// The handles over the selection.
+    pub gizmo: Option<gizmo::Mode>,
+    pub change: PictureChange,
+    /// Path of a file to be added.
+    pub mesh_path: String,
+    /// Size of saved images, as a multiple of the window's.
+    pub scale: u32,
+    /// The mouse was pressed in the panel and has not been released.
+    pub pressed: bool,
+    /// Lists of the scene's items, with the revision of the scene.
+    pub inventory: Option<(u64, Rc<Inventory>)>,
+    pub object_list: ListState,
+    pub material_list: ListState,
+    pub light_list: ListState,
+    /// The material whose editor is open in the list.
+    pub material: Option<Entity>,
+}
+
+impl PanelState {
+    /// Returns the inventory, rebuilt only if it is shown and the scene has changed.
+    pub fn inventory(&mut self, session: &Session) -> Rc<Inventory> {
+        let revision = session.revision();
+        let known = self.inventory.take().filter(|(of, _)| *of == revision);
+        let (_, inventory) = self.inventory.insert(known.unwrap_or_else(|| (revision, Rc::new(session.inventory()))));
+        inventory.clone()
+    }
+
+    /// What the list of objects calls an object or a light; `None` if it is not there.
+    pub fn label_of(&mut self, session: &Session, entity: Entity) -> Option<String> {
+        let inventory = self.inventory(session);
+        inventory.objects.iter().find(|entry| entry.entity == entity).map(|entry| entry.label.clone())
+    }
+}
+
+impl Default for PanelState {
+    fn default() -> Self {
+        Self {
+            shown: false,
+            gizmo: None,
+            change: PictureChange::default(),
+            mesh_path: String::new(),
+            scale: 1,
+            pressed: false,
+            inventory: None,
+            object_list: ListState::default(),
+            material_list: ListState::default(),
+            light_list: ListState::default(),
+            material: None,
+        }
+    }
+}
+
+/// Values shown besides the session.
+pub struct Around<'a> {
+    pub reaction: &'a Reaction,
+    pub speed: f64,
+    pub spinning: bool,
+    /// Whether the animation plays.
+    pub playing: bool,
+    /// Whether a drag orbits the pivot.
+    pub orbits: bool,
+    /// The preset of keys and gestures.
+    pub navigation: Navigation,
+    /// The mouse position as a fraction of the image.
+    pub place: [f64; 2],
+    /// Memory of the process in bytes, if known.
+    pub memory: Option<u64>,
+    /// Whether the next drag selects a rectangle.
+    pub brush: bool,
+    /// Recent scenes, the latest first.
+    pub recent: &'a [String],
+}
+
+/// Requests of the panel.
+#[derive(Default)]
+pub struct Asked {
+    pub commands: Vec<Command>,
+    pub speed: Option<f64>,
+    pub toggle_spin: bool,
+    pub toggle_play: bool,
+    pub toggle_drag: bool,
+    pub navigation: Option<Navigation>,
+    pub screenshot: Option<bool>,
+    pub save_layers: bool,
+    /// The filter of denoised images, which may not be installed.
+    pub filter: Option<DenoiseFilter>,
+    pub toggle_brush: bool,
+    /// A file dialog to show, with its purpose.
+    pub dialog: Option<DialogPurpose>,
+}
+
+impl Asked {
+    pub fn send(&mut self, command: Command) {
+        self.commands.push(command);
+    }
+
+    pub fn edit(&mut self, edit: Edit) {
+        self.commands.push(Command::Edit(edit));
+    }
+}
