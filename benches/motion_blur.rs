@@ -69,18 +69,7 @@ fn preparation(n: u32) -> f64 {
 }
 
 fn eye() -> Camera {
-    Camera {
-        eye: Vec3::new(0.0, 5.0, 10.0),
-        right: Vec3::X,
-        up: Vec3::Y,
-        forward: Vec3::NEG_Z,
-        tan_half_vfov: 0.5,
-        orthographic: None,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
-        blades: 0,
-        blade_rotation: 0.0,
-    }
+    Camera { eye: Vec3::new(0.0, 5.0, 10.0), tan_half_vfov: 0.5, ..Camera::default() }
 }
 
 fn row(name: &str) {

@@ -23,7 +23,7 @@ pub const LIMITS: Limits = Limits {
     library_bytes: 1 << 18,
     scene_bytes: 1 << 20,
     picture_pixels: 1 << 18,
-    scene_pixels: 1 << 21,
+    scene_image_bytes: 1 << 23,
     film_pixels: 1 << 12,
     note_bytes: 1 << 18,
     recording_bytes: 1 << 18,

@@ -4,6 +4,7 @@ use crate::cli::args::{SceneArgs, ScenesArgs, check_scenes};
 use crate::cli::console;
 use crate::cli::console::print;
 use crate::cli::failure::Failure;
+use crate::cli::info_materials;
 use crate::cli::info_objects::ObjectList;
 use crate::cli::number::{counted, two_digits};
 use clap::Args;
@@ -28,6 +29,9 @@ pub struct InfoArgs {
     /// Compare kd-trees over each mesh: build time, size, and cost per ray.
     #[arg(long)]
     tree: bool,
+    /// List the materials with what differs from their defaults.
+    #[arg(long)]
+    materials: bool,
     /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
@@ -63,7 +67,20 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     let list = ObjectList::of(&inputs);
     let told =
         Told { scene: &scene, inputs: &inputs, list, extraction: &extraction, film, layers, caustics, animation };
-    if args.json { print(told.json()) } else { print(told.text()) }
+    match (args.json, args.materials) {
+        (true, false) => print(told.json()),
+        (true, true) => {
+            let mut json = told.json();
+            json["material_list"] = info_materials::json(&inputs);
+            print(json)
+        }
+        (false, _) => {
+            let mut text = told.text();
+            let materials = args.materials.then(|| info_materials::lines(&inputs)).into_iter().flatten();
+            text.extend(materials.map(|line| format!("  material      {line}")));
+            print(text)
+        }
+    }
 }
 
 /// The data for the report on a scene.

@@ -15,6 +15,7 @@ mod failure;
 mod film_denoiser;
 mod frames;
 mod info;
+mod info_materials;
 mod info_objects;
 mod job;
 mod layers;

@@ -167,7 +167,6 @@ fn extract(
         if hexadecimal(sum) != *expected {
             return Err(UnpackError::Damaged(name));
         }
-        out.sync_all().map_err(failed)?;
     }
     if let Some(missing) = sums.keys().find(|name| !part.path().join(text_to_path(name)).is_file()) {
         return Err(UnpackError::Damaged(missing.clone()));

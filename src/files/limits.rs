@@ -16,8 +16,8 @@ pub struct Limits {
     pub scene_bytes: u64,
     /// Pixels of an image; decoding takes up to 32 bytes of memory per pixel.
     pub picture_pixels: u64,
-    /// Pixels of all images of a scene together, which stay in memory.
-    pub scene_pixels: u64,
+    /// Bytes of all images of a scene together, as they stay in memory.
+    pub scene_image_bytes: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
     /// Bytes of the metadata in an image.
@@ -40,7 +40,7 @@ impl Limits {
         library_bytes: 16 << 20,
         scene_bytes: 256 << 20,
         picture_pixels: 1 << 27,
-        scene_pixels: 1 << 30,
+        scene_image_bytes: 4 << 30,
         film_pixels: 1 << 26,
         note_bytes: 64 << 20,
         recording_bytes: 256 << 20,
@@ -74,7 +74,7 @@ impl Limits {
             library_bytes: scaled(self.library_bytes),
             scene_bytes: scaled(self.scene_bytes),
             picture_pixels: scaled(self.picture_pixels),
-            scene_pixels: scaled(self.scene_pixels),
+            scene_image_bytes: scaled(self.scene_image_bytes),
             film_pixels: scaled(self.film_pixels),
             note_bytes: scaled(self.note_bytes),
             recording_bytes: scaled(self.recording_bytes),

@@ -5,7 +5,7 @@
 
 use crate::format::bad_value::BadValue;
 use crate::format::camera::CameraPart;
-use crate::format::camera_components::camera;
+use crate::format::camera::camera;
 use crate::format::film_size::FilmSize;
 use crate::format::parts::{DisplayPart, SceneFile};
 use crate::format::units::{LEAST_SINE, lens_radius_of};

@@ -1,5 +1,7 @@
 //! The expected form of the fields of a scene file, with examples, for error messages.
 
+use crate::format::property::{CameraProperty, LightProperty, ObjectProperty, Quantity};
+use crate::render::{MaterialKind, ValueType};
 use std::borrow::Cow;
 
 /// The innermost field at a position in a text.
@@ -19,22 +21,16 @@ impl FieldAt<'_> {
     pub fn expectation(&self) -> Option<(&'static str, Cow<'static, str>)> {
         let in_transform = self.parent == "transform";
         let (what, example) = match self.name {
-            "eye" | "look_at" | "center" | "point" | "position" | "corner" | "first" | "translate" => {
-                ("a point in round brackets", "(0, 1, 4)")
-            }
-            "forward" | "up" | "normal" | "direction" | "edge_u" | "edge_v" => {
-                ("a vector in round brackets", "(0, 1, 0)")
-            }
+            "center" | "point" | "corner" | "first" => ("a point in round brackets", "(0, 1, 4)"),
+            "normal" | "edge_u" | "edge_v" => ("a vector in round brackets", "(0, 1, 0)"),
             "rotate" if in_transform => ("three angles in degrees, about x, y and z", "(0, 30, 0)"),
             "scale" if in_transform => ("a factor, or one for each axis in round brackets", "(1, 2, 1)"),
             "matrix" => ("three rows of four numbers", "((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0))"),
-            "rotate" | "vfov" | "inner_angle" | "outer_angle" | "blade_rotation" => ("an angle in degrees", "30"),
-            "radius" | "lens_radius" | "focus_distance" | "pivot_distance" | "orthographic_height" => {
-                ("a length in metres", "0.5")
-            }
-            "f_stop" | "ior" | "simplify" | "exposure" => ("a number", "1.5"),
+            "rotate" => ("an angle in degrees", "30"),
+            "radius" | "pivot_distance" => ("a length in metres", "0.5"),
+            "simplify" | "exposure" => ("a number", "1.5"),
             "width" | "height" | "max_depth" | "blades" => ("a whole number", "8"),
-            "depth_of_field" | "smooth" | "invert" | "two_sided" | "thin_walled" => ("true or false", "true"),
+            "depth_of_field" | "smooth" | "invert" => ("true or false", "true"),
             "stretch" | "repeat" | "offset" | "squares" => ("two numbers in round brackets", "(2, 2)"),
             "vertices" => ("three points", "((0, 0, 0), (1, 0, 0), (0, 1, 0))"),
             "centers" => ("a list of points", "[(0, 0, 0), (1, 0, 0)]"),
@@ -72,14 +68,25 @@ impl FieldAt<'_> {
             "lights" => ("a list of lights in square brackets", "[point(position: (0, 3, 0), intensity: 50)]"),
             _ if self.parent == "materials" => ("a material with its kind", "diffuse(albedo: 0.5)"),
             _ if self.parent == "textures" => ("a texture with its kind", "image(file: \"tiles.png\")"),
-            "albedo" | "reflectance" | "transmittance" if self.is_word() => {
-                ("a colour, or the name of a texture in quotes", "\"tiles\"")
-            }
-            "albedo" | "reflectance" | "radiance" | "intensity" | "irradiance" | "zenith" | "horizon" | "ground"
-            | "air" | "absorption" | "tint" | "scale" => ("a number, or red, green and blue", "(0.8, 0.2, 0.1)"),
-            _ => return None,
+            "zenith" | "horizon" | "ground" | "air" | "tint" | "scale" => COLOR,
+            name => of_animated(name).or_else(|| self.of_material(name))?,
         };
         Some((what, Cow::Borrowed(example)))
+    }
+
+    /// The form of a property of a material.
+    fn of_material(&self, name: &str) -> Option<(&'static str, &'static str)> {
+        let mut all = MaterialKind::ALL.iter().flat_map(|kind| kind.properties());
+        Some(match all.find(|property| property.name == name)?.value {
+            ValueType::Color if self.is_word() => ("a colour, or the name of a texture in quotes", "\"tiles\""),
+            ValueType::Color | ValueType::Rgb => COLOR,
+            ValueType::Scalar if self.is_word() => ("a number, or the name of a texture in quotes", "\"tiles\""),
+            ValueType::Scalar | ValueType::Cutoff => ("a number", "0.5"),
+            ValueType::Number => ("a number", "1.5"),
+            ValueType::Flag => ("true or false", "true"),
+            ValueType::Fresnel => ("constant or schlick", "schlick"),
+            ValueType::Part => ("the name of a material in quotes", "\"red\""),
+        })
     }
 
     /// Whether a position is inside the brackets of a tagged value such as `constant(…)`.
@@ -102,6 +109,26 @@ impl FieldAt<'_> {
         value.starts_with(|c: char| c.is_alphabetic() || c == '_')
             && value.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c))
     }
+}
+
+const COLOR: (&str, &str) = ("a number, or red, green and blue", "(0.8, 0.2, 0.1)");
+
+/// The form of a property of a camera, a light or a transform.
+fn of_animated(name: &str) -> Option<(&'static str, &'static str)> {
+    let of_camera = CameraProperty::ALL.iter().map(|property| property.info());
+    let of_light = LightProperty::ALL.iter().map(|property| property.info());
+    let of_object = ObjectProperty::ALL.iter().map(|property| property.info());
+    let info = of_camera.chain(of_light).chain(of_object).find(|info| info.name == name)?;
+    Some(match (info.quantity, info.unit) {
+        (Quantity::Position, _) => ("a point in round brackets", "(0, 1, 4)"),
+        (Quantity::Direction, _) => ("a vector in round brackets", "(0, 1, 0)"),
+        (Quantity::Rotation, _) => ("three angles in degrees, about x, y and z", "(0, 30, 0)"),
+        (Quantity::Factors, _) => ("a factor, or one for each axis in round brackets", "(1, 2, 1)"),
+        (Quantity::Color, _) => COLOR,
+        (Quantity::Number, "°") => ("an angle in degrees", "30"),
+        (Quantity::Number, " m") => ("a length in metres", "0.5"),
+        (Quantity::Number, _) => ("a number", "1.5"),
+    })
 }
 
 /// The innermost field whose value begins at or before `offset`.

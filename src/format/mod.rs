@@ -9,7 +9,6 @@ pub(crate) mod bad_value;
 pub(crate) mod bounds;
 pub(crate) mod builtin;
 pub(crate) mod camera;
-pub(crate) mod camera_components;
 pub(crate) mod check;
 pub(crate) mod check_animation;
 pub(crate) mod choice;

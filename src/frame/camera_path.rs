@@ -52,8 +52,8 @@ fn between(stops: &[Rig], leg: usize, t: f64) -> Rig {
         radius: even(a.lens.effective_radius(), b.lens.effective_radius()),
         focus_distance: even(a.lens.focus_distance.recip(), b.lens.focus_distance.recip()).recip(),
         enabled: a.lens.enabled || b.lens.enabled,
-        blades: a.lens.blades,
         blade_rotation_deg: even(a.lens.blade_rotation_deg, b.lens.blade_rotation_deg),
+        ..a.lens
     };
     let heights = a.projection.orthographic_height.zip(b.projection.orthographic_height);
     let projection = Projection {

@@ -9,7 +9,7 @@ use crate::import::gltf::images::part_of_model;
 use crate::import::gltf::mesh::BuiltMesh;
 use crate::import::gltf::surfaces::Surfaces;
 use crate::import::model::imported::ModelNormals;
-use crate::import::picture::{PictureError, PixelBudget, picture_of_bytes, read_picture_of_scene};
+use crate::import::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
 use crate::render::ImageTexture;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -26,7 +26,7 @@ pub(crate) struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
     /// Of all images that are decoded.
-    pixels: PixelBudget,
+    pixels: ImageBudget,
     /// Images that were decoded and not yet taken, by path.
     decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
 }

@@ -33,6 +33,12 @@ pub struct Framing {
     triangles: usize,
 }
 
+/// Corners of the box of a mesh, in its own coordinates, metres.
+pub fn corners_of(mesh: &Mesh) -> (DVec3, DVec3) {
+    let around = mesh.bounds();
+    (around.min.as_dvec3() + mesh.center, around.max.as_dvec3() + mesh.center)
+}
+
 impl Framing {
     /// - `side`: signs of the direction of the front; `aspect`: width over height of the image.
     pub fn new(side: DVec3, aspect: f64) -> Self {
@@ -57,7 +63,9 @@ impl Framing {
     }
 
     /// Adds a mesh that is placed in the world.
-    pub fn add(&mut self, mesh: &Mesh, world: &DAffine3) {
+    ///
+    /// - `corners`: those of [`corners_of`] the mesh, which many instances may share.
+    pub fn add(&mut self, mesh: &Mesh, (min, max): (DVec3, DVec3), world: &DAffine3) {
         self.triangles += mesh.triangles.len();
         if self.triangles <= MOST_TRIANGLES {
             let points = mesh.triangles.par_iter().flatten_iter().map(|&vertex| mesh.positions[vertex as usize]);
@@ -78,8 +86,6 @@ impl Framing {
                 },
             ));
         } else {
-            let around = mesh.bounds();
-            let (min, max) = (around.min.as_dvec3() + mesh.center, around.max.as_dvec3() + mesh.center);
             for i in 0..8 {
                 let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
                 self.add_point(world.transform_point3(DVec3::new(pick(0), pick(1), pick(2))));
@@ -150,7 +156,7 @@ mod tests {
                 let turned = DQuat::from_rotation_z(turn) * DQuat::from_rotation_x(0.5 * turn);
                 let world = DAffine3::from_scale_rotation_translation(scale, turned, DVec3::splat(far));
                 let mut framing = Framing::new(DVec3::ONE, aspect);
-                framing.add(mesh, &world);
+                framing.add(mesh, corners_of(mesh), &world);
                 let points = projected(&framing.camera(), mesh, &world, aspect);
                 let largest = points.iter().fold(DVec2::ZERO, |largest, point| largest.max(point.abs()));
                 let case = format!("{scale} {turn} {aspect}: {largest}");

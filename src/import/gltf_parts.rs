@@ -6,7 +6,6 @@ use crate::format::value::Rgb;
 use crate::import::gltf::assembly::PlacedLight;
 use crate::import::gltf::cameras::{GltfCamera, Lens};
 use crate::import::gltf::lights::LightKind;
-use crate::import::gltf::mesh::BuiltMesh;
 use glam::{DAffine3, DVec3};
 
 /// Whether an object may have this transform.
@@ -71,12 +70,6 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
             LightPart::Directional { name, direction, irradiance: intensity, transform: TransformPart::default() }
         }
     }
-}
-
-/// Corners of the box of a mesh, in its own coordinates.
-pub(crate) fn corners_of(mesh: &BuiltMesh) -> (DVec3, DVec3) {
-    let around = mesh.mesh.bounds();
-    (around.min.as_dvec3() + mesh.mesh.center, around.max.as_dvec3() + mesh.mesh.center)
 }
 
 /// Extends bounds by a box that is placed in the world.

@@ -14,12 +14,12 @@ use crate::format::value::Named;
 use crate::format::value::Rgb;
 use crate::import::documents::{Documents, Opened};
 use crate::import::error::gltf::{GltfProblem, Located};
-use crate::import::framing::Framing;
+use crate::import::framing::{Framing, corners_of};
 use crate::import::gltf::assembly::PlacedLight;
 use crate::import::gltf::facts::GltfFacts;
 use crate::import::gltf::mesh::BuiltMesh;
 use crate::import::gltf_motion::GltfMotion;
-use crate::import::gltf_parts::{camera_of, corners_of, is_placement, light_of, transform};
+use crate::import::gltf_parts::{camera_of, is_placement, light_of, transform};
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -90,7 +90,7 @@ impl Maker<'_> {
         let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
         let mut shown = Vec::new();
         let mut framing = Framing::new(DVec3::ONE, self.wish.aspect);
-        let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
+        let mut built: HashMap<_, Option<(Arc<BuiltMesh>, _)>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
             let at = placed.key.node.and(choice.at);
             if let Entry::Vacant(entry) = built.entry(placed.key) {
@@ -99,9 +99,12 @@ impl Maker<'_> {
                     // Its warnings are told when the object is loaded.
                     mesh => document.omissions.kept(&format!("meshes[{}]", placed.key.mesh), mesh),
                 };
-                entry.insert(mesh);
+                entry.insert(mesh.map(|mesh| {
+                    let corners = corners_of(&mesh.mesh);
+                    (mesh, corners)
+                }));
             }
-            let Some(Some(mesh)) = built.get(&placed.key) else { continue };
+            let Some(Some((mesh, corners))) = built.get(&placed.key) else { continue };
             let name = placed.name.clone().unwrap_or_else(|| format!("mesh {}", i + 1));
             if !is_placement(&placed.world) {
                 let name = crate::files::printable::name(&name);
@@ -109,8 +112,8 @@ impl Maker<'_> {
                 document.omissions.tell(&format!("meshes {i}"), sentence);
                 continue;
             }
-            framing.add(&mesh.mesh, &placed.world);
-            shown.push((i, corners_of(mesh)));
+            framing.add(&mesh.mesh, *corners, &placed.world);
+            shown.push((i, *corners));
             let names: Vec<String> = (mesh.keys.iter())
                 .map(|key| {
                     let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);

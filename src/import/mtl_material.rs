@@ -9,7 +9,7 @@ use crate::format::sources::TextureSource;
 use crate::format::value::{ColorValue, Rgb, ScalarValue};
 use crate::import::model::material::{ImportedMaterial, PbrMaterial};
 use crate::import::model::texture_map::TextureMap;
-use crate::import::picture::{Alpha, PixelBudget, alpha_of};
+use crate::import::picture::{Alpha, ImageBudget, alpha_of};
 use crate::render::{Channel, Encoding, Wrap};
 use glam::{DVec2, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -26,7 +26,7 @@ pub(crate) struct MtlMaterials {
     names: HashSet<String>,
     /// Alpha of the images that were looked at, by their real paths, and the pixels that may be decoded for it.
     alphas: HashMap<PathBuf, Alpha>,
-    pixels: PixelBudget,
+    pixels: ImageBudget,
 }
 
 impl MtlMaterials {

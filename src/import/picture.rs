@@ -5,12 +5,14 @@ use crate::files::limits::Limits;
 use crate::import::gltf::images::{part_of_model, picture_of};
 use crate::import::ktx2;
 use crate::render::{ImageTexture, Texels};
+use bytemuck::allocation::try_cast_vec;
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Maximum width and height, pixels.
 const MAX_SIDE: u32 = 32_768;
@@ -46,34 +48,42 @@ pub enum PictureError {
         /// Pixels that an image may have.
         limit: u64,
     },
-    /// All images of the scene together have more pixels than the limits allow.
-    #[error("is left out: the images of the scene have more than {limit} pixels together: {}", Limits::advice())]
+    /// All images of the scene together take more memory than the limits allow.
+    #[error("is left out: the images of the scene take more than {} MiB together: {}", limit >> 20, Limits::advice())]
     TooLargeTogether {
-        /// Pixels that they may have.
+        /// Bytes that they may take.
         limit: u64,
+    },
+    /// There is not enough memory to decode the image.
+    #[error("has {width} x {height} pixels, for which there is not enough memory")]
+    NoMemory {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
     },
     /// The image is truncated or damaged, or uses a feature that the decoder does not support.
     #[error("cannot be decoded: {0}")]
     Decode(#[from] image::ImageError),
 }
 
-/// The pixels that the images of a scene may still have, all together.
+/// The memory that the images of a scene may still take, all together.
 #[derive(Debug)]
-pub(crate) struct PixelBudget {
+pub(crate) struct ImageBudget {
     limit: u64,
     used: AtomicU64,
 }
 
-impl Default for PixelBudget {
+impl Default for ImageBudget {
     fn default() -> Self {
-        Self { limit: Limits::of_this_process().scene_pixels, used: AtomicU64::new(0) }
+        Self { limit: Limits::of_this_process().scene_image_bytes, used: AtomicU64::new(0) }
     }
 }
 
-impl PixelBudget {
-    fn take(&self, pixels: u64) -> Result<(), PictureError> {
+impl ImageBudget {
+    fn take(&self, bytes: u64) -> Result<(), PictureError> {
         let limit = self.limit;
-        let used = |used: u64| used.checked_add(pixels).filter(|used| *used <= limit);
+        let used = |used: u64| used.checked_add(bytes).filter(|used| *used <= limit);
         let taken = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, used);
         taken.map(drop).map_err(|_| PictureError::TooLargeTogether { limit })
     }
@@ -100,7 +110,7 @@ pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), Pictu
 /// Like [`read_picture_within`], and if all of them together are too large.
 pub(crate) fn read_picture_of_scene(
     path: &Path,
-    budget: &PixelBudget,
+    budget: &ImageBudget,
 ) -> Result<(ImageTexture, Option<String>), PictureError> {
     let limits = Limits::of_this_process();
     texture(picture_reader(path, &limits)?, &limits, budget)
@@ -113,7 +123,7 @@ pub(crate) fn read_picture_of_scene(
 pub(crate) fn picture_of_bytes(
     bytes: &[u8],
     limits: &Limits,
-    budget: &PixelBudget,
+    budget: &ImageBudget,
 ) -> Result<(ImageTexture, Option<String>), PictureError> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(ReadError::from)?;
     reader.limits(limits_of_decoder(limits));
@@ -127,15 +137,15 @@ pub(crate) fn picture_of_bytes(
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
     if let Some((model, number)) = part_of_model(path) {
         let bytes = picture_of(&model, number).map_err(|error| PictureError::Model(error.to_string()))?;
-        return picture_of_bytes(&bytes, limits, &PixelBudget::default());
+        return picture_of_bytes(&bytes, limits, &ImageBudget::default());
     }
-    texture(picture_reader(path, limits)?, limits, &PixelBudget::default())
+    texture(picture_reader(path, limits)?, limits, &ImageBudget::default())
 }
 
 fn texture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
-    budget: &PixelBudget,
+    budget: &ImageBudget,
 ) -> Result<(ImageTexture, Option<String>), PictureError> {
     let picture = decode_counted(reader, limits, budget)?;
     let (width, height) = (picture.width(), picture.height());
@@ -156,7 +166,11 @@ pub(crate) fn texels_of(picture: DynamicImage) -> (Texels, usize) {
         DynamicImage::ImageRgb16(pixels) => Texels::U16 { channels: 3, data: pixels.into_raw() },
         DynamicImage::ImageRgba16(pixels) => Texels::U16 { channels: 4, data: pixels.into_raw() },
         other => {
-            let mut texels: Vec<Vec3> = other.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
+            let numbers = other.into_rgb32f().into_raw();
+            // Without a copy, unless the memory ends within a pixel.
+            let mut texels: Vec<Vec3> = try_cast_vec(numbers).unwrap_or_else(|(_, numbers)| {
+                numbers.as_chunks().0.iter().map(|&rgb| Vec3::from_array(rgb)).collect()
+            });
             let is_good = |texel: &Vec3| texel.is_finite() && texel.cmpge(Vec3::ZERO).all();
             let bad = texels.iter().filter(|texel| !is_good(texel)).count();
             texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
@@ -183,7 +197,7 @@ pub(crate) enum Alpha {
 ///
 /// # Errors
 /// Like [`read_picture`].
-pub(crate) fn alpha_of(path: &Path, budget: &PixelBudget) -> Result<Alpha, PictureError> {
+pub(crate) fn alpha_of(path: &Path, budget: &ImageBudget) -> Result<Alpha, PictureError> {
     let limits = Limits::of_this_process();
     let reader = picture_reader(path, &limits)?;
     if matches!(reader.format(), None | Some(ImageFormat::Hdr)) {
@@ -233,13 +247,13 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
 ) -> Result<DynamicImage, PictureError> {
-    decode_counted(reader, limits, &PixelBudget::default())
+    decode_counted(reader, limits, &ImageBudget::default())
 }
 
 fn decode_counted<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
-    budget: &PixelBudget,
+    budget: &ImageBudget,
 ) -> Result<DynamicImage, PictureError> {
     if reader.format() == Some(ImageFormat::Tiff) {
         let mut bytes = reader.into_inner();
@@ -262,7 +276,9 @@ fn decode_counted<R: BufRead + Seek>(
         if is_large {
             return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
         }
-        budget.take(u64::from(width) * u64::from(height))?;
+        let bytes = 4 * u64::from(width) * u64::from(height);
+        budget.take(bytes)?;
+        check_memory(width, height, bytes)?;
         return ktx2::decode(&whole).map_err(PictureError::Ktx2);
     }
     if !bytes.fill_buf().map_err(ReadError::from)?.starts_with(HDR) {
@@ -304,7 +320,7 @@ fn tiff_counts_fit(reader: &mut (impl BufRead + Seek)) -> std::io::Result<bool> 
 fn decode_within(
     decoder: impl ImageDecoder,
     limits: &Limits,
-    budget: &PixelBudget,
+    budget: &ImageBudget,
 ) -> Result<DynamicImage, PictureError> {
     // A few bytes can claim any size: it is checked before decoding.
     let (width, height) = decoder.dimensions();
@@ -315,8 +331,34 @@ fn decode_within(
     if pixels > limits.picture_pixels {
         return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
     }
-    budget.take(pixels)?;
+    let bytes = pixels * texel_bytes(decoder.color_type());
+    budget.take(bytes)?;
+    let _alone = (bytes > LARGE).then(|| DECODING.lock().unwrap_or_else(PoisonError::into_inner));
+    check_memory(width, height, bytes)?;
     Ok(DynamicImage::from_decoder(decoder)?)
+}
+
+/// Bytes from which on images are decoded one after the other: each takes its memory twice meanwhile.
+const LARGE: u64 = 256 << 20;
+
+static DECODING: Mutex<()> = Mutex::new(());
+
+/// Bytes of a pixel as a texture.
+fn texel_bytes(color: ColorType) -> u64 {
+    match color {
+        ColorType::Rgb32F | ColorType::Rgba32F => size_of::<Vec3>() as u64,
+        color => color.bytes_per_pixel().into(),
+    }
+}
+
+/// Whether there is room for an image and for what its decoder takes besides.
+fn check_memory(width: u32, height: u32, bytes: u64) -> Result<(), PictureError> {
+    let mut room: Vec<u8> = Vec::new();
+    let wanted = usize::try_from(bytes.saturating_mul(2));
+    match wanted.map(|bytes| room.try_reserve_exact(bytes)) {
+        Ok(Ok(())) => Ok(()),
+        _ => Err(PictureError::NoMemory { width, height }),
+    }
 }
 
 #[cfg(test)]
@@ -411,12 +453,12 @@ mod tests {
         let path = dir.path().join("a.png");
         let alpha = |pixels: Vec<u8>| {
             image::GrayAlphaImage::from_raw(2, 1, pixels).unwrap().save(&path).unwrap();
-            alpha_of(&path, &PixelBudget::default()).unwrap()
+            alpha_of(&path, &ImageBudget::default()).unwrap()
         };
         assert_eq!([alpha(vec![9, 255, 7, 255]), alpha(vec![9, 0, 9, 255])], [Alpha::Uniform, Alpha::Varies]);
         image::GrayImage::new(2, 1).save(&path).unwrap();
-        assert_eq!(alpha_of(&path, &PixelBudget::default()).unwrap(), Alpha::Missing);
-        assert!(alpha_of(&dir.path().join("none.png"), &PixelBudget::default()).is_err());
+        assert_eq!(alpha_of(&path, &ImageBudget::default()).unwrap(), Alpha::Missing);
+        assert!(alpha_of(&dir.path().join("none.png"), &ImageBudget::default()).is_err());
     }
 
     #[test]
@@ -424,10 +466,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("small.png");
         image::GrayImage::new(10, 10).save(&path).unwrap();
-        let budget = PixelBudget { limit: 250, used: AtomicU64::new(0) };
+        let budget = ImageBudget { limit: 250, used: AtomicU64::new(0) };
         let read = || read_picture_of_scene(&path, &budget).map(drop).map_err(|error| error.to_string());
         assert_eq!((read(), read()), (Ok(()), Ok(())));
-        assert!(read().unwrap_err().contains("more than 250 pixels together"));
+        assert!(read().unwrap_err().contains("more than 0 MiB together"));
     }
 
     #[test]

@@ -277,19 +277,7 @@ fn phong(diffuse: ColorInput, specular: f32) -> Material {
 fn camera(center: Vec3, size: f32, view: usize) -> Camera {
     let distance = 2.0 * size / 1.2_f32.powi(view as i32);
     let forward = -Vec3::new(0.35, 0.55, 1.0).normalize();
-    let right = forward.cross(Vec3::Y).normalize();
-    Camera {
-        eye: center - distance * forward,
-        right,
-        up: right.cross(forward),
-        forward,
-        tan_half_vfov: 0.75,
-        orthographic: None,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
-        blades: 0,
-        blade_rotation: 0.0,
-    }
+    Camera::looking_at(center - distance * forward, center, 0.75)
 }
 
 /// Three kinds of rays in the space of the mesh.

@@ -5,7 +5,7 @@ use crate::format::source::UpAxis;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
 use crate::format::value::Named;
 use crate::format::value::{ColorValue, Rgb};
-use crate::import::framing::Framing;
+use crate::import::framing::{Framing, corners_of};
 use crate::import::meshes::LoadedMesh;
 use crate::import::orientation::faces_away;
 use crate::import::up_axis::{guess_up, guess_up_of_obj};
@@ -141,7 +141,7 @@ pub fn around(
     // Rotated half a turn about the vertical axis if the model faces the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
     let mut framing = Framing::new(side, aspect);
-    framing.add(&loaded.mesh, &world);
+    framing.add(&loaded.mesh, corners_of(&loaded.mesh), &world);
     let model = ObjectPart::Mesh {
         name: Some("model".to_owned()),
         source: source.clone(),

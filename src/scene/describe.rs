@@ -6,7 +6,7 @@
 //! original file are lost.
 
 use crate::files::relative::path_to_text;
-use crate::format::camera_components::camera_part;
+use crate::format::camera::camera_part;
 use crate::format::film_size::FilmSize;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::names::Names;

@@ -11,7 +11,7 @@ use crate::files::relative::{absolute, relative_path, text_to_path};
 use crate::files::write_error::WriteError;
 use crate::format::bounds::{check_film_size, check_max_depth};
 use crate::format::camera::CameraPart;
-use crate::format::camera_components::camera;
+use crate::format::camera::camera;
 use crate::format::parts::{DisplayPart, FilmPart, SceneFile};
 use crate::format::source::{SceneSource, UpAxis};
 use crate::render::{Film, Integrator, SampleAllocation};
@@ -280,12 +280,7 @@ impl ImageMetadata {
     pub fn differs_from(&self, other: &Self) -> Option<&'static str> {
         let seen = |shot: &Self| {
             let (view, projection, lens) = camera(&shot.camera);
-            let lens = (lens.effective_radius() > 0.0).then_some((
-                lens.radius,
-                lens.focus_distance,
-                lens.blades,
-                lens.blade_rotation_deg,
-            ));
+            let lens = (lens.effective_radius() > 0.0).then_some(lens);
             (view.eye, view.forward, view.up, projection, lens)
         };
         let checks = [

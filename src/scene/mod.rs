@@ -40,7 +40,7 @@ pub use crate::files::write_error::WriteError;
 pub use crate::format::bad_value::BadValue;
 pub use crate::format::bounds::{check_film_size, check_fps, check_max_depth, check_stops};
 pub use crate::format::builtin::{BUILTIN_SCENES, builtin_text};
-pub use crate::format::camera_components::camera_part;
+pub use crate::format::camera::camera_part;
 pub use crate::format::choice::ModelChoice;
 pub use crate::format::error::{Problem, SceneError, suggestion};
 pub use crate::format::film_size::FilmSize;

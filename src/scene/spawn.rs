@@ -1,7 +1,7 @@
 //! From a loaded scene to entities.
 
 use crate::format::animation::AnimationPart;
-use crate::format::camera_components::{camera, unit};
+use crate::format::camera::{camera, unit};
 use crate::format::film_size::FilmSize;
 use crate::format::light::LightKind;
 use crate::format::material_textures::without_lost_textures;

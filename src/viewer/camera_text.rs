@@ -2,6 +2,7 @@
 
 use crate::format::CameraPart;
 use crate::frame::navigation::Rig;
+use crate::scene::camera_part;
 
 /// Returns the camera block of this view; the pivot becomes `look_at`.
 pub fn camera_text(rig: &Rig) -> String {
@@ -15,9 +16,12 @@ pub fn camera_text(rig: &Rig) -> String {
         orthographic_height: projection.orthographic_height.map(|height| rounded(height, height)),
         lens_radius: (radius > 0.0).then_some(rounded(radius, radius)),
         focus_distance: Some(rounded(lens.focus_distance, lens.focus_distance)),
-        blades: lens.blades,
-        blade_rotation: lens.blade_rotation_deg,
-        ..CameraPart::looking_at(place(view.eye), place(view.pivot()))
+        eye: place(view.eye),
+        look_at: Some(place(view.pivot())),
+        forward: None,
+        pivot_distance: None,
+        depth_of_field: None,
+        ..camera_part(view, projection, lens, None)
     };
     let style = ron::ser::PrettyConfig::new()
         .depth_limit(2)

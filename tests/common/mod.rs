@@ -31,20 +31,7 @@ pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Shape {
 
 /// A pinhole at `camera`; `vfov` in degrees.
 pub fn camera(eye: Vec3, look_at: Vec3, vfov: f32) -> Camera {
-    let forward = (look_at - eye).normalize();
-    let right = forward.cross(if forward.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }).normalize();
-    Camera {
-        eye,
-        right,
-        up: right.cross(forward),
-        forward,
-        tan_half_vfov: (0.5 * vfov.to_radians()).tan(),
-        orthographic: None,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
-        blades: 0,
-        blade_rotation: 0.0,
-    }
+    Camera::looking_at(eye, look_at, (0.5 * vfov.to_radians()).tan())
 }
 
 /// Each shape with the index of its material.

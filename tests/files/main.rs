@@ -17,4 +17,5 @@ mod ply_programs;
 mod ply_stl;
 mod save;
 mod scene;
+mod shared_lists;
 mod strangers;

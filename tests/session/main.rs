@@ -5,6 +5,7 @@ mod edit;
 mod keys;
 mod lists;
 mod living_files;
+mod properties;
 #[path = "../common/random.rs"]
 mod random;
 mod reopening;

@@ -12,8 +12,8 @@
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    CameraInput, LightInput, LightKind, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape, SnapshotPart,
-    View, origin_for,
+    CameraInput, Lens, LightInput, LightKind, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape,
+    SnapshotPart, View, origin_for,
 };
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
@@ -165,8 +165,8 @@ fn compare_cameras(old: Option<&CameraInput>, new: Option<&CameraInput>, changes
         if old.focus_distance != new.focus_distance {
             changes.add(Level::Restart, "focus");
         }
-        if (old.blades, old.blade_rotation_deg) != (new.blades, new.blade_rotation_deg) {
-            changes.add(Level::Restart, "aperture blades");
+        if (Lens { focus_distance: new.focus_distance, ..old }) != new {
+            changes.add(Level::Restart, "shape of the aperture");
         }
     }
 }

@@ -8,7 +8,8 @@ use crate::import::error::gltf::{GltfProblem, Located, place};
 use crate::import::gltf::document::Document;
 use crate::import::gltf::json;
 use glam::{DQuat, DVec3};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
+use std::rc::Rc;
 
 /// The animated transform of a node; `None`: as stored in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,8 +47,9 @@ enum Interpolation {
 impl Document {
     /// The time at which the last animation ends, seconds; `None` without animations.
     pub(crate) fn animation_length(&self) -> Option<f64> {
-        let inputs = self.root.animations.iter().flat_map(|animation| &animation.samplers);
-        let ends = inputs.filter_map(|sampler| self.floats::<1>(sampler.input).ok()?.last().copied());
+        let samplers = self.root.animations.iter().flat_map(|animation| &animation.samplers);
+        let inputs: BTreeSet<u32> = samplers.map(|sampler| sampler.input).collect();
+        let ends = inputs.into_iter().filter_map(|input| self.floats::<1>(input).ok()?.last().copied());
         ends.map(|[end]| f64::from(end)).reduce(f64::max)
     }
 
@@ -57,10 +59,11 @@ impl Document {
     pub(crate) fn pose(&self, at: Option<f64>) -> Pose {
         let mut pose = Pose::default();
         let Some(at) = at else { return pose };
+        let mut keys = Keys::default();
         for (i, animation) in self.root.animations.iter().enumerate() {
             for (k, channel) in animation.channels.iter().enumerate() {
                 let part = format!("{}.{}", place("animations", i), place("channels", k));
-                self.omissions.kept(&part, self.add_channel(&mut pose, animation, channel, at));
+                self.omissions.kept(&part, self.add_channel(&mut pose, &mut keys, animation, channel, at));
             }
         }
         pose
@@ -69,6 +72,7 @@ impl Document {
     fn add_channel(
         &self,
         pose: &mut Pose,
+        keys: &mut Keys,
         animation: &json::Animation,
         channel: &json::Channel,
         at: f64,
@@ -89,30 +93,34 @@ impl Document {
                 return Err(here(GltfProblem::Value { what: "interpolation", found, expected }));
             }
         };
-        let times: Vec<f64> = self.floats::<1>(sampler.input)?.iter().map(|[t]| f64::from(*t)).collect();
+        let times = keys.one.of(self, sampler.input)?;
         if times.is_empty() {
             return Ok(());
         }
         let output = sampler.output;
         let posed = pose.nodes.get(&node).copied().unwrap_or_default();
+        let mut three = || {
+            let value = sampled(&times, &keys.three.of(self, output)?, 1, interpolation, at, false).map_err(here)?;
+            Ok(value.first().map_or(DVec3::ZERO, |&v| DVec3::from(v)))
+        };
         match channel.target.path.as_str() {
             "translation" if posed.translation.is_none() => {
-                let value = self.three(output, &times, interpolation, at)?;
+                let value = three()?;
                 pose.nodes.entry(node).or_default().translation = Some(value);
             }
             "scale" if posed.scale.is_none() => {
-                let value = self.three(output, &times, interpolation, at)?;
+                let value = three()?;
                 pose.nodes.entry(node).or_default().scale = Some(value);
             }
             "rotation" if posed.rotation.is_none() => {
-                let values: Vec<[f64; 4]> = widened(&self.floats::<4>(output)?);
+                let values = keys.four.of(self, output)?;
                 let value = sampled(&times, &values, 1, interpolation, at, true).map_err(here)?;
                 pose.nodes.entry(node).or_default().rotation = value.first().map(|&v| DQuat::from_array(v));
             }
             "weights" if !pose.weights.contains_key(&node) => {
-                let values: Vec<[f64; 1]> = widened(&self.floats::<1>(output)?);
-                let keys = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-                let value = sampled(&times, &values, values.len() / keys, interpolation, at, false).map_err(here)?;
+                let values = keys.one.of(self, output)?;
+                let n = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+                let value = sampled(&times, &values, values.len() / n, interpolation, at, false).map_err(here)?;
                 pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
             }
             // A later animation of the same property, or a path that belongs to an extension.
@@ -137,24 +145,36 @@ impl Document {
         }
         moved
     }
-
-    fn three(&self, output: u32, times: &[f64], how: Interpolation, at: f64) -> Result<DVec3, Located> {
-        let values: Vec<[f64; 3]> = widened(&self.floats::<3>(output)?);
-        let value = sampled(times, &values, 1, how, at, false).map_err(|problem| (String::new(), problem))?;
-        Ok(value.first().map_or(DVec3::ZERO, |&v| DVec3::from(v)))
-    }
 }
 
-fn widened<const N: usize>(values: &[[f32; N]]) -> Vec<[f64; N]> {
-    values.iter().map(|value| value.map(f64::from)).collect()
+/// Lists of keys that were read for a pose: many channels may use one.
+#[derive(Default)]
+struct Keys {
+    one: Lists<1>,
+    three: Lists<3>,
+    four: Lists<4>,
+}
+
+#[derive(Default)]
+struct Lists<const N: usize>(HashMap<u32, Rc<[[f32; N]]>>);
+
+impl<const N: usize> Lists<N> {
+    fn of(&mut self, document: &Document, accessor: u32) -> Result<Rc<[[f32; N]]>, Located> {
+        if let Some(known) = self.0.get(&accessor) {
+            return Ok(known.clone());
+        }
+        let list: Rc<[[f32; N]]> = document.floats(accessor)?.into();
+        self.0.insert(accessor, list.clone());
+        Ok(list)
+    }
 }
 
 /// The values at a time, `group` of them.
 ///
 /// - `turns`: whether they are rotations.
 fn sampled<const N: usize>(
-    times: &[f64],
-    values: &[[f64; N]],
+    times: &[[f32; 1]],
+    values: &[[f32; N]],
     group: usize,
     how: Interpolation,
     at: f64,
@@ -167,16 +187,17 @@ fn sampled<const N: usize>(
         return Err(GltfProblem::Length { what, found, expected: expected.max(times.len() * parts) as u64 });
     }
     // Parts of a spline key: 0 incoming tangent, 1 value, 2 outgoing tangent.
-    let value = |key: usize, part: usize, i: usize| values[(key * parts + part) * group + i];
+    let value = |key: usize, part: usize, i: usize| values[(key * parts + part) * group + i].map(f64::from);
+    let time = |key: usize| f64::from(times[key][0]);
     let middle = parts / 2;
-    let next = times.partition_point(|&t| t <= at);
+    let next = times.partition_point(|&[t]| f64::from(t) <= at);
     if next == 0 || next == times.len() {
         let key = next.saturating_sub(1);
         return Ok((0..group).map(|i| value(key, middle, i)).collect());
     }
     let (a, b) = (next - 1, next);
-    let span = times[b] - times[a];
-    let t = if span > 0.0 { (at - times[a]) / span } else { 0.0 };
+    let span = time(b) - time(a);
+    let t = if span > 0.0 { (at - time(a)) / span } else { 0.0 };
     let mix = |i: usize| -> [f64; N] {
         let (p, q) = (value(a, middle, i), value(b, middle, i));
         match how {
@@ -223,8 +244,8 @@ fn slerp<const N: usize>(p: [f64; N], q: [f64; N], t: f64) -> [f64; N] {
 mod tests {
     use super::*;
 
-    fn at(how: Interpolation, values: &[[f64; 1]], t: f64) -> f64 {
-        sampled(&[1.0, 3.0], values, 1, how, t, false).ok().unwrap()[0][0]
+    fn at(how: Interpolation, values: &[[f32; 1]], t: f64) -> f64 {
+        sampled(&[[1.0], [3.0]], values, 1, how, t, false).ok().unwrap()[0][0]
     }
 
     #[test]
@@ -236,14 +257,14 @@ mod tests {
             assert_eq!(at(Interpolation::Linear, &values, t), linear);
             assert_eq!(at(Interpolation::Step, &values, t), step);
         }
-        assert!(sampled(&[1.0, 3.0], &values[..1], 1, Interpolation::Step, 2.0, false).is_err());
+        assert!(sampled(&[[1.0], [3.0]], &values[..1], 1, Interpolation::Step, 2.0, false).is_err());
     }
 
     #[test]
     fn splines_follow_any_cubic() {
         // f = t³ with its exact derivatives at the keys 1 and 3.
-        let (f, d) = (|t: f64| t * t * t, |t: f64| 3.0 * t * t);
-        let values = [[d(1.0)], [f(1.0)], [d(1.0)], [d(3.0)], [f(3.0)], [d(3.0)]];
+        let f = |t: f64| t * t * t;
+        let values = [[3.0], [1.0], [3.0], [27.0], [27.0], [27.0]];
         for t in [1.0, 1.2, 2.0, 2.9, 3.0] {
             assert!((at(Interpolation::CubicSpline, &values, t) - f(t)).abs() < 1e-12, "{t}");
         }
@@ -252,9 +273,9 @@ mod tests {
     #[test]
     fn turns_take_the_shorter_way_at_an_even_pace() {
         let turn = |angle: f64| DQuat::from_rotation_y(angle);
-        let values = [turn(0.2).to_array(), (-turn(1.4)).to_array()];
+        let values = [turn(0.2), -turn(1.4)].map(|turn| turn.to_array().map(|part| part as f32));
         for t in [0.0, 0.25, 0.7] {
-            let found = sampled(&[0.0, 1.0], &values, 1, Interpolation::Linear, t, true).ok().unwrap()[0];
+            let found = sampled(&[[0.0], [1.0]], &values, 1, Interpolation::Linear, t, true).ok().unwrap()[0];
             let angle = DQuat::from_array(found).angle_between(turn(0.2 + 1.2 * t));
             assert!(angle < 1e-6, "{t}: {angle}");
         }

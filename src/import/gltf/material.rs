@@ -284,6 +284,9 @@ impl Document {
             };
             DVec2::new(number(0), number(1))
         };
+        // An angle that is hardly finite in degrees says nothing.
+        let rotation = transform.0.and_then(|object| object.get("rotation")).and_then(Value::as_f64);
+        let rotation = rotation.filter(|angle| angle.abs() <= SceneFile::MAX_COORDINATE).unwrap_or(0.0);
         let set = transform.0.and_then(|object| object.get("texCoord")).and_then(Value::as_u64);
         let uv_set = set.and_then(|set| u32::try_from(set).ok()).unwrap_or(reference.tex_coord);
         if uv_set > 1 {
@@ -294,7 +297,7 @@ impl Document {
             image,
             uv_set,
             offset: pair("offset", 0.0),
-            rotation: transform.0.and_then(|object| object.get("rotation")).and_then(Value::as_f64).unwrap_or(0.0),
+            rotation,
             scale: pair("scale", 1.0),
             wrap: [wrap(sampler.wrap_s), wrap(sampler.wrap_t)],
             smooth: sampler.mag_filter != Some(NEAREST),

@@ -52,10 +52,8 @@ impl Document {
                 deformation.weights = weights;
             }
             if let Some(skin) = json.skin {
-                let joints = self.joints(skin, &tree.worlds).unwrap_or_else(|located| {
-                    warnings.push(omission(&place("skins", skin), &located));
-                    Vec::new()
-                });
+                let (joints, problem) = self.joints_in(skin, tree);
+                warnings.extend(problem.map(|located| omission(&place("skins", skin), &located)));
                 deformation.joints = Some(Joints { joints, of_node: tree.worlds[node as usize] });
             }
         }

@@ -7,6 +7,7 @@ use crate::import::gltf::animation::Pose;
 use crate::import::gltf::document::Document;
 use crate::import::gltf::json;
 use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4};
+use std::sync::{Arc, OnceLock};
 
 /// The nodes of a file, posed.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +16,8 @@ pub(crate) struct Tree {
     pub scene: Vec<u32>,
     /// From the coordinates of each node of the file to the world, metres.
     pub worlds: Vec<DAffine3>,
+    /// From mesh coordinates to the world by each joint of each skin, once something needs it.
+    pub skins: Vec<OnceLock<Arc<[DAffine3]>>>,
 }
 
 impl Document {
@@ -71,7 +74,11 @@ impl Document {
     /// of the scene are no roots; what is outside of the scene has no say in it.
     pub(crate) fn placed_nodes(&self, pose: &Pose) -> Tree {
         let count = self.root.nodes.len();
-        let mut tree = Tree { scene: Vec::new(), worlds: vec![DAffine3::IDENTITY; count] };
+        let mut tree = Tree {
+            scene: Vec::new(),
+            worlds: vec![DAffine3::IDENTITY; count],
+            skins: vec![OnceLock::new(); self.root.skins.len()],
+        };
         let mut is_placed = vec![false; count];
         let roots = self.roots();
         let (below, top): (Vec<u32>, Vec<u32>) = {

@@ -5,21 +5,40 @@
 
 use crate::import::error::gltf::{GltfProblem, Located, place};
 use crate::import::gltf::document::Document;
+use crate::import::gltf::nodes::Tree;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
+use std::sync::{Arc, OnceLock};
 
 /// The joints of a skin.
 pub(crate) struct Joints {
     /// From mesh coordinates to the world by each joint; none if the skin is broken.
-    pub joints: Vec<DAffine3>,
+    pub joints: Arc<[DAffine3]>,
     /// That of the node, which moves what follows no joint.
     pub of_node: DAffine3,
 }
 
 impl Document {
+    /// The joints of a skin, computed once for all meshes that use it; none, and the reason, if it is broken.
+    pub(crate) fn joints_in(&self, skin: u32, tree: &Tree) -> (Arc<[DAffine3]>, Option<Located>) {
+        let known = tree.skins.get(skin as usize);
+        if let Some(joints) = known.and_then(OnceLock::get) {
+            return (joints.clone(), None);
+        }
+        let (joints, problem): (Arc<[DAffine3]>, _) = match self.joints(skin, &tree.worlds) {
+            Ok(joints) => (joints.into(), None),
+            Err(problem) => (Arc::default(), Some(problem)),
+        };
+        let joints = match known {
+            Some(known) => known.get_or_init(|| joints).clone(),
+            None => joints,
+        };
+        (joints, problem)
+    }
+
     /// From mesh coordinates to the world by each joint of a skin.
     ///
     /// - `worlds`: from each node of the file to the world.
-    pub(crate) fn joints(&self, skin: u32, worlds: &[DAffine3]) -> Result<Vec<DAffine3>, Located> {
+    fn joints(&self, skin: u32, worlds: &[DAffine3]) -> Result<Vec<DAffine3>, Located> {
         let here = |problem| (place("skins", skin), problem);
         let count = self.root.skins.len();
         let json = self.root.skins.get(skin as usize);

@@ -24,7 +24,7 @@ use crate::import::model::polygon;
 use crate::import::obj::parse::{Corner, ParsedObj};
 use crate::mesh::Mesh;
 use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Further `mtllib` lines are ignored.
@@ -259,12 +259,20 @@ fn find_materials(
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known: HashMap<String, ImportedMaterial> = HashMap::new();
     let files = References::of(path, options.allow_outside);
-    let (mut seen, mut has_materials) = (Vec::new(), Vec::new());
-    for line in parsed.libraries.iter().take(MAX_LIBRARIES) {
+    let (mut seen, mut has_materials, mut n_names) = (HashSet::new(), Vec::new(), 0);
+    for line in &parsed.libraries {
         // A name may contain spaces, and a line may contain several names.
         let is_one = files.resolve(folder, line).is_ok_and(|file| folder.join(file.path).exists());
         let names: Vec<&str> = if is_one { vec![line] } else { line.split_whitespace().collect() };
         for name in names {
+            n_names += 1;
+            if n_names > MAX_LIBRARIES {
+                warnings.push(format!(
+                    "{}: names more than {MAX_LIBRARIES} libraries: only these are read",
+                    path.display()
+                ));
+                return with_materials(path, parsed, known, has_materials, warnings);
+            }
             let library = match files.resolve(folder, name) {
                 Ok(file) => {
                     if let Some(difference) = file.difference(name) {
@@ -277,15 +285,25 @@ fn find_materials(
                     continue;
                 }
             };
-            if !seen.contains(&library) {
+            if seen.insert(library.clone()) {
                 let materials = mtl::load_library(&library, files, options.max_library_bytes, warnings);
                 // Any text can be named here; only what has materials is a library.
                 has_materials.extend((!materials.is_empty()).then(|| library.clone()));
                 known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
-                seen.push(library);
             }
         }
     }
+    with_materials(path, parsed, known, has_materials, warnings)
+}
+
+/// The materials of the faces, as far as the libraries have them.
+fn with_materials(
+    path: &Path,
+    parsed: ParsedObj,
+    known: HashMap<String, ImportedMaterial>,
+    libraries: Vec<PathBuf>,
+    warnings: &mut Warnings,
+) -> (Vec<ImportedMaterial>, Vec<PathBuf>) {
     let mut missing = Vec::new();
     let mut find = |name: String| match known.get(&name) {
         Some(material) => material.clone(),
@@ -306,5 +324,5 @@ fn find_materials(
             missing[..missing.len().min(3)].join(", ")
         ));
     }
-    (materials, has_materials)
+    (materials, libraries)
 }

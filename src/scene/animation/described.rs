@@ -1,7 +1,7 @@
 //! The animation of a world as part of a scene file: names of the animated entities, and what cannot be expressed.
 
 use crate::format::animation::{AnimationPart, EditedPart};
-use crate::format::camera_components::camera_part;
+use crate::format::camera::camera_part;
 use crate::format::placement::{Linear, Placement};
 use crate::scene::animation::written::to_part;
 use crate::scene::animation::{Animation, Channel};

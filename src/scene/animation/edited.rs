@@ -5,7 +5,7 @@
 
 use crate::format::animation::EditedPart;
 use crate::format::camera::CameraPart;
-use crate::format::camera_components::camera;
+use crate::format::camera::camera;
 use crate::format::parts::SceneFile;
 use crate::scene::animation::moment::rest_camera;
 use crate::scene::animation::written::{Entities, of_part};

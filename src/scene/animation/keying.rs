@@ -2,7 +2,7 @@
 
 use crate::format::animation::AnimationPart;
 use crate::format::camera::CameraPart;
-use crate::format::camera_components::{camera, camera_part};
+use crate::format::camera::{camera, camera_part};
 use crate::format::key::{Curve, Interpolation};
 use crate::format::material_property::MaterialProperty;
 use crate::format::property::{CameraProperty, LightProperty, ObjectProperty};

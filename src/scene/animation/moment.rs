@@ -1,7 +1,7 @@
 //! The state of a scene at a given time.
 
 use crate::format::camera::CameraPart;
-use crate::format::camera_components::{camera, camera_part};
+use crate::format::camera::{camera, camera_part};
 use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::property::CameraProperty;

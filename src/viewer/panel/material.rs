@@ -203,3 +203,37 @@ fn cutoff_slider(ui: &mut Ui, cutoff: Option<f32>) -> Option<f64> {
     })
     .inner
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render;
+    use glam::Vec3;
+
+    #[test]
+    fn every_property_that_can_be_set_has_a_row_with_its_label() {
+        for kind in MaterialKind::plain() {
+            let material: Material = render::Material::of_kind(kind, ColorParam::Rgb(Vec3::splat(0.5))).unwrap();
+            let context = egui::Context::default();
+            let output = context.run(egui::RawInput::default(), |context| {
+                egui::CentralPanel::default().show(context, |ui| {
+                    rows(ui, "material", |ui| {
+                        for (property, param) in material.params() {
+                            property_row(ui, 0, property, param, None, &mut Asked::default());
+                        }
+                    });
+                });
+            });
+            let shown: Vec<String> = (output.shapes.iter())
+                .filter_map(|shape| match &shape.shape {
+                    egui::Shape::Text(text) => Some(text.galley.text().to_owned()),
+                    _ => None,
+                })
+                .collect();
+            for (property, _) in material.params() {
+                let can_be_set = MaterialProperty::named(property.name).is_some();
+                assert_eq!(shown.iter().any(|text| text == property.label), can_be_set, "{kind:?} {}", property.name);
+            }
+        }
+    }
+}

@@ -48,7 +48,34 @@ pub struct CameraError {
     pub allowed: &'static str,
 }
 
+impl Default for Camera {
+    /// A pinhole at the origin that looks along −Z, with +Y up and a vertical field of view of 90 degrees.
+    fn default() -> Self {
+        Self {
+            eye: Vec3::ZERO,
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: Vec3::NEG_Z,
+            tan_half_vfov: 1.0,
+            orthographic: None,
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+            blades: 0,
+            blade_rotation: 0.0,
+        }
+    }
+}
+
 impl Camera {
+    /// A pinhole at `eye` with `look_at` in the centre of the image and +Y up, or +Z for a view along Y.
+    ///
+    /// - `tan_half_vfov`: tangent of half the vertical field of view.
+    pub fn looking_at(eye: Vec3, look_at: Vec3, tan_half_vfov: f32) -> Self {
+        let forward = (look_at - eye).normalize();
+        let right = forward.cross(if forward.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }).normalize();
+        Self { eye, right, up: right.cross(forward), forward, tan_half_vfov, ..Self::default() }
+    }
+
     /// Checks that rays through every film and lens position have an origin and a direction.
     ///
     /// # Errors
@@ -275,18 +302,8 @@ mod tests {
     use super::*;
 
     fn camera(lens_radius: f32, focus_distance: f32) -> Camera {
-        Camera {
-            eye: Vec3::new(1.0, 2.0, 3.0),
-            right: Vec3::X,
-            up: Vec3::Y,
-            forward: Vec3::NEG_Z,
-            tan_half_vfov: 0.5,
-            orthographic: None,
-            lens_radius,
-            focus_distance,
-            blades: 0,
-            blade_rotation: 0.0,
-        }
+        let (eye, tan_half_vfov) = (Vec3::new(1.0, 2.0, 3.0), 0.5);
+        Camera { eye, tan_half_vfov, lens_radius, focus_distance, ..Camera::default() }
     }
 
     #[test]

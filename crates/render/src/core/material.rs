@@ -6,6 +6,7 @@
 //! reference pages read it.
 
 pub use crate::core::fresnel::Fresnel;
+use crate::core::material_params::has_value;
 pub use crate::core::material_params::{
     ColorInput, InSnapshot, MapParams, MaterialId, Param, ParamMut, ParamRef, Params, ScalarInput,
 };
@@ -204,6 +205,13 @@ impl<P: Params> Material<P> {
             *main = color;
         }
         Some(material)
+    }
+
+    /// The parameters that do not have their default, as in [`Self::params`].
+    pub fn given(&self) -> Vec<(&'static Property, ParamRef<'_, P>)> {
+        let mut params = self.params();
+        params.retain(|(property, param)| !property.default.is_some_and(|default| has_value::<P>(param, default)));
+        params
     }
 
     /// Contribution to [`MAX_LOBES`] as a part of a blend; a blend itself counts by its parts.

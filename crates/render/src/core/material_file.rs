@@ -2,7 +2,7 @@
 
 use crate::core::fresnel::Fresnel;
 use crate::core::material::{Material, MaterialKind};
-use crate::core::material_params::{Param, Params, has_value};
+use crate::core::material_params::{Param, Params};
 use crate::core::property::Property;
 use glam::Vec3;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, VariantAccess, Visitor};
@@ -19,8 +19,7 @@ where
 {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let kind = self.kind();
-        let mut params = self.params();
-        params.retain(|(property, param)| !property.default.is_some_and(|default| has_value::<P>(param, default)));
+        let params = self.given();
         let mut fields = serializer.serialize_struct_variant("Material", kind as u32, kind.name(), params.len())?;
         for (Property { name, .. }, param) in params {
             match param {

@@ -1,0 +1,73 @@
+//! Small files whose parts all refer to one large thing: it is read once, or the rest is told to be too much. Read again
+//! for each part, these files take minutes.
+
+use super::gltf_writer::{Writer, quad};
+use firstlight::scene::{LoadOptions, LoadedScene, ModelChoice, SceneSource, load};
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn open(path: &Path) -> Result<LoadedScene, String> {
+    let choice = ModelChoice { at: Some(0.5), ..ModelChoice::default() };
+    let options = LoadOptions { choice: Some(&choice), ..LoadOptions::default() };
+    load(&SceneSource::parse(path).unwrap(), &options).map_err(|error| error.to_string())
+}
+
+fn opened(writer: &Writer) -> LoadedScene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.glb");
+    std::fs::write(&path, writer.glb()).unwrap();
+    open(&path).unwrap()
+}
+
+#[test]
+fn keys_that_many_channels_share_are_read_once() {
+    const KEYS: usize = 300_000;
+    const CHANNELS: usize = 20_000;
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let view = writer.view(&vec![0; KEYS], None);
+    let list = |writer: &mut Writer, kind: &str, count: usize| {
+        let accessor = json!({ "bufferView": view, "componentType": 5121, "normalized": true, "count": count });
+        let mut accessor = accessor;
+        accessor["type"] = json!(kind);
+        writer.accessor(accessor)
+    };
+    let times = list(&mut writer, "SCALAR", KEYS / 3);
+    let values = list(&mut writer, "VEC3", KEYS / 3);
+    let channels: Vec<Value> = (0..CHANNELS)
+        .map(|i| {
+            let path = if i % 2 == 0 { "translation" } else { "scale" };
+            json!({ "sampler": i, "target": { "node": i / 2 + 1, "path": path } })
+        })
+        .collect();
+    let nodes = writer.json["nodes"].as_array_mut().unwrap();
+    nodes.extend(vec![json!({}); CHANNELS / 2 + 1]);
+    writer.json["scenes"] = json!([{ "nodes": [0] }]);
+    writer.json["animations"] =
+        json!([{ "samplers": vec![json!({ "input": times, "output": values }); CHANNELS], "channels": channels }]);
+    opened(&writer);
+}
+
+#[test]
+fn a_skin_that_many_nodes_use_is_posed_once() {
+    const JOINTS: usize = 100_000;
+    const NODES: usize = 3000;
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    writer.json["skins"] = json!([{ "joints": vec![0; JOINTS] }]);
+    writer.json["nodes"] = json!(vec![json!({ "mesh": 0, "skin": 0 }); NODES]);
+    writer.json["scenes"] = json!([{ "nodes": (0..NODES).collect::<Vec<_>>() }]);
+    opened(&writer);
+}
+
+#[test]
+fn a_line_of_libraries_is_read_up_to_the_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.obj");
+    let names: Vec<String> = (0..60_000).map(|i| format!("{i:x}")).collect();
+    let text = format!("mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", names.join(" "));
+    std::fs::write(&path, text).unwrap();
+    let scene = open(&path).unwrap();
+    let warnings: Vec<String> = scene.warnings.iter().map(|warning| warning.to_string()).collect();
+    assert!(warnings.iter().any(|text| text.contains("names more than 256 libraries")), "{warnings:?}");
+}
