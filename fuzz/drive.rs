@@ -83,7 +83,7 @@ pub fn gltf(bytes: &[u8]) {
 }
 
 fn open_model(path: PathBuf, choice: Option<&ModelChoice>) {
-    match load(&SceneSource::Model(path), &LoadOptions { choice, hasty: true, ..LoadOptions::default() }) {
+    match load(&SceneSource::Model(path), &LoadOptions { choice, preview: true, ..LoadOptions::default() }) {
         Ok(scene) => {
             scene.file.check().expect("a scene that was made is sound");
             scene.spawn(&mut World::new());

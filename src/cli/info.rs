@@ -65,8 +65,16 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
         .then(|| caustic_choice(prepared, &settings, (film.width, film.height)));
     let animation = world.get_resource::<Animation>().cloned();
     let list = ObjectList::of(&inputs);
-    let told =
-        Told { scene: &scene, inputs: &inputs, list, extraction: &extraction, film, layers, caustics, animation };
+    let told = SceneReport {
+        scene: &scene,
+        inputs: &inputs,
+        list,
+        extraction: &extraction,
+        film,
+        layers,
+        caustics,
+        animation,
+    };
     match (args.json, args.materials) {
         (true, false) => print(told.json()),
         (true, true) => {
@@ -84,7 +92,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
 }
 
 /// The data for the report on a scene.
-struct Told<'a> {
+struct SceneReport<'a> {
     scene: &'a LoadedScene,
     inputs: &'a SceneInputs,
     list: ObjectList<'a>,
@@ -98,7 +106,7 @@ struct Told<'a> {
     animation: Option<Animation>,
 }
 
-impl Told<'_> {
+impl SceneReport<'_> {
     /// As text.
     fn text(&self) -> Vec<String> {
         let Self { scene, extraction, film, .. } = self;

@@ -32,7 +32,7 @@ const MOST_NAMED: usize = 6;
 
 /// Objects with equal keys form one line of the list.
 #[derive(PartialEq, Eq, Hash)]
-enum Key {
+enum GroupKey {
     /// Address of the mesh or group of spheres.
     Shared(usize),
     /// Unnamed objects of one kind, or many named ones.
@@ -51,10 +51,10 @@ impl<'a> ObjectList<'a> {
         let mut list = Self { groups: Vec::new(), bounds: None, faults: BTreeMap::new() };
         for (i, object) in inputs.objects.iter().enumerate() {
             let key = match &object.shape {
-                Shape::Mesh(mesh) => Key::Shared(Arc::as_ptr(mesh) as usize),
-                Shape::Spheres(cloud) => Key::Shared(Arc::as_ptr(cloud) as usize),
-                shape if object.name.is_none() || named[shape.kind()] > MOST_NAMED => Key::Kind(shape.kind()),
-                _ => Key::Own(i),
+                Shape::Mesh(mesh) => GroupKey::Shared(Arc::as_ptr(mesh) as usize),
+                Shape::Spheres(cloud) => GroupKey::Shared(Arc::as_ptr(cloud) as usize),
+                shape if object.name.is_none() || named[shape.kind()] > MOST_NAMED => GroupKey::Kind(shape.kind()),
+                _ => GroupKey::Own(i),
             };
             if let Shape::Mesh(mesh) = &object.shape {
                 list.faults.entry(Arc::as_ptr(mesh)).or_insert_with(|| Faults::of(mesh));

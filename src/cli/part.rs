@@ -98,12 +98,12 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     check_samples(&film, &samples, region.as_ref(), &path)?;
     // The features of all parts are equal: the first part stores them for the merged film.
     let features = if part.index == 0 { job.features(args, kept).map_err(Failure::of_part)? } else { None };
-    let work = Work { args, job: &job, part, samples, region, features, path };
+    let work = PartWork { args, job: &job, part, samples, region, features, path };
     work.render(film, claim, progress, stop)
 }
 
 /// The work on a part.
-struct Work<'a> {
+struct PartWork<'a> {
     args: &'a RenderArgs,
     job: &'a RenderJob,
     part: Part,
@@ -113,7 +113,7 @@ struct Work<'a> {
     path: PathBuf,
 }
 
-impl Work<'_> {
+impl PartWork<'_> {
     fn render(&self, mut film: Film, claim: WholeFile, mut progress: Progress, stop: &Stop) -> Result<(), Failure> {
         let Self { args, job, samples, region, .. } = self;
         let (region, goal) = (region.as_ref(), samples.end - samples.start);

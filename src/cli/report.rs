@@ -210,7 +210,7 @@ struct ReportScene {
     moment: Moment,
     trees: Trees,
     settings: RenderSettings,
-    developing: DisplaySettings,
+    display_settings: DisplaySettings,
     size: (u32, u32),
     key: Key,
 }
@@ -248,7 +248,7 @@ impl ReportScene {
             moment: world.get_resource().copied().unwrap_or_default(),
             trees: scene.trees.clone(),
             settings,
-            developing: *world.resource(),
+            display_settings: *world.resource(),
             size,
             key: Key::new(&scene.source.title(), scene.fingerprint(), &settings, size),
         })
@@ -267,15 +267,15 @@ impl ReportScene {
         let steps = self.measure_curve(limits, self.settings, "all techniques", progress, stop);
         let mut missing =
             stop.is_asked().then(|| "its later steps and the comparison of techniques are missing".to_owned());
-        let Some(last_rung) = steps.last() else { return (None, Some("no step was completed".to_owned())) };
+        let Some(last_step) = steps.last() else { return (None, Some("no step was completed".to_owned())) };
         let reference = match given {
             Some(given) => given.clone(),
-            None => match self.reference(last_rung, progress, stop) {
+            None => match self.reference(last_step, progress, stop) {
                 Some(reference) => reference,
                 None => return (None, Some("its reference was not completed".to_owned())),
             },
         };
-        let display = self.developing.0;
+        let display = self.display_settings.0;
         let measure = |steps: &[CurveStep]| ConvergenceCurve::measure(steps, &reference.picture, &display);
         let picture = |step: Option<&CurveStep>| step.map(|step| step.picture.clone());
         let last: LinearPicture = picture(steps.last()).expect("a curve has at least one step");

@@ -29,7 +29,7 @@ pub struct StatusArgs {
 
 /// Progress of the parts of a round.
 #[derive(Default)]
-struct Parts {
+struct JobParts {
     count: u32,
     done: u32,
     begun: u32,
@@ -38,7 +38,7 @@ struct Parts {
     films: Vec<PathBuf>,
 }
 
-impl Parts {
+impl JobParts {
     fn of(folder: &Path, job: &Job, number: usize, round: &Round) -> Self {
         let count = job.parts_of(&round.range());
         let mut parts = Self { count, ..Self::default() };
@@ -64,7 +64,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     }
     let (number, is_done) = rounds.open().map_or((rounds.0.len(), true), |number| (number, false));
     let round = rounds.get(number).expect("there is one at least");
-    let parts = if is_done { Parts::default() } else { Parts::of(folder, &job, number, round) };
+    let parts = if is_done { JobParts::default() } else { JobParts::of(folder, &job, number, round) };
     let merged = rounds.0.iter().rev().find(|round| round.merged);
     let share = parts.samples as f64 / round.range().len() as f64;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
@@ -96,7 +96,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     if is_done {
         return print(format!("done: {}", folder.join(ALL[1]).display()));
     }
-    let Parts { count, done, begun, .. } = parts;
+    let JobParts { count, done, begun, .. } = parts;
     let left = left.map_or_else(String::new, |seconds| format!(", about {} left in this round", duration(seconds)));
     let samples = in_words(&[round.range()]);
     print(format!(

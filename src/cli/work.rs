@@ -52,7 +52,7 @@ impl From<JobError> for Failure {
 
 pub fn run(args: &WorkArgs, stop: &Stop) -> Result<(), Failure> {
     stop.is_of_part();
-    let work = Work::open(&args.folder).map_err(|error| Failure::from(error).of_part())?;
+    let work = WorkOrder::open(&args.folder).map_err(|error| Failure::from(error).of_part())?;
     if args.next {
         return match work.rounds.open() {
             Some(round) => print(round.to_string()),
@@ -80,13 +80,13 @@ pub fn run(args: &WorkArgs, stop: &Stop) -> Result<(), Failure> {
 }
 
 /// A job, read from its folder.
-struct Work {
+struct WorkOrder {
     folder: PathBuf,
     job: Job,
     rounds: Rounds,
 }
 
-impl Work {
+impl WorkOrder {
     fn open(folder: &Path) -> Result<Self, JobError> {
         Ok(Self { folder: folder.to_path_buf(), job: Job::read(folder)?, rounds: Rounds::read(folder)? })
     }

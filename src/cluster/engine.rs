@@ -56,7 +56,7 @@ enum Language {
 }
 
 /// What a word in a template stands for.
-enum Value {
+enum TemplateValue {
     Number(u64),
     /// Letters, digits and `-`, which mean the same in every language, even within a word or a string.
     Name(String),
@@ -66,7 +66,7 @@ enum Value {
     Directives(Vec<SlurmOption>),
 }
 
-impl Value {
+impl TemplateValue {
     fn quoted(&self, language: Language) -> String {
         match (self, language) {
             (Self::Number(number), _) => number.to_string(),
@@ -94,7 +94,7 @@ pub fn shell_word(text: &str) -> String {
 }
 
 /// The text of a template with every word in `@` replaced by its value; of values, nothing is replaced.
-fn fill(template: &str, language: Language, values: &[(&str, Value)]) -> String {
+fn fill(template: &str, language: Language, values: &[(&str, TemplateValue)]) -> String {
     let mut text = String::with_capacity(template.len());
     let mut rest = template;
     while let Some((before, after)) = rest.split_once('@') {
@@ -116,14 +116,14 @@ fn fill(template: &str, language: Language, values: &[(&str, Value)]) -> String 
 /// The files with which an engine runs `job`.
 pub fn files(job: &Job, options: &EngineOptions) -> Vec<JobFile> {
     let values = [
-        ("NAME", Value::Name(job.name.clone())),
-        ("PROGRAM", Value::Text(job.program.clone())),
-        ("FOLDER", Value::Text(options.folder.clone())),
-        ("SUBFOLDER", Value::Text(options.folder.rsplit('/').next().unwrap_or_default().to_owned())),
-        ("OPTIONS", Value::Directives(options.slurm.clone())),
-        ("IMAGE", Value::Text(options.image.clone())),
-        ("CLAIM", Value::Text(options.claim.clone())),
-        ("PARTS", Value::Number(job.parts.into())),
+        ("NAME", TemplateValue::Name(job.name.clone())),
+        ("PROGRAM", TemplateValue::Text(job.program.clone())),
+        ("FOLDER", TemplateValue::Text(options.folder.clone())),
+        ("SUBFOLDER", TemplateValue::Text(options.folder.rsplit('/').next().unwrap_or_default().to_owned())),
+        ("OPTIONS", TemplateValue::Directives(options.slurm.clone())),
+        ("IMAGE", TemplateValue::Text(options.image.clone())),
+        ("CLAIM", TemplateValue::Text(options.claim.clone())),
+        ("PARTS", TemplateValue::Number(job.parts.into())),
     ];
     let script = |name, text| JobFile { name, text: fill(text, Language::Shell, &values), is_script: false };
     let program = |name, text| JobFile { is_script: true, ..script(name, text) };
@@ -148,15 +148,16 @@ pub fn files(job: &Job, options: &EngineOptions) -> Vec<JobFile> {
 fn openjd(job: &Job) -> String {
     let template = include_str!("../../cluster/openjd/template.yaml");
     let (head, step) = template.split_once("#@STEPS@\n").expect("the template has steps");
-    let values = [("NAME", Value::Name(job.name.clone())), ("PROGRAM", Value::Text(job.program.clone()))];
+    let values =
+        [("NAME", TemplateValue::Name(job.name.clone())), ("PROGRAM", TemplateValue::Text(job.program.clone()))];
     let mut steps = fill(head, Language::Yaml, &values);
     for round in 1..=job.most_rounds() as u64 {
         let after = if round == 1 { "" } else { "    dependencies:\n      - dependsOn: Merge@BEFORE@\n" };
         let values = [
-            ("ROUND", Value::Number(round)),
-            ("BEFORE", Value::Number(round - 1)),
+            ("ROUND", TemplateValue::Number(round)),
+            ("BEFORE", TemplateValue::Number(round - 1)),
             // What a later round has is not known yet, but no more parts than samples.
-            ("PARTS", Value::Number(job.parts.into())),
+            ("PARTS", TemplateValue::Number(job.parts.into())),
         ];
         steps += &fill(&step.replace("    #@AFTER@\n", after), Language::Yaml, &values);
     }
@@ -216,8 +217,8 @@ mod tests {
     #[test]
     fn values_are_not_filled_again() {
         let hostile = "x'||touch y;#@SUBFOLDER@ @PARTS@ @NONE@ \"$(z)`".to_owned();
-        let text = |text: &str| Value::Text(text.to_owned());
-        let values = [("A", text(&hostile)), ("SUBFOLDER", text("'")), ("PARTS", Value::Number(3))];
+        let text = |text: &str| TemplateValue::Text(text.to_owned());
+        let values = [("A", text(&hostile)), ("SUBFOLDER", text("'")), ("PARTS", TemplateValue::Number(3))];
         let words = shlex::split(&fill("@A@ @SUBFOLDER@ @PARTS@", Language::Shell, &values));
         assert_eq!(words, Some(vec![hostile.clone(), "'".to_owned(), "3".to_owned()]));
         let string: String = serde_json::from_str(&fill("@A@", Language::Yaml, &values)).unwrap();

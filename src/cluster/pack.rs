@@ -39,13 +39,13 @@ pub struct Package {
     /// The image that lights the scene instead of its own environment, likewise.
     pub environment: Option<String>,
     /// By name, with `/` between the parts.
-    files: BTreeMap<String, Content>,
+    files: BTreeMap<String, PackedContent>,
     /// Files from outside of the folder of what was opened, with their names in the package.
     pub outside: Vec<(PathBuf, String)>,
 }
 
 #[derive(Clone, Debug)]
-enum Content {
+enum PackedContent {
     File(PathBuf),
     Text(String),
 }
@@ -153,13 +153,13 @@ impl Package {
         if let SceneSource::Scene(path) = &scene.source
             && let Some(text) = renamed(path, &scene_name, scene, &named)?
         {
-            files.insert(scene_name.clone(), Content::Text(text));
+            files.insert(scene_name.clone(), PackedContent::Text(text));
         }
         match source {
             SceneSource::Builtin(name) => {
                 scene_name = format!("{name}.ron");
                 let text = builtin_text(name).unwrap_or_default().to_owned();
-                files.insert(scene_name.clone(), Content::Text(text));
+                files.insert(scene_name.clone(), PackedContent::Text(text));
             }
             SceneSource::Picture(path) => {
                 let folder = Path::new(&scene_name).parent().unwrap_or(Path::new(""));
@@ -200,8 +200,8 @@ impl Package {
         let mut sums = String::new();
         for (name, content) in &self.files {
             let size = match content {
-                Content::File(path) => std::fs::metadata(path).map_or(0, |info| info.len()),
-                Content::Text(text) => text.len() as u64,
+                PackedContent::File(path) => std::fs::metadata(path).map_or(0, |info| info.len()),
+                PackedContent::Text(text) => text.len() as u64,
             };
             zip.start_file(name.as_str(), options.large_file(size >= LARGE)).map_err(failed)?;
             let sum = content.copy(&mut zip, &path)?;
@@ -237,7 +237,7 @@ impl Package {
     }
 }
 
-impl Content {
+impl PackedContent {
     /// Copies it to `out`, and answers with its checksum in hexadecimal.
     ///
     /// - `path`: of the output, for messages.
@@ -300,13 +300,13 @@ fn base_of(
 }
 
 /// Adds a file under its name in the package.
-fn put(files: &mut BTreeMap<String, Content>, name: String, path: &Path) -> Result<(), PackError> {
-    if let Some(Content::File(first)) = files.get(&name)
+fn put(files: &mut BTreeMap<String, PackedContent>, name: String, path: &Path) -> Result<(), PackError> {
+    if let Some(PackedContent::File(first)) = files.get(&name)
         && place(first) != place(path)
     {
         return Err(PackError::Twice { first: first.clone(), second: path.to_path_buf(), name });
     }
-    files.insert(name, Content::File(path.to_path_buf()));
+    files.insert(name, PackedContent::File(path.to_path_buf()));
     Ok(())
 }
 

@@ -12,11 +12,11 @@ pub enum Flow {
     /// Rendering continues until the target is reached.
     Continue,
     /// Rendering ends; the image has the samples taken so far.
-    Stop,
+    StopCondition,
 }
 
 type OnProgress = Box<dyn Fn(&Progress) -> Flow + Send + Sync>;
-type Stop = Box<dyn Fn() -> bool + Send + Sync>;
+type StopCondition = Box<dyn Fn() -> bool + Send + Sync>;
 
 /// Options of a rendering. An option that is not set keeps the scene's value.
 ///
@@ -36,7 +36,7 @@ pub struct RenderOptions {
     pub(super) exposure: f32,
     pub(super) threads: Option<usize>,
     on_progress: Option<OnProgress>,
-    stop: Option<Stop>,
+    stop: Option<StopCondition>,
 }
 
 impl RenderOptions {

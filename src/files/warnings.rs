@@ -80,12 +80,12 @@ impl fmt::Display for Warning {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Warnings {
     list: Vec<Warning>,
-    kinds: HashMap<String, Kind>,
+    kinds: HashMap<String, WarningKind>,
 }
 
 /// Numbers of warnings of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Kind {
+struct WarningKind {
     listed: usize,
     more: usize,
 }

@@ -149,7 +149,7 @@ impl<'de> Deserialize<'de> for KeyValue {
             type Value = KeyValue;
 
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("the value of a key: a number or (x, y, z)")
+                f.write_str("a number or (x, y, z)")
             }
 
             fn visit_f64<E>(self, value: f64) -> Result<KeyValue, E> {

@@ -46,7 +46,7 @@ pub fn check(file: &SceneFile, most: usize) -> Found {
         check.object(&format!("objects/{i}"), object);
     }
     for (i, light) in file.lights.iter().enumerate() {
-        check.lamp(&format!("lights/{i}"), light);
+        check.light_part(&format!("lights/{i}"), light);
     }
     check.animation();
     check.found
@@ -233,7 +233,7 @@ impl Check<'_> {
         (lobes, glowing)
     }
 
-    fn lamp(&mut self, path: &str, light: &LightPart) {
+    fn light_part(&mut self, path: &str, light: &LightPart) {
         match light {
             LightPart::Point { position, intensity, radius, .. } => {
                 self.point(&format!("{path}/position"), *position);

@@ -16,7 +16,7 @@ use crate::format::view::unit_direction;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Paths, properties and curves of the tracks of one entity.
-type Moved<'a, P> = Vec<(String, P, Curve)>;
+type MovedTracks<'a, P> = Vec<(String, P, Curve)>;
 
 impl Check<'_> {
     pub(crate) fn animation(&mut self) {
@@ -90,8 +90,8 @@ impl Check<'_> {
         let objects = by_name(file.objects.iter().map(ObjectPart::name));
         let lights = by_name(file.lights.iter().map(|light| light.name()));
         let mut seen: HashMap<(&str, Option<&str>, &str), usize> = HashMap::new();
-        let mut camera = Moved::new();
-        let mut moved_lights: BTreeMap<usize, Moved<LightProperty>> = BTreeMap::new();
+        let mut camera = MovedTracks::new();
+        let mut moved_lights: BTreeMap<usize, MovedTracks<LightProperty>> = BTreeMap::new();
         for (i, track) in file.animation.tracks.iter().enumerate() {
             let path = format!("animation/tracks/{i}");
             let (what, name, property, quantity) = match track {
@@ -263,7 +263,7 @@ impl Check<'_> {
         }
     }
 
-    fn light_tracks(&mut self, index: usize, moved: &Moved<LightProperty>) {
+    fn light_tracks(&mut self, index: usize, moved: &MovedTracks<LightProperty>) {
         let (light, placement) = LightKind::from_part(&self.file.lights[index]);
         for (path, property, curve) in moved {
             if property.set(&mut light.clone(), &mut placement.clone(), curve.keys[0].1.three()).is_none() {
@@ -285,7 +285,7 @@ impl Check<'_> {
     }
 
     /// Checks an entity at the times of all keys of its tracks, and reports the first problem.
-    fn at_all_keys<P: Property>(&mut self, moved: &Moved<P>, problem: impl Fn(f64) -> Option<BadValue>) {
+    fn at_all_keys<P: Property>(&mut self, moved: &MovedTracks<P>, problem: impl Fn(f64) -> Option<BadValue>) {
         let mut times: Vec<(f64, usize, usize)> = (moved.iter().enumerate())
             .flat_map(|(track, (.., curve))| {
                 curve.keys.iter().enumerate().map(move |(key, &(time, _))| (time, track, key))

@@ -65,7 +65,7 @@ pub struct Curve {
 }
 
 /// Position of a time relative to the keys.
-enum Place {
+enum KeyPlace {
     /// At a key, or outside of all keys.
     At(usize),
     /// Between key `i` and the next one, at a fraction in (0, 1).
@@ -86,13 +86,13 @@ impl Curve {
         self.time(key + 1) - self.time(key)
     }
 
-    fn place(&self, seconds: f64) -> Place {
+    fn place(&self, seconds: f64) -> KeyPlace {
         let next = self.keys.partition_point(|&(time, _)| time <= seconds);
-        let Some(before) = next.checked_sub(1) else { return Place::At(0) };
+        let Some(before) = next.checked_sub(1) else { return KeyPlace::At(0) };
         if next == self.keys.len() || self.time(before) == seconds {
-            return Place::At(before);
+            return KeyPlace::At(before);
         }
-        Place::Between(before, (seconds - self.time(before)) / self.span(before))
+        KeyPlace::Between(before, (seconds - self.time(before)) / self.span(before))
     }
 
     /// The value at a time; a single number is returned three times. The values at keys are exact.
@@ -100,8 +100,8 @@ impl Curve {
     /// - `quantity`: determines how values are interpolated.
     pub fn at(&self, quantity: Quantity, seconds: f64) -> DVec3 {
         let (key, share) = match self.place(seconds) {
-            Place::At(key) => return self.value(key),
-            Place::Between(key, share) => (key, share),
+            KeyPlace::At(key) => return self.value(key),
+            KeyPlace::Between(key, share) => (key, share),
         };
         if self.rests(key) {
             return self.value(key);

@@ -9,7 +9,7 @@
 /// Names of enum variants are not part of it.
 pub fn locate(text: &str, path: &str) -> (usize, usize) {
     let target: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
-    let mut walk = Walk { text: text.as_bytes(), at: 0, path: Vec::new(), target, best: 0, best_depth: None };
+    let mut walk = TextWalk { text: text.as_bytes(), at: 0, path: Vec::new(), target, best: 0, best_depth: None };
     walk.skip_header();
     walk.value(0);
     line_and_column(text, walk.best)
@@ -24,7 +24,7 @@ pub(crate) fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     (line, column)
 }
 
-struct Walk<'a> {
+struct TextWalk<'a> {
     text: &'a [u8],
     at: usize,
     path: Vec<String>,
@@ -33,7 +33,7 @@ struct Walk<'a> {
     best_depth: Option<usize>,
 }
 
-impl Walk<'_> {
+impl TextWalk<'_> {
     /// Deeper than any file that the parser accepts.
     const MAX_DEPTH: usize = 256;
 

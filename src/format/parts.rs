@@ -2,6 +2,7 @@
 
 use crate::format::animation::AnimationPart;
 use crate::format::camera::CameraPart;
+use crate::format::key::KeyValue;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::format::value::{ColorValue, Named, Rgb, ScalarValue};
 use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve};
@@ -387,33 +388,7 @@ impl LightPart {
 
 impl<'de> Deserialize<'de> for ScalePart {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrThree;
-        impl<'de> serde::de::Visitor<'de> for NumberOrThree {
-            type Value = DVec3;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-                f.write_str("a factor or (x, y, z)")
-            }
-
-            fn visit_f64<E>(self, value: f64) -> Result<DVec3, E> {
-                Ok(DVec3::splat(value))
-            }
-
-            fn visit_i64<E>(self, value: i64) -> Result<DVec3, E> {
-                Ok(DVec3::splat(value as f64))
-            }
-
-            fn visit_u64<E>(self, value: u64) -> Result<DVec3, E> {
-                Ok(DVec3::splat(value as f64))
-            }
-
-            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<DVec3, A::Error> {
-                let mut next =
-                    |i| seq.next_element::<f64>()?.ok_or_else(|| serde::de::Error::invalid_length(i, &"three factors"));
-                Ok(DVec3::new(next(0)?, next(1)?, next(2)?))
-            }
-        }
-        deserializer.deserialize_any(NumberOrThree).map(Self)
+        Ok(Self(KeyValue::deserialize(deserializer)?.three()))
     }
 }
 

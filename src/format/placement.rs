@@ -99,11 +99,12 @@ impl Placement {
         let linear = self.linear();
         let squared = linear.x_axis.length_squared();
         // Rounding in a rotation changes dot products of the axes by a few parts in 10¹⁶.
-        let slack = 1e-12 * squared;
-        let even = [linear.y_axis, linear.z_axis].iter().all(|axis| (axis.length_squared() - squared).abs() <= slack);
+        let tolerance = 1e-12 * squared;
+        let even =
+            [linear.y_axis, linear.z_axis].iter().all(|axis| (axis.length_squared() - squared).abs() <= tolerance);
         let square = [(linear.x_axis, linear.y_axis), (linear.y_axis, linear.z_axis), (linear.z_axis, linear.x_axis)]
             .iter()
-            .all(|(a, b)| a.dot(*b).abs() <= slack);
+            .all(|(a, b)| a.dot(*b).abs() <= tolerance);
         (even && square && squared > 0.0).then(|| squared.sqrt())
     }
 }

@@ -95,14 +95,14 @@ pub(crate) fn hex_color(text: &str) -> Option<Vec3> {
     Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
 }
 
-enum Found {
+enum FoundValue {
     Number(f32),
     Rgb(Vec3),
     Name(String),
 }
 
 impl<'de> Visitor<'de> for AnyValue {
-    type Value = Found;
+    type Value = FoundValue;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match (self.colours, self.textures) {
@@ -112,29 +112,29 @@ impl<'de> Visitor<'de> for AnyValue {
         })
     }
 
-    fn visit_f64<E: Error>(self, value: f64) -> Result<Found, E> {
-        narrow(value).map(Found::Number)
+    fn visit_f64<E: Error>(self, value: f64) -> Result<FoundValue, E> {
+        narrow(value).map(FoundValue::Number)
     }
 
-    fn visit_i64<E: Error>(self, value: i64) -> Result<Found, E> {
-        Ok(Found::Number(value as f32))
+    fn visit_i64<E: Error>(self, value: i64) -> Result<FoundValue, E> {
+        Ok(FoundValue::Number(value as f32))
     }
 
-    fn visit_u64<E: Error>(self, value: u64) -> Result<Found, E> {
-        Ok(Found::Number(value as f32))
+    fn visit_u64<E: Error>(self, value: u64) -> Result<FoundValue, E> {
+        Ok(FoundValue::Number(value as f32))
     }
 
-    fn visit_str<E: Error>(self, value: &str) -> Result<Found, E> {
+    fn visit_str<E: Error>(self, value: &str) -> Result<FoundValue, E> {
         if let Some(color) = hex_color(value).filter(|_| self.colours) {
-            Ok(Found::Rgb(color))
+            Ok(FoundValue::Rgb(color))
         } else if self.textures {
-            Ok(Found::Name(value.to_owned()))
+            Ok(FoundValue::Name(value.to_owned()))
         } else {
             Err(E::invalid_type(serde::de::Unexpected::Str(value), &self))
         }
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Found, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<FoundValue, A::Error> {
         if !self.colours {
             return Err(A::Error::invalid_type(serde::de::Unexpected::Seq, &self));
         }
@@ -145,16 +145,16 @@ impl<'de> Visitor<'de> for AnyValue {
         if seq.next_element::<f32>()?.is_some() {
             return Err(A::Error::invalid_length(4, &self));
         }
-        Ok(Found::Rgb(Vec3::from_array(rgb)))
+        Ok(FoundValue::Rgb(Vec3::from_array(rgb)))
     }
 }
 
 impl<'de> Deserialize<'de> for ColorValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: true })? {
-            Found::Number(value) => Self::grey(value),
-            Found::Rgb(rgb) => Self::Rgb(rgb),
-            Found::Name(name) => Self::Texture(name),
+            FoundValue::Number(value) => Self::grey(value),
+            FoundValue::Rgb(rgb) => Self::Rgb(rgb),
+            FoundValue::Name(name) => Self::Texture(name),
         })
     }
 }
@@ -162,8 +162,8 @@ impl<'de> Deserialize<'de> for ColorValue {
 impl<'de> Deserialize<'de> for ScalarValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: false })? {
-            Found::Name(name) => Self::Texture(name),
-            Found::Number(value) | Found::Rgb(Vec3 { x: value, .. }) => Self::Number(value),
+            FoundValue::Name(name) => Self::Texture(name),
+            FoundValue::Number(value) | FoundValue::Rgb(Vec3 { x: value, .. }) => Self::Number(value),
         })
     }
 }
@@ -171,9 +171,9 @@ impl<'de> Deserialize<'de> for ScalarValue {
 impl<'de> Deserialize<'de> for Rgb {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match deserializer.deserialize_any(AnyValue { textures: false, colours: true })? {
-            Found::Number(value) => Ok(Self(Vec3::splat(value))),
-            Found::Rgb(rgb) => Ok(Self(rgb)),
-            Found::Name(name) => {
+            FoundValue::Number(value) => Ok(Self(Vec3::splat(value))),
+            FoundValue::Rgb(rgb) => Ok(Self(rgb)),
+            FoundValue::Name(name) => {
                 Err(D::Error::invalid_type(serde::de::Unexpected::Str(&name), &"a colour without texture"))
             }
         }

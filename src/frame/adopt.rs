@@ -65,7 +65,7 @@ pub fn adopt_again(
     // One that follows its tracks follows the new ones.
     let is_kept = same_camera && !camera_follows(world);
     let camera = SceneInputs::of(world).camera.filter(|_| is_kept);
-    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
+    let display_settings = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
     let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
         == (old.file.integrator, old.file.max_depth, old.file.film.filter);
     let rendering = same_settings.then(|| *world.resource::<Rendering>());
@@ -83,8 +83,8 @@ pub fn adopt_again(
     {
         world.entity_mut(new.entity).insert((camera.view, camera.projection, camera.lens));
     }
-    if let Some(developing) = developing {
-        world.insert_resource(developing);
+    if let Some(display_settings) = display_settings {
+        world.insert_resource(display_settings);
     }
     if let Some(rendering) = rendering {
         world.insert_resource(rendering);

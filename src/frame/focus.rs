@@ -28,17 +28,17 @@ pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<S
         return None;
     }
     if let Some(seen) = projection.orthographic_height {
-        let slack = seen / (2.0 * f64::from(height.max(1)) * radius);
+        let tolerance = seen / (2.0 * f64::from(height.max(1)) * radius);
         let (near, far) = match lens.focus_distance {
             f64::INFINITY => (0.0, f64::INFINITY),
-            focus => (focus * (1.0 - slack).max(0.0), focus * (1.0 + slack)),
+            focus => (focus * (1.0 - tolerance).max(0.0), focus * (1.0 + tolerance)),
         };
         return Some(SharpZone { near, far });
     }
     let pixel = 2.0 * projection.tan_half_vfov() / f64::from(height.max(1));
-    let (focus, slack) = (lens.focus_distance.recip(), pixel / (2.0 * radius));
-    let far = if focus > slack { (focus - slack).recip() } else { f64::INFINITY };
-    Some(SharpZone { near: (focus + slack).recip(), far })
+    let (focus, tolerance) = (lens.focus_distance.recip(), pixel / (2.0 * radius));
+    let far = if focus > tolerance { (focus - tolerance).recip() } else { f64::INFINITY };
+    Some(SharpZone { near: (focus + tolerance).recip(), far })
 }
 
 /// Returns the f-number of a lens radius in metres, for a film 24 mm high and the field of view in perspective.

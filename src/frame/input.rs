@@ -39,14 +39,14 @@ type CameraParts = (Entity, Option<&'static Ordinal>, &'static mut View, &'stati
 #[derive(SystemParam)]
 pub struct CommandParams<'w, 's> {
     cameras: Query<'w, 's, CameraParts>,
-    developing: ResMut<'w, DisplaySettings>,
+    display_settings: ResMut<'w, DisplaySettings>,
     rendering: ResMut<'w, Rendering>,
     size: ResMut<'w, PictureSize>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
     hidden: ResMut<'w, Hidden>,
     stop_at: ResMut<'w, StopAt>,
-    looking: ResMut<'w, ViewMode>,
+    view_mode: ResMut<'w, ViewMode>,
     explaining: ResMut<'w, Explaining>,
     brush: ResMut<'w, RenderRegion>,
     focus: ResMut<'w, Focus>,
@@ -131,25 +131,25 @@ impl CommandParams<'_, '_> {
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {
-                let look = crate::frame::ViewOptions { inspection, ..self.looking.0 };
-                self.looking.set_if_neq(ViewMode(look));
+                let look = crate::frame::ViewOptions { inspection, ..self.view_mode.0 };
+                self.view_mode.set_if_neq(ViewMode(look));
             }
             Command::SetDenoising(denoising) => {
-                let look = crate::frame::ViewOptions { denoising, ..self.looking.0 };
-                self.looking.set_if_neq(ViewMode(look));
+                let look = crate::frame::ViewOptions { denoising, ..self.view_mode.0 };
+                self.view_mode.set_if_neq(ViewMode(look));
             }
             Command::SetDenoiseFilter(filter) => {
-                let look = crate::frame::ViewOptions { filter, ..self.looking.0 };
-                self.looking.set_if_neq(ViewMode(look));
+                let look = crate::frame::ViewOptions { filter, ..self.view_mode.0 };
+                self.view_mode.set_if_neq(ViewMode(look));
             }
             Command::NextDenoising => {
-                let denoising = self.looking.0.denoising.next();
-                let look = crate::frame::ViewOptions { inspection: Inspection::Picture, denoising, ..self.looking.0 };
-                self.looking.set_if_neq(ViewMode(look));
+                let denoising = self.view_mode.0.denoising.next();
+                let look = crate::frame::ViewOptions { inspection: Inspection::Picture, denoising, ..self.view_mode.0 };
+                self.view_mode.set_if_neq(ViewMode(look));
             }
             Command::SetSharpZone { shown } => {
-                let look = crate::frame::ViewOptions { sharp_zone: shown, ..self.looking.0 };
-                self.looking.set_if_neq(ViewMode(look));
+                let look = crate::frame::ViewOptions { sharp_zone: shown, ..self.view_mode.0 };
+                self.view_mode.set_if_neq(ViewMode(look));
             }
             Command::ExplainAt { x, y } => self.explaining.wanted = Some((x, y)),
             Command::ForgetExplanation => self.explaining.forget(),
@@ -191,13 +191,13 @@ impl CommandParams<'_, '_> {
                 };
             }
             Command::AdjustExposure { stops } => {
-                let stops = self.developing.0.exposure_stops + stops;
+                let stops = self.display_settings.0.exposure_stops + stops;
                 self.set_exposure(stops);
             }
             Command::SetExposure { stops } => self.set_exposure(stops),
             Command::SetToneCurve(curve) => self.set_tone_curve(curve),
             Command::NextToneCurve => {
-                let next = match self.developing.0.tone_curve {
+                let next = match self.display_settings.0.tone_curve {
                     ToneCurve::Linear => ToneCurve::Neutral,
                     ToneCurve::Neutral => ToneCurve::Filmic,
                     ToneCurve::Filmic => ToneCurve::Linear,
@@ -269,14 +269,14 @@ impl CommandParams<'_, '_> {
     fn set_exposure(&mut self, stops: f32) {
         if !stops.is_nan() {
             let exposure_stops = stops.clamp(-MOST_STOPS, MOST_STOPS);
-            let display = crate::render::Display { exposure_stops, ..self.developing.0 };
-            self.developing.set_if_neq(DisplaySettings(display));
+            let display = crate::render::Display { exposure_stops, ..self.display_settings.0 };
+            self.display_settings.set_if_neq(DisplaySettings(display));
         }
     }
 
     fn set_tone_curve(&mut self, tone_curve: ToneCurve) {
-        let display = crate::render::Display { tone_curve, ..self.developing.0 };
-        self.developing.set_if_neq(DisplaySettings(display));
+        let display = crate::render::Display { tone_curve, ..self.display_settings.0 };
+        self.display_settings.set_if_neq(DisplaySettings(display));
     }
 
     fn resize(&mut self, size: PictureSize) {

@@ -135,7 +135,7 @@ impl LeftBehind {
     /// If they cannot be read or written; then they stay.
     pub fn restore(self, to: &Path) -> Result<(), String> {
         let scene =
-            load(&SceneSource::Scene(self.scene.clone()), &LoadOptions { hasty: true, ..LoadOptions::default() });
+            load(&SceneSource::Scene(self.scene.clone()), &LoadOptions { preview: true, ..LoadOptions::default() });
         let scene = scene.map_err(|error| error.to_string())?;
         let mut world = World::new();
         scene.spawn(&mut world);

@@ -20,7 +20,7 @@ pub struct SavedAs {
     pub content: Option<Fingerprint>,
 }
 
-struct Saved {
+struct SavedState {
     path: PathBuf,
     result: Result<SavedScene, WriteError>,
     content: Fingerprint,
@@ -32,7 +32,7 @@ struct Saved {
 pub struct Saving {
     /// Files to write at the next frame.
     pub(super) requests: Vec<PathBuf>,
-    finished: Arc<Mutex<Vec<Saved>>>,
+    finished: Arc<Mutex<Vec<SavedState>>>,
     threads: Vec<JoinHandle<()>>,
     waker: Option<Waker>,
 }
@@ -72,7 +72,7 @@ pub fn save(world: &mut World) {
         saving.threads.retain(|thread| !thread.is_finished());
         std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner))
     };
-    for Saved { path, result, content, clean } in finished {
+    for SavedState { path, result, content, clean } in finished {
         match result {
             Ok(saved) => {
                 let notes: String = saved.notes.iter().map(|note| format!("; {note}")).collect();
@@ -100,7 +100,7 @@ pub fn save(world: &mut World) {
         let work = move || {
             let content = content.fingerprint();
             let result = description.save(&path);
-            finished.lock().unwrap_or_else(PoisonError::into_inner).push(Saved { path, result, content, clean });
+            finished.lock().unwrap_or_else(PoisonError::into_inner).push(SavedState { path, result, content, clean });
             if let Some(waker) = waker {
                 waker();
             }

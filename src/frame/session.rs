@@ -99,7 +99,7 @@ pub enum Stage {
 }
 
 #[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
-struct Frame;
+struct FrameSchedule;
 
 /// A world, its schedule, and the threads that render it.
 pub struct Session {
@@ -165,7 +165,7 @@ impl Session {
         world.init_resource::<RenderRegion>();
         world.init_resource::<Explaining>();
 
-        let mut frame = Schedule::new(Frame);
+        let mut frame = Schedule::new(FrameSchedule);
         frame.configure_sets(
             (
                 Stage::Input,

@@ -101,18 +101,18 @@ pub struct SceneBookmarks {
 }
 
 /// Data of files that users may have edited.
-trait Kept {
+trait KeptSettings {
     fn check(&self) -> Result<(), BadValue>;
 }
 
-impl Kept for Settings {
+impl KeptSettings for Settings {
     fn check(&self) -> Result<(), BadValue> {
         self.window.map_or(Ok(()), |(width, height)| check_film_size(width, height))?;
         self.display.as_ref().map_or(Ok(()), DisplayPart::check)
     }
 }
 
-impl Kept for SceneBookmarks {
+impl KeptSettings for SceneBookmarks {
     fn check(&self) -> Result<(), BadValue> {
         self.views.values().try_for_each(Rig::check)
     }
@@ -170,7 +170,7 @@ impl SettingsStore {
         self.write(&bookmark_file(source), &bookmarks)
     }
 
-    fn read<T: DeserializeOwned + Default + Kept>(&self, name: &str) -> (T, Option<String>) {
+    fn read<T: DeserializeOwned + Default + KeptSettings>(&self, name: &str) -> (T, Option<String>) {
         let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return (T::default(), None) };
         let text = match InputFile::open(&path, FileKind::Settings).and_then(InputFile::text) {
             Ok(text) => Ok(text),

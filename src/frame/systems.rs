@@ -28,9 +28,9 @@ pub fn edit(world: &mut World) {
             Finished::Picture { entity, part, result } => crate::frame::edit::take_picture(world, entity, part, result),
             Finished::Trees(trees) => {
                 let mut shown = world.resource_mut::<RenderState>();
-                let hasty = shown.trees.hasty().len();
+                let preview = shown.trees.preview().len();
                 shown.trees.extend(trees);
-                shown.better_trees |= shown.trees.hasty().len() < hasty;
+                shown.better_trees |= shown.trees.preview().len() < preview;
                 shown.waiting = true;
             }
             Finished::Scene { again: true, result: Ok(scene), .. } => adopt_moment(world, *scene, now),
@@ -174,9 +174,9 @@ fn is_another_list(old: &SceneInputs, new: &SceneInputs) -> bool {
 
 /// Starts building the final trees of those that have preview trees so far.
 fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer) {
-    let hasty = shown.trees.hasty();
-    shown.improving.retain(|shape| hasty.contains(shape));
-    let new: Vec<Shape> = hasty.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
+    let preview = shown.trees.preview();
+    shown.improving.retain(|shape| preview.contains(shape));
+    let new: Vec<Shape> = preview.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
     if !new.is_empty() {
         shown.improving.extend(new.iter().cloned());
         beside.build(new, false, renderer.0.pool());
@@ -280,18 +280,18 @@ pub fn accumulate(
 ///
 /// Reads [`DisplaySettings`]; writes [`RenderState`], [`FrameChanges`], and to the [`Renderer`].
 pub fn develop(
-    developing: Option<Res<DisplaySettings>>,
-    looking: Res<ViewMode>,
+    display_settings: Option<Res<DisplaySettings>>,
+    view_mode: Res<ViewMode>,
     renderer: Res<Renderer>,
     mut shown: ResMut<RenderState>,
     mut found: ResMut<FrameChanges>,
 ) {
-    if shown.look != looking.0 {
+    if shown.look != view_mode.0 {
         found.0.add(Level::Redraw, "view");
-        renderer.0.set_look(looking.0);
-        shown.look = looking.0;
+        renderer.0.set_look(view_mode.0);
+        shown.look = view_mode.0;
     }
-    let display = developing.map(|developing| developing.0).unwrap_or_default();
+    let display = display_settings.map(|display_settings| display_settings.0).unwrap_or_default();
     if shown.display != display {
         compare_displays(&shown.display, &display, &mut found.0);
         renderer.0.set_display(display);

@@ -34,11 +34,13 @@ impl MtlMaterials {
     pub fn part(&mut self, material: &ImportedMaterial) -> MaterialPart {
         let meaning = Meaning::of(material);
         match meaning.kind {
-            Kind::Light { radiance } => MaterialPart::Emissive { radiance: self.emission(material, radiance) },
-            Kind::Mirror { reflectance } => MaterialPart::Mirror { reflectance: share(reflectance) },
-            Kind::Glass => MaterialPart::Glass { ior: ior(material), absorption: Rgb::default(), dispersion: 0.0 },
-            Kind::Diffuse => MaterialPart::Diffuse { albedo: self.base_color(material, meaning.base) },
-            Kind::Layered => self.layered(material, &meaning),
+            SurfaceKind::Light { radiance } => MaterialPart::Emissive { radiance: self.emission(material, radiance) },
+            SurfaceKind::Mirror { reflectance } => MaterialPart::Mirror { reflectance: share(reflectance) },
+            SurfaceKind::Glass => {
+                MaterialPart::Glass { ior: ior(material), absorption: Rgb::default(), dispersion: 0.0 }
+            }
+            SurfaceKind::Diffuse => MaterialPart::Diffuse { albedo: self.base_color(material, meaning.base) },
+            SurfaceKind::Layered => self.layered(material, &meaning),
         }
     }
 
@@ -190,7 +192,7 @@ fn refracts(material: &ImportedMaterial) -> bool {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
+enum SurfaceKind {
     /// A light whose surface is not seen beside what it emits.
     Light {
         radiance: Vec3,
@@ -206,7 +208,7 @@ enum Kind {
 /// What the numbers of a material mean, whoever wrote them.
 #[derive(Debug)]
 struct Meaning<'a> {
-    kind: Kind,
+    kind: SurfaceKind,
     /// Base colour without texture.
     base: Vec3,
     metallic: f32,
@@ -248,15 +250,15 @@ impl<'a> Meaning<'a> {
         let is_mirror = meaning.metallic == 1.0 && is_sharp && !has_maps && !material.vertex_colors;
         let has_layers = meaning.metallic > 0.0 || has_maps || meaning.specular != Vec3::ZERO;
         meaning.kind = if is_plain && glows && (is_black || outshines) {
-            Kind::Light { radiance: glow }
+            SurfaceKind::Light { radiance: glow }
         } else if is_plain && !glows && meaning.transmits {
-            Kind::Glass
+            SurfaceKind::Glass
         } else if is_plain && !glows && is_mirror && material.normal_map().is_none() {
-            Kind::Mirror { reflectance: meaning.base }
+            SurfaceKind::Mirror { reflectance: meaning.base }
         } else if is_plain_surface(material, meaning.opacity) && !glows && !has_layers {
-            Kind::Diffuse
+            SurfaceKind::Diffuse
         } else {
-            Kind::Layered
+            SurfaceKind::Layered
         };
         meaning
     }
@@ -314,7 +316,7 @@ impl<'a> Meaning<'a> {
 
     fn diffuse(material: &ImportedMaterial, grey: f32) -> Self {
         Self {
-            kind: Kind::Diffuse,
+            kind: SurfaceKind::Diffuse,
             base: material.diffuse.unwrap_or(if glows(material) { Vec3::ZERO } else { Vec3::splat(grey) }),
             metallic: 0.0,
             metallic_map: None,

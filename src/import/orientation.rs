@@ -30,7 +30,7 @@ pub fn faces_away(mesh: &Mesh, up: UpAxis) -> bool {
     let (min, max) =
         corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), corner| (min.min(corner), max.max(corner)));
     let level = max.y - HEAD * (max.y - min.y);
-    let (mut whole, mut head) = (Skin::default(), Skin::default());
+    let (mut whole, mut head) = (Posture::default(), Posture::default());
     for triangle in triangles() {
         whole.add(&triangle);
         head.add(&above(&triangle, level));
@@ -42,12 +42,12 @@ pub fn faces_away(mesh: &Mesh, up: UpAxis) -> bool {
 
 /// Area and first moment of a surface. Both have a factor of 2, which cancels in the centroid.
 #[derive(Default)]
-struct Skin {
+struct Posture {
     area: f64,
     moment: DVec3,
 }
 
-impl Skin {
+impl Posture {
     /// Adds a planar convex polygon.
     fn add(&mut self, polygon: &[DVec3]) {
         for pair in polygon.get(1..).unwrap_or_default().windows(2) {
@@ -151,7 +151,7 @@ mod tests {
     fn what_is_cut_at_the_level_counts_in_part() {
         let triangle = [DVec3::ZERO, DVec3::new(2.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
         let area = |polygon: &[DVec3]| {
-            let mut skin = Skin::default();
+            let mut skin = Posture::default();
             skin.add(polygon);
             0.5 * skin.area
         };

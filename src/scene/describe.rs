@@ -102,7 +102,7 @@ impl Description {
 }
 
 /// An object with its components.
-struct Item {
+struct DescribedItem {
     name: Option<String>,
     shape: Shape,
     placement: Placement,
@@ -150,13 +150,13 @@ impl<'a> Writer<'a> {
         writer
     }
 
-    fn objects(&self, world: &mut World, inputs: &SceneInputs, moved: &Moved) -> Vec<Item> {
+    fn objects(&self, world: &mut World, inputs: &SceneInputs, moved: &Moved) -> Vec<DescribedItem> {
         let item = |object: &crate::scene::world::inputs::ObjectInput| {
             let origin = world.get::<MeshOrigin>(object.entity).cloned();
             let own = origin.as_ref().is_some_and(|origin| origin.own_materials)
                 && !object.slots.iter().any(|&slot| moved.has_material(slot))
                 && self.has_own_materials(world, &object.shape, &object.slots);
-            Item {
+            DescribedItem {
                 name: moved.name(object.entity).or(object.name.as_ref()).filter(|name| !name.is_empty()).cloned(),
                 shape: object.shape.clone(),
                 placement: object.placement,
@@ -190,7 +190,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Gives each material a unique name, except those that come with the file of a mesh.
-    fn name_materials(&mut self, world: &mut World, objects: &[Item], moved: &Moved) {
+    fn name_materials(&mut self, world: &mut World, objects: &[DescribedItem], moved: &Moved) {
         let own: HashSet<Entity> = objects.iter().filter(|item| item.own).flat_map(|item| item.slots.clone()).collect();
         let mut needed: HashSet<Entity> =
             objects.iter().filter(|item| !item.own).flat_map(|item| item.slots.clone()).collect();
@@ -307,7 +307,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn object(&mut self, item: &Item) -> ObjectPart {
+    fn object(&mut self, item: &DescribedItem) -> ObjectPart {
         let index = self.n_objects;
         self.n_objects += 1;
         let name = item.name.clone();
@@ -368,7 +368,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn mesh(&mut self, index: usize, item: &Item, mesh: &Arc<Mesh>) -> ObjectPart {
+    fn mesh(&mut self, index: usize, item: &DescribedItem, mesh: &Arc<Mesh>) -> ObjectPart {
         let file_has_materials = self.loaded_meshes.get(&address(mesh)).is_some_and(|known| !known.slots.is_empty());
         let (material, materials) = match &item.slots[..] {
             _ if item.own => (None, None),

@@ -45,7 +45,7 @@ pub struct LoadOptions<'a> {
     pub choice: Option<&'a ModelChoice>,
     /// Whether large meshes first get trees that are faster to build ([`crate::scene::world::trees::Trees::hasty`]), for a quick
     /// first image.
-    pub hasty: bool,
+    pub preview: bool,
     /// The previous state of the scene: files that have not changed on disk are not read again.
     pub known: Option<&'a LoadedScene>,
     /// Called with a description of each step.
@@ -244,8 +244,8 @@ fn resolve(
             }
         }
     };
-    let before = options.known.map(Known::new);
-    let mut known: HashMap<MeshKey, Result<LoadedMesh, SceneError>> = HashMap::new();
+    let before = options.known.map(KnownMeshes::new);
+    let mut known: HashMap<LoadedMeshKey, Result<LoadedMesh, SceneError>> = HashMap::new();
     for (i, object) in scene.file.objects.iter().enumerate() {
         let (mut mesh, mut balls) = (None, None);
         match object {
@@ -530,7 +530,7 @@ impl LoadedScene {
                     _ => String::new(),
                 });
             }
-            let added = if options.hasty { self.trees.add_hastily(&shape) } else { self.trees.add(&shape) };
+            let added = if options.preview { self.trees.add_preview(&shape) } else { self.trees.add(&shape) };
             added.map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
         }
         Ok(())
@@ -572,12 +572,12 @@ fn known_picture<'a>(
 }
 
 /// Identity of a mesh: source, shading and bits of the simplification ratio.
-type MeshKey = (MeshSource, MeshShading, Option<u64>);
+type LoadedMeshKey = (MeshSource, MeshShading, Option<u64>);
 
 /// The data that was read before, by the objects that it was read for.
-struct Known<'a> {
+struct KnownMeshes<'a> {
     scene: &'a LoadedScene,
-    meshes: HashMap<MeshKey, usize>,
+    meshes: HashMap<LoadedMeshKey, usize>,
     balls: HashMap<BallsKey, usize>,
 }
 
@@ -588,7 +588,7 @@ enum BallsKey {
     Spheres(Vec<[u64; 3]>, Vec<u64>, bool),
 }
 
-impl<'a> Known<'a> {
+impl<'a> KnownMeshes<'a> {
     fn new(scene: &'a LoadedScene) -> Self {
         let mut known = Self { scene, meshes: HashMap::new(), balls: HashMap::new() };
         for (i, object) in scene.file.objects.iter().enumerate() {
@@ -601,7 +601,7 @@ impl<'a> Known<'a> {
         known
     }
 
-    fn mesh_key(object: &ObjectPart) -> Option<MeshKey> {
+    fn mesh_key(object: &ObjectPart) -> Option<LoadedMeshKey> {
         match object {
             ObjectPart::Mesh { source, shading, simplify, .. } => {
                 Some((source.clone(), *shading, simplify.map(f64::to_bits)))

@@ -1,4 +1,4 @@
-//! Light for a model that is opened by itself: that of its file where it is enough to see the model by, and generated
+//! ModelLight for a model that is opened by itself: that of its file where it is enough to see the model by, and generated
 //! light where it is not.
 //!
 //! What the file brings is measured, not guessed: a small image is rendered in its light alone, and divided by the albedo
@@ -38,9 +38,9 @@ pub(super) struct Model {
 /// The light on the surfaces that the camera sees: radiance of a white surface in their place, W·m⁻²·sr⁻¹, 1 being the
 /// white of the display; ascending, not empty.
 #[derive(Clone, Debug)]
-struct Light(Vec<f32>);
+struct ModelLight(Vec<f32>);
 
-impl Light {
+impl ModelLight {
     /// Medians outside of this range call for another exposure.
     const USUAL: std::ops::RangeInclusive<f64> = 0.2..=1.5;
     /// The median after it.
@@ -155,7 +155,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
                 let text = format!("{title}: {reason}: an environment and a key light are added");
                 scene.warnings.push(Warning::notice(text));
             }
-            let share = own.as_ref().filter(|_| model.emits).map_or(1.0, Light::dimming);
+            let share = own.as_ref().filter(|_| model.emits).map_or(1.0, ModelLight::dimming);
             default_scene::light(&mut scene.file, model.bounds, model.side, share);
         }
         scene.meshes.resize(scene.file.objects.len(), None);
@@ -173,7 +173,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
         return;
     };
     // Only what is added may be too little here.
-    if !is_enough && light.mean(0.0) < Light::SHADED {
+    if !is_enough && light.mean(0.0) < ModelLight::SHADED {
         let place = middle_of_room(&extraction(scene));
         let added = place.map(|place| default_scene::light_inside(&mut scene.file, &place));
         match added.and_then(|()| measure(scene, model.aspect)).filter(|inside| inside.reached() > light.reached()) {
@@ -190,7 +190,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
             "{title}: hardly any light reaches what the camera sees, which is enclosed or faces away: choose another view, \
              or add a light"
         ));
-    } else if is_enough && light.reached() < Light::MOSTLY_REACHED {
+    } else if is_enough && light.reached() < ModelLight::MOSTLY_REACHED {
         let share = 100.0 * light.reached();
         scene.warnings.push(Warning::notice(format!(
             "{title}: its lights reach {share:.0} % of what the camera sees: --env FILE adds light from all around"
@@ -216,7 +216,7 @@ fn extraction(scene: &LoadedScene) -> Extraction {
 }
 
 /// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
-fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
+fn measure(scene: &LoadedScene, aspect: f64) -> Option<ModelLight> {
     /// Pixels of the image.
     const PIXELS: f64 = 1024.0;
     const SAMPLES: u32 = 4;
@@ -252,5 +252,5 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<Light> {
         .map(|i| level(all[i] - emitted[i]).max(0.0) / level(surfaces.albedo[i]).max(LEAST_ALBEDO))
         .collect();
     levels.sort_by(f32::total_cmp);
-    (!levels.is_empty()).then_some(Light(levels))
+    (!levels.is_empty()).then_some(ModelLight(levels))
 }

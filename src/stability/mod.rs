@@ -30,11 +30,11 @@ pub struct Case {
     pub about: &'static str,
     /// Ratio of the rays of this case to the requested rays.
     share: f64,
-    kind: Kind,
+    kind: CaseKind,
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum CaseKind {
     RaySet(fn() -> Vec<Plan>),
     Pictures(fn() -> Vec<LightCase>),
     Bounces,
@@ -47,97 +47,97 @@ pub const CASES: &[Case] = &[
         name: "closed",
         about: "closed meshes hit at corners and edges from inside, sizes 10^-6 ... 10^6, 0 ... 10^7 sizes from the origin",
         share: 1.0,
-        kind: Kind::RaySet(surfaces::closed),
+        kind: CaseKind::RaySet(surfaces::closed),
     },
     Case {
         name: "georeferenced",
         about: "a model in map coordinates (500000, 4500000) against the same model at the origin",
         share: 0.01,
-        kind: Kind::Georeferenced,
+        kind: CaseKind::Georeferenced,
     },
     Case {
         name: "slivers",
         about: "crossing triangles 10^3 ... 10^6 times longer than wide",
         share: 0.1,
-        kind: Kind::RaySet(surfaces::slivers),
+        kind: CaseKind::RaySet(surfaces::slivers),
     },
     Case {
         name: "degenerate",
         about: "triangles without area, repeated and coplanar ones",
         share: 0.1,
-        kind: Kind::RaySet(surfaces::degenerate),
+        kind: CaseKind::RaySet(surfaces::degenerate),
     },
     Case {
         name: "split-planes",
         about: "boxes and sheets along the axes, and rays within their planes, from corners, with -0, denormals, 10^±24",
         share: 0.1,
-        kind: Kind::RaySet(surfaces::split_planes),
+        kind: CaseKind::RaySet(surfaces::split_planes),
     },
     Case {
         name: "leaving",
         about: "rays that leave every kind of surface, down to 10^-4 rad",
         share: 0.2,
-        kind: Kind::RaySet(surfaces::leaving),
+        kind: CaseKind::RaySet(surfaces::leaving),
     },
     Case {
         name: "tangent",
         about: "spheres that touch a floor, each other, and a floor that is a sphere of 10 km",
         share: 0.2,
-        kind: Kind::RaySet(surfaces::tangent),
+        kind: CaseKind::RaySet(surfaces::tangent),
     },
     Case {
         name: "white-box",
         about: "paths of 10^5 bounces in closed boxes, many straight into edges and corners",
         share: 0.5,
-        kind: Kind::Bounces,
+        kind: CaseKind::Bounces,
     },
     Case {
         name: "glass",
         about: "nested and touching glass, indices 1, 1 ± 10^-6 and extreme, in a white furnace",
         share: 0.02,
-        kind: Kind::Pictures(light::glass),
+        kind: CaseKind::Pictures(light::glass),
     },
     Case {
         name: "metal",
         about: "microfacets of alpha 0 ... 1 in a white furnace",
         share: 0.02,
-        kind: Kind::Pictures(light::metal),
+        kind: CaseKind::Pictures(light::metal),
     },
     Case {
         name: "nested-media",
         about: "up to 100 shells of glass, shared walls, overlaps, blends, a camera at every level, in a white furnace",
         share: 0.1,
-        kind: Kind::Pictures(furnace::nested),
+        kind: CaseKind::Pictures(furnace::nested),
     },
     Case {
         name: "random-furnaces",
         about: "random lossless scenes of every material and shape in a white furnace",
         share: 0.5,
-        kind: Kind::Pictures(furnace::random),
+        kind: CaseKind::Pictures(furnace::random),
     },
     Case {
         name: "lights",
         about: "tiny, huge and touching sphere lights over a floor, against the closed form",
         share: 0.02,
-        kind: Kind::Pictures(light::lights),
+        kind: CaseKind::Pictures(light::lights),
     },
     Case {
         name: "cameras",
         about: "fields of view to 179.9 degrees, focus from 0+ to infinity, lenses larger than the scene",
         share: 0.02,
-        kind: Kind::Pictures(light::cameras),
+        kind: CaseKind::Pictures(light::cameras),
     },
     Case {
         name: "long-sums",
         about: "10^6 samples in one pixel, against the exact answer",
         share: 0.1,
-        kind: Kind::Pictures(light::long_sums),
+        kind: CaseKind::Pictures(light::long_sums),
     },
     Case {
         name: "anywhere",
         about: "the same scene moved by 10^6 and scaled by 10^-3 ... 10^3: the same image within its noise",
         share: 0.05,
-        kind: Kind::Anywhere,
+        kind: CaseKind::Anywhere,
     },
 ];
 
@@ -156,26 +156,26 @@ impl Case {
     pub fn run(&self, rays: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let n = self.rays(rays);
         match self.kind {
-            Kind::RaySet(plans) => {
+            CaseKind::RaySet(plans) => {
                 let plans = plans();
                 let each = rays_of_plan(n, &plans);
                 let stages = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
                 stages.map(|(i, stage)| stage.run(i, each, tick)).fold(Tally::default(), Tally::merged)
             }
-            Kind::Pictures(pictures) => {
+            CaseKind::Pictures(pictures) => {
                 let pictures = pictures();
                 let run = |i: usize| pictures[i].run(i, spp_of_picture(n, &pictures, i), tick);
                 (0..pictures.len()).map(run).fold(Tally::default(), Tally::merged)
             }
-            Kind::Bounces => bounces::run(n, tick),
-            Kind::Anywhere => anywhere::run(n, tick),
-            Kind::Georeferenced => anywhere::georeferenced(n, tick),
+            CaseKind::Bounces => bounces::run(n, tick),
+            CaseKind::Anywhere => anywhere::run(n, tick),
+            CaseKind::Georeferenced => anywhere::georeferenced(n, tick),
         }
     }
 
     /// Whether [`Self::replay`] supports the rays that the tally of this case reports.
     pub fn can_replay(&self) -> bool {
-        matches!(self.kind, Kind::RaySet(_) | Kind::Pictures(_))
+        matches!(self.kind, CaseKind::RaySet(_) | CaseKind::Pictures(_))
     }
 
     /// Returns all details of one ray of the case.
@@ -187,13 +187,13 @@ impl Case {
         let check =
             |count: u64| if ray < count { Ok(()) } else { Err(ReplayError::NoRay { stage, ray, last: count - 1 }) };
         match self.kind {
-            Kind::RaySet(plans) => {
+            CaseKind::RaySet(plans) => {
                 let plans = plans();
                 let plan = plans.get(stage).ok_or(no_stage(plans.len()))?;
                 check(rays_of_plan(n, &plans))?;
                 Ok((plan.build)().ok_or(ReplayError::EmptyStage { stage })?.replay(stage, ray))
             }
-            Kind::Pictures(pictures) => {
+            CaseKind::Pictures(pictures) => {
                 let pictures = pictures();
                 let picture = pictures.get(stage).ok_or(no_stage(pictures.len()))?;
                 check(picture.samples(spp_of_picture(n, &pictures, stage)))?;

@@ -27,7 +27,7 @@ pub enum Solid {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Item {
+struct ReferenceItem {
     solid: Solid,
     /// Growth of relative errors by the transform into the space of an instance, and the size of its translations there
     /// and back; 0 for primitives in world space.
@@ -38,7 +38,7 @@ struct Item {
 /// The primitives of one scene.
 #[derive(Debug)]
 pub struct ReferenceIntersector {
-    items: Vec<Item>,
+    items: Vec<ReferenceItem>,
     /// Start of each object in `items`.
     starts: Vec<usize>,
 }
@@ -61,7 +61,7 @@ impl ReferenceIntersector {
             starts.push(items.len());
             let mut push = |solid, map: Option<&Affine3A>| {
                 let (condition, reach) = map.map_or((0.0, 0.0), cost_of_map);
-                items.push(Item { solid, condition, reach });
+                items.push(ReferenceItem { solid, condition, reach });
             };
             match shape {
                 Shape::Triangle { vertices } => push(Solid::Triangle(vertices.map(Vec3::as_dvec3)), None),
@@ -99,7 +99,7 @@ impl ReferenceIntersector {
         &self.item(hit).solid
     }
 
-    fn item(&self, hit: &Hit) -> &Item {
+    fn item(&self, hit: &Hit) -> &ReferenceItem {
         &self.items[self.starts[hit.object as usize] + hit.prim as usize]
     }
 
@@ -163,7 +163,7 @@ impl ReferenceIntersector {
     }
 }
 
-impl Item {
+impl ReferenceItem {
     fn seen_from(&self, origin: DVec3) -> Self {
         let solid = match self.solid {
             Solid::Triangle(corners) => Solid::Triangle(corners.map(|p| p - origin)),

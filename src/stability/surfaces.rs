@@ -45,12 +45,12 @@ impl SurfaceCase {
 
 /// An indexed triangle soup.
 #[derive(Clone, Default)]
-struct Soup {
+struct TriangleSoup {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Soup {
+impl TriangleSoup {
     fn of(mesh: Mesh) -> Self {
         Self { positions: mesh.positions, triangles: mesh.triangles }
     }
@@ -91,21 +91,21 @@ fn mesh_shape(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
 }
 
 /// Closed meshes of one to two metres.
-fn closed_meshes() -> Vec<(&'static str, Soup)> {
+fn closed_meshes() -> Vec<(&'static str, TriangleSoup)> {
     let dented = procedural::DisplacedSphere { frequency: 6, ..procedural::DisplacedSphere::default() };
     vec![
-        ("ball", Soup::of(procedural::icosphere(6))),
-        ("cube", Soup::of(procedural::cuboid(DVec3::splat(2.0)))),
-        ("ring", Soup::of(procedural::torus(1.0, 0.35, 24, 12))),
-        ("stone", Soup::of(procedural::displaced_sphere(&dented))),
+        ("ball", TriangleSoup::of(procedural::icosphere(6))),
+        ("cube", TriangleSoup::of(procedural::cuboid(DVec3::splat(2.0)))),
+        ("ring", TriangleSoup::of(procedural::torus(1.0, 0.35, 24, 12))),
+        ("stone", TriangleSoup::of(procedural::displaced_sphere(&dented))),
         ("cube with slits", slit_cube()),
     ]
 }
 
 /// A cube of side 2 whose faces are cut by strips of 2 µm: needles a million times longer than wide.
-fn slit_cube() -> Soup {
+fn slit_cube() -> TriangleSoup {
     let cuts = [-1.0, -0.1, -0.1 + 2e-6, 1.0f32];
-    let mut soup = Soup::default();
+    let mut soup = TriangleSoup::default();
     for (axis, level, i, j) in (0..3).flat_map(|axis| {
         [-1.0, 1.0].into_iter().flat_map(move |level| (0..9).map(move |cell| (axis, level, cell / 3, cell % 3)))
     }) {
@@ -124,7 +124,7 @@ fn slit_cube() -> Soup {
 }
 
 /// Returns points well inside a closed surface, within the bounds of its corners.
-fn insides(reference: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3> {
+fn insides(reference: &ReferenceIntersector, soup: &TriangleSoup, seed: u64) -> Vec<Vec3> {
     let bounds = crate::geometry::Aabb::from_points(soup.positions.iter().copied());
     let mut random = Random::new(seed, 0x1251DE);
     let candidates = (0..60).map(|_| bounds.center() + 0.5 * random.point() * bounds.size());
@@ -132,7 +132,7 @@ fn insides(reference: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3
 }
 
 /// Rays from inside a closed mesh at its corners, its edges, its faces and in random directions.
-fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> RaySet {
+fn rays_from_inside(soup: TriangleSoup, origins: Vec<Vec3>) -> RaySet {
     Box::new(move |random| {
         let origin = *random.pick(&origins);
         let [a, b, c] = soup.corners(random.below(soup.triangles.len()));
@@ -181,7 +181,7 @@ pub fn closed() -> Vec<Plan> {
 
 /// Rays at corners, along edges and axes, from corners and from afar, with zeros of both signs, denormal and extreme
 /// directions.
-fn awkward_rays(soup: Soup) -> RaySet {
+fn awkward_rays(soup: TriangleSoup) -> RaySet {
     let size = soup.size();
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z, vec3(-0.0, 1.0, -0.0), vec3(-0.0, -0.0, -1.0)];
     Box::new(move |random| {
@@ -220,7 +220,7 @@ fn awkward_rays(soup: Soup) -> RaySet {
     })
 }
 
-fn plans_of_soup(make: fn() -> Soup) -> Vec<Plan> {
+fn plans_of_soup(make: fn() -> TriangleSoup) -> Vec<Plan> {
     let plan = |place: SurfaceCase| {
         let build = move || {
             let soup = make().mapped(|p| place.apply(p));
@@ -236,7 +236,7 @@ fn plans_of_soup(make: fn() -> Soup) -> Vec<Plan> {
 pub fn slivers() -> Vec<Plan> {
     plans_of_soup(|| {
         let mut random = Random::new(1, 1);
-        let mut soup = Soup::default();
+        let mut soup = TriangleSoup::default();
         for _ in 0..80 {
             let (start, along) = (random.point(), random.point());
             let across = along.cross(random.direction()).normalize_or(Vec3::X) * along.length();
@@ -251,7 +251,7 @@ pub fn slivers() -> Vec<Plan> {
 pub fn degenerate() -> Vec<Plan> {
     plans_of_soup(|| {
         let mut random = Random::new(2, 1);
-        let mut soup = Soup::default();
+        let mut soup = TriangleSoup::default();
         for i in 0..60 {
             let (p, q, r) = (random.point(), random.point(), random.point());
             match i % 5 {
@@ -270,8 +270,8 @@ pub fn degenerate() -> Vec<Plan> {
 /// A lattice of boxes and sheets whose faces lie in split planes of the tree.
 pub fn split_planes() -> Vec<Plan> {
     plans_of_soup(|| {
-        let mut soup = Soup::default();
-        let cube = Soup::of(procedural::cuboid(DVec3::ONE));
+        let mut soup = TriangleSoup::default();
+        let cube = TriangleSoup::of(procedural::cuboid(DVec3::ONE));
         for i in 0..6 {
             let corner = vec3((i % 2) as f32, (i / 2 % 2) as f32, (i / 4) as f32) * 1.0;
             (0..12).for_each(|t| soup.push(cube.corners(t).map(|p| p + corner)));
@@ -299,7 +299,7 @@ fn shapes_at(place: SurfaceCase) -> Vec<(&'static str, Shape)> {
     let turned = Affine3A::from_scale_rotation_translation(vec3(2.0, 0.5, 1.0) * scale, turn, place.shift());
     let mirrored = Affine3A::from_scale_rotation_translation(vec3(-1.0, 1.0, 1.0) * scale, turn, place.shift());
     let even = Affine3A::from_scale_rotation_translation(Vec3::splat(scale), turn, place.shift());
-    let stone = Soup::of(procedural::icosphere(8)).mapped(|p| p * vec3(1.0, 0.6, 0.8));
+    let stone = TriangleSoup::of(procedural::icosphere(8)).mapped(|p| p * vec3(1.0, 0.6, 0.8));
     let placed = stone.clone().mapped(|p| place.apply(p));
     let balls = SphereTree::build(&[a, b, c], &[0.5, 0.25, 0.125]);
     vec![

@@ -72,8 +72,8 @@ impl PictureChange {
 
 /// Whether the image is shown, without inspection or overlay.
 fn is_plain(session: &Session) -> bool {
-    let looking = session.world().resource::<ViewMode>().0;
-    looking == ViewOptions { denoising: looking.denoising, ..ViewOptions::default() }
+    let view_mode = session.world().resource::<ViewMode>().0;
+    view_mode == ViewOptions { denoising: view_mode.denoising, ..ViewOptions::default() }
 }
 
 /// Computes the difference; `None` for images of different sizes.

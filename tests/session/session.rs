@@ -287,9 +287,9 @@ fn a_new_mesh_is_prepared_beside_the_old_picture() {
 #[test]
 fn a_hasty_tree_gives_way_to_a_better_one_and_no_sample_is_lost() {
     let source = SceneSource::Builtin("gallery".to_owned());
-    let hasty = load(&source, &LoadOptions { hasty: true, ..LoadOptions::default() }).unwrap();
+    let hasty = load(&source, &LoadOptions { preview: true, ..LoadOptions::default() }).unwrap();
     let best = load(&source, &LoadOptions::default()).unwrap();
-    assert_eq!((hasty.trees.hasty().len(), best.trees.hasty().len()), (1, 0), "the serpent is large");
+    assert_eq!((hasty.trees.preview().len(), best.trees.preview().len()), (1, 0), "the serpent is large");
     assert_ne!(hasty.trees.bytes(), best.trees.bytes());
 
     let mut driver = Driver::new(64, 48, spp(24));

@@ -220,6 +220,76 @@ fn doc_comments_are_in_words_of_the_field() {
     expect_none(problems);
 }
 
+/// Words that no name of the code has as a part, of types, variables, parameters and functions alike.
+const RETIRED_NAMES: [(&str, &str); 14] = [
+    ("lamp", "light"),
+    ("chance", "probability"),
+    ("house", "architecture"),
+    ("judge", "reference"),
+    ("verdict", "check result"),
+    ("rung", "step"),
+    ("climb", "step"),
+    ("scout", "pilot"),
+    ("arrival", "lens connection"),
+    ("hasty", "preview"),
+    ("slack", "tolerance, or error bound"),
+    ("wobble", "error bound"),
+    ("squeeze", "radiance_eta"),
+    ("developing", "display settings"),
+];
+
+/// The names in code, with their line; neither of strings nor of comments.
+fn names(code: &str) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
+    for (i, line) in code.lines().enumerate() {
+        let mut is_text = false;
+        let mut plain = String::new();
+        let mut before = ' ';
+        for c in line.split("//").next().unwrap_or_default().chars() {
+            is_text ^= c == '"' && before != '\\';
+            plain.push(if is_text { ' ' } else { c });
+            before = c;
+        }
+        let words = plain.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|word| !word.is_empty());
+        found.extend(words.map(|word| (i + 1, word.to_owned())));
+    }
+    found
+}
+
+/// The words of a name in lower case: of `LensArrivals` and `lens_arrivals`, `lens` and `arrivals`.
+fn parts(name: &str) -> Vec<String> {
+    let mut parts = vec![String::new()];
+    for c in name.chars() {
+        if c == '_' || c.is_uppercase() {
+            parts.push(String::new());
+        }
+        if c != '_' {
+            parts.last_mut().unwrap().extend(c.to_lowercase());
+        }
+    }
+    parts
+}
+
+#[test]
+fn names_in_the_code_are_in_words_of_the_field() {
+    let is = |part: &str, retired: &str| part == retired || part.strip_suffix('s') == Some(retired);
+    let mut wrong = BTreeSet::new();
+    for path in ["src", "crates"].iter().flat_map(|folder| files(folder, &[".rs"])) {
+        let text = read(&path).text;
+        for (line, name) in names(&text) {
+            for part in parts(&name) {
+                if let Some((_, better)) = RETIRED_NAMES.iter().find(|(retired, _)| is(&part, retired)) {
+                    wrong.insert(format!("{path}:{line}: `{name}`: {better}"));
+                }
+            }
+        }
+    }
+    expect_none(wrong.into_iter().collect());
+    assert_eq!(parts("LensArrivals_of"), ["", "lens", "arrivals", "of"]);
+    let code = "let is_scout = \"a lamp\"; // chance";
+    assert_eq!(names(code), [(1, "let".to_owned()), (1, "is_scout".to_owned())]);
+}
+
 #[test]
 fn doc_comments_of_public_items_are_found() {
     let source = "//! Of a module.\n\n/// Of a lamp.\n#[derive(Debug)]\npub struct A {\n    /// A field.\n    pub a: u32,\n}\n\n\

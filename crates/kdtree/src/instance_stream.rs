@@ -32,7 +32,7 @@ pub(super) trait InstanceSource: Source {
 /// A ray in state.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Slot {
+struct InstanceSlot {
     /// In the tree that the ray is in.
     walk: Walk,
     nearest: Nearest,
@@ -55,7 +55,7 @@ struct Slot {
     is_busy: bool,
 }
 
-impl Slot {
+impl InstanceSlot {
     const IDLE: Self = Self {
         walk: Walk::IDLE,
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
@@ -84,7 +84,7 @@ const IDLE: usize = 5;
 
 /// Slots of the rays in state and their stacks, reused for many streams.
 pub(super) struct InstanceState {
-    slots: Box<[Slot]>,
+    slots: Box<[InstanceSlot]>,
     /// For each slot the stack in the upper tree, and that in an instance.
     stacks: Box<[[Stack; 2]]>,
 }
@@ -95,14 +95,14 @@ impl InstanceState {
         for stack in stacks.iter_mut().flatten() {
             (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
         }
-        Self { slots: vec![Slot::IDLE; SLOTS].into(), stacks }
+        Self { slots: vec![InstanceSlot::IDLE; SLOTS].into(), stacks }
     }
 }
 
 /// The rays by what they do next.
-struct Lists([List; 6]);
+struct InstanceLists([List; 6]);
 
-impl Lists {
+impl InstanceLists {
     /// - `in_instance`: whether the slot's ray is in an instance.
     #[inline(always)]
     fn push(&mut self, i: u8, child: u32, in_instance: bool) {
@@ -127,10 +127,10 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
         return;
     }
     let stacks: &mut [[Stack; 2]; SLOTS] = (&mut *state.stacks).try_into().expect("two for each slot");
-    let slots: &mut [Slot; SLOTS] = (&mut *state.slots).try_into().expect("as many as there are");
+    let slots: &mut [InstanceSlot; SLOTS] = (&mut *state.slots).try_into().expect("as many as there are");
     let mut nodes: [&[Node8]; SLOTS] = [upper_nodes; SLOTS];
     let mut trees: [Option<&OwnTree>; SLOTS] = [None; SLOTS];
-    let mut lists = Lists([List::NEW; 6]);
+    let mut lists = InstanceLists([List::NEW; 6]);
     for (i, slot) in (0..).zip(slots.iter_mut().take(source.left())) {
         // A stream that ended by a panic leaves busy slots behind.
         slot.is_busy = false;
@@ -152,7 +152,17 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             let nearest = setup.nearest(lane);
             let (origin, dir) = setup.ray(lane);
             let (id, found) = (setup.id(lane), [nearest.prim, 0]);
-            *slot = Slot { walk, nearest, upper: walk.descent, origin, dir, found, id, is_busy: true, ..Slot::IDLE };
+            *slot = InstanceSlot {
+                walk,
+                nearest,
+                upper: walk.descent,
+                origin,
+                dir,
+                found,
+                id,
+                is_busy: true,
+                ..InstanceSlot::IDLE
+            };
             lists.0[INNER].push_if(true, i);
         }
         if lists.0.iter().all(|list| list.len() == 0) {
@@ -252,7 +262,7 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
 /// Pushes the objects of a leaf's block that the ray passes within the leaf's cell, nearest on top, and below them the
 /// leaf's next block.
 #[inline(always)]
-fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut Slot, stack: &mut Stack) {
+fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut InstanceSlot, stack: &mut Stack) {
     let block = tree.block(slot.walk.child);
     let (mut met, t) = block.entries(s, &slot.walk.descent, slot.walk.t0, slot.walk.t1);
     let mut height = slot.walk.height as usize;
@@ -283,7 +293,7 @@ fn test_boxes<S: KernelSimd>(s: S, tree: &InstanceTree, slot: &mut Slot, stack: 
 /// Moves the ray into an object. Returns the nodes of the object's tree; `None` if the ray misses its bounds.
 #[inline(always)]
 fn enter<'a, B: LeafBlock, const ANY: bool>(
-    slot: &mut Slot,
+    slot: &mut InstanceSlot,
     tree: &'a BlockTree<B>,
     placement: &Placement,
 ) -> Option<&'a [Node8]>
@@ -313,19 +323,19 @@ where
 
 /// A ray prepared for the leaves of an instance.
 trait OwnRay: LeafRay {
-    fn put(self, slot: &mut Slot);
+    fn put(self, slot: &mut InstanceSlot);
 }
 
 impl OwnRay for ShearedRay {
     #[inline(always)]
-    fn put(self, slot: &mut Slot) {
+    fn put(self, slot: &mut InstanceSlot) {
         slot.sheared = self;
     }
 }
 
 impl OwnRay for PreciseRay {
     #[inline(always)]
-    fn put(self, slot: &mut Slot) {
+    fn put(self, slot: &mut InstanceSlot) {
         slot.precise = self;
     }
 }

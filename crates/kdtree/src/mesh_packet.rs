@@ -57,14 +57,14 @@ pub(super) trait PacketBlock: LeafBlock {
 }
 
 /// Sixteen triangles in either vertex layout.
-trait Triangles: LeafBlock<Ray = ShearedRay> {
+trait PacketTriangles: LeafBlock<Ray = ShearedRay> {
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3];
 
     /// Returns the triangles whose sheared vertices all lie on one side of the rays of the footprint, or behind them.
     fn missed<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> Mask;
 }
 
-impl Triangles for TriangleBlock {
+impl PacketTriangles for TriangleBlock {
     #[inline(always)]
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
         let [x, y, z] = &self.vertices[corner];
@@ -84,7 +84,7 @@ impl Triangles for TriangleBlock {
     }
 }
 
-impl Triangles for SharedBlock {
+impl PacketTriangles for SharedBlock {
     #[inline(always)]
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
         self.corner(lane, corner)
@@ -360,7 +360,7 @@ impl<S: KernelSimd> MeshPacket<S> {
     }
 
     #[inline(always)]
-    fn test_triangles(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, mask: Mask) {
+    fn test_triangles(&mut self, s: S, group: &PacketGroup<S>, block: &impl PacketTriangles, mask: Mask) {
         let n_rays = mask.count_ones();
         if n_rays <= FEW_RAYS {
             return self.test_by_ray(s, group, block, mask);
@@ -377,7 +377,7 @@ impl<S: KernelSimd> MeshPacket<S> {
 
     /// Tests one ray after the other against all triangles.
     #[inline(always)]
-    fn test_by_ray(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, mut mask: Mask) {
+    fn test_by_ray(&mut self, s: S, group: &PacketGroup<S>, block: &impl PacketTriangles, mut mask: Mask) {
         let [kx, ky, kz] = group.axes;
         let origin = [stored(s, self.origin[kx]), stored(s, self.origin[ky]), stored(s, self.origin[kz])];
         let (sx, sy, sz) = (stored(s, group.sx), stored(s, group.sy), stored(s, group.sz));
@@ -442,7 +442,7 @@ impl<S: KernelSimd> MeshPacket<S> {
 
     /// Tests one triangle against all rays.
     #[inline(always)]
-    fn test_triangle(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, lane: usize, mask: Mask) {
+    fn test_triangle(&mut self, s: S, group: &PacketGroup<S>, block: &impl PacketTriangles, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
         let [kx, ky, kz] = group.axes;
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];

@@ -57,18 +57,18 @@ pub struct MeshTree {
 }
 
 /// The builder's view of a mesh.
-struct Triangles<'a> {
+struct LeafTriangles<'a> {
     positions: &'a [Vec3],
     triangles: &'a [[u32; 3]],
 }
 
-impl Triangles<'_> {
+impl LeafTriangles<'_> {
     fn vertices(&self, prim: u32) -> [Vec3; 3] {
         self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
     }
 }
 
-impl Primitives for Triangles<'_> {
+impl Primitives for LeafTriangles<'_> {
     fn len(&self) -> usize {
         self.triangles.len()
     }
@@ -104,7 +104,7 @@ impl MeshTree {
     fn build_by(positions: &[Vec3], triangles: &[[u32; 3]], config: &BuildConfig) -> Self {
         assert!(triangles.len() < MAX_PRIMS, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
-        let view = Triangles { positions: &positions, triangles: &triangles };
+        let view = LeafTriangles { positions: &positions, triangles: &triangles };
         let vertices = |prim| view.vertices(prim);
         let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
         let tree = BlockTree::build(&view, config, make_block, |prims| SharedBlock::pack_if_small(prims, vertices));

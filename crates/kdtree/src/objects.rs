@@ -63,7 +63,7 @@ impl QuadFilter {
 }
 
 #[derive(Debug)]
-struct Triangle {
+struct TriangleObject {
     vertices: [Point; 3],
     object: u32,
 }
@@ -87,7 +87,7 @@ struct Plane {
 pub(super) struct SimpleObjects {
     quads: Vec<Quad>,
     filter: Option<QuadFilter>,
-    triangles: Vec<Triangle>,
+    triangles: Vec<TriangleObject>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
 }
@@ -106,7 +106,7 @@ impl SimpleObjects {
                     simple.quads.push(Quad { corners, object });
                 }
                 Shape::Triangle { vertices } => {
-                    simple.triangles.push(Triangle { vertices: vertices.map(point), object });
+                    simple.triangles.push(TriangleObject { vertices: vertices.map(point), object });
                 }
                 Shape::Sphere { center, radius } => {
                     let center = center.as_dvec3().to_array();

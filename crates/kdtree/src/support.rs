@@ -135,8 +135,8 @@ mod tests {
         turned.chain(shears).chain([Affine3A::IDENTITY]).collect()
     }
 
-    /// - `slack`: excess that is allowed, in radii of the object.
-    fn check(balls: &[Ball], slack: f32) {
+    /// - `tolerance`: excess that is allowed, in radii of the object.
+    fn check(balls: &[Ball], tolerance: f32) {
         let own = balls
             .iter()
             .fold(Aabb::EMPTY, |all, (center, radius)| all.grown_by(*center - *radius).grown_by(*center + *radius));
@@ -153,7 +153,7 @@ mod tests {
             let tiny = 1e-6 * Vec3::from(map.translation.abs()) + 1e-6 * largest * reach;
             assert!((bounds.min - tiny).cmple(exact.min).all() && exact.max.cmple(bounds.max + tiny).all());
             let excess = (exact.min - bounds.min).max(bounds.max - exact.max);
-            assert!(excess.cmple(reach * (slack * radius) + tiny * 9.0).all(), "{excess} {exact:?}");
+            assert!(excess.cmple(reach * (tolerance * radius) + tiny * 9.0).all(), "{excess} {exact:?}");
         }
     }
 

@@ -27,7 +27,7 @@ const MOST_COMPARED: usize = 64;
 
 /// What the texture coordinates of a triangle say about it.
 #[derive(Clone, Copy, Default)]
-struct Triangle {
+struct CornerTriangle {
     /// Unit direction in which u grows.
     s: Vec3,
     /// Unit direction in which v grows.
@@ -127,7 +127,7 @@ struct Scratch {
 struct Fans<'a> {
     mesh: &'a Mesh,
     vertex_of: &'a [u32],
-    triangles: Vec<Triangle>,
+    triangles: Vec<CornerTriangle>,
     /// First entry in `corners` of each vertex, and the end.
     starts: Vec<u32>,
     /// Ascending for each vertex.
@@ -136,7 +136,8 @@ struct Fans<'a> {
 
 impl<'a> Fans<'a> {
     fn new(mesh: &'a Mesh, vertex_of: &'a [u32]) -> Self {
-        let triangles: Vec<Triangle> = mesh.triangles.par_iter().map(|corners| Triangle::of(mesh, corners)).collect();
+        let triangles: Vec<CornerTriangle> =
+            mesh.triangles.par_iter().map(|corners| CornerTriangle::of(mesh, corners)).collect();
         let mut starts = vec![0; vertex_of.len() + 2];
         let whole = || mesh.triangles.iter().zip(&triangles).zip(0..).filter(|((_, known), _)| !known.is_degenerate);
         for ((corners, _), _) in whole() {
@@ -165,7 +166,7 @@ impl<'a> Fans<'a> {
         &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 
-    fn triangle(&self, corner: u32) -> &Triangle {
+    fn triangle(&self, corner: u32) -> &CornerTriangle {
         &self.triangles[corner as usize / 3]
     }
 
@@ -213,7 +214,7 @@ impl<'a> Fans<'a> {
     /// Returns the groups of the corners at vertices of triangles without a direction, as numbers that are different
     /// at each vertex, and sets the orientation of these triangles; `None` if there are no such triangles.
     fn groups_around_undirected(&mut self) -> Option<Vec<u32>> {
-        let is_undirected = |triangle: &Triangle| triangle.fits_any && !triangle.is_degenerate;
+        let is_undirected = |triangle: &CornerTriangle| triangle.fits_any && !triangle.is_degenerate;
         if !self.triangles.iter().any(is_undirected) {
             return None;
         }
@@ -365,7 +366,7 @@ impl<'a> Fans<'a> {
     }
 }
 
-impl Triangle {
+impl CornerTriangle {
     /// - `corners`: vertices of the mesh.
     fn of(mesh: &Mesh, corners: &[u32; 3]) -> Self {
         let [a, b, c] = corners.map(|vertex| mesh.positions[vertex as usize]);

@@ -7,11 +7,11 @@ pub(crate) struct ChiSquared {
 }
 
 impl ChiSquared {
-    /// - `slack`: relative uncertainty of the expectations.
-    pub fn of(counts: &[f64], expected: &[f64], slack: f64) -> Self {
+    /// - `tolerance`: relative uncertainty of the expectations.
+    pub fn of(counts: &[f64], expected: &[f64], tolerance: f64) -> Self {
         let (mut value, mut bins) = (0.0, 0.0);
         let mut add = |count: f64, expected: f64| {
-            value += ((count - expected).abs() - slack * expected).max(0.0).powi(2) / expected;
+            value += ((count - expected).abs() - tolerance * expected).max(0.0).powi(2) / expected;
             bins += 1.0;
         };
         let mut rest = (0.0, 0.0);

@@ -56,8 +56,8 @@ pub enum OidnError {
     Failed(String),
 }
 
-/// Handle of an object of the library; null if it could not be made.
-type Handle = *mut c_void;
+/// OidnHandle of an object of the library; null if it could not be made.
+type OidnHandle = *mut c_void;
 
 /// The loaded library with a device.
 pub struct Oidn {
@@ -68,25 +68,25 @@ pub struct Oidn {
     _library: ManuallyDrop<Library>,
 }
 
-struct Device(Handle);
+struct Device(OidnHandle);
 
 // SAFETY: a device may be used by any thread, as long as it is by one at a time; the mutex sees to that.
 unsafe impl Send for Device {}
 
 /// Functions of the C interface.
 struct Calls {
-    new_device: unsafe extern "C" fn(c_int) -> Handle,
-    set_device_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
-    set_device_int: unsafe extern "C" fn(Handle, *const c_char, c_int),
-    commit_device: unsafe extern "C" fn(Handle),
-    release_device: unsafe extern "C" fn(Handle),
-    device_error: unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int,
-    new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
-    set_image: unsafe extern "C" fn(Handle, *const c_char, Handle, c_int, usize, usize, usize, usize, usize),
-    set_filter_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
-    commit_filter: unsafe extern "C" fn(Handle),
-    execute_filter: unsafe extern "C" fn(Handle),
-    release_filter: unsafe extern "C" fn(Handle),
+    new_device: unsafe extern "C" fn(c_int) -> OidnHandle,
+    set_device_bool: unsafe extern "C" fn(OidnHandle, *const c_char, bool),
+    set_device_int: unsafe extern "C" fn(OidnHandle, *const c_char, c_int),
+    commit_device: unsafe extern "C" fn(OidnHandle),
+    release_device: unsafe extern "C" fn(OidnHandle),
+    device_error: unsafe extern "C" fn(OidnHandle, *mut *const c_char) -> c_int,
+    new_filter: unsafe extern "C" fn(OidnHandle, *const c_char) -> OidnHandle,
+    set_image: unsafe extern "C" fn(OidnHandle, *const c_char, OidnHandle, c_int, usize, usize, usize, usize, usize),
+    set_filter_bool: unsafe extern "C" fn(OidnHandle, *const c_char, bool),
+    commit_filter: unsafe extern "C" fn(OidnHandle),
+    execute_filter: unsafe extern "C" fn(OidnHandle),
+    release_filter: unsafe extern "C" fn(OidnHandle),
 }
 
 /// `OIDN_DEVICE_TYPE_CPU`: the same result whatever graphics card there is.
@@ -223,7 +223,7 @@ impl Oidn {
     }
 
     /// The last error of the device.
-    fn check(&self, device: Handle) -> Result<(), OidnError> {
+    fn check(&self, device: OidnHandle) -> Result<(), OidnError> {
         let mut message = std::ptr::null();
         // SAFETY: the library sets the message to null or to a text that it keeps until the next call.
         unsafe {

@@ -241,7 +241,7 @@ fn compare_materials(old: &MaterialInput, new: &MaterialInput, label: &str, chan
 }
 
 /// An item with an identity of its own.
-trait Named {
+trait NamedEntity {
     fn entity(&self) -> Entity;
     fn name(&self) -> Option<&str>;
     /// Name of the item if the user gave none.
@@ -250,7 +250,7 @@ trait Named {
 
 macro_rules! named {
     ($($input:ty: $kind:expr),*) => {$(
-        impl Named for $input {
+        impl NamedEntity for $input {
             fn entity(&self) -> Entity {
                 self.entity
             }
@@ -269,7 +269,7 @@ macro_rules! named {
 named!(ObjectInput: |object| object.shape.kind(), LightInput: |light| light.light.name(), MaterialInput: |_| "material");
 
 /// Finds added, removed and changed items; `structure` is the level of additions and removals.
-fn compare_lists<T: Named + PartialEq>(
+fn compare_lists<T: NamedEntity + PartialEq>(
     old: &[T],
     new: &[T],
     kind: &str,

@@ -125,13 +125,13 @@ impl From<FilmError> for String {
 
 /// Contents of the attribute.
 #[derive(Serialize, Deserialize)]
-struct Header {
+struct FilmHeader {
     /// Format version; increased by incompatible changes.
     format: u32,
     /// Checksum of all bytes of the file with zeros in place of these 32 digits.
     check: String,
     layout: FilmLayout,
-    /// Header of the feature buffers, if there are any; programs that do not know them skip their channels.
+    /// FilmHeader of the feature buffers, if there are any; programs that do not know them skip their channels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     features: Option<FeatureHeader>,
 }
@@ -187,7 +187,7 @@ pub fn write_film_with_features(
     drop(Room::for_files(film.width(), film.height(), &[purpose]).map_err(|error| unwritable(path, error))?);
     let FilmRecord { layout, planes, changes } = film.to_record();
     let of_features = features.map(FeatureLayers::header);
-    let header = Header { format: FORMAT, check: NO_CHECK.to_owned(), layout, features: of_features };
+    let header = FilmHeader { format: FORMAT, check: NO_CHECK.to_owned(), layout, features: of_features };
     let mut bytes =
         encode(film, (&planes, changes), features, note, &header).map_err(|error| unwritable(path, error))?;
     let place = place_of_check(&bytes).expect("the header has just been written");
@@ -203,7 +203,7 @@ fn encode(
     (planes, changes): (&[Vec<f64>], Option<Vec<Vec<f32>>>),
     features: Option<&FeatureLayers>,
     note: &str,
-    header: &Header,
+    header: &FilmHeader,
 ) -> Result<Vec<u8>, exr::error::Error> {
     // Serialising plain data cannot fail.
     let header = ron::to_string(header).expect("a film's header is plain data");
@@ -333,7 +333,7 @@ fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
     if format > FORMAT {
         return Err(FilmProblem::Newer);
     }
-    Ok(ron::from_str::<Header>(&text).map_err(damaged)?.layout)
+    Ok(ron::from_str::<FilmHeader>(&text).map_err(damaged)?.layout)
 }
 
 /// Reads a film exactly.
@@ -386,7 +386,7 @@ fn decode(bytes: &[u8], limits: &Limits) -> Result<FilmFile, FilmProblem> {
     if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
         return Err(damaged(&WRONG));
     }
-    let Header { layout, features, .. } = ron::from_str(&text).map_err(|error| damaged(&error))?;
+    let FilmHeader { layout, features, .. } = ron::from_str(&text).map_err(|error| damaged(&error))?;
     let FilmLayout { width, height, .. } = layout;
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {

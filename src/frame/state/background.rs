@@ -112,7 +112,7 @@ impl BackgroundTasks {
                 up,
                 environment: environment.as_deref(),
                 aspect: Some(aspect),
-                hasty: true,
+                preview: true,
                 progress: Some(&say),
                 known: known.as_deref(),
                 choice: Some(&choice),
@@ -140,14 +140,14 @@ impl BackgroundTasks {
         });
     }
 
-    /// Builds the missing trees of shapes; with `hasty`, preview trees for large meshes.
-    pub fn build(&self, shapes: Vec<Shape>, hasty: bool, pool: Arc<rayon::ThreadPool>) {
+    /// Builds the missing trees of shapes; with `preview`, preview trees for large meshes.
+    pub fn build(&self, shapes: Vec<Shape>, preview: bool, pool: Arc<rayon::ThreadPool>) {
         self.with(|board| board.building += 1);
         let this = self.clone();
         let work = move || {
             let mut trees = Trees::default();
             for shape in &shapes {
-                let build = || if hasty { trees.add_hastily(shape) } else { trees.add(shape) };
+                let build = || if preview { trees.add_preview(shape) } else { trees.add(shape) };
                 let built = guarded(|| pool.install(build));
                 if let Err(reason) | Ok(Err(reason)) = built {
                     trees.mark_unfit(shape, reason);

@@ -247,13 +247,13 @@ pub fn brightness(radiance: DVec3) -> f64 {
 pub struct Explaining {
     /// The requested position, in fractions of the image.
     pub(crate) wanted: Option<(f64, f64)>,
-    waiting: Option<Waiting>,
+    waiting: Option<PendingExplanation>,
     /// The last answer, until another question is asked or it is removed.
     pub story: Option<PixelStory>,
 }
 
 /// A pending question.
-struct Waiting {
+struct PendingExplanation {
     // A receiver is not `Sync`, but a resource must be.
     answer: Mutex<Receiver<Answer>>,
     generation: u64,
@@ -314,5 +314,5 @@ pub fn explain_pixel(
     let question = Question { generation, x: place.0, y: place.1, n_samples: Explaining::SAMPLES };
     let names = SnapshotNames::of(extraction, &shown.inputs);
     let answer = Mutex::new(renderer.0.ask(question));
-    explaining.waiting = Some(Waiting { answer, generation, names, place });
+    explaining.waiting = Some(PendingExplanation { answer, generation, names, place });
 }

@@ -25,7 +25,7 @@ struct State {
     environment: Option<SceneEnvironment>,
     camera: Option<(Entity, Rig)>,
     moment: Option<Moment>,
-    animation: Keys,
+    animation: AnimationKeys,
 }
 
 impl State {
@@ -37,9 +37,9 @@ impl State {
 
 /// The animation. It may be large, so a new one is made only for another value, and is compared by address.
 #[derive(Clone, Debug, Default)]
-struct Keys(Option<Arc<Animation>>);
+struct AnimationKeys(Option<Arc<Animation>>);
 
-impl PartialEq for Keys {
+impl PartialEq for AnimationKeys {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
@@ -48,7 +48,7 @@ impl PartialEq for Keys {
     }
 }
 
-impl Keys {
+impl AnimationKeys {
     /// That of a world; `known` if it has not changed.
     fn of(world: &World, known: &Self) -> Self {
         match (world.get_resource::<Animation>(), &known.0) {
@@ -84,7 +84,7 @@ struct UndoStep {
 pub(crate) struct Content {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
-    animation: Keys,
+    animation: AnimationKeys,
 }
 
 /// The steps that can be undone and redone, and whether the scene has unsaved changes.
@@ -311,7 +311,7 @@ pub fn remember(world: &mut World) {
         .min_by_key(|(entity, ordinal, ..)| (ordinal.map_or(u32::MAX, |ordinal| ordinal.0), *entity))
         .map(|(entity, _, view, projection, lens)| (entity, Rig { view: *view, projection: *projection, lens: *lens }));
     let environment = world.get_resource::<SceneEnvironment>().cloned();
-    let animation = if touched { Keys::of(world, &old.animation) } else { old.animation };
+    let animation = if touched { AnimationKeys::of(world, &old.animation) } else { old.animation };
     let state = State { entities, environment, camera, moment: world.get_resource::<Moment>().copied(), animation };
     world.resource_mut::<History>().record(state);
     remember_selection(world);

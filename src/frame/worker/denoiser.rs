@@ -57,7 +57,7 @@ impl KnownGuides {
 }
 
 #[derive(Default)]
-struct Slot {
+struct DenoiserSlot {
     request: Option<Request>,
     result: Option<Settled>,
     /// The view that has guides, and their samples per pixel.
@@ -70,8 +70,8 @@ struct Slot {
 }
 
 #[derive(Default)]
-struct Shared {
-    slot: Mutex<Slot>,
+struct DenoiserState {
+    slot: Mutex<DenoiserSlot>,
     arrived: Condvar,
     /// Results of other generations are of no use.
     wanted: Arc<AtomicU64>,
@@ -80,7 +80,7 @@ struct Shared {
 
 /// The near end of the thread.
 pub struct Denoiser {
-    shared: Arc<Shared>,
+    shared: Arc<DenoiserState>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -91,7 +91,7 @@ impl Denoiser {
     ///
     /// Without a thread, if the system has none, nothing is denoised.
     pub fn start(yielding: bool, wanted: Arc<AtomicU64>, tell: impl Fn() + Send + 'static) -> Self {
-        let shared = Arc::new(Shared { wanted, ..Shared::default() });
+        let shared = Arc::new(DenoiserState { wanted, ..DenoiserState::default() });
         let of_thread = shared.clone();
         let thread = std::thread::Builder::new().name("firstlight denoise".to_owned());
         let thread = thread.spawn(move || run(&of_thread, yielding, &tell)).ok();
@@ -148,7 +148,7 @@ impl Drop for Denoiser {
     }
 }
 
-fn run(shared: &Shared, yielding: bool, tell: &dyn Fn()) {
+fn run(shared: &DenoiserState, yielding: bool, tell: &dyn Fn()) {
     let mut known = KnownGuides::default();
     let mut pools = Pools { yielding, ..Pools::default() };
     while let Some(mut request) = next(shared) {
@@ -204,7 +204,7 @@ impl Pools {
 }
 
 /// The next request; `None` when it is time to go.
-fn next(shared: &Shared) -> Option<Request> {
+fn next(shared: &DenoiserState) -> Option<Request> {
     let mut slot = lock(&shared.slot);
     loop {
         if slot.quit {

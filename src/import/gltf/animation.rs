@@ -38,7 +38,7 @@ impl Pose {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Interpolation {
+enum SamplerInterpolation {
     Step,
     Linear,
     CubicSpline,
@@ -59,7 +59,7 @@ impl Document {
     pub(crate) fn pose(&self, at: Option<f64>) -> Pose {
         let mut pose = Pose::default();
         let Some(at) = at else { return pose };
-        let mut keys = Keys::default();
+        let mut keys = KeyLists::default();
         for (i, animation) in self.root.animations.iter().enumerate() {
             for (k, channel) in animation.channels.iter().enumerate() {
                 let part = format!("{}.{}", place("animations", i), place("channels", k));
@@ -72,7 +72,7 @@ impl Document {
     fn add_channel(
         &self,
         pose: &mut Pose,
-        keys: &mut Keys,
+        keys: &mut KeyLists,
         animation: &json::Animation,
         channel: &json::Channel,
         at: f64,
@@ -85,9 +85,9 @@ impl Document {
         let sampler = animation.samplers.get(index as usize).ok_or_else(|| here(problem))?;
         self.node(node)?;
         let interpolation = match sampler.interpolation.as_deref() {
-            None | Some("LINEAR") => Interpolation::Linear,
-            Some("STEP") => Interpolation::Step,
-            Some("CUBICSPLINE") => Interpolation::CubicSpline,
+            None | Some("LINEAR") => SamplerInterpolation::Linear,
+            Some("STEP") => SamplerInterpolation::Step,
+            Some("CUBICSPLINE") => SamplerInterpolation::CubicSpline,
             Some(other) => {
                 let (found, expected) = (other.to_owned(), "STEP, LINEAR or CUBICSPLINE");
                 return Err(here(GltfProblem::Value { what: "interpolation", found, expected }));
@@ -119,7 +119,7 @@ impl Document {
             }
             "weights" if !pose.weights.contains_key(&node) => {
                 let values = keys.one.of(self, output)?;
-                let n = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+                let n = times.len() * if interpolation == SamplerInterpolation::CubicSpline { 3 } else { 1 };
                 let value = sampled(&times, &values, values.len() / n, interpolation, at, false).map_err(here)?;
                 pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
             }
@@ -147,18 +147,18 @@ impl Document {
     }
 }
 
-/// Lists of keys that were read for a pose: many channels may use one.
+/// AccessorLists of keys that were read for a pose: many channels may use one.
 #[derive(Default)]
-struct Keys {
-    one: Lists<1>,
-    three: Lists<3>,
-    four: Lists<4>,
+struct KeyLists {
+    one: AccessorLists<1>,
+    three: AccessorLists<3>,
+    four: AccessorLists<4>,
 }
 
 #[derive(Default)]
-struct Lists<const N: usize>(HashMap<u32, Rc<[[f32; N]]>>);
+struct AccessorLists<const N: usize>(HashMap<u32, Rc<[[f32; N]]>>);
 
-impl<const N: usize> Lists<N> {
+impl<const N: usize> AccessorLists<N> {
     fn of(&mut self, document: &Document, accessor: u32) -> Result<Rc<[[f32; N]]>, Located> {
         if let Some(known) = self.0.get(&accessor) {
             return Ok(known.clone());
@@ -176,11 +176,11 @@ fn sampled<const N: usize>(
     times: &[[f32; 1]],
     values: &[[f32; N]],
     group: usize,
-    how: Interpolation,
+    how: SamplerInterpolation,
     at: f64,
     turns: bool,
 ) -> Result<Vec<[f64; N]>, GltfProblem> {
-    let parts = if how == Interpolation::CubicSpline { 3 } else { 1 };
+    let parts = if how == SamplerInterpolation::CubicSpline { 3 } else { 1 };
     let expected = times.len() * group * parts;
     if values.len() != expected || group == 0 {
         let (what, found) = ("the output of its sampler".to_owned(), values.len() as u64);
@@ -201,10 +201,10 @@ fn sampled<const N: usize>(
     let mix = |i: usize| -> [f64; N] {
         let (p, q) = (value(a, middle, i), value(b, middle, i));
         match how {
-            Interpolation::Step => p,
-            Interpolation::Linear if turns && N == 4 => slerp(p, q, t),
-            Interpolation::Linear => std::array::from_fn(|k| p[k] + t * (q[k] - p[k])),
-            Interpolation::CubicSpline => {
+            SamplerInterpolation::Step => p,
+            SamplerInterpolation::Linear if turns && N == 4 => slerp(p, q, t),
+            SamplerInterpolation::Linear => std::array::from_fn(|k| p[k] + t * (q[k] - p[k])),
+            SamplerInterpolation::CubicSpline => {
                 let (out, into) = (value(a, 2, i), value(b, 0, i));
                 let (t2, t3) = (t * t, t * t * t);
                 std::array::from_fn(|k| {
@@ -244,7 +244,7 @@ fn slerp<const N: usize>(p: [f64; N], q: [f64; N], t: f64) -> [f64; N] {
 mod tests {
     use super::*;
 
-    fn at(how: Interpolation, values: &[[f32; 1]], t: f64) -> f64 {
+    fn at(how: SamplerInterpolation, values: &[[f32; 1]], t: f64) -> f64 {
         sampled(&[[1.0], [3.0]], values, 1, how, t, false).ok().unwrap()[0][0]
     }
 
@@ -254,10 +254,10 @@ mod tests {
         for (t, linear, step) in
             [(0.0, 10.0, 10.0), (1.0, 10.0, 10.0), (1.5, 12.5, 10.0), (3.0, 20.0, 20.0), (9.0, 20.0, 20.0)]
         {
-            assert_eq!(at(Interpolation::Linear, &values, t), linear);
-            assert_eq!(at(Interpolation::Step, &values, t), step);
+            assert_eq!(at(SamplerInterpolation::Linear, &values, t), linear);
+            assert_eq!(at(SamplerInterpolation::Step, &values, t), step);
         }
-        assert!(sampled(&[[1.0], [3.0]], &values[..1], 1, Interpolation::Step, 2.0, false).is_err());
+        assert!(sampled(&[[1.0], [3.0]], &values[..1], 1, SamplerInterpolation::Step, 2.0, false).is_err());
     }
 
     #[test]
@@ -266,7 +266,7 @@ mod tests {
         let f = |t: f64| t * t * t;
         let values = [[3.0], [1.0], [3.0], [27.0], [27.0], [27.0]];
         for t in [1.0, 1.2, 2.0, 2.9, 3.0] {
-            assert!((at(Interpolation::CubicSpline, &values, t) - f(t)).abs() < 1e-12, "{t}");
+            assert!((at(SamplerInterpolation::CubicSpline, &values, t) - f(t)).abs() < 1e-12, "{t}");
         }
     }
 
@@ -275,7 +275,7 @@ mod tests {
         let turn = |angle: f64| DQuat::from_rotation_y(angle);
         let values = [turn(0.2), -turn(1.4)].map(|turn| turn.to_array().map(|part| part as f32));
         for t in [0.0, 0.25, 0.7] {
-            let found = sampled(&[[0.0], [1.0]], &values, 1, Interpolation::Linear, t, true).ok().unwrap()[0];
+            let found = sampled(&[[0.0], [1.0]], &values, 1, SamplerInterpolation::Linear, t, true).ok().unwrap()[0];
             let angle = DQuat::from_array(found).angle_between(turn(0.2 + 1.2 * t));
             assert!(angle < 1e-6, "{t}: {angle}");
         }

@@ -215,12 +215,12 @@ fn zigzag(value: u32) -> u32 {
 }
 
 /// The last 16 values.
-struct Recent<T> {
+struct RecentVertices<T> {
     list: [T; 16],
     next: usize,
 }
 
-impl<T: Copy + Default> Recent<T> {
+impl<T: Copy + Default> RecentVertices<T> {
     fn new() -> Self {
         Self { list: [T::default(); 16], next: 0 }
     }
@@ -245,8 +245,8 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
     }
     let (codes, rest) = data[1..].split_at_checked(count / 3)?;
     let (mut data, table) = rest.split_at_checked(rest.len().checked_sub(TABLE)?)?;
-    let mut edges = Recent::<[u32; 2]>::new();
-    let mut vertices = Recent::<u32>::new();
+    let mut edges = RecentVertices::<[u32; 2]>::new();
+    let mut vertices = RecentVertices::<u32>::new();
     let (mut next, mut last) = (0_u32, 0_u32);
     let mut out = Vec::with_capacity(count);
     let fresh = |next: &mut u32| {

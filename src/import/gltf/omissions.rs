@@ -9,10 +9,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What is told about a file; each part has one sentence.
 #[derive(Debug, Default)]
-pub(crate) struct Omissions(Mutex<Told>);
+pub(crate) struct Omissions(Mutex<ToldOmissions>);
 
 #[derive(Debug, Default)]
-struct Told {
+struct ToldOmissions {
     parts: HashSet<String>,
     sentences: Vec<String>,
 }
@@ -56,7 +56,7 @@ impl Omissions {
         (String::new(), problem)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Told> {
+    fn lock(&self) -> MutexGuard<'_, ToldOmissions> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -63,7 +63,7 @@ struct Textures<'a> {
 const LOST: &str = "";
 
 /// How a texture is used.
-struct Role {
+struct TextureRole {
     what: &'static str,
     channel: Option<Channel>,
     encoding: Encoding,
@@ -85,7 +85,7 @@ impl Textures<'_> {
     }
 
     /// The name of a texture; one whose image must not be read is not listed.
-    fn of(&mut self, used: &TextureUse, role: Role) -> String {
+    fn of(&mut self, used: &TextureUse, role: TextureRole) -> String {
         let part = crate::import::error::gltf::place("images", used.image);
         let found = self.document.image_file(used.image, self.file);
         let Some((image, file)) = self.document.omissions.kept(&part, found) else { return LOST.to_owned() };
@@ -147,7 +147,8 @@ impl Textures<'_> {
         match texture {
             Some(used) if factor != 0.0 => {
                 let (encoding, tint) = (Encoding::Linear, Vec3::splat(factor));
-                let role = Role { what, channel: Some(channel), encoding, tint, invert: false, vertex_colors: false };
+                let role =
+                    TextureRole { what, channel: Some(channel), encoding, tint, invert: false, vertex_colors: false };
                 ScalarValue::Texture(self.of(used, role))
             }
             _ => ScalarValue::Number(factor),
@@ -159,7 +160,8 @@ impl Textures<'_> {
         match texture {
             Some(used) if *glossiness != 0.0 => {
                 let (channel, encoding, tint) = (Some(Channel::A), Encoding::Linear, Vec3::splat(*glossiness));
-                let role = Role { what: "roughness", channel, encoding, tint, invert: true, vertex_colors: false };
+                let role =
+                    TextureRole { what: "roughness", channel, encoding, tint, invert: true, vertex_colors: false };
                 ScalarValue::Texture(self.of(used, role))
             }
             _ => ScalarValue::Number(1.0 - glossiness),
@@ -171,7 +173,7 @@ impl Textures<'_> {
         match texture {
             Some(used) if factor != Vec3::ZERO => {
                 let (channel, encoding) = (None, Encoding::Auto);
-                let role = Role { what, channel, encoding, tint: factor, invert: false, vertex_colors: false };
+                let role = TextureRole { what, channel, encoding, tint: factor, invert: false, vertex_colors: false };
                 ColorValue::Texture(self.of(used, role))
             }
             _ => ColorValue::Rgb(factor),
@@ -182,7 +184,7 @@ impl Textures<'_> {
     fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Option<ColorValue> {
         let used = texture?;
         let (channel, encoding) = (None, Encoding::Linear);
-        let role = Role { what, channel, encoding, tint: Vec3::ONE, invert: false, vertex_colors: false };
+        let role = TextureRole { what, channel, encoding, tint: Vec3::ONE, invert: false, vertex_colors: false };
         Some(ColorValue::Texture(self.of(used, role)))
     }
 
@@ -195,7 +197,7 @@ impl Textures<'_> {
             Some(used) => {
                 let role = |what, channel, tint| {
                     let encoding = Encoding::Auto;
-                    Role { what, channel, encoding, tint, invert: false, vertex_colors }
+                    TextureRole { what, channel, encoding, tint, invert: false, vertex_colors }
                 };
                 let color = ColorValue::Texture(self.of(used, role("color", None, rgb)));
                 let opacity = match is_cut {

@@ -45,7 +45,7 @@ impl TextureMap {
     }
 
     /// Returns whether the option has an effect or asks for what is done anyway.
-    fn apply(&mut self, option: &Words) -> bool {
+    fn apply(&mut self, option: &MapWords) -> bool {
         let numbers: Vec<f64> = option.values.iter().filter_map(|word| word.parse().ok()).collect();
         if numbers.iter().any(|number| !number.is_finite()) {
             return false;
@@ -103,13 +103,13 @@ pub(crate) fn ignored_options(value: &str) -> impl Iterator<Item = &str> {
 }
 
 /// An option and what follows it.
-struct Words<'a> {
+struct MapWords<'a> {
     name: &'a str,
     values: Vec<&'a str>,
 }
 
 /// The name of the image, and the options before and behind it.
-fn split(value: &str) -> (&str, Vec<Words<'_>>) {
+fn split(value: &str) -> (&str, Vec<MapWords<'_>>) {
     let (mut options, name) = leading_options(value.trim());
     /// No real line has as many; each is tried up to the end of the line.
     const MOST_TRIED: usize = 64;
@@ -124,7 +124,7 @@ fn split(value: &str) -> (&str, Vec<Words<'_>>) {
 }
 
 /// The options at the beginning of a text, and the rest.
-fn leading_options(text: &str) -> (Vec<Words<'_>>, &str) {
+fn leading_options(text: &str) -> (Vec<MapWords<'_>>, &str) {
     let (mut options, mut left) = (Vec::new(), text);
     while left.starts_with('-') {
         let name = left.split_whitespace().next().unwrap_or_default();
@@ -146,7 +146,7 @@ fn leading_options(text: &str) -> (Vec<Words<'_>>, &str) {
             values.push(word);
             left = left[word.len()..].trim_start();
         }
-        options.push(Words { name, values });
+        options.push(MapWords { name, values });
     }
     (options, left)
 }

@@ -15,7 +15,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// What follows a keyword.
-enum Value {
+enum KeywordValue {
     Name,
     /// Three numbers, none negative, or one for all three.
     Color,
@@ -27,46 +27,46 @@ enum Value {
     UnusedMap,
 }
 
-const SHARE: Value = Value::Number(0.0..=1.0);
+const SHARE: KeywordValue = KeywordValue::Number(0.0..=1.0);
 
 /// The keywords, in the spelling of tobj.
-const KEYWORDS: &[(&str, Value)] = &[
-    ("newmtl", Value::Name),
-    ("Ka", Value::Color),
-    ("Kd", Value::Color),
-    ("Ks", Value::Color),
-    ("Ke", Value::Color),
-    ("Tf", Value::Color),
-    ("Ns", Value::Number(0.0..=1e6)),
-    ("Ni", Value::Number(1e-3..=10.0)),
+const KEYWORDS: &[(&str, KeywordValue)] = &[
+    ("newmtl", KeywordValue::Name),
+    ("Ka", KeywordValue::Color),
+    ("Kd", KeywordValue::Color),
+    ("Ks", KeywordValue::Color),
+    ("Ke", KeywordValue::Color),
+    ("Tf", KeywordValue::Color),
+    ("Ns", KeywordValue::Number(0.0..=1e6)),
+    ("Ni", KeywordValue::Number(1e-3..=10.0)),
     ("d", SHARE),
     ("Tr", SHARE),
-    ("illum", Value::Whole),
+    ("illum", KeywordValue::Whole),
     ("Pr", SHARE),
     ("Pm", SHARE),
     ("Ps", SHARE),
-    ("Pc", Value::Number(0.0..=1e3)),
+    ("Pc", KeywordValue::Number(0.0..=1e3)),
     ("Pcr", SHARE),
     ("aniso", SHARE),
-    ("anisor", Value::Number(0.0..=1e3)),
-    ("map_Kd", Value::Map),
-    ("map_Ke", Value::Map),
-    ("map_d", Value::Map),
-    ("map_Ns", Value::Map),
-    ("map_refl", Value::Map),
-    ("map_Pr", Value::Map),
-    ("map_Pm", Value::Map),
-    ("norm", Value::Map),
-    ("map_Bump", Value::Map),
-    ("bump", Value::Map),
-    ("map_Ks", Value::UnusedMap),
-    ("refl", Value::UnusedMap),
-    ("disp", Value::UnusedMap),
-    ("map_disp", Value::UnusedMap),
-    ("decal", Value::UnusedMap),
-    ("map_Ps", Value::UnusedMap),
-    ("map_Pc", Value::UnusedMap),
-    ("map_Pcr", Value::UnusedMap),
+    ("anisor", KeywordValue::Number(0.0..=1e3)),
+    ("map_Kd", KeywordValue::Map),
+    ("map_Ke", KeywordValue::Map),
+    ("map_d", KeywordValue::Map),
+    ("map_Ns", KeywordValue::Map),
+    ("map_refl", KeywordValue::Map),
+    ("map_Pr", KeywordValue::Map),
+    ("map_Pm", KeywordValue::Map),
+    ("norm", KeywordValue::Map),
+    ("map_Bump", KeywordValue::Map),
+    ("bump", KeywordValue::Map),
+    ("map_Ks", KeywordValue::UnusedMap),
+    ("refl", KeywordValue::UnusedMap),
+    ("disp", KeywordValue::UnusedMap),
+    ("map_disp", KeywordValue::UnusedMap),
+    ("decal", KeywordValue::UnusedMap),
+    ("map_Ps", KeywordValue::UnusedMap),
+    ("map_Pc", KeywordValue::UnusedMap),
+    ("map_Pcr", KeywordValue::UnusedMap),
 ];
 
 /// Reads a library; invalid lines give warnings, and all other lines are used.
@@ -143,32 +143,32 @@ fn clean(text: &str, unused: &mut BTreeSet<String>, warn: &mut impl FnMut(String
         let numbers: Vec<f32> =
             value.split_whitespace().map_while(|word| word.parse().ok().filter(|v: &f32| v.is_finite())).collect();
         let valid = match kind {
-            Value::Name => {
+            KeywordValue::Name => {
                 // A missing name still begins a new material.
                 named = true;
                 Ok(if value.is_empty() { "(unnamed)".to_owned() } else { value.to_owned() })
             }
-            Value::Color => match numbers[..] {
+            KeywordValue::Color => match numbers[..] {
                 [r, g, b, ..] if r.min(g).min(b) >= 0.0 => Ok(format!("{r} {g} {b}")),
                 [grey] if grey >= 0.0 && value.split_whitespace().count() == 1 => Ok(format!("{grey} {grey} {grey}")),
                 [_, _, _, ..] => Err("must not be negative"),
                 _ => Err("cannot be parsed"),
             },
-            Value::Number(range) => match numbers.first() {
+            KeywordValue::Number(range) => match numbers.first() {
                 Some(number) if range.contains(number) => Ok(number.to_string()),
                 Some(_) => Err("is out of range"),
                 None => Err("cannot be parsed"),
             },
-            Value::Whole => match value.split_whitespace().next().and_then(|word| word.parse::<u8>().ok()) {
+            KeywordValue::Whole => match value.split_whitespace().next().and_then(|word| word.parse::<u8>().ok()) {
                 Some(whole) => Ok(whole.to_string()),
                 None => Err("cannot be parsed"),
             },
-            Value::Map | Value::UnusedMap if value.is_empty() => Err("has no image"),
-            Value::Map => {
+            KeywordValue::Map | KeywordValue::UnusedMap if value.is_empty() => Err("has no image"),
+            KeywordValue::Map => {
                 unused.extend(ignored_options(value).map(|option| format!("`{option}`")));
                 Ok(value.to_owned())
             }
-            Value::UnusedMap => {
+            KeywordValue::UnusedMap => {
                 unused.insert(format!("`{keyword}`"));
                 continue;
             }

@@ -53,14 +53,15 @@ const LEAST_PIECE: usize = 1 << 18;
 fn parse_in(bytes: &[u8], n_pieces: usize) -> ParsedObj {
     let pieces = pieces(bytes, n_pieces);
     // The counts before each piece, since faces may use indices relative to them.
-    let mut starts = vec![Start::default()];
+    let mut starts = vec![PieceStart::default()];
     if pieces.len() > 1 {
-        let sizes: Vec<Start> = pieces.par_iter().map(|piece| Start::of(piece)).collect();
+        let sizes: Vec<PieceStart> = pieces.par_iter().map(|piece| PieceStart::of(piece)).collect();
         for size in sizes {
             starts.push(starts[starts.len() - 1].and(size));
         }
     }
-    let read: Vec<Piece> = pieces.par_iter().zip(&starts).map(|(piece, start)| Piece::read(piece, *start)).collect();
+    let read: Vec<TextPiece> =
+        pieces.par_iter().zip(&starts).map(|(piece, start)| TextPiece::read(piece, *start)).collect();
     let mut furthest = [(0_i64, 0_usize); 3];
     for piece in &read {
         for (furthest, of_piece) in furthest.iter_mut().zip(piece.furthest) {
@@ -92,14 +93,14 @@ const NORMAL: usize = 2;
 
 /// Counts before a position in the file.
 #[derive(Clone, Copy, Default)]
-struct Start {
+struct PieceStart {
     /// Number of line endings.
     lines: usize,
     /// Number of positions, texture coordinates and normals.
     counts: [usize; 3],
 }
 
-impl Start {
+impl PieceStart {
     /// The counts of a piece, assuming that it is valid.
     fn of(piece: &[u8]) -> Self {
         let mut start = Self { lines: line_ends(piece), ..Self::default() };
@@ -122,7 +123,7 @@ impl Start {
 
 /// The contents of one piece of a file.
 #[derive(Default)]
-struct Piece {
+struct TextPiece {
     parsed: ParsedObj,
     before: [usize; 3],
     /// Each `usemtl`: the number of faces before it, and the name.
@@ -131,8 +132,8 @@ struct Piece {
     furthest: [(i64, usize); 3],
 }
 
-impl Piece {
-    fn read(bytes: &[u8], start: Start) -> Self {
+impl TextPiece {
+    fn read(bytes: &[u8], start: PieceStart) -> Self {
         let mut piece = Self { before: start.counts, ..Self::default() };
         for (number, line) in lines(bytes) {
             let number = start.lines + number;
@@ -174,7 +175,7 @@ impl Piece {
 }
 
 /// Concatenates the pieces.
-fn joined(pieces: Vec<Piece>) -> ParsedObj {
+fn joined(pieces: Vec<TextPiece>) -> ParsedObj {
     let mut all = ParsedObj::default();
     let total = |len: fn(&ParsedObj) -> usize| pieces.iter().map(|piece| len(&piece.parsed)).sum::<usize>();
     all.positions.reserve_exact(total(|p| p.positions.len()));
@@ -187,7 +188,7 @@ fn joined(pieces: Vec<Piece>) -> ParsedObj {
     // The current material name, and its index once a face has used it.
     let (mut name, mut material) = (String::new(), None);
     let mut known: HashMap<String, u32> = HashMap::new();
-    for Piece { parsed, materials, .. } in pieces {
+    for TextPiece { parsed, materials, .. } in pieces {
         let mut from = 0;
         let ends = materials.iter().map(|(face, _)| *face).skip(1).chain([parsed.arities.len()]);
         let first = materials.first().map_or(parsed.arities.len(), |(face, _)| *face);

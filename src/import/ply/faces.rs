@@ -52,7 +52,7 @@ const NO_TEXTURE: u16 = u16::MAX;
 
 /// What a property of a face is.
 #[derive(Clone, Copy, PartialEq)]
-enum Role {
+enum FaceRole {
     Indices,
     Uvs,
     Texture,
@@ -90,20 +90,20 @@ impl Faces {
     ) -> Result<usize, Located> {
         let indices = index_list(element)?;
         let colour = colour_of(element).filter(|_| wants_colours);
-        let roles: Vec<Role> = (0..element.properties.len())
+        let roles: Vec<FaceRole> = (0..element.properties.len())
             .map(|i| match &element.properties[i] {
-                _ if i == indices => Role::Indices,
+                _ if i == indices => FaceRole::Indices,
                 // As MeshLab writes them: six numbers per triangle.
-                Property { name, length: Some(_), number } if name == "texcoord" && !number.is_whole() => Role::Uvs,
-                Property { name, length: None, .. } if name == "texnumber" && n_textures > 0 => Role::Texture,
+                Property { name, length: Some(_), number } if name == "texcoord" && !number.is_whole() => FaceRole::Uvs,
+                Property { name, length: None, .. } if name == "texnumber" && n_textures > 0 => FaceRole::Texture,
                 _ => match colour.and_then(|(channels, _)| channels.iter().position(|&k| k == i)) {
-                    Some(channel) => Role::Channel(channel),
-                    None => Role::Ignored,
+                    Some(channel) => FaceRole::Channel(channel),
+                    None => FaceRole::Ignored,
                 },
             })
             .collect();
-        ignored.extend((0..roles.len()).filter(|&i| roles[i] == Role::Ignored));
-        let (has_uvs, has_textures) = (roles.contains(&Role::Uvs), roles.contains(&Role::Texture));
+        ignored.extend((0..roles.len()).filter(|&i| roles[i] == FaceRole::Ignored));
+        let (has_uvs, has_textures) = (roles.contains(&FaceRole::Uvs), roles.contains(&FaceRole::Texture));
         // Strips that come before have neither.
         self.uvs.resize(if has_uvs { self.corners.len() } else { 0 }, Vec2::ZERO);
         self.textures.resize(if has_textures { self.arities.len() } else { 0 }, NO_TEXTURE);
@@ -147,33 +147,33 @@ impl Faces {
         element: &Element,
         row: u64,
         rows: &mut impl Rows,
-        roles: &[Role],
+        roles: &[FaceRole],
         face: &mut OfFace,
     ) -> Result<(), Located> {
         let missing = |problem, rows: &_| missing(problem, element, row, rows);
         rows.begin_row().map_err(|problem| missing(problem, rows))?;
         for (property, &role) in element.properties.iter().zip(roles) {
             match (role, property.length) {
-                (Role::Indices, Some(_)) => {
+                (FaceRole::Indices, Some(_)) => {
                     for _ in 0..next_length(element, row, property, rows)? {
                         let index = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
                         let corner = self.corner(index, element, row, rows);
                         self.corners.push(corner);
                     }
                 }
-                (Role::Uvs, Some(_)) => {
+                (FaceRole::Uvs, Some(_)) => {
                     face.uvs.clear();
                     for _ in 0..next_length(element, row, property, rows)? {
                         face.uvs.push(rows.next(property.number).map_err(|problem| missing(problem, rows))? as f32);
                     }
                 }
                 (_, Some(_)) => skip_list(element, row, property, rows)?,
-                (Role::Texture, None) => {
+                (FaceRole::Texture, None) => {
                     let number = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
                     let is_number = number >= 0.0 && number < f64::from(NO_TEXTURE);
                     face.texture = if is_number { number as u16 } else { NO_TEXTURE };
                 }
-                (Role::Channel(channel), None) => {
+                (FaceRole::Channel(channel), None) => {
                     face.channels[channel] = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
                 }
                 (_, None) => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,

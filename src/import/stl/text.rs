@@ -9,12 +9,12 @@ use crate::import::stl::soup::{Located, Soup};
 use glam::DVec3;
 
 /// The words with their line numbers.
-struct Words<'a> {
+struct StlWords<'a> {
     left: &'a [u8],
     line: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a> StlWords<'a> {
     /// The next word; empty at the end of the file.
     fn next(&mut self) -> &'a [u8] {
         let start = self.left.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(self.left.len());
@@ -60,7 +60,7 @@ impl<'a> Words<'a> {
 
 /// Reads all solids of the text.
 pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
-    let mut words = Words { left: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 1 };
+    let mut words = StlWords { left: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 1 };
     let mut soup = Soup::default();
     let (mut corners, mut cut) = (Vec::new(), Vec::new());
     let mut is_open = false;
@@ -95,7 +95,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
 }
 
 /// Parses a facet after the word `facet`, up to `endfacet`.
-fn facet(words: &mut Words, corners: &mut Vec<DVec3>) -> Result<(), Located> {
+fn facet(words: &mut StlWords, corners: &mut Vec<DVec3>) -> Result<(), Located> {
     let word = words.next();
     if !word.eq_ignore_ascii_case(b"normal") {
         return Err(words.wrong(word, "`normal`"));

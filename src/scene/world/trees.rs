@@ -15,7 +15,7 @@ pub struct Trees {
     /// Shapes without a tree because they are invalid, and why.
     unfit: HashMap<usize, (Shape, String)>,
     /// Meshes with a tree of the quick preset: equal hits, slower traversal.
-    hasty: HashSet<usize>,
+    preview: HashSet<usize>,
 }
 
 impl Trees {
@@ -44,7 +44,7 @@ impl Trees {
     ///
     /// # Errors
     /// Like [`Self::add`].
-    pub fn add_hastily(&mut self, shape: &Shape) -> Result<(), String> {
+    pub fn add_preview(&mut self, shape: &Shape) -> Result<(), String> {
         /// Below this, the best tree is built within a frame or two.
         const LARGE: usize = 10_000;
         let is_large = matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() >= LARGE);
@@ -61,7 +61,7 @@ impl Trees {
                 let tree = MeshTree::build(&mesh.positions, &mesh.triangles, preset);
                 self.meshes.insert(address(mesh), (mesh.clone(), Arc::new(tree)));
                 if preset == BuildPreset::Quick {
-                    self.hasty.insert(address(mesh));
+                    self.preview.insert(address(mesh));
                 }
             }
             Shape::Spheres(balls) => {
@@ -75,8 +75,8 @@ impl Trees {
     }
 
     /// The meshes with a tree of the quick preset, in ascending order of size.
-    pub fn hasty(&self) -> Vec<Shape> {
-        let meshes = self.meshes.iter().filter(|(key, _)| self.hasty.contains(key));
+    pub fn preview(&self) -> Vec<Shape> {
+        let meshes = self.meshes.iter().filter(|(key, _)| self.preview.contains(key));
         let mut meshes: Vec<Arc<Mesh>> = meshes.map(|(_, (mesh, _))| mesh.clone()).collect();
         // The largest takes the longest to rebuild.
         meshes.sort_by_key(|mesh| mesh.triangles.len());
@@ -106,12 +106,12 @@ impl Trees {
     pub fn extend(&mut self, other: Self) {
         self.unfit.extend(other.unfit);
         for (key, tree) in other.meshes {
-            if !other.hasty.contains(&key) {
-                self.hasty.remove(&key);
+            if !other.preview.contains(&key) {
+                self.preview.remove(&key);
             } else if self.meshes.contains_key(&key) {
                 continue;
             } else {
-                self.hasty.insert(key);
+                self.preview.insert(key);
             }
             self.meshes.insert(key, tree);
         }
@@ -124,7 +124,7 @@ impl Trees {
         self.meshes.retain(|key, _| used.contains(key));
         self.balls.retain(|key, _| used.contains(key));
         self.unfit.retain(|key, _| used.contains(key));
-        self.hasty.retain(|key| used.contains(key));
+        self.preview.retain(|key| used.contains(key));
     }
 }
 

@@ -64,7 +64,7 @@ impl Sum {
     }
 }
 
-pub fn add(sum: &mut [f64; 2], amount: [f64; 2]) {
-    sum[0] += amount[0];
-    sum[1] += amount[1];
+pub fn add(sum: &mut [f64; 2], step: [f64; 2]) {
+    sum[0] += step[0];
+    sum[1] += step[1];
 }

@@ -147,11 +147,11 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 }
             })
         });
-        let looking = session.world().resource::<ViewMode>().0;
+        let view_mode = session.world().resource::<ViewMode>().0;
         row_with_hint(ui, "noise", "raw, denoised, or split: raw on the left; F2 goes through them", |ui| {
             ui.horizontal(|ui| {
                 for denoising in Denoising::ALL {
-                    if ui.selectable_label(looking.denoising == denoising, denoising.label()).clicked() {
+                    if ui.selectable_label(view_mode.denoising == denoising, denoising.label()).clicked() {
                         asked.send(Command::SetDenoising(denoising));
                     }
                 }
@@ -164,7 +164,7 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             |ui| {
                 ui.horizontal(|ui| {
                     for filter in DenoiseFilter::ALL {
-                        if ui.selectable_label(looking.filter == filter, filter.short_label()).clicked() {
+                        if ui.selectable_label(view_mode.filter == filter, filter.short_label()).clicked() {
                             asked.filter = Some(filter);
                         }
                     }
@@ -172,7 +172,7 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             },
         );
         row(ui, "show", |ui| {
-            let shown = looking.inspection;
+            let shown = view_mode.inspection;
             egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {
                 for inspection in Inspection::ALL {
                     if ui.selectable_label(shown == inspection, inspection.label()).clicked() {

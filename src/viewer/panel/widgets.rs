@@ -79,9 +79,11 @@ pub fn whole(ui: &mut Ui, value: u32, range: std::ops::RangeInclusive<u32>) -> O
 pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
     let mut new = value;
     let mut changed = false;
+    // Beside long labels there is less room.
+    let width = ((ui.available_width() - 8.0) / 3.0).clamp(36.0, 52.0);
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        ui.spacing_mut().interact_size.x = 52.0;
+        ui.spacing_mut().interact_size.x = width;
         for axis in 0..3 {
             let drag = egui::DragValue::new(&mut new[axis]).speed(speed).max_decimals(3).update_while_editing(false);
             changed |= ui.add(drag).changed();

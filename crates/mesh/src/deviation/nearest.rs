@@ -68,7 +68,7 @@ impl NearestTree {
         if triangles.is_empty() {
             return Self { nodes: Vec::new(), frames: Vec::new(), triangles, rounding: 0.0 };
         }
-        let Branch { nodes, frames, .. } = build(&mut triangles, 0);
+        let NearestBranch { nodes, frames, .. } = build(&mut triangles, 0);
         let largest = nodes[0].min.abs().max(nodes[0].max.abs()).max_element();
         Self { nodes, frames, triangles, rounding: 64.0 * f64::EPSILON * largest }
     }
@@ -91,8 +91,8 @@ impl NearestTree {
         let best = guess.map_or(f64::INFINITY, |t| distance2_to_triangle(point, &self.triangles[t as usize]));
         let mut found = NearestSoFar { best, precision: PRECISION, limit: self.limit(best, PRECISION), guess };
         // Splits halve the count, so 64 levels suffice for any mesh.
-        let mut stack = [Open { bound: 0.0, node: 0 }; 64];
-        stack[0] = Open { bound: distance2_to_box(point, root), node: 0 };
+        let mut stack = [OpenNode { bound: 0.0, node: 0 }; 64];
+        stack[0] = OpenNode { bound: distance2_to_box(point, root), node: 0 };
         let (mut top, mut steps) = (1, 0);
         while top > 0 && steps < DEPTH_FIRST {
             top -= 1;
@@ -118,7 +118,7 @@ impl NearestTree {
     fn search_best_first(
         &self,
         point: DVec3,
-        mut open: BinaryHeap<Open>,
+        mut open: BinaryHeap<OpenNode>,
         found: &mut NearestSoFar,
         visit: &mut impl FnMut(),
     ) {
@@ -137,10 +137,16 @@ impl NearestTree {
 
     /// Tests the triangles of a leaf, or returns the children of an inner node, the nearer one first.
     #[inline(always)]
-    fn step(&self, point: DVec3, index: u32, found: &mut NearestSoFar, visit: &mut impl FnMut()) -> Option<[Open; 2]> {
+    fn step(
+        &self,
+        point: DVec3,
+        index: u32,
+        found: &mut NearestSoFar,
+        visit: &mut impl FnMut(),
+    ) -> Option<[OpenNode; 2]> {
         let node = &self.nodes[index as usize];
         if node.count == 0 {
-            let child = |node: u32| Open { bound: self.bound(point, &self.nodes[node as usize]), node };
+            let child = |node: u32| OpenNode { bound: self.bound(point, &self.nodes[node as usize]), node };
             let [left, right] = [child(index + 1), child(node.link)];
             return Some(if left.bound <= right.bound { [left, right] } else { [right, left] });
         }
@@ -169,30 +175,30 @@ struct NearestSoFar<'a> {
 
 /// A pending node. The ordering makes the nearest the greatest; of equals, the first.
 #[derive(Clone, Copy, Debug)]
-struct Open {
+struct OpenNode {
     bound: f64,
     node: u32,
 }
 
-impl Ord for Open {
+impl Ord for OpenNode {
     fn cmp(&self, other: &Self) -> Ordering {
         other.bound.total_cmp(&self.bound).then(other.node.cmp(&self.node))
     }
 }
 
-impl PartialOrd for Open {
+impl PartialOrd for OpenNode {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Open {
+impl PartialEq for OpenNode {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Open {}
+impl Eq for OpenNode {}
 
 impl NearestTree {
     /// Returns the squared distance from which on a node contains nothing that is nearer than `best` by more than
@@ -212,7 +218,7 @@ impl NearestTree {
 }
 
 /// A subtree, depth first.
-struct Branch {
+struct NearestBranch {
     nodes: Vec<BoxNode>,
     frames: Vec<BoxFrame>,
     /// Doubled area of all triangles.
@@ -220,14 +226,14 @@ struct Branch {
 }
 
 /// Builds nodes over `triangles`, which are reordered; `first` is the index of the first of them.
-fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Branch {
+fn build(triangles: &mut [[DVec3; 3]], first: u32) -> NearestBranch {
     let corners = triangles.iter().flatten();
     let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), &p| (min.min(p), max.max(p)));
     let count = triangles.len();
     let node = BoxNode { min, max, link: first, count: count as u32, frame: NONE };
     let mut branch = if count <= LEAF {
         let area = triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum();
-        Branch { nodes: vec![node], frames: Vec::new(), area }
+        NearestBranch { nodes: vec![node], frames: Vec::new(), area }
     } else {
         // The axis along which the centres vary most, not the corners: parallel needles are long along another axis.
         let size = extent_of_centers(triangles);
@@ -265,7 +271,7 @@ fn extent_of_centers(triangles: &[[DVec3; 3]]) -> DVec3 {
     max - min
 }
 
-fn join(node: BoxNode, left: Branch, right: Branch) -> Branch {
+fn join(node: BoxNode, left: NearestBranch, right: NearestBranch) -> NearestBranch {
     let shift = left.nodes.len() as u32 + 1;
     let shift_frames = left.frames.len() as u32;
     let moved = |by: u32, frames: u32| {
@@ -281,7 +287,7 @@ fn join(node: BoxNode, left: Branch, right: Branch) -> Branch {
     nodes.extend(right.nodes.into_iter().map(moved(shift, shift_frames)));
     let mut frames = left.frames;
     frames.extend(right.frames);
-    Branch { nodes, frames, area: left.area + right.area }
+    NearestBranch { nodes, frames, area: left.area + right.area }
 }
 
 impl BoxFrame {

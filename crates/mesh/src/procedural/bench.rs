@@ -10,7 +10,7 @@ pub fn blob_in_bowl() -> Mesh {
     let blob = displaced_sphere(&DisplacedSphere { frequency: 71, ..DisplacedSphere::default() });
     let cells: u32 = 75;
     let bowl = terrain(&Terrain { cells, size: 400.0, height: 4.0, mountains: 3.0, seed: 7 });
-    let mut parts = Parts::default();
+    let mut parts = BenchParts::default();
     parts.add(&blob, |p| p + dvec3(0.0, 4.0, 0.0));
     parts.add(&bowl, |p| p + dvec3(0.0, 60.0 * (p.x * p.x + p.z * p.z) / 8e4, 0.0));
     parts.finish()
@@ -19,7 +19,7 @@ pub fn blob_in_bowl() -> Mesh {
 /// A closed room of 20 × 6 × 12 metres that faces inwards, with two rows of six columns and nine blobs: 230 k
 /// triangles, and every ray from inside hits something.
 pub fn room() -> Mesh {
-    let mut parts = Parts::default();
+    let mut parts = BenchParts::default();
     let mut walls = cuboid(dvec3(20.0, 6.0, 12.0));
     walls.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     parts.add(&walls, |p| p);
@@ -75,12 +75,12 @@ fn column(sides: u32, rings: u32) -> Mesh {
 }
 
 #[derive(Default)]
-struct Parts {
+struct BenchParts {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Parts {
+impl BenchParts {
     fn add(&mut self, mesh: &Mesh, place: impl Fn(DVec3) -> DVec3) {
         let base = self.positions.len() as u32;
         self.positions.extend(mesh.positions.iter().map(|p| place(p.as_dvec3() + mesh.center)));

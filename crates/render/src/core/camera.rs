@@ -197,19 +197,19 @@ impl Camera {
     /// to x + o (1 − z/f), in metres.
     pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
         if let Some(half) = self.orthographic {
-            let slack = half / (height.max(1) as f32 * self.lens_radius);
+            let tolerance = half / (height.max(1) as f32 * self.lens_radius);
             // Focused at infinity, all rays of a film position have one direction.
-            if self.focus_distance.is_infinite() || slack.is_infinite() {
+            if self.focus_distance.is_infinite() || tolerance.is_infinite() {
                 return (0.0, f32::INFINITY);
             }
-            return (self.focus_distance * (1.0 - slack).max(0.0), self.focus_distance * (1.0 + slack));
+            return (self.focus_distance * (1.0 - tolerance).max(0.0), self.focus_distance * (1.0 + tolerance));
         }
         let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
         // Infinite for a pinhole, and then not subtracted from.
-        let slack = pixel / (2.0 * self.lens_radius);
+        let tolerance = pixel / (2.0 * self.lens_radius);
         let focus = self.focus_distance.recip();
-        let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
-        ((focus + slack).recip(), far)
+        let far = if focus > tolerance { (focus - tolerance).recip() } else { f32::INFINITY };
+        ((focus + tolerance).recip(), far)
     }
 
     /// Returns a lens position as its offset from the camera along `right` and `up`, metres.

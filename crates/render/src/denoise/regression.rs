@@ -50,7 +50,7 @@ const BRIGHT: f32 = 8.0;
 
 /// Returns `None` if `stop` returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression> {
-    let Start { samples, mut blocks, albedo, noise } = Start::of(input, stop)?;
+    let RegressionStart { samples, mut blocks, albedo, noise } = RegressionStart::of(input, stop)?;
     // Without halves the noise is that of the residuals.
     let (significance, n_small) = if input.half_steps.is_some() { (SIGNIFICANCE, 1) } else { (0.0, 2) };
     let mut levels = Vec::new();
@@ -75,11 +75,11 @@ pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression>
 
 /// The noise of the raw image alone; `None` if `stop` returned true.
 pub(super) fn noise(input: &DenoiseInput, stop: Stop) -> Option<Noise> {
-    Start::of(input, stop).map(|start| start.noise)
+    RegressionStart::of(input, stop).map(|start| start.noise)
 }
 
 /// What a regression starts from.
-struct Start {
+struct RegressionStart {
     samples: Samples,
     blocks: Blocks,
     /// Divisors of radiance.
@@ -87,7 +87,7 @@ struct Start {
     noise: Noise,
 }
 
-impl Start {
+impl RegressionStart {
     fn of(input: &DenoiseInput, stop: Stop) -> Option<Self> {
         let guides = &input.guides;
         let n = input.n_pixels();

@@ -81,7 +81,7 @@ fn gather(
     let media = snapshot.camera_media();
     let mut buffers = FeatureBuffers::new(size.x, size.y, samples, with_ids);
     let done = bands_of(&mut buffers).into_par_iter().map_init(
-        || Worker { tracer: PartTracer::begin(snapshot, &media, false), ..Worker::default() },
+        || FeatureWorker { tracer: PartTracer::begin(snapshot, &media, false), ..FeatureWorker::default() },
         |worker, mut band| {
             Part::of_band(band.first_row, size).all(|part| worker.look_at(&look, samples, &mut band, &part, stop))
         },
@@ -110,7 +110,7 @@ impl<'a> Look<'a> {
 }
 
 /// The rows of one band in all buffers.
-struct Band<'a> {
+struct FeatureBand<'a> {
     first_row: u32,
     albedo: &'a mut [Vec3],
     normal: &'a mut [Vec3],
@@ -124,7 +124,7 @@ struct Band<'a> {
     ids: Option<[&'a mut [IdShares]; 2]>,
 }
 
-fn bands_of(buffers: &mut FeatureBuffers) -> Vec<Band<'_>> {
+fn bands_of(buffers: &mut FeatureBuffers) -> Vec<FeatureBand<'_>> {
     let FeatureBuffers { width, albedo, normal, position, depth, coverage, variance, ids, .. } = buffers;
     let n = (*width * BAND) as usize;
     let [mut albedo, mut normal, mut position] = [albedo, normal, position].map(|list| list.chunks_mut(n));
@@ -134,7 +134,7 @@ fn bands_of(buffers: &mut FeatureBuffers) -> Vec<Band<'_>> {
     let mut depth_variance = variance.depth.chunks_mut(n);
     let mut ids = ids.as_mut().map(|ids| [&mut ids.objects, &mut ids.materials].map(|list| list.chunks_mut(n)));
     let band = |first_row| {
-        Some(Band {
+        Some(FeatureBand {
             first_row,
             albedo: albedo.next()?,
             normal: normal.next()?,
@@ -153,26 +153,26 @@ fn bands_of(buffers: &mut FeatureBuffers) -> Vec<Band<'_>> {
 
 /// Scratch memory of one worker.
 #[derive(Default)]
-struct Worker {
+struct FeatureWorker {
     tracer: PartTracer,
-    sums: Vec<Sums>,
+    sums: Vec<FeatureSums>,
     ids: Vec<[IdCounts; 2]>,
 }
 
-impl Worker {
+impl FeatureWorker {
     /// Gathers the features of a part of a band; false if `stop` returned true.
     fn look_at(
         &mut self,
         look: &Look,
         samples: u32,
-        band: &mut Band,
+        band: &mut FeatureBand,
         part: &Part,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> bool {
         let n_pixels = part.n_pixels();
         let at = |local: usize| part.in_band(local, look.lens.size.x);
         self.sums.clear();
-        self.sums.resize(n_pixels, Sums::default());
+        self.sums.resize(n_pixels, FeatureSums::default());
         self.ids.clear();
         self.ids.resize(if band.ids.is_some() { n_pixels } else { 0 }, Default::default());
         let Self { tracer, sums, ids } = self;
@@ -312,7 +312,7 @@ impl PartTracer {
     }
 }
 
-impl Band<'_> {
+impl FeatureBand<'_> {
     /// Stores a pixel with a single sample.
     fn set_one(&mut self, at: usize, seen: &Seen) {
         (self.albedo[at], self.normal[at], self.position[at]) = (seen.albedo, seen.normal, seen.position);
@@ -321,7 +321,7 @@ impl Band<'_> {
     }
 
     /// Stores a pixel with several samples.
-    fn set_mean(&mut self, at: usize, sums: &Sums, samples: u32) {
+    fn set_mean(&mut self, at: usize, sums: &FeatureSums, samples: u32) {
         let n = samples as f32;
         (self.albedo[at], self.albedo_variance[at]) = sums.albedo.mean(n);
         (self.normal[at], self.normal_variance[at]) = sums.normal.mean(n);
@@ -337,18 +337,18 @@ impl Band<'_> {
     }
 }
 
-/// Sums of one pixel.
+/// FeatureSums of one pixel.
 #[derive(Clone, Copy, Default)]
-struct Sums {
-    albedo: Moments,
-    normal: Moments,
-    position: Moments,
+struct FeatureSums {
+    albedo: FeatureMoments,
+    normal: FeatureMoments,
+    position: FeatureMoments,
     /// The depth is component 0.
-    depth: Moments,
+    depth: FeatureMoments,
     n_surfaces: u32,
 }
 
-impl Sums {
+impl FeatureSums {
     #[inline]
     fn add(&mut self, seen: &Seen) {
         self.albedo.add(seen.albedo);
@@ -363,13 +363,13 @@ impl Sums {
 
 /// Sum and sum of squares relative to the first value, so that large values lose no digits.
 #[derive(Clone, Copy, Default)]
-struct Moments {
+struct FeatureMoments {
     first: Option<Vec3>,
     sum: Vec3,
     squares: Vec3,
 }
 
-impl Moments {
+impl FeatureMoments {
     #[inline]
     fn add(&mut self, value: Vec3) {
         let away = value - *self.first.get_or_insert(value);
@@ -392,12 +392,12 @@ mod tests {
     #[test]
     fn means_and_variances_are_those_of_the_values() {
         let values = [3.0, 5.0, 4.0, 8.0].map(|x| 1e4 + x);
-        let mut moments = Moments::default();
+        let mut moments = FeatureMoments::default();
         values.iter().for_each(|&value| moments.add(Vec3::splat(value)));
         let (mean, variance) = moments.mean(4.0);
         // Deviations −2, 0, −1 and 3: 14 / 3 of one value, a fourth of that of the mean.
         assert_eq!((mean.x, variance.x), (10005.0, 14.0 / 12.0));
-        let mut alike = Moments::default();
+        let mut alike = FeatureMoments::default();
         (0..7).for_each(|_| alike.add(Vec3::splat(0.3)));
         assert_eq!(alike.mean(7.0), (Vec3::splat(0.3), Vec3::ZERO), "nothing is rounded where all are alike");
     }

@@ -81,7 +81,7 @@ pub fn gather_guides(
 pub struct GuideGatherer {
     samples: u32,
     /// Of those samples that each pixel has so far; meaningless without samples.
-    sums: Vec<Sums>,
+    sums: Vec<GuideSums>,
     /// Their means.
     guides: SurfaceGuides,
 }
@@ -147,13 +147,13 @@ impl GuideGatherer {
             seen.object != Seen::NONE
                 && snapshot.tables.emission.get(seen.material as usize).is_some_and(Option::is_some)
         };
-        let add = |sums: &mut Sums, seen: &Seen| sums.add(seen, is_emitter(seen));
+        let add = |sums: &mut GuideSums, seen: &Seen| sums.add(seen, is_emitter(seen));
         let done = self.bands((size.x * BAND) as usize).enumerate().map_init(
             || PartTracer::begin(snapshot, &media, true),
             |tracer, (number, mut band)| {
                 let first_row = number as u32 * BAND;
                 if of_all.start == 0 {
-                    band.sums.fill(Sums::default());
+                    band.sums.fill(GuideSums::default());
                 }
                 if !of_all.is_empty() {
                     let done = Part::of_band(first_row, size).all(|part| {
@@ -195,16 +195,16 @@ impl GuideGatherer {
         done
     }
 
-    /// Sums and means of bands of the image, from the top.
+    /// GuideSums and means of bands of the image, from the top.
     ///
     /// - `length`: of a band, pixels.
-    fn bands(&mut self, length: usize) -> impl IndexedParallelIterator<Item = Band<'_>> {
+    fn bands(&mut self, length: usize) -> impl IndexedParallelIterator<Item = GuideBand<'_>> {
         let SurfaceGuides { albedo, emitted, normal, depth, emitters, .. } = &mut self.guides;
         let sums = self.sums.par_chunks_mut(length);
         let surfaces =
             albedo.par_chunks_mut(length).zip(emitted.par_chunks_mut(length)).zip(normal.par_chunks_mut(length));
         let rest = depth.par_chunks_mut(length).zip(emitters.par_chunks_mut(length));
-        sums.zip(surfaces).zip(rest).map(|((sums, ((albedo, emitted), normal)), (depth, emitters))| Band {
+        sums.zip(surfaces).zip(rest).map(|((sums, ((albedo, emitted), normal)), (depth, emitters))| GuideBand {
             sums,
             albedo,
             emitted,
@@ -216,8 +216,8 @@ impl GuideGatherer {
 }
 
 /// Some rows of the image.
-struct Band<'a> {
-    sums: &'a mut [Sums],
+struct GuideBand<'a> {
+    sums: &'a mut [GuideSums],
     albedo: &'a mut [Vec3],
     emitted: &'a mut [Vec3],
     normal: &'a mut [Vec3],
@@ -225,7 +225,7 @@ struct Band<'a> {
     emitters: &'a mut [bool],
 }
 
-impl Band<'_> {
+impl GuideBand<'_> {
     /// - `i`: pixel of the band; `samples`: that it has.
     fn set_mean(&mut self, i: usize, samples: u32) {
         let sums = &mut self.sums[i];
@@ -251,12 +251,12 @@ impl Band<'_> {
 /// Changes the seed, so that guides and image have different samples.
 const OTHER_SEED: u32 = 0x9e37_79b9;
 
-/// Sums of one pixel.
+/// GuideSums of one pixel.
 #[derive(Clone, Copy, Default, Zeroable)]
-struct Sums {
-    albedo: Sum,
-    emitted: Sum,
-    normal: Sum,
+struct GuideSums {
+    albedo: GuideSum,
+    emitted: GuideSum,
+    normal: GuideSum,
     /// Of the first sample that hits a surface, metres.
     first_depth: f32,
     /// Relative to that one.
@@ -273,7 +273,7 @@ const UNEVEN: f32 = 0.03;
 /// Squared albedo below which differences do not count.
 const BLACK: f32 = 1e-3;
 
-impl Sums {
+impl GuideSums {
     #[inline]
     fn add(&mut self, seen: &Seen, emits: bool) {
         if !self.has_samples {
@@ -309,15 +309,15 @@ impl Sums {
     }
 }
 
-/// Sum relative to the first value, so that nothing is rounded where all are alike.
+/// GuideSum relative to the first value, so that nothing is rounded where all are alike.
 #[derive(Clone, Copy, Default, Zeroable)]
-struct Sum {
+struct GuideSum {
     first: Vec3,
     away: Vec3,
     squares: f32,
 }
 
-impl Sum {
+impl GuideSum {
     #[inline]
     fn add(&mut self, value: Vec3) {
         let away = value - self.first;

@@ -175,7 +175,7 @@ fn advance_tiles(passes: &[(u32, Pass)], film: &mut Film, due: &Due, stop: &(dyn
 }
 
 /// A block and its missing samples.
-struct Piece {
+struct PassPiece {
     tile: usize,
     block: usize,
     /// Range in the wave's pixels.
@@ -203,12 +203,12 @@ fn advance_group(
             }
             let first = wave.pixels.local.len();
             add_pixels(tile.origin + block.start, block.size, &mut wave.pixels);
-            pieces.push(Piece { tile: i, block: k, pixels: first..wave.pixels.local.len(), samples });
+            pieces.push(PassPiece { tile: i, block: k, pixels: first..wave.pixels.local.len(), samples });
         }
     }
     let (mut runs, mut radiance) = (Vec::new(), Vec::new());
     for (sample, pass) in passes {
-        let is_due = |piece: &&Piece| piece.samples.contains(sample);
+        let is_due = |piece: &&PassPiece| piece.samples.contains(sample);
         let mut slot = 0;
         runs.clear();
         wave.path.shadow_thresholds.clear();

@@ -38,7 +38,7 @@ const LEAST_GAIN: f64 = 0.05;
 
 /// State of a block at the beginning of a round.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+struct BlockCandidate {
     n_pixels: u32,
     spp: u32,
     /// Variance of one sample relative to the squared level, mean over pixels and channels; `None` if unknown.
@@ -52,7 +52,7 @@ struct Candidate {
 /// The blocks of a film, row by row.
 struct Grid {
     width: usize,
-    blocks: Vec<Candidate>,
+    blocks: Vec<BlockCandidate>,
 }
 
 /// A possible doubling of a block's samples.
@@ -132,9 +132,9 @@ fn place_of(tile: &FilmTile, block: &Block, width: usize) -> usize {
 
 impl Grid {
     fn of(tiles: &[FilmTile], size: UVec2, metric: ErrorMetric) -> Self {
-        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None, weight: 1.0, cost: 1.0 };
+        let nothing = BlockCandidate { n_pixels: 0, spp: 0, variance: None, weight: 1.0, cost: 1.0 };
         let mut grid = Self { width: size.x as usize, blocks: vec![nothing; (size.x * size.y) as usize] };
-        let known: Vec<Vec<(usize, Candidate)>> = tiles
+        let known: Vec<Vec<(usize, BlockCandidate)>> = tiles
             .par_iter()
             .map(|tile| {
                 let of = |(i, block): (usize, &Block)| {
@@ -144,7 +144,7 @@ impl Grid {
                         ErrorMetric::Display { exposure_stops } => display_weight(tile, block, exposure_stops),
                     };
                     let variance = variance_of(&block.steps, 3 * n_pixels);
-                    let candidate = Candidate { n_pixels, spp: block.spp, variance, weight, cost: 1.0 };
+                    let candidate = BlockCandidate { n_pixels, spp: block.spp, variance, weight, cost: 1.0 };
                     (place_of(tile, &tile.blocks[i], size.x as usize), candidate)
                 };
                 tile.blocks.iter().enumerate().map(of).collect()
@@ -173,10 +173,10 @@ impl Grid {
 
     /// Returns the weighted means of a variance and of the cost over each block and its neighbours. Where no variance is
     /// known, that of the whole image is taken.
-    fn smoothed(&self, variance_of: impl Fn(&Candidate) -> Option<f64> + Sync) -> Vec<(f64, f64)> {
+    fn smoothed(&self, variance_of: impl Fn(&BlockCandidate) -> Option<f64> + Sync) -> Vec<(f64, f64)> {
         const WEIGHTS: [[f64; 3]; 3] = [[1.0, 2.0, 1.0], [2.0, 8.0, 2.0], [1.0, 2.0, 1.0]];
         let (width, height) = (self.width, self.blocks.len() / self.width);
-        let of = |block: &Candidate| {
+        let of = |block: &BlockCandidate| {
             variance_of(block).map_or((0.0, 0.0), |v| (v * f64::from(block.n_pixels), f64::from(block.n_pixels)))
         };
         let (sum, n) = self.blocks.iter().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
@@ -230,15 +230,15 @@ impl Grid {
             return false;
         }
         // Squared error times cost.
-        let product = |spp_of: &dyn Fn(usize, &Candidate) -> u32| {
-            let of = |(i, block): (usize, &Candidate)| {
+        let product = |spp_of: &dyn Fn(usize, &BlockCandidate) -> u32| {
+            let of = |(i, block): (usize, &BlockCandidate)| {
                 let (n_pixels, spp) = (f64::from(block.n_pixels), f64::from(spp_of(i, block)));
                 (n_pixels * block.variance.unwrap_or_default() / spp, n_pixels * spp * block.cost)
             };
             let sums = self.blocks.iter().enumerate().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
             sums.0 * sums.1
         };
-        let after = |i: usize, block: &Candidate| {
+        let after = |i: usize, block: &BlockCandidate| {
             due[i].iter().filter(|&&due| due != NEVER).fold(block.spp, |spp, _| doubled(spp))
         };
         product(&after) >= (1.0 - LEAST_GAIN) * product(&|_, _| to)

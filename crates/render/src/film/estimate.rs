@@ -38,14 +38,14 @@ pub struct ErrorEstimate {
 /// The measured doublings of all parts of an image.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Evidence {
-    parts: Vec<Part>,
+    parts: Vec<ErrorPart>,
     /// Pixels times channels of each tile.
     n_values: Vec<f64>,
 }
 
 /// A block of pixels, or the light-traced part of a tile.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct ErrorPart {
     tile: usize,
     steps: Steps,
     /// Samples per pixel now, at least those of the newest doubling.
@@ -60,7 +60,7 @@ impl Evidence {
 
     /// Adds a part with `spp` samples per pixel to the tile that was added last.
     pub fn add_part(&mut self, steps: Steps, spp: u32) {
-        self.parts.push(Part { tile: self.n_values.len() - 1, steps, spp });
+        self.parts.push(ErrorPart { tile: self.n_values.len() - 1, steps, spp });
     }
 
     /// Returns the squared change per tile by the doubling `ago` doublings before the newest, if all parts know it.

@@ -39,7 +39,7 @@ const MOST_SEGMENTS: u32 = 32;
 const MISSES: usize = 0;
 
 /// A second path from the first surface of a slot.
-struct Branch {
+struct FeatureBranch {
     /// Of the camera ray.
     slot: u32,
     /// Probability of this path, 0..1.
@@ -59,7 +59,7 @@ pub(crate) struct FeatureWave {
     /// Per slot: depth along the view axis so far in metres, and depth per metre of the present segment.
     way: Vec<(f32, f32)>,
     /// The second paths of slots, in slots of their own.
-    branches: Vec<Branch>,
+    branches: Vec<FeatureBranch>,
     /// Whether the features are for the denoiser: free of the noise of glass as far as possible, with emitted light, and
     /// with the material of the surface that is seen, in mirrors and through glass too, instead of that which the camera
     /// ray hits; an emitter's if there is one.
@@ -166,7 +166,10 @@ impl FeatureWave {
             self.way[slot].0 = along;
             self.go_on(&path, vertex, &first);
             if let Some(second) = second {
-                self.branches.push(Branch { slot: path.slot, share: second.chance / (first.chance + second.chance) });
+                self.branches.push(FeatureBranch {
+                    slot: path.slot,
+                    share: second.probability / (first.probability + second.probability),
+                });
                 path.slot = self.seen.len() as u32;
                 self.seen.push(self.seen[slot]);
                 self.way.resize(self.way.len().max(self.seen.len()), (0.0, 0.0));
@@ -194,8 +197,8 @@ impl FeatureWave {
     fn go_on(&mut self, path: &Path, vertex: &Vertex, sample: &BsdfSample) {
         let mut path = *path;
         // Removes the n² scale of radiance, which is no colour.
-        let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze);
-        path.throughput *= sample.weight / (squeeze * squeeze);
+        let radiance_eta = sample.through.map_or(1.0, |interface| interface.radiance_eta);
+        path.throughput *= sample.weight / (radiance_eta * radiance_eta);
         let origin = match sample.through {
             Some(interface) => {
                 path.media = interface.beyond;

@@ -55,7 +55,7 @@ pub(crate) struct Boundary {
 }
 
 /// A body without rows so far.
-struct Candidate {
+struct BodyCandidate {
     material: MaterialId,
     /// Volume in cubic metres; infinite for a half-space.
     volume: f64,
@@ -89,7 +89,7 @@ impl Bodies {
         // Of equally large bodies the later one counts, as if it had been entered last.
         candidates.sort_by(|a, b| b.volume.total_cmp(&a.volume));
         let mut rows = Vec::new();
-        for Candidate { material, of, .. } in &candidates {
+        for BodyCandidate { material, of, .. } in &candidates {
             let first = rows.len() as u32;
             let leaves = leaves_of(materials, *material);
             let n_leaves = leaves.len() as u32;
@@ -269,15 +269,15 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
 }
 
 /// All bodies, in the order of objects and primitives.
-fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
+fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
     let mut bodies = Vec::new();
-    let mut open: Vec<Candidate> = Vec::new();
+    let mut open: Vec<BodyCandidate> = Vec::new();
     for (i, (object, shape)) in (0..).zip(geometry.objects.iter().zip(geometry.tree.shapes())) {
         let is_clear = |id: MaterialId| n_leaves[id as usize] > 0;
         if !object.materials.iter().any(|&id| is_clear(id)) {
             continue;
         }
-        let of_sphere = |material, center: DVec3, radius: f64, of| Candidate {
+        let of_sphere = |material, center: DVec3, radius: f64, of| BodyCandidate {
             material,
             volume: 4.0 / 3.0 * PI * radius.powi(3),
             low: center - radius,
@@ -305,7 +305,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
                 distinct.sort_unstable();
                 distinct.dedup();
                 for material in distinct.into_iter().filter(|&id| is_clear(id)) {
-                    let mut body = Candidate::empty(material, BodyPart::Slot(i));
+                    let mut body = BodyCandidate::empty(material, BodyPart::Slot(i));
                     for prim in (0..tree.n_triangles() as u32).filter(|&prim| object.material_of(prim) == material) {
                         body.add(tree.vertices(prim).map(|p| map * p.as_dvec3() + offset));
                     }
@@ -314,7 +314,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
             }
             Shape::Plane { .. } | Shape::Quad { .. } | Shape::Triangle { .. } => {
                 let at = open.iter().position(|body| body.material == material).unwrap_or_else(|| {
-                    open.push(Candidate::empty(material, BodyPart::Open(Vec::new())));
+                    open.push(BodyCandidate::empty(material, BodyPart::Open(Vec::new())));
                     open.len() - 1
                 });
                 let body = &mut open[at];
@@ -341,7 +341,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
     bodies
 }
 
-impl Candidate {
+impl BodyCandidate {
     fn empty(material: MaterialId, of: BodyPart) -> Self {
         Self { material, volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, of }
     }
@@ -354,9 +354,9 @@ impl Candidate {
     }
 }
 
-fn deepest(bodies: &[Candidate]) -> u32 {
-    let holds = |a: &Candidate, b: &Candidate| a.low.cmple(b.low).all() && b.high.cmple(a.high).all();
+fn deepest(bodies: &[BodyCandidate]) -> u32 {
+    let holds = |a: &BodyCandidate, b: &BodyCandidate| a.low.cmple(b.low).all() && b.high.cmple(a.high).all();
     let largest = &bodies[..bodies.len().min(N_LARGEST)];
-    let depth = |b: &Candidate| largest.iter().filter(|a| !std::ptr::eq(*a, b) && holds(a, b)).count() as u32 + 1;
+    let depth = |b: &BodyCandidate| largest.iter().filter(|a| !std::ptr::eq(*a, b) && holds(a, b)).count() as u32 + 1;
     bodies.iter().map(depth).max().unwrap_or(0)
 }

@@ -117,8 +117,8 @@ impl Outside {
     /// Whether some plane occludes light to `position`, outside of all finite objects.
     fn is_shaded(&self, position: Vec3, to_light: Vec3) -> bool {
         self.planes.iter().any(|(point, normal)| {
-            let (height, climb) = ((*point - position).dot(*normal), to_light.dot(*normal));
-            height / climb > 0.0
+            let (height, slope) = ((*point - position).dot(*normal), to_light.dot(*normal));
+            height / slope > 0.0
         })
     }
 }

@@ -39,7 +39,7 @@ pub(crate) enum Lobe {
 
 impl Lobe {
     /// A placeholder for a transmissive lobe that is distinguished from others but never sampled.
-    pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, squeeze: 1.0, beyond: MediumId::OUTSIDE });
+    pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, radiance_eta: 1.0, beyond: MediumId::OUTSIDE });
 }
 
 impl Lobe {
@@ -102,7 +102,8 @@ impl Scatter for Lobe {
 
     #[inline]
     fn sample(&self, wo: Vec3, normal: Vec3, u_choice: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        let specular = |chance, wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, chance, through };
+        let specular =
+            |probability, wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, probability, through };
         match *self {
             Self::Diffuse { albedo } => {
                 let local = cosine_hemisphere(u);
@@ -111,7 +112,7 @@ impl Scatter for Lobe {
                     wi,
                     weight: albedo,
                     pdf: cosine_hemisphere_pdf(local.z),
-                    chance: 1.0,
+                    probability: 1.0,
                     through: None,
                 })
             }
@@ -132,7 +133,7 @@ impl Scatter for Lobe {
                 }
                 let found = metal.eval(local);
                 let weight = Vec3::from(found.tint) * found.weight;
-                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, chance: 1.0, through: None })
+                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
             }
             Self::RoughGlass { interface, alpha, compensate } => {
                 let surface = RoughGlass::new(normal, wo, alpha, interface, compensate);
@@ -140,12 +141,12 @@ impl Scatter for Lobe {
                     wi,
                     weight: Vec3::splat(weight),
                     pdf,
-                    chance: 1.0,
+                    probability: 1.0,
                     through: passes.then_some(interface),
                 })
             }
             Self::Glass(interface) => {
-                let Interface { eta, squeeze, .. } = interface;
+                let Interface { eta, radiance_eta, .. } = interface;
                 let (reflectance, cos_t) = fresnel(normal.dot(wo).clamp(0.0, 1.0), eta);
                 if u_choice() < reflectance {
                     // The weight f·cos/pdf is reflectance over the probability of reflection: one.
@@ -153,7 +154,7 @@ impl Scatter for Lobe {
                 } else {
                     // Radiance scales with n² across the interface: the factor η².
                     let wi = refract(wo.into(), normal.into(), eta, cos_t).into();
-                    Some(specular(1.0 - reflectance, wi, Vec3::splat(squeeze * squeeze), Some(interface)))
+                    Some(specular(1.0 - reflectance, wi, Vec3::splat(radiance_eta * radiance_eta), Some(interface)))
                 }
             }
         }
@@ -285,7 +286,7 @@ mod tests {
     fn glass_splits_all_light_and_nothing_more() {
         for eta in [1.0 / 1.5, 1.5, 1.0, 1.0 / 1.000_001] {
             for cos in [1.0, 0.6, 0.2, 1e-3] {
-                let bsdf = Lobe::Glass(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE });
+                let bsdf = Lobe::Glass(Interface { eta, radiance_eta: eta, beyond: MediumId::OUTSIDE });
                 let (reflectance, _) = fresnel(cos, eta);
                 let n = 1000;
                 let reflected = (0..n)

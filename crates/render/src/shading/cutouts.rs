@@ -107,7 +107,7 @@ impl Prepared {
             };
             let is_there = match opacity_cutoff {
                 Some(cutoff) => opacity >= *cutoff,
-                None => opacity >= 1.0 || chance(ray, hit) < opacity,
+                None => opacity >= 1.0 || probability(ray, hit) < opacity,
             };
             if is_there {
                 return None;
@@ -137,7 +137,7 @@ fn along(ray: &Ray, point: glam::Vec3) -> f32 {
 }
 
 /// A hash of a ray and its hit, uniform in `[0, 1)`.
-fn chance(ray: &Ray, hit: &Hit) -> f32 {
+fn probability(ray: &Ray, hit: &Hit) -> f32 {
     let of_ray = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).map(f32::to_bits);
     let bits = of_ray.chain([hit.object, hit.prim]).fold(0x51ed_270b, hash_combine);
     (hash_u32(bits) >> 8) as f32 * (1.0 / (1 << 24) as f32)

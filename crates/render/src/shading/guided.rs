@@ -54,6 +54,12 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
         };
         let (value, pdf) = self.eval(wo, wi, normal);
         let through = self.through().filter(|_| normal.dot(wi) < 0.0);
-        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, chance: 1.0, through })
+        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample {
+            wi,
+            weight: value / pdf,
+            pdf,
+            probability: 1.0,
+            through,
+        })
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct Interface {
     /// Index of refraction on the side of the path over that on the far side.
     pub eta: f32,
     /// Relative index whose square scales radiance from the far side: η of the two media, or 1.
-    pub squeeze: f32,
+    pub radiance_eta: f32,
     /// Media of the path after passing.
     pub beyond: MediumId,
 }
@@ -43,6 +43,6 @@ impl Interface {
     /// Returns the interface as seen from the far side, except for `beyond`.
     #[inline]
     pub fn reversed(self) -> Self {
-        Self { eta: 1.0 / self.eta, squeeze: 1.0 / self.squeeze, ..self }
+        Self { eta: 1.0 / self.eta, radiance_eta: 1.0 / self.radiance_eta, ..self }
     }
 }

@@ -108,14 +108,14 @@ impl MediumSets {
         match beyond {
             Some(beyond) => {
                 let eta = here / self.ior(beyond);
-                Interface { eta, squeeze: eta, beyond }
+                Interface { eta, radiance_eta: eta, beyond }
             }
             // An open surface hit from behind, alone or with others: it refracts, but medium and radiance of the path
             // stay the same.
             None => {
                 let iors = scene.tables.bodies.iors(boundary.body + leaf);
                 let eta = iors[from.channel() as usize] / here;
-                Interface { eta, squeeze: 1.0, beyond: from }
+                Interface { eta, radiance_eta: 1.0, beyond: from }
             }
         }
     }
@@ -227,13 +227,13 @@ mod tests {
         for i in 0..100 {
             ids.push(at);
             let interface = pass(&mut sets, &scene, at, i, true);
-            scale *= f64::from(interface.squeeze).powi(2);
+            scale *= f64::from(interface.radiance_eta).powi(2);
             at = interface.beyond;
             assert_eq!(sets.ior(at), radii[i as usize].1);
         }
         for i in (0..100).rev() {
             let interface = pass(&mut sets, &scene, at, i, false);
-            scale *= f64::from(interface.squeeze).powi(2);
+            scale *= f64::from(interface.radiance_eta).powi(2);
             at = interface.beyond;
             assert_eq!(at, ids[i as usize], "layer {i}");
         }
@@ -264,7 +264,7 @@ mod tests {
         sets.start(&scene, &[]);
         let inside = pass(&mut sets, &scene, MediumId::OUTSIDE, 0, true).beyond;
         let interface = pass(&mut sets, &scene, inside, 1, false);
-        assert_eq!(interface, Interface { eta: 1.3 / 1.5, squeeze: 1.0, beyond: inside });
+        assert_eq!(interface, Interface { eta: 1.3 / 1.5, radiance_eta: 1.0, beyond: inside });
     }
 
     #[test]

@@ -131,11 +131,11 @@ impl RoughGlass {
 
     /// Adds [`Multiple`] to the value and pdf of single scattering.
     fn with_multiple(&self, wi: Vector3<f32>, (value, pdf): (f32, f32)) -> (f32, f32) {
-        let Interface { eta, squeeze, .. } = self.interface;
+        let Interface { eta, radiance_eta, .. } = self.interface;
         let Some(Multiple { lost, sides }) = self.multiple else { return (value, pdf) };
         let beyond = wi.z < 0.0;
         let (share, mean) = sides[usize::from(beyond)];
-        let (cos, eta, scale) = if beyond { (-wi.z, 1.0 / eta, squeeze * squeeze) } else { (wi.z, eta, 1.0) };
+        let (cos, eta, scale) = if beyond { (-wi.z, 1.0 / eta, radiance_eta * radiance_eta) } else { (wi.z, eta, 1.0) };
         let per_angle = lost * share * cosine_hemisphere_pdf(cos);
         let back = per_angle * glass_loss::lost(cos, self.alpha, eta) / mean;
         (value + back * scale, pdf * (1.0 - lost) + per_angle)
@@ -161,7 +161,7 @@ impl RoughGlass {
     ///
     /// `None` for light that single scattering loses.
     pub fn sample(&self, mut u_choice: f32, u: Vec2) -> Option<RoughGlassSample> {
-        let Interface { eta, squeeze, .. } = self.interface;
+        let Interface { eta, radiance_eta, .. } = self.interface;
         if let Some(multiple) = self.multiple {
             if u_choice < multiple.lost {
                 return self.sample_multiple(multiple, u_choice / multiple.lost, u);
@@ -180,7 +180,7 @@ impl RoughGlass {
         let (both, scale, once) = if reflects {
             (self.both_above(wi), 1.0, self.reflected(half, wi))
         } else {
-            (self.above_and_below(wi), squeeze * squeeze, self.refracted(half, wi))
+            (self.above_and_below(wi), radiance_eta * radiance_eta, self.refracted(half, wi))
         };
         let (value, pdf) = self.with_multiple(wi, once);
         let weight = if self.multiple.is_some() { value / pdf } else { (both * seen).min(1.0) * scale };
@@ -202,7 +202,7 @@ impl RoughGlass {
 
     /// [`Self::eval`] for a direction below the surface, with the microfacet normal that refracts it.
     fn refracted(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
-        let Interface { eta, squeeze, .. } = self.interface;
+        let Interface { eta, radiance_eta, .. } = self.interface;
         let cos_o = self.cos_o(half);
         let (reflectance, cos_t) = fresnel(cos_o, eta);
         if reflectance >= 1.0 {
@@ -214,7 +214,7 @@ impl RoughGlass {
         let jacobian = cos_t / (length * length);
         let visible = ggx::distribution(half, self.alpha) * cos_o / self.wo.z;
         let per_angle = (1.0 - reflectance) * visible * jacobian;
-        (per_angle * self.above_and_below(wi) * (squeeze * squeeze), per_angle / (1.0 + self.lambda_o))
+        (per_angle * self.above_and_below(wi) * (radiance_eta * radiance_eta), per_angle / (1.0 + self.lambda_o))
     }
 
     fn cos_o(&self, half: Vector3<f32>) -> f32 {
@@ -264,7 +264,7 @@ mod tests {
     ];
 
     fn interface(eta: f32) -> Interface {
-        Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE }
+        Interface { eta, radiance_eta: eta, beyond: MediumId::OUTSIDE }
     }
 
     fn lobe(alpha: f32, eta: f32) -> Lobe {
@@ -573,9 +573,9 @@ mod tests {
             if let Some(s) = lobe.sample(wo, Vec3::Z, || sampler.single(1), sampler.pair(0)) {
                 let (value, pdf) = lobe.eval(wo, s.wi, Vec3::Z);
                 // At grazing incidence on a microfacet its angle has fewer accurate digits.
-                let slack = 1e-2 + 1e-4 / s.wi.z.abs();
-                prop_assert!((pdf / s.pdf - 1.0).abs() < slack, "{pdf} for {s:?}");
-                prop_assert!((value.x / pdf / s.weight.x - 1.0).abs() < slack, "{value} / {pdf} for {s:?}");
+                let tolerance = 1e-2 + 1e-4 / s.wi.z.abs();
+                prop_assert!((pdf / s.pdf - 1.0).abs() < tolerance, "{pdf} for {s:?}");
+                prop_assert!((value.x / pdf / s.weight.x - 1.0).abs() < tolerance, "{value} / {pdf} for {s:?}");
             }
         }
     }

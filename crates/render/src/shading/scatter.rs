@@ -38,7 +38,7 @@ pub(crate) struct BsdfSample {
     /// Pdf per steradian; infinite for a perfectly specular lobe.
     pub pdf: f32,
     /// Probability with which a perfectly specular lobe was chosen; 1 for all others.
-    pub chance: f32,
+    pub probability: f32,
     /// The interface that was passed, if `wi` is on the far side.
     pub through: Option<Interface>,
 }

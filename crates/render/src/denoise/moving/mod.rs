@@ -333,9 +333,9 @@ mod tests {
     fn bright_pixels_and_odd_ones_stay_as_they_are_and_touch_no_others() {
         let mut surfaces = floor_and_wall(|_, _| 0.5);
         let mut color = vec![Vec3::splat(0.5); surfaces.len()];
-        let (lamp, bad) = (20 * WIDTH + 30, 30 * WIDTH + 50);
-        surfaces[lamp].is_bright = true;
-        color[lamp] = Vec3::splat(1e6);
+        let (light_part, bad) = (20 * WIDTH + 30, 30 * WIDTH + 50);
+        surfaces[light_part].is_bright = true;
+        color[light_part] = Vec3::splat(1e6);
         color[bad] = Vec3::splat(f32::INFINITY);
         for (i, found) in smooth(&color, &surfaces, InstructionSet::detect()).into_iter().enumerate() {
             let expected = color[i];

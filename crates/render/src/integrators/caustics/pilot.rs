@@ -20,12 +20,12 @@ pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)
     if !pass.plan.guided || pass.casters.guide.get().is_some() {
         return true;
     }
-    let scouts =
+    let pilots =
         CausticPass { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, camera_media: Vec::new(), ..*pass };
     let traces: Vec<Option<Vec<_>>> = (0..PILOT_PATHS / PILOT_BATCH)
         .into_par_iter()
         .map_init(LightWave::default, |wave, batch| {
-            wave.trace_pilots(&scouts, u64::from(batch * PILOT_BATCH), PILOT_BATCH, stop)
+            wave.trace_pilots(&pilots, u64::from(batch * PILOT_BATCH), PILOT_BATCH, stop)
         })
         .collect();
     let Some(traces) = traces.into_iter().collect::<Option<Vec<_>>>() else { return false };

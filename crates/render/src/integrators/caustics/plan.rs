@@ -108,7 +108,7 @@ pub(crate) fn for_preview(scene: &Prepared, settings: &RenderSettings) -> Causti
 
 /// A part of the image, represented by one pilot pixel.
 #[derive(Clone, Copy, Debug, Default)]
-struct Spot {
+struct PilotPixel {
     mean: DVec3,
     /// Variance of one sample.
     variance: DVec3,
@@ -117,7 +117,7 @@ struct Spot {
 /// Result of the pilot camera paths.
 #[derive(Clone)]
 struct CameraPilot {
-    spots: Vec<Spot>,
+    spots: Vec<PilotPixel>,
     /// Cost of one sample of the whole image.
     cost: f64,
 }
@@ -209,7 +209,7 @@ impl Pilot {
             let variance = self.mean_over_spots(spots, |spot| spot.variance);
             // Everything that light paths cannot find.
             let rest = (variance - found(known.light_path_stride).camera).max(0.5 * variance);
-            let Found { camera, light } = found(plan.light_path_stride);
+            let FoundPlan { camera, light } = found(plan.light_path_stride);
             let tracking = if plan.is_none() { 1.0 } else { TRACKING };
             let paths = if plan.has_light_paths() { 1.0 / f64::from(plan.light_path_stride) } else { 0.0 };
             (factor * rest + camera + light, cost * tracking + paths * self.light_cost)
@@ -297,14 +297,14 @@ impl Pilot {
         splat.light.as_dvec3() * (1.0 - f64::from(power_weight(ratio)))
     }
 
-    fn mean_over_spots(&self, spots: &[Spot], value: impl Fn(&Spot) -> DVec3) -> f64 {
+    fn mean_over_spots(&self, spots: &[PilotPixel], value: impl Fn(&PilotPixel) -> DVec3) -> f64 {
         let levels = self.levels();
         spots.iter().zip(levels).map(|(spot, level)| relative(value(spot), *level)).sum::<f64>() / spots.len() as f64
     }
 
     /// Variance of the caustics found by camera and light paths, for one sample of the image with a light path per
     /// `stride` camera paths; 0 for no light paths.
-    fn found_by_light(&self, stride: u32) -> Found {
+    fn found_by_light(&self, stride: u32) -> FoundPlan {
         let paths = if stride == 0 { 0.0 } else { 1.0 / f64::from(stride) };
         let n_pixels = f64::from(self.size.x) * f64::from(self.size.y);
         let levels = self.levels();
@@ -317,7 +317,7 @@ impl Pilot {
             means[cell_at(splat.film, self.size, cells)] += self.kept(splat) * per_splat;
         }
         let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); levels.len()];
-        let mut found = Found { camera: 0.0, light: 0.0 };
+        let mut found = FoundPlan { camera: 0.0, light: 0.0 };
         for splat in &self.splats {
             let (light, ratio) = (splat.light.as_dvec3(), f64::from(splat.ratio));
             let spot = self.spot_at(splat.film);
@@ -340,13 +340,16 @@ impl Pilot {
         let per_square = self.per_splat(self.grid).powi(2) / levels.len() as f64;
         let squares: f64 =
             sums.into_iter().zip(levels).map(|((sum, own), level)| relative(sum * sum - own, *level)).sum();
-        Found { camera: (found.camera * per_moment - squares * per_square).max(0.0), light: found.light * per_moment }
+        FoundPlan {
+            camera: (found.camera * per_moment - squares * per_square).max(0.0),
+            light: found.light * per_moment,
+        }
     }
 }
 
 /// Relative variances of a sample, mean over pixels.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct FoundPlan {
     camera: f64,
     light: f64,
 }
@@ -384,7 +387,7 @@ fn trace_spots(
     size: UVec2,
     grid: UVec2,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Option<(Vec<Spot>, f64)> {
+) -> Option<(Vec<PilotPixel>, f64)> {
     let n_spots = (grid.x * grid.y) as usize;
     let scene = pass.scene;
     let trace = |wave: &mut PathWave, first: usize| {
@@ -412,7 +415,7 @@ fn trace_spots(
             let n = f64::from(SPOT_SAMPLES);
             let good = samples.iter().map(|sample| if sample.is_finite() { sample.as_dvec3() } else { DVec3::ZERO });
             let mean = good.clone().sum::<DVec3>() / n;
-            Spot { mean, variance: good.map(|sample| (sample - mean).powf(2.0)).sum::<DVec3>() / (n - 1.0) }
+            PilotPixel { mean, variance: good.map(|sample| (sample - mean).powf(2.0)).sum::<DVec3>() / (n - 1.0) }
         });
         Some((spots.collect::<Vec<_>>(), wave.work.take()?.total))
     };

@@ -40,7 +40,7 @@ pub(crate) struct LightHits<'a> {
     /// Indices of the hits.
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
-    pub arrivals: &'a mut LensConnections,
+    pub lens_connections: &'a mut LensConnections,
     pub sets: &'a mut MediumSets,
     /// Media of the camera.
     pub camera: MediumId,
@@ -89,7 +89,8 @@ fn scatter_coated<S: Simd>(s: S, group: LightHits) {
 
 #[inline(always)]
 fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
-    let LightHits { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
+    let LightHits { pass, n_vertices, dimension, paths, hits, materials, order, next, lens_connections, sets, camera } =
+        group;
     let scene = pass.scene;
     for some in order.chunks(LANES) {
         let chunk = LaneGroup::of(some);
@@ -113,7 +114,7 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
         let step =
             LightPathLanes { pass, at: &at, place: &place, media: &media, throughput, ratio, kept, sampler, dimension };
         if scatters(KIND) && n_vertices > 1 {
-            step.join::<KIND>(s, sets, camera, arrivals);
+            step.join::<KIND>(s, sets, camera, lens_connections);
         }
         if pass.goes_on(n_vertices) {
             step.go_on::<KIND>(s, sets, n_vertices, next);
@@ -139,7 +140,13 @@ struct LightPathLanes<'a, S: Simd> {
 impl<S: Simd> LightPathLanes<'_, S> {
     /// Appends shadow rays to points of the lens, with film positions and contributions.
     #[inline(always)]
-    fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {
+    fn join<const KIND: usize>(
+        &self,
+        s: S,
+        sets: &mut MediumSets,
+        camera: MediumId,
+        lens_connections: &mut LensConnections,
+    ) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
         let scene = pass.scene;
         let mut open = at.mask;
@@ -181,7 +188,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             light
         };
         let start = place.leaving();
-        arrivals.append(open, [start, lens - start], [film_x, film_y], light, [ratio, self.kept]);
+        lens_connections.append(open, [start, lens - start], [film_x, film_y], light, [ratio, self.kept]);
     }
 
     /// Lens points along the film axes, metres.

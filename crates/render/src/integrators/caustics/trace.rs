@@ -81,7 +81,7 @@ pub(crate) struct LightWave {
     /// Hits of one kind: those handled in SIMD, and the others.
     together: Vec<u32>,
     apart: Vec<u32>,
-    arrivals: LensConnections,
+    lens_connections: LensConnections,
     sets: MediumSets,
     /// Media of the camera.
     camera: MediumId,
@@ -150,15 +150,15 @@ impl LightWave {
                 work.add_rays(&self.hits, &self.paths.slot[..self.paths.len()], RayClass::Incoherent);
             }
             self.scatter(pass, n_vertices);
-            let arrivals = &mut self.arrivals;
+            let lens_connections = &mut self.lens_connections;
             if let Some(work) = &mut self.work {
-                work.add_connections(arrivals.rays.len());
+                work.add_connections(lens_connections.rays.len());
             }
-            pass.scene.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
-            counts.shadow += arrivals.rays.len() as u64;
-            for i in 0..arrivals.rays.len() {
-                if !arrivals.occluded[i] {
-                    take(arrivals, i);
+            pass.scene.any_hits(&lens_connections.rays, RayClass::Incoherent, &mut lens_connections.occluded);
+            counts.shadow += lens_connections.rays.len() as u64;
+            for i in 0..lens_connections.rays.len() {
+                if !lens_connections.occluded[i] {
+                    take(lens_connections, i);
                 }
             }
             std::mem::swap(&mut self.paths, &mut self.next);
@@ -204,7 +204,7 @@ impl LightWave {
                     hit: &hit,
                     material,
                     n_vertices,
-                    is_scout: true,
+                    is_pilot: true,
                 };
                 if let Some((ray, path, true)) = step.go_on(&surface) {
                     self.next.push(&ray, &path.into());
@@ -248,7 +248,7 @@ impl LightWave {
         let scene = pass.scene;
         let (surfaces, kinds) = (&scene.surfaces, &scene.tables.materials.kinds);
         self.next.start(self.paths.len(), scene.tables.features.glass, false);
-        self.arrivals.start(self.paths.len());
+        self.lens_connections.start(self.paths.len());
         let set = pass.simd.unwrap_or(InstructionSet::Portable);
         self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
         // All kinds after the misses.
@@ -273,7 +273,7 @@ impl LightWave {
                     materials: &self.sorted.materials,
                     order: &self.together,
                     next: &mut self.next,
-                    arrivals: &mut self.arrivals,
+                    lens_connections: &mut self.lens_connections,
                     sets: &mut self.sets,
                     camera: self.camera,
                 };
@@ -295,13 +295,13 @@ impl LightWave {
         let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, &mut path);
         let Some((vertex, material, surface)) = found else { return };
         let step =
-            LightPathStep { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
+            LightPathStep { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_pilot: false };
         if n_vertices > 1
             && surface.has_non_specular()
             && (path.media.of_all_channels() == self.camera || surface.through().is_some())
             && let Some((ray, film, light, ratio)) = step.join(&surface, &self.sets, self.camera)
         {
-            self.arrivals.push(&ray, film, light, [ratio, path.kept]);
+            self.lens_connections.push(&ray, film, light, [ratio, path.kept]);
         }
         if pass.goes_on(n_vertices)
             && let Some((ray, path, _)) = step.go_on(&surface)
@@ -357,7 +357,7 @@ struct LightPathStep<'a> {
     material: MaterialId,
     n_vertices: u32,
     /// Whether the path is one of [`LightWave::trace_pilots`], which carry no throughput.
-    is_scout: bool,
+    is_pilot: bool,
 }
 
 impl LightPathStep<'_> {
@@ -431,7 +431,7 @@ impl LightPathStep<'_> {
             let u = sampler.single(dimension + DIM_LOBE);
             match scene.shading.materials[material as usize] {
                 // Reflects with a fixed probability, whatever the shares of the light.
-                Material::Glass { .. } if self.is_scout => f32::from(u >= PILOT_REFLECTION) * 1.0f32.next_down(),
+                Material::Glass { .. } if self.is_pilot => f32::from(u >= PILOT_REFLECTION) * 1.0f32.next_down(),
                 _ => u,
             }
         };
@@ -467,8 +467,8 @@ impl LightPathStep<'_> {
             let gain = etendue_gain_at(vertex, vertex.wo, sample.wi);
             path.ratio /= gain;
             // Radiance scales with n² on entering glass, flux does not.
-            let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);
-            sample.weight * (gain / (squeeze * squeeze))
+            let radiance_eta = sample.through.map_or(1.0, |Interface { radiance_eta, .. }| radiance_eta);
+            sample.weight * (gain / (radiance_eta * radiance_eta))
         } else {
             let passes = sample.through.is_some();
             let seen = vertex.seen_along(sample.wi);

@@ -132,7 +132,7 @@ impl CausticPass<'_> {
 /// interface.
 #[inline]
 pub(crate) fn etendue_scale(through: Option<Interface>) -> f32 {
-    through.map_or(1.0, |Interface { squeeze, .. }| squeeze * squeeze)
+    through.map_or(1.0, |Interface { radiance_eta, .. }| radiance_eta * radiance_eta)
 }
 
 /// Whether a path from the other end could do the same.

@@ -58,7 +58,7 @@ impl PathWave {
             for (lane, surface) in surfaces.iter().enumerate() {
                 let lights = lights.each_ref().map(|candidates| candidates[lane]);
                 let lights = &lights[..n_candidates as usize];
-                let Surface { path, vertex, hit, material, bsdf } = surface;
+                let PathSurface { path, vertex, hit, material, bsdf } = surface;
                 let step = PathStep {
                     scene,
                     techniques,
@@ -118,7 +118,7 @@ impl PathWave {
         caustics: Option<&CausticPass>,
         i: usize,
         radiance: &mut [Vec3],
-    ) -> Option<Surface> {
+    ) -> Option<PathSurface> {
         let techniques = &settings.techniques;
         let mut path = self.paths.get(i);
         let ray = self.paths.rays.get(i);
@@ -155,7 +155,7 @@ impl PathWave {
             }
             _ => Bsdf::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?),
         };
-        Some(Surface { path, vertex, hit, material, bsdf })
+        Some(PathSurface { path, vertex, hit, material, bsdf })
     }
 
     /// Scatters with guiding distributions, if there are any.
@@ -352,7 +352,7 @@ impl PathStep<'_> {
 }
 
 /// A hit that scatters.
-struct Surface {
+struct PathSurface {
     path: Path,
     vertex: Vertex,
     hit: Hit,
@@ -367,7 +367,7 @@ enum Bsdf {
     Layers(Principled),
 }
 
-impl Surface {
+impl PathSurface {
     /// The side for light sampling, see [`lit_side`]; `None` where all scattering is specular.
     fn lit_side(&self) -> Option<Vec3> {
         fn side(vertex: &Vertex, bsdf: &impl Scatter) -> Option<Vec3> {
@@ -389,7 +389,7 @@ fn light_points(
     settings: &RenderSettings,
     dimension: u32,
     n_candidates: u32,
-    surfaces: &[Surface],
+    surfaces: &[PathSurface],
 ) -> [[Option<LightPoint>; LANES]; CANDIDATES as usize] {
     let techniques = &settings.techniques;
     let mut places = [None; LANES];

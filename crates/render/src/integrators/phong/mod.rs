@@ -283,14 +283,14 @@ impl PhongWave {
                 self.follow(step, weight, mirrored, None, DIRECT_ALREADY_SAMPLED, dimension);
             }
             Shiny::Pane { share, interface } => {
-                let Interface { eta, squeeze, .. } = interface;
+                let Interface { eta, radiance_eta, .. } = interface;
                 let (reflectance, cos_t) = fresnel(vertex.normal.dot(vertex.wo).clamp(0.0, 1.0), eta);
                 let weight = path.throughput * share;
                 self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
                     let wi = refract(vertex.wo.into(), vertex.normal.into(), eta, cos_t).into();
                     // Radiance scales with n² across the interface: the factor η².
-                    let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
+                    let weight = weight * ((1.0 - reflectance) * radiance_eta * radiance_eta);
                     self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);
                 }
             }

@@ -38,7 +38,7 @@ pub(crate) struct LitLanes<'a, S: Simd> {
 
 /// Points on lights, and their light if they are unoccluded.
 #[derive(Clone, Copy)]
-struct Candidate<S: Simd> {
+struct LightCandidate<S: Simd> {
     found: Mask,
     infinite: Mask,
     target: Vector<S>,
@@ -55,7 +55,7 @@ impl<S: Simd> LitLanes<'_, S> {
             true => self.resampled::<KIND>(s),
             false => self.candidate::<KIND>(s, 0, 1.0),
         };
-        let Candidate { infinite, target, wi, mut light, .. } = chosen;
+        let LightCandidate { infinite, target, wi, mut light, .. } = chosen;
         let found = self.roulette(chosen.found, &mut light);
         if found == 0 {
             return;
@@ -81,7 +81,7 @@ impl<S: Simd> LitLanes<'_, S> {
     ///
     /// - `n`: number of light samples per sample of the BSDF, for the MIS weight.
     #[inline(always)]
-    fn candidate<const KIND: usize>(&self, s: S, k: u32, n: f32) -> Candidate<S> {
+    fn candidate<const KIND: usize>(&self, s: S, k: u32, n: f32) -> LightCandidate<S> {
         let &Self { scene, techniques, mask, place, surface, hints, sampler, .. } = self;
         let points = s.call(LightPoints {
             scene,
@@ -101,14 +101,14 @@ impl<S: Simd> LitLanes<'_, S> {
         let weight = light_weight(techniques, points.pdf * n, pdf) / points.pdf;
         let light = self.throughput.times(value).times(points.radiance) * weight;
         let found = found & !light.is_zero();
-        Candidate { found, infinite: points.infinite, target: points.target, wi, light }
+        LightCandidate { found, infinite: points.infinite, target: points.target, wi, light }
     }
 
     /// Chooses one of several light samples; see [`crate::integrators::common::resampling`].
     #[inline(always)]
-    fn resampled<const KIND: usize>(&self, s: S) -> Candidate<S> {
+    fn resampled<const KIND: usize>(&self, s: S) -> LightCandidate<S> {
         let zero = Float::splat(s, 0.0);
-        let worth_of = |of: &Candidate<S>| select(of.found, worth(of.light), zero);
+        let worth_of = |of: &LightCandidate<S>| select(of.found, worth(of.light), zero);
         let mut u = self.sampler.single(resampling_dimension(self.depth));
         let mut chosen = self.candidate::<KIND>(s, 0, CANDIDATES as f32);
         let mut own = worth_of(&chosen);
@@ -122,7 +122,7 @@ impl<S: Simd> LitLanes<'_, S> {
             let rest = select(takes, u / share, (u - share) / (zero.all(1.0) - share));
             u = select(other.found, rest.at_most(1.0f32.next_down()), u);
             own = select(takes, others, own);
-            chosen = Candidate {
+            chosen = LightCandidate {
                 found: chosen.found | takes,
                 infinite: chosen.infinite & !takes | other.infinite & takes,
                 target: select_vector(takes, other.target, chosen.target),

@@ -113,17 +113,17 @@ impl<R: Real> NodeBound<R> {
         let (distance2, r2) = (offset.length_squared(), radius * radius);
         let inv_distance = radius.all(1.0) / distance2.sqrt();
         // A margin, so that rounding excludes nothing.
-        let slack = 16.0 * f32::EPSILON;
+        let tolerance = 16.0 * f32::EPSILON;
         let receiver = match normal {
-            Some(normal) => (offset.dot(normal) + radius) * inv_distance + slack,
+            Some(normal) => (offset.dot(normal) + radius) * inv_distance + tolerance,
             None => radius.all(1.0),
         };
-        let emitter = (radius - offset.dot(axis)) * inv_distance + widening + slack;
+        let emitter = (radius - offset.dot(axis)) * inv_distance + widening + tolerance;
         let receiver = receiver.at_least(0.0).at_most(1.0);
         let mut emitter = emitter.at_least(0.0).at_most(1.0);
         if let Some(least_cos) = least_cos {
             // Over the positions in the sphere the cosine differs by at most a chord: √2 times radius over distance.
-            let most_cos = (radius * 1.4143 - offset.dot(axis)) * inv_distance + widening + slack;
+            let most_cos = (radius * 1.4143 - offset.dot(axis)) * inv_distance + widening + tolerance;
             emitter = select(most_cos.lt(least_cos), emitter.all(0.0), emitter);
         }
         let outside = power * receiver * emitter * (inv_distance * inv_distance);

@@ -20,7 +20,7 @@ const BINS: usize = 12;
 #[derive(Clone, Copy)]
 struct LightItem {
     bounds: Aabb,
-    cone: Cone,
+    cone: EmissionCone,
     power: f32,
     least_cos: f32,
     id: u32,
@@ -32,7 +32,7 @@ struct LightItem {
 
 /// Directions within `spread` radians of a unit axis.
 #[derive(Clone, Copy)]
-struct Cone {
+struct EmissionCone {
     axis: Vec3,
     spread: f32,
 }
@@ -136,23 +136,23 @@ impl LightNode {
 
 impl LightItem {
     fn new(id: u32, light: &Light) -> Self {
-        let everywhere = Cone { axis: Vec3::Z, spread: PI };
+        let everywhere = EmissionCone { axis: Vec3::Z, spread: PI };
         let (bounds, cone, facing) = match light.shape {
             LightShape::Sphere { center, radius } => {
                 (Aabb { min: center - radius, max: center + radius }, everywhere, 0.25)
             }
             LightShape::Quad { corner, edge_u, edge_v, normal, .. } => {
                 let corners = [corner, corner + edge_u, corner + edge_v, corner + edge_u + edge_v];
-                (Aabb::from_points(corners), Cone { axis: normal, spread: 0.0 }, 1.0)
+                (Aabb::from_points(corners), EmissionCone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Triangle { vertices, normal, .. } => {
-                (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
+                (Aabb::from_points(vertices), EmissionCone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
             // Its rays deviate from the axis by at most 90°, and those near it are the brightest: like those of a flat
             // light.
             LightShape::Point { position, cone: Some(spot) } => {
-                (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
+                (Aabb::from_points([position]), EmissionCone { axis: spot.axis, spread: 0.0 }, 0.25)
             }
             LightShape::Directional { .. } => {
                 let (center, size) = (light.shape.center(), Vec3::splat(EVERYTHING));
@@ -175,7 +175,7 @@ impl LightItem {
     }
 }
 
-impl Cone {
+impl EmissionCone {
     fn union(self, other: Self) -> Self {
         let (wide, narrow) = if self.spread >= other.spread { (self, other) } else { (other, self) };
         if wide.spread >= PI {
@@ -206,7 +206,7 @@ impl Cone {
 #[derive(Clone, Copy)]
 struct Half {
     bounds: Aabb,
-    cone: Option<Cone>,
+    cone: Option<EmissionCone>,
     power: f32,
 }
 

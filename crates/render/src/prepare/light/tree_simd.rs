@@ -8,9 +8,9 @@ use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, Word, padded
 
 #[derive(Debug, Default)]
 pub(crate) struct LightTreeArrays {
-    all: Rows,
+    all: NodeRows,
     /// The first nodes.
-    top: Rows,
+    top: NodeRows,
     /// The path to each light, lower and upper half.
     ways: [Vec<u32>; 2],
     has_spots: bool,
@@ -21,7 +21,7 @@ const TOP: usize = 2 * LANES;
 
 /// One entry per node; see `LightNode` of the tree.
 #[derive(Debug, Default)]
-struct Rows {
+struct NodeRows {
     center: [Vec<f32>; 3],
     radius: Vec<f32>,
     axis: [Vec<f32>; 3],
@@ -35,7 +35,7 @@ impl LightTreeArrays {
     pub fn new(tree: &LightTree) -> Self {
         // Node numbers of the tree, by level.
         let mut order = vec![0];
-        let mut all = Rows::default();
+        let mut all = NodeRows::default();
         let mut next = 0;
         while let Some(&number) = order.get(next) {
             let node = &tree.nodes[number as usize];
@@ -120,7 +120,7 @@ impl LightTreeArrays {
 
     /// Returns the table that has the children of all open lanes.
     #[inline(always)]
-    fn rows<S: Simd>(&self, open: Mask, node: Bits<S>) -> &Rows {
+    fn rows<S: Simd>(&self, open: Mask, node: Bits<S>) -> &NodeRows {
         let s = node.s;
         let near = s.lt_u(node.v, s.splat_u(TOP as u32 - 1));
         if open & !near == 0 { &self.top } else { &self.all }
@@ -133,7 +133,7 @@ fn first_of<T: Copy + Default>(mut array: Vec<T>) -> Vec<T> {
     array
 }
 
-impl Rows {
+impl NodeRows {
     fn map(&self, floats: fn(Vec<f32>) -> Vec<f32>, links: fn(Vec<u32>) -> Vec<u32>) -> Self {
         Self {
             center: self.center.clone().map(floats),

@@ -90,7 +90,7 @@ pub(crate) fn principled_at(
         } else {
             Inside::Solid(match sides {
                 Some(sides) => sides.interface(scene, leaf),
-                None => Interface { eta: 1.0 / ior, squeeze: 1.0, beyond: MediumId::OUTSIDE },
+                None => Interface { eta: 1.0 / ior, radiance_eta: 1.0, beyond: MediumId::OUTSIDE },
             })
         };
         Transmission { share: (1.0 - metallic) * transmitting, tint: base, inside, is_lit }

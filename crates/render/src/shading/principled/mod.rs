@@ -95,7 +95,7 @@ mod tests {
     }
 
     fn solid(eta: f32) -> Inside {
-        Inside::Solid(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE })
+        Inside::Solid(Interface { eta, radiance_eta: eta, beyond: MediumId::OUTSIDE })
     }
 
     fn brushed(surface: Principled) -> Principled {
@@ -216,8 +216,9 @@ mod tests {
         for i in 0..n {
             let sampler = Sampler::new(7, 0, 0, i);
             if let Some(sample) = surface.sample(direction(cos), Vec3::Z, || sampler.single(2), sampler.pair(0)) {
-                let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze * interface.squeeze);
-                sum += sample.weight / squeeze;
+                let radiance_eta =
+                    sample.through.map_or(1.0, |interface| interface.radiance_eta * interface.radiance_eta);
+                sum += sample.weight / radiance_eta;
             }
         }
         sum / n as f32

@@ -300,7 +300,7 @@ impl<'a> Seen<'a> {
         }
         let wi = self.above_surface(frame.to_world(local).normalize());
         let (value, pdf) = self.eval(wi);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, chance: 1.0, through: None })
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, probability: 1.0, through: None })
     }
 
     fn sample_reflection(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
@@ -308,7 +308,7 @@ impl<'a> Seen<'a> {
             let wi = self.above_surface(self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize());
             let below = self.below_coat(wi) * self.past_sheen;
             let weight = self.tint(self.wo.z, below) / pmf;
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf, through: None });
         }
         let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
         self.reflected(mirrored(self.wo, half), &self.frame)
@@ -320,7 +320,7 @@ impl<'a> Seen<'a> {
             let wi = self.above_surface(coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize());
             let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.z);
             let weight = tint * (self.of.coat / pmf);
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf, through: None });
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf, through: None });
         }
         let half: Vec3 = sample_anisotropic_normal(coat.wo.into(), [self.of.coat_alpha; 2], u.to_array()).into();
         let local = mirrored(coat.wo, half);
@@ -337,10 +337,10 @@ impl<'a> Seen<'a> {
             let cos = self.frame.z.dot(wi).abs();
             self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, cos))
         };
-        let specular = |chance: f32, wi: Vec3, weight: Vec3, passes: bool| {
+        let specular = |probability: f32, wi: Vec3, weight: Vec3, passes: bool| {
             let through = passes.then(|| transmission.interface());
             let weight = weight * (share * below(wi));
-            Some(BsdfSample { wi, weight, pdf: f32::INFINITY, chance: pmf * chance, through })
+            Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf * probability, through })
         };
         let wo = self.frame.to_world(self.wo).normalize();
         match transmission.inside {
@@ -352,13 +352,13 @@ impl<'a> Seen<'a> {
                         wi: found.wi,
                         weight: value / pdf,
                         pdf,
-                        chance: 1.0,
+                        probability: 1.0,
                         through: None,
                     });
                 }
                 let weight = transmission.tint * (found.weight * share * below(found.wi));
                 let pdf = if transmission.is_lit { found.pdf * pmf } else { f32::INFINITY };
-                Some(BsdfSample { wi: found.wi, weight, pdf, chance: 1.0, through: Some(interface) })
+                Some(BsdfSample { wi: found.wi, weight, pdf, probability: 1.0, through: Some(interface) })
             }
             Inside::Solid(interface) => {
                 let (reflectance, cos_t) = fresnel(self.wo.z.min(1.0), interface.eta);
@@ -367,7 +367,12 @@ impl<'a> Seen<'a> {
                     specular(reflectance, wi, Vec3::ONE, false)
                 } else {
                     let wi = refract(wo.into(), self.frame.z.into(), interface.eta, cos_t).into();
-                    specular(1.0 - reflectance, wi, transmission.tint * interface.squeeze * interface.squeeze, true)
+                    specular(
+                        1.0 - reflectance,
+                        wi,
+                        transmission.tint * interface.radiance_eta * interface.radiance_eta,
+                        true,
+                    )
                 }
             }
             Inside::Thin(_) if self.of.is_smooth() => {
@@ -384,7 +389,7 @@ impl<'a> Seen<'a> {
                 let (value, pdf) = self.eval_through(&transmission, wi, local);
                 let stated = if transmission.is_lit { pdf } else { f32::INFINITY };
                 let through = Some(transmission.interface());
-                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, chance: 1.0, through })
+                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, probability: 1.0, through })
             }
         }
     }

@@ -9,7 +9,7 @@ use firstlight_simd::{Float, LANES, Mask, Simd};
 /// See [`crate::shading::interface::Interface`].
 pub(crate) struct GlassLanes<S: Simd> {
     pub eta: Float<S>,
-    pub squeeze: Float<S>,
+    pub radiance_eta: Float<S>,
     pub beyond: [MediumId; LANES],
 }
 
@@ -17,7 +17,7 @@ impl<S: Simd> GlassLanes<S> {
     /// - `front`: lanes that hit it from outside; `media`: media of each path.
     #[inline(always)]
     pub fn of(s: S, at: &HitGroup<S>, front: Mask, sets: &mut MediumSets, media: &[MediumId; LANES]) -> Self {
-        let (mut eta, mut squeeze, mut beyond) = ([1.0; LANES], [1.0; LANES], *media);
+        let (mut eta, mut radiance_eta, mut beyond) = ([1.0; LANES], [1.0; LANES], *media);
         for lane in lanes_of(at.mask) {
             let i = at.indices[lane] as usize;
             let (object, prim, front) = (at.hits.object[i], at.hits.prim[i], front >> lane & 1 != 0);
@@ -28,8 +28,8 @@ impl<S: Simd> GlassLanes<S> {
                 None => Vec::new(),
             };
             let interface = sets.interface(at.scene, media[lane], boundary, 0, &others);
-            (eta[lane], squeeze[lane], beyond[lane]) = (interface.eta, interface.squeeze, interface.beyond);
+            (eta[lane], radiance_eta[lane], beyond[lane]) = (interface.eta, interface.radiance_eta, interface.beyond);
         }
-        Self { eta: Float::load(s, &eta), squeeze: Float::load(s, &squeeze), beyond }
+        Self { eta: Float::load(s, &eta), radiance_eta: Float::load(s, &radiance_eta), beyond }
     }
 }

@@ -151,8 +151,8 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let reflected = sampler.single(dimension + DIM_LOBE).lt(reflectance);
             let refracted = refract(place.wo, normal, eta, cos_t);
             let wi = select_vector(reflected, reflect(place.wo, normal), refracted);
-            let squeeze = select(reflected, one, glass.squeeze * glass.squeeze);
-            let weight = Vector { x: squeeze, y: squeeze, z: squeeze };
+            let radiance_eta = select(reflected, one, glass.radiance_eta * glass.radiance_eta);
+            let weight = Vector { x: radiance_eta, y: radiance_eta, z: radiance_eta };
             Bounce { go_on: Mask::MAX, wi, weight, pdf: infinite, transmitted: !reflected }
         }
         _ => {

@@ -137,7 +137,7 @@ impl Scatter for Blend {
             sample.pdf = pdf;
         } else {
             sample.weight *= p.weight / p.pmf;
-            sample.chance *= p.pmf;
+            sample.probability *= p.pmf;
             sample.pdf = f32::INFINITY;
         }
         Some(sample)

@@ -23,19 +23,19 @@ pub(crate) fn blend_at(
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
 ) -> Option<Blend> {
-    let mut parts = Parts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
+    let mut parts = BlendParts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
     collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
     (parts.n > 0).then(|| Blend::new(&parts.parts[..parts.n], parts.layers))
 }
 
 /// The parts of a blend so far, with their weights.
-struct Parts {
+struct BlendParts {
     parts: [(Part, f32); MAX_LOBES],
     n: usize,
     layers: Vec<Principled>,
 }
 
-impl Parts {
+impl BlendParts {
     fn push(&mut self, lobe: Lobe, weight: f32) {
         self.push_part(Part::Lobe(lobe), weight);
     }
@@ -59,7 +59,7 @@ fn collect(
     sides: &mut Option<&mut Sides>,
     n_leaves: &mut u32,
     weight: f32,
-    parts: &mut Parts,
+    parts: &mut BlendParts,
 ) {
     let material = &scene.shading.materials[id as usize];
     let leaf = *n_leaves;
