@@ -4,9 +4,9 @@ use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
 use crate::cli::frames::FramesArg;
 use crate::cli::job::RenderJob;
-use crate::cli::progress::Progress;
+use crate::cli::progress::ProgressBars;
 use crate::cli::render_args::RenderArgs;
-use crate::cli::sequence::{Motion, Sequence};
+use crate::cli::sequence::{Sequence, SequenceMotion};
 use crate::cli::stop::Stop;
 use crate::cli::video;
 use firstlight::frame::navigation::Rig;
@@ -21,12 +21,12 @@ use std::path::Path;
 pub(super) fn animate(
     args: &RenderArgs,
     mut job: RenderJob,
-    mut progress: Progress,
+    mut progress: ProgressBars,
     sequence: &Sequence,
     stop: &Stop,
 ) -> Result<(), Failure> {
     let rigs = match sequence.motion {
-        Motion::Animation => {
+        SequenceMotion::Animation => {
             job.set_fps(args)?;
             None
         }

@@ -60,12 +60,12 @@ impl DenoiseArgs {
 }
 
 /// A denoiser that is ready.
-pub enum Denoiser {
+pub enum ImageDenoiser {
     Own,
     Oidn(Oidn),
 }
 
-impl Denoiser {
+impl ImageDenoiser {
     /// The one that is asked for, for the threads of the current pool; `None` if nothing is denoised.
     ///
     /// - `wanted`: whether an image or a layer is denoised.

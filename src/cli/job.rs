@@ -1,9 +1,9 @@
 //! A scene that is rendered without a window, and its images.
 
 use crate::cli::console::{inform, print_bytes, remark, tell};
-use crate::cli::denoising::Denoiser;
+use crate::cli::denoising::ImageDenoiser;
 use crate::cli::failure::Failure;
-use crate::cli::progress::Progress;
+use crate::cli::progress::ProgressBars;
 use crate::cli::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
 use crate::cli::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
@@ -36,7 +36,7 @@ pub(super) struct RenderJob {
     pub build_seconds: f64,
     pub draft: MetadataDraft,
     /// `None` if nothing is denoised.
-    denoiser: Option<Denoiser>,
+    denoiser: Option<ImageDenoiser>,
     /// Problems of the extraction that were printed.
     told: Vec<String>,
 }
@@ -46,9 +46,9 @@ impl RenderJob {
         args: &RenderArgs,
         kept: Option<&ImageMetadata>,
         files: &mut Files,
-        progress: &Progress,
+        progress: &ProgressBars,
     ) -> Result<Self, Failure> {
-        let denoiser = Denoiser::of(&args.denoise, args.wants_denoised())?;
+        let denoiser = ImageDenoiser::of(&args.denoise, args.wants_denoised())?;
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
         let scene = args.scene.load(aspect, files, &|text| progress.stage(text.to_owned()))?;
         if let Some(announcement) = &args.announcement {

@@ -134,14 +134,14 @@ pub fn parse_faces(text: &str) -> Result<usize, String> {
 
 /// The maximum distance between two surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Deviation {
+pub enum PrintedDeviation {
     /// In the units of the file.
     Length(f64),
     /// As a fraction of the diagonal of the model's bounding box.
     Share(f64),
 }
 
-impl Deviation {
+impl PrintedDeviation {
     /// The distance for a model with this diagonal, in the same units.
     pub fn length(self, diagonal: f64) -> f64 {
         match self {
@@ -152,11 +152,11 @@ impl Deviation {
 }
 
 /// Parses `0.01` as a length and `0.5%` as a fraction of the diagonal.
-pub fn parse_error(text: &str) -> Result<Deviation, String> {
+pub fn parse_error(text: &str) -> Result<PrintedDeviation, String> {
     let (number, unit) = number_and_unit(text);
     let number: f64 = number.parse().map_err(|_| "must be a length above 0, or a percentage of the diagonal")?;
     check_target(Target::Error(number)).map_err(|error| error.to_string())?;
-    Ok(if unit == 1.0 { Deviation::Length(number) } else { Deviation::Share(unit * number) })
+    Ok(if unit == 1.0 { PrintedDeviation::Length(number) } else { PrintedDeviation::Share(unit * number) })
 }
 
 /// A number and its unit: 0.01 with `%`, else 1.
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn deviations_are_lengths_or_percentages_of_the_diagonal() {
-        assert_eq!(parse_error("0.25"), Ok(Deviation::Length(0.25)));
+        assert_eq!(parse_error("0.25"), Ok(PrintedDeviation::Length(0.25)));
         assert_eq!(parse_error("0.5%").unwrap().length(200.0), 1.0);
         assert_eq!(parse_error("2 %").unwrap().length(50.0), 1.0);
         for text in ["", "%", "0%", "-1%", "nan", "0", "half"] {

@@ -1,15 +1,15 @@
-//! Progress of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
+//! ProgressBars of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
 
 use crate::cli::console::Bar;
 use crate::cli::waiting::Waiting;
 
 /// Ends when it is dropped.
-pub struct Progress {
+pub struct ProgressBars {
     bar: Bar,
     lines: Option<Waiting>,
 }
 
-impl Progress {
+impl ProgressBars {
     pub fn new() -> Self {
         Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("loading")) }
     }
@@ -44,7 +44,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for ProgressBars {
     fn drop(&mut self) {
         self.finish();
     }

@@ -11,8 +11,8 @@ use firstlight::render::{
     ErrorMetric, GuideGatherer, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
 };
 use firstlight::report::{
-    Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
-    csv, denoised_curves, denoised_text, foreign_share, measure_curve, page, summary_text, timed,
+    Ablation, ConvergenceCurve, CurveLimits, CurveStep, LinearPicture, ReferenceImage, ReferenceKey, ReferenceStore,
+    SceneOutcome, csv, denoised_curves, denoised_text, foreign_share, measure_curve, page, summary_text, timed,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
@@ -81,7 +81,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
             names.len()
         )));
     }
-    let given = args.reference.as_deref().map(Reference::read).transpose().map_err(Failure::Failed)?;
+    let given = args.reference.as_deref().map(ReferenceImage::read).transpose().map_err(Failure::Failed)?;
     let folder = OutFolder::new(&args.output)?;
     let again = folder.clone();
     stop.undo(move || drop(again));
@@ -149,7 +149,7 @@ impl Drop for OutFolder {
 fn measure_all(
     args: &ReportArgs,
     names: &[OsString],
-    given: Option<&Reference>,
+    given: Option<&ReferenceImage>,
     files: &mut Files,
     stop: &Stop,
 ) -> Result<(Vec<SceneOutcome>, Option<String>), Failure> {
@@ -212,11 +212,11 @@ struct ReportScene {
     settings: RenderSettings,
     display_settings: DisplaySettings,
     size: (u32, u32),
-    key: Key,
+    key: ReferenceKey,
 }
 
 impl ReportScene {
-    fn new(args: &ReportArgs, scene: &LoadedScene, given: Option<&Reference>) -> Result<Self, Failure> {
+    fn new(args: &ReportArgs, scene: &LoadedScene, given: Option<&ReferenceImage>) -> Result<Self, Failure> {
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
         let inputs = SceneInputs::of(&mut world);
@@ -250,7 +250,7 @@ impl ReportScene {
             settings,
             display_settings: *world.resource(),
             size,
-            key: Key::new(&scene.source.title(), scene.fingerprint(), &settings, size),
+            key: ReferenceKey::new(&scene.source.title(), scene.fingerprint(), &settings, size),
         })
     }
 
@@ -259,7 +259,7 @@ impl ReportScene {
         &self,
         args: &ReportArgs,
         limits: CurveLimits,
-        given: Option<&Reference>,
+        given: Option<&ReferenceImage>,
         oidn: Option<&Oidn>,
         progress: &mut ReportProgress,
         stop: &Stop,
@@ -359,7 +359,7 @@ impl ReportScene {
     }
 
     /// A cached reference, or a new one; `None` if it was stopped too early to be useful.
-    fn reference(&self, last: &CurveStep, progress: &mut ReportProgress, stop: &Stop) -> Option<Reference> {
+    fn reference(&self, last: &CurveStep, progress: &mut ReportProgress, stop: &Stop) -> Option<ReferenceImage> {
         let store = ReferenceStore::of_platform();
         let spp = last.spp.saturating_mul(REFERENCE_FACTOR);
         let time = duration(f64::from(REFERENCE_FACTOR) * last.spent.wall_seconds);

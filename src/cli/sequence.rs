@@ -14,7 +14,7 @@ pub const DEFAULT_FPS: f64 = 24.0;
 
 /// What moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum SequenceMotion {
     /// The camera, once around its pivot.
     Turntable,
     /// The camera, along bookmarks.
@@ -26,7 +26,7 @@ pub enum Motion {
 /// The frames of a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sequence {
-    pub motion: Motion,
+    pub motion: SequenceMotion,
     /// As in the names of files: of an animation frame i is at i / fps, others begin with 1.
     pub numbers: Range<u32>,
     digits: usize,
@@ -36,12 +36,12 @@ impl Sequence {
     /// The sequence that is asked for, if there is to be one.
     pub fn of(args: &RenderArgs) -> Result<Option<Self>, Failure> {
         let (motion, numbers) = match (args.turntable, &args.bookmarks, args.frames) {
-            (Some(n), ..) => (Motion::Turntable, 1..n + 1),
-            (None, Some(_), Some(FramesArg::Count(n))) => (Motion::Bookmarks, 1..n + 1),
+            (Some(n), ..) => (SequenceMotion::Turntable, 1..n + 1),
+            (None, Some(_), Some(FramesArg::Count(n))) => (SequenceMotion::Bookmarks, 1..n + 1),
             (None, Some(_), _) => {
                 return Err(Failure::Usage("--bookmarks needs --frames N: a number of frames".to_owned()));
             }
-            (None, None, Some(frames)) => (Motion::Animation, frames.range()),
+            (None, None, Some(frames)) => (SequenceMotion::Animation, frames.range()),
             (None, None, None) => return Ok(None),
         };
         let digits = numbers.end.saturating_sub(1).to_string().len().max(4);
@@ -77,7 +77,7 @@ impl Sequence {
     /// the same camera, ground and lights where the file has none.
     pub fn opened(&self, args: &RenderArgs) -> Result<RenderArgs, Failure> {
         let mut args = args.clone();
-        if self.motion == Motion::Animation
+        if self.motion == SequenceMotion::Animation
             && let SceneSource::Model(path) = args.scene.source()?
             && ModelFormat::of(&path) == Some(ModelFormat::Gltf)
         {

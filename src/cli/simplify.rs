@@ -3,7 +3,9 @@
 use crate::cli::args::{OverwriteArgs, replaced};
 use crate::cli::console::{inform, print, remark, tell};
 use crate::cli::failure::Failure;
-use crate::cli::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent, three_digits};
+use crate::cli::number::{
+    PrintedDeviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent, three_digits,
+};
 use crate::cli::stop::Stop;
 use crate::cli::waiting::Waiting;
 use clap::{Args, ValueEnum};

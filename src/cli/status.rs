@@ -7,7 +7,7 @@ use crate::cli::number::percent;
 use crate::cli::work::ALL;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
-use firstlight::cluster::job::{Job, Round, Rounds};
+use firstlight::cluster::job::{Job, JobRound, Rounds};
 use firstlight::cluster::part::sample_ranges;
 use firstlight::frame::{FilmFile, PictureFormat, Print, read_film_summary};
 use firstlight::scene::whole_file::Replace;
@@ -39,7 +39,7 @@ struct JobParts {
 }
 
 impl JobParts {
-    fn of(folder: &Path, job: &Job, number: usize, round: &Round) -> Self {
+    fn of(folder: &Path, job: &Job, number: usize, round: &JobRound) -> Self {
         let count = job.parts_of(&round.range());
         let mut parts = Self { count, ..Self::default() };
         let ranges = sample_ranges(round.range(), count);

@@ -10,7 +10,7 @@ use crate::cli::render::Command;
 use crate::cli::stop::Stop;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
-use firstlight::cluster::job::{Job, JobError, ROUNDS, Round, Rounds};
+use firstlight::cluster::job::{Job, JobError, JobRound, ROUNDS, Rounds};
 use firstlight::cluster::part::Part;
 use firstlight::frame::{FilmFile, Print, read_film_summary, write_film_with_features};
 use firstlight::scene::whole_file::{Replace, WholeFile};
@@ -91,7 +91,14 @@ impl WorkOrder {
         Ok(Self { folder: folder.to_path_buf(), job: Job::read(folder)?, rounds: Rounds::read(folder)? })
     }
 
-    fn part(&self, number: usize, round: &Round, part: &str, threads: Option<u16>, stop: &Stop) -> Result<(), Failure> {
+    fn part(
+        &self,
+        number: usize,
+        round: &JobRound,
+        part: &str,
+        threads: Option<u16>,
+        stop: &Stop,
+    ) -> Result<(), Failure> {
         let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
         let Job { parts, .. } = self.job;
         if part.count != parts {
@@ -145,13 +152,13 @@ impl WorkOrder {
     }
 
     /// The existing films of the parts of a round, and the number of its parts.
-    fn films(&self, number: usize, round: &Round) -> (Vec<PathBuf>, u32) {
+    fn films(&self, number: usize, round: &JobRound) -> (Vec<PathBuf>, u32) {
         let count = self.job.parts_of(&round.range());
         let films = self.job.films_there(&self.folder, number, &round.range());
         (films.into_iter().map(|(_, path)| path).collect(), count)
     }
 
-    fn merge(&self, number: usize, round: &Round, allow_missing: bool, stop: &Stop) -> Result<(), Failure> {
+    fn merge(&self, number: usize, round: &JobRound, allow_missing: bool, stop: &Stop) -> Result<(), Failure> {
         if round.merged {
             inform(format_args!("round {number} is merged already"));
             self.tell_next(&self.rounds);
@@ -201,14 +208,14 @@ impl WorkOrder {
         let estimate = film.error_estimate();
         let mut rounds = self.rounds.clone();
         let error = estimate.map(|estimate| estimate.relative);
-        rounds.0[number - 1] = Round { merged: true, error, ..round.clone() };
+        rounds.0[number - 1] = JobRound { merged: true, error, ..round.clone() };
         let told = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
         inform(format_args!("round {number}: {} samples per pixel{told}: {}", film.spp(), all.display()));
         let is_good = self.job.error.zip(error).is_some_and(|(target, error)| error <= target);
         let wanted = self.job.error.zip(estimate).map(|(target, estimate)| estimate.spp_for(target));
         let end = self.job.next_end(round.samples.1, Some(wanted.unwrap_or(u32::MAX))).filter(|_| !is_good);
         if let Some(end) = end.filter(|_| number == rounds.0.len()) {
-            rounds.0.push(Round::beginning(round.samples.1..end));
+            rounds.0.push(JobRound::beginning(round.samples.1..end));
         }
         rounds.write(&self.folder)?;
         self.tell_next(&rounds);

@@ -70,7 +70,7 @@ pub struct Job {
 
 /// A range of samples that is divided into parts and merged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Round {
+pub struct JobRound {
     /// The first sample, and the one after the last.
     pub samples: (u32, u32),
     /// Seconds since 1970 when it could begin.
@@ -82,7 +82,7 @@ pub struct Round {
     pub error: Option<f64>,
 }
 
-impl Round {
+impl JobRound {
     /// Of these samples, from now on.
     pub fn beginning(samples: Range<u32>) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
@@ -97,7 +97,7 @@ impl Round {
 
 /// All rounds so far; the file `rounds.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Rounds(pub Vec<Round>);
+pub struct Rounds(pub Vec<JobRound>);
 
 /// Why a folder is not a job.
 #[derive(Debug, thiserror::Error)]
@@ -187,7 +187,7 @@ impl Job {
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         write(self, &folder.join("job.json"))?;
-        Rounds(vec![Round::beginning(0..self.spp)]).write(folder)
+        Rounds(vec![JobRound::beginning(0..self.spp)]).write(folder)
     }
 
     /// Parts of a round with these samples: no more than there are samples.
@@ -283,7 +283,7 @@ impl Rounds {
     pub fn read(folder: &Path) -> Result<Self, JobError> {
         let path = folder.join(ROUNDS);
         let rounds: Self = read(path.clone())?;
-        let is_right = |round: &Round| round.samples.0 < round.samples.1;
+        let is_right = |round: &JobRound| round.samples.0 < round.samples.1;
         if rounds.0.is_empty() || !rounds.0.iter().all(is_right) {
             return Err(JobError::Content { path, reason: "has no rounds, or one without samples".to_owned() });
         }
@@ -299,7 +299,7 @@ impl Rounds {
     }
 
     /// The round with this number, from 1.
-    pub fn get(&self, number: usize) -> Option<&Round> {
+    pub fn get(&self, number: usize) -> Option<&JobRound> {
         self.0.get(number.checked_sub(1)?)
     }
 

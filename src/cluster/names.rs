@@ -1,4 +1,4 @@
-//! Names of files in a package: which of them keep their places, and which lie outside of the folder that was opened.
+//! ArchiveNames of files in a package: which of them keep their places, and which lie outside of the folder that was opened.
 //!
 //! A place is told twice: as it is named, which decides the name in the package, and where it really lies behind symbolic
 //! links, which decides whether it is outside.
@@ -109,8 +109,8 @@ fn real(place: &Path) -> PathBuf {
     place.canonicalize().unwrap_or_else(|_| place.to_path_buf())
 }
 
-/// Names of files in a package.
-pub(super) struct Names {
+/// ArchiveNames of files in a package.
+pub(super) struct ArchiveNames {
     /// The folder of what is opened; `None`: it is in none.
     home: Option<Folder>,
     /// What lies below keeps its place; `None`: nothing does.
@@ -127,7 +127,7 @@ pub(super) struct Names {
     pub outside: Vec<(PathBuf, String)>,
 }
 
-impl Names {
+impl ArchiveNames {
     /// - `home`, `base`: as they are named.
     pub fn new(home: Option<PathBuf>, base: Option<PathBuf>, is_fixed: bool, reads: &[ReadFiles]) -> Self {
         let all = reads.iter().flat_map(|read| &read.files).map(|path| place(path));
@@ -157,7 +157,7 @@ impl Names {
         text_of(Path::new(path.file_name().unwrap_or_default()), path)
     }
 
-    /// Names for a file and those that it names, which stay in their places relative to each other.
+    /// ArchiveNames for a file and those that it names, which stay in their places relative to each other.
     ///
     /// # Errors
     /// When one is not UTF-8.

@@ -8,7 +8,7 @@
 //! for is packed. The package of the same files has the same bytes. Start reading at [`Package::of`].
 
 use crate::cluster::names::{
-    Names, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to,
+    ArchiveNames, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to,
 };
 use crate::files::printable;
 use crate::files::whole_file::{WholeFile, unwritable, write_whole};
@@ -123,7 +123,7 @@ impl Package {
             // Of the command line: no name in the scene stands for it.
             reads.push(ReadFiles { name: String::new(), files: vec![path] });
         }
-        let mut names = Names::new(home, base, is_model, &reads);
+        let mut names = ArchiveNames::new(home, base, is_model, &reads);
         let all: Vec<PathBuf> = reads.iter().flat_map(|read| &read.files).map(|path| place(path)).collect();
         let mut files = BTreeMap::new();
         // By the name in the scene.
@@ -175,7 +175,7 @@ impl Package {
         Ok(Self { scene: scene_name, environment, files, outside: names.outside })
     }
 
-    /// Names of all files.
+    /// ArchiveNames of all files.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.files.keys().map(String::as_str)
     }

@@ -5,7 +5,7 @@ use crate::format::parts::{LightPart, SceneFile, TransformPart};
 use crate::format::value::Rgb;
 use crate::import::gltf::assembly::PlacedLight;
 use crate::import::gltf::cameras::{GltfCamera, Lens};
-use crate::import::gltf::lights::LightKind;
+use crate::import::gltf::lights::GltfLightKind;
 use glam::{DAffine3, DVec3};
 
 /// Whether an object may have this transform.
@@ -56,8 +56,8 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
     let direction = placed.world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
     let intensity = Rgb(placed.light.intensity);
     match placed.light.kind {
-        LightKind::Point => LightPart::Point { name, position, intensity, radius: 0.0 },
-        LightKind::Spot { inner, outer } => LightPart::Spot {
+        GltfLightKind::Point => LightPart::Point { name, position, intensity, radius: 0.0 },
+        GltfLightKind::Spot { inner, outer } => LightPart::Spot {
             name,
             position,
             direction,
@@ -66,7 +66,7 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
             outer_angle: outer.to_degrees(),
             transform: TransformPart::default(),
         },
-        LightKind::Directional => {
+        GltfLightKind::Directional => {
             LightPart::Directional { name, direction, irradiance: intensity, transform: TransformPart::default() }
         }
     }

@@ -3,7 +3,7 @@
 use crate::render::{
     DenoiseSource, Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance, compute_tables,
 };
-use crate::report::curve::{Seconds, seconds_at, seconds_to, slope};
+use crate::report::curve::{CurveSeconds, seconds_at, seconds_to, slope};
 use crate::report::{Distance, LinearPicture};
 use std::time::{Duration, Instant};
 
@@ -181,7 +181,7 @@ impl ConvergenceCurve {
         self.steps.iter().find(|step| step.spp == spp)
     }
 
-    /// Seconds and relMSE of each step.
+    /// CurveSeconds and relMSE of each step.
     pub fn points(&self) -> Vec<(f64, f64)> {
         self.steps.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect()
     }
@@ -209,8 +209,8 @@ impl ConvergenceCurve {
         Some(seconds_at(&times.collect::<Vec<_>>(), f64::from(spp)) / last.spent.seconds())
     }
 
-    /// Seconds until the relative error is down to `error`; `None` if the curve does not reach it.
-    pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
+    /// CurveSeconds until the relative error is down to `error`; `None` if the curve does not reach it.
+    pub fn seconds_to(&self, error: f64) -> Option<CurveSeconds> {
         seconds_to(&self.points(), self.slope(), error * error)
     }
 }

@@ -2,14 +2,14 @@
 
 /// A time that was measured, or extrapolated along the fitted line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Seconds {
+pub enum CurveSeconds {
     /// Between two measured steps.
     Interpolated(f64),
     /// Beyond the first or the last step.
     Extrapolated(f64),
 }
 
-impl Seconds {
+impl CurveSeconds {
     pub fn value(self) -> f64 {
         match self {
             Self::Interpolated(seconds) | Self::Extrapolated(seconds) => seconds,
@@ -51,16 +51,16 @@ pub fn seconds_at(steps: &[(f64, f64)], spp: f64) -> f64 {
 /// Returns when `points` (seconds, error), rising in seconds, fall below `target` for good.
 ///
 /// Interpolates between two points, extrapolates beyond them along `slope`; `None` if that hardly falls (`STUCK`).
-pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<Seconds> {
+pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<CurveSeconds> {
     let along = |(seconds, error): (f64, f64), slope: f64| seconds * (target / error).powf(1.0 / slope);
     let falling = slope.filter(|slope| *slope < STUCK);
     match points.iter().rposition(|&(_, error)| error > target) {
-        None => Some(Seconds::Extrapolated(along(*points.first()?, falling?))),
-        Some(last) if last + 1 == points.len() => Some(Seconds::Extrapolated(along(points[last], falling?))),
+        None => Some(CurveSeconds::Extrapolated(along(*points.first()?, falling?))),
+        Some(last) if last + 1 == points.len() => Some(CurveSeconds::Extrapolated(along(points[last], falling?))),
         Some(before) => {
             let (a, b) = (points[before], points[before + 1]);
             let share = (a.1 / target).ln() / (a.1 / b.1).ln();
-            Some(Seconds::Interpolated(a.0 * (b.0 / a.0).powf(share)))
+            Some(CurveSeconds::Interpolated(a.0 * (b.0 / a.0).powf(share)))
         }
     }
 }
@@ -76,11 +76,11 @@ mod tests {
         assert!((fitted.unwrap() + 1.0).abs() < 1e-12);
         // error = 0.08 / seconds.
         let inside = seconds_to(&points, fitted, 0.03);
-        assert!(matches!(inside, Some(Seconds::Interpolated(s)) if (s - 0.08 / 0.03).abs() < 1e-9), "{inside:?}");
+        assert!(matches!(inside, Some(CurveSeconds::Interpolated(s)) if (s - 0.08 / 0.03).abs() < 1e-9), "{inside:?}");
         for target in [1e-4, 5.0] {
             let outside = seconds_to(&points, fitted, target);
             assert!(
-                matches!(outside, Some(Seconds::Extrapolated(s)) if (s * target - 0.08).abs() < 1e-9),
+                matches!(outside, Some(CurveSeconds::Extrapolated(s)) if (s * target - 0.08).abs() < 1e-9),
                 "{outside:?}"
             );
         }

@@ -2,7 +2,7 @@
 
 use crate::frame::core::oidn::{Oidn, OidnError};
 use crate::render::{Denoised, Display, SurfaceGuides, denoise_source, guide_samples};
-use crate::report::curve::{Seconds, seconds_to};
+use crate::report::curve::{CurveSeconds, seconds_to};
 use crate::report::{CurveStep, Distance, LinearPicture, cpu_seconds};
 use glam::Vec3;
 use std::time::Instant;
@@ -39,8 +39,8 @@ impl DenoisedStep {
 }
 
 impl DenoisedCurve {
-    /// Seconds until the relative error is down to `error`; `None` if it is not, in the measured steps.
-    pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
+    /// CurveSeconds until the relative error is down to `error`; `None` if it is not, in the measured steps.
+    pub fn seconds_to(&self, error: f64) -> Option<CurveSeconds> {
         let mut points: Vec<(f64, f64)> =
             self.steps.iter().map(|step| (step.seconds, step.distance.relative_mse)).collect();
         // A single sample per pixel takes longer to denoise: an image of more samples may be there sooner.
@@ -49,7 +49,7 @@ impl DenoisedCurve {
         }
         let first = points.first().copied()?;
         // The first step is the earliest image there can be.
-        let at_once = || (first.1 <= error * error).then_some(Seconds::Interpolated(first.0));
+        let at_once = || (first.1 <= error * error).then_some(CurveSeconds::Interpolated(first.0));
         seconds_to(&points, None, error * error).or_else(at_once)
     }
 }
@@ -120,8 +120,8 @@ mod tests {
             // The first step is slow to denoise.
             steps: vec![step(1, 0.3, 0.04), step(2, 0.2, 0.03), step(4, 0.4, 0.015)],
         };
-        assert_eq!(curve.seconds_to(0.05), Some(Seconds::Interpolated(0.2)));
-        let Some(Seconds::Interpolated(seconds)) = curve.seconds_to(0.02) else { panic!("between two steps") };
+        assert_eq!(curve.seconds_to(0.05), Some(CurveSeconds::Interpolated(0.2)));
+        let Some(CurveSeconds::Interpolated(seconds)) = curve.seconds_to(0.02) else { panic!("between two steps") };
         assert!((0.2..0.4).contains(&seconds), "{seconds}");
         assert_eq!(curve.seconds_to(0.01), None, "beyond the measured steps");
     }

@@ -19,7 +19,7 @@ mod table;
 mod trees;
 
 pub use convergence::{ConvergenceCurve, CurveLimits, CurveStep, Spent, Step, cpu_seconds, measure_curve};
-pub use curve::{Seconds, seconds_to, slope};
+pub use curve::{CurveSeconds, seconds_to, slope};
 pub use denoised::{DenoisedCurve, DenoisedStep, denoised_curves, timed};
 pub use flip::flip;
 pub use metrics::{Distance, RELATIVE_FLOOR};
@@ -27,6 +27,6 @@ pub use mismatch::{foreign_share, is_another_scene};
 pub use outcome::{Ablation, SceneOutcome};
 pub use page::{denoised_text, page, summary_text};
 pub use picture::LinearPicture;
-pub use reference::{Key, Made, Reference, ReferenceStore};
+pub use reference::{Made, ReferenceImage, ReferenceKey, ReferenceStore};
 pub use table::csv;
 pub use trees::{CountedVisits, MeanVisits, TreePlan, TreeRow, TreeTable, tree_plans};

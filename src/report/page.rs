@@ -2,7 +2,7 @@
 
 use crate::files::printable;
 use crate::render::{Display, develop_pixel};
-use crate::report::curve::Seconds;
+use crate::report::curve::CurveSeconds;
 use crate::report::outcome::{Ablation, SceneOutcome};
 use crate::report::plot::{Band, Plot, Series, Style, escape, number};
 use crate::report::{ConvergenceCurve, DenoisedCurve, LinearPicture};
@@ -26,7 +26,7 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
          <style>\n{}</style>\n<h1>Speed against error</h1>\n\
          <p class=\"soft\">firstlight {} · {threads} threads · <code>{}</code></p>\n\
          <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \
-         light. Seconds are CPU seconds per thread (wall time on an idle machine) spent on rendering alone. Times in \
+         light. CurveSeconds are CPU seconds per thread (wall time on an idle machine) spent on rendering alone. Times in \
          brackets lie beyond the measured steps and follow the slope, which is fitted to the later half of the steps. A slope \
          of −1 means: twice the time, half \
          the squared error. Predicted time: by the renderer, when a tenth of the time had passed, to the error that \
@@ -49,7 +49,7 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
 /// Errors that denoised images are compared by.
 const DENOISED_TARGETS: [f64; 2] = [0.05, 0.02];
 
-/// Seconds to the same error raw and denoised, as plain text; empty if nothing was denoised.
+/// CurveSeconds to the same error raw and denoised, as plain text; empty if nothing was denoised.
 pub fn denoised_text(outcomes: &[SceneOutcome]) -> String {
     let mut text = String::new();
     for outcome in outcomes {
@@ -346,11 +346,11 @@ fn ablation_table(outcome: &SceneOutcome) -> String {
     )
 }
 
-fn seconds(time: Option<Seconds>) -> String {
+fn seconds(time: Option<CurveSeconds>) -> String {
     match time {
         None => "–".to_owned(),
-        Some(Seconds::Interpolated(seconds)) => number(seconds),
-        Some(Seconds::Extrapolated(seconds)) => format!("({})", number(seconds)),
+        Some(CurveSeconds::Interpolated(seconds)) => number(seconds),
+        Some(CurveSeconds::Extrapolated(seconds)) => format!("({})", number(seconds)),
     }
 }
 

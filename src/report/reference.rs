@@ -14,7 +14,7 @@ use std::time::Instant;
 
 /// An image that serves as ground truth.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub struct ReferenceImage {
     pub picture: LinearPicture,
     /// How an own render was made; `None` for a given file.
     pub made: Option<Made>,
@@ -38,12 +38,12 @@ pub struct ReferenceStore {
 
 /// Identity of a stored render.
 #[derive(Clone, Debug)]
-pub struct Key {
+pub struct ReferenceKey {
     name: String,
     size: (u32, u32),
 }
 
-impl Key {
+impl ReferenceKey {
     /// Computes the key.
     ///
     /// - `title`: of the scene, for readable file names.
@@ -73,13 +73,13 @@ impl ReferenceStore {
     }
 
     /// Returns a render with at least `min_spp` samples per pixel, if a readable one is stored.
-    pub fn find(&self, key: &Key, min_spp: u32) -> Option<Reference> {
+    pub fn find(&self, key: &ReferenceKey, min_spp: u32) -> Option<ReferenceImage> {
         let path = self.folder.as_ref()?.join(format!("{}.exr", key.name));
         let note = InputFile::open(&path.with_extension("json"), FileKind::Settings).ok()?.bytes().ok()?;
         let made: Made = serde_json::from_slice(&note).ok()?;
         let picture = LinearPicture::read_exr(&path).ok()?;
         let fits = made.spp >= min_spp && (picture.width, picture.height) == key.size;
-        fits.then_some(Reference { picture, made: Some(made), path: Some(path) })
+        fits.then_some(ReferenceImage { picture, made: Some(made), path: Some(path) })
     }
 
     /// Renders with `spp` samples per pixel and stores the image; `progress` receives the completed fraction.
@@ -88,13 +88,13 @@ impl ReferenceStore {
     /// the samples so far are returned, and not stored; `None` before the first sample.
     pub fn make(
         &self,
-        key: &Key,
+        key: &ReferenceKey,
         prepared: &Prepared,
         settings: &RenderSettings,
         spp: u32,
         progress: &mut dyn FnMut(f64),
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Option<(Reference, Option<String>)> {
+    ) -> Option<(ReferenceImage, Option<String>)> {
         // Any seed other than the measured one: an image agrees too well with itself.
         let allocation = SampleAllocation::Uniform;
         let settings = RenderSettings { seed: !settings.seed, techniques: Default::default(), allocation, ..*settings };
@@ -117,10 +117,10 @@ impl ReferenceStore {
             Ok(path) => (path, None),
             Err(reason) => (None, Some(format!("the reference could not be cached: {reason}"))),
         };
-        Some((Reference { picture: LinearPicture::of(&film), made: Some(made), path }, trouble))
+        Some((ReferenceImage { picture: LinearPicture::of(&film), made: Some(made), path }, trouble))
     }
 
-    fn keep(&self, key: &Key, film: &Film, made: &Made) -> Result<Option<PathBuf>, String> {
+    fn keep(&self, key: &ReferenceKey, film: &Film, made: &Made) -> Result<Option<PathBuf>, String> {
         let Some(folder) = &self.folder else { return Ok(None) };
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let path = folder.join(format!("{}.exr", key.name));
@@ -136,7 +136,7 @@ impl ReferenceStore {
     }
 }
 
-impl Reference {
+impl ReferenceImage {
     /// Reads a reference made by another program.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use crate::import::meshes::LoadedMesh;
 use crate::import::orientation::faces_away;
 use crate::import::up_axis::{guess_up, guess_up_of_obj};
 use crate::render::Integrator;
-use crate::scene::inner_light::Inside;
+use crate::scene::inner_light::RoomInside;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -86,7 +86,7 @@ pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
 }
 
 /// Adds a light inside of a model that is closed: a point, which cannot be seen.
-pub fn light_inside(file: &mut SceneFile, &Inside { position, distance }: &Inside) {
+pub fn light_inside(file: &mut SceneFile, &RoomInside { position, distance }: &RoomInside) {
     // Direct light on a white surface at this distance; walls reflect about twice as much again.
     const RADIANCE: f64 = 0.3;
     let intensity = Rgb(Vec3::splat((RADIANCE * PI * distance * distance) as f32));

@@ -15,7 +15,7 @@ const PLACES: usize = 24;
 const NEAR: f32 = 1e-3;
 
 /// A place of a light.
-pub(super) struct Inside {
+pub(super) struct RoomInside {
     /// World position, metres.
     pub position: DVec3,
     /// Median distance of the surfaces that it lights, metres.
@@ -30,7 +30,7 @@ pub(super) fn sees_anything(scene: &Extraction) -> bool {
 
 /// Finds the place from which most of the visible surfaces are seen; `None` if the camera sees none, or none that faces
 /// another one.
-pub(super) fn middle_of_room(scene: &Extraction) -> Option<Inside> {
+pub(super) fn middle_of_room(scene: &Extraction) -> Option<RoomInside> {
     let tree = &scene.prepared.geometry.tree;
     let settings = RenderSettings::default();
     let seen = gather_features(&scene.prepared, &settings, SIZE, 1, &|| false)?;
@@ -63,5 +63,5 @@ pub(super) fn middle_of_room(scene: &Extraction) -> Option<Inside> {
     let all = places.iter().step_by(step).map(|&(_, place)| (lit(place), place));
     let (distances, place) = all.max_by_key(|(distances, _)| distances.len())?;
     let distance = f64::from(*distances.get(distances.len() / 2)?);
-    Some(Inside { position: scene.origin + place.as_dvec3(), distance })
+    Some(RoomInside { position: scene.origin + place.as_dvec3(), distance })
 }

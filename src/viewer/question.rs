@@ -7,7 +7,7 @@ use winit::keyboard::{Key, NamedKey};
 
 /// A question to the user.
 #[derive(Debug)]
-pub enum Question {
+pub enum Prompt {
     /// The scene of this name has unsaved edits, and another scene or closing the window is about to replace it.
     ///
     /// - `file`: the file that saving writes.
@@ -18,7 +18,7 @@ pub enum Question {
 
 /// The user's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum PromptAnswer {
     /// Save and leave; or restore the edits.
     Yes,
     /// Leave without saving; or discard the edits.
@@ -27,7 +27,7 @@ pub enum Answer {
     Later,
 }
 
-impl Question {
+impl Prompt {
     fn text(&self) -> (String, String) {
         match self {
             Self::Leave { title, file, .. } => (
@@ -41,29 +41,33 @@ impl Question {
         }
     }
 
-    fn choices(&self) -> [(&'static str, &'static str, Answer); 3] {
+    fn choices(&self) -> [(&'static str, &'static str, PromptAnswer); 3] {
         match self {
-            Self::Leave { .. } => {
-                [("Save", "Enter", Answer::Yes), ("Don't save", "D", Answer::No), ("Cancel", "Esc", Answer::Later)]
-            }
-            Self::Restore(_) => {
-                [("Restore", "Enter", Answer::Yes), ("Discard", "D", Answer::No), ("Later", "Esc", Answer::Later)]
-            }
+            Self::Leave { .. } => [
+                ("Save", "Enter", PromptAnswer::Yes),
+                ("Don't save", "D", PromptAnswer::No),
+                ("Cancel", "Esc", PromptAnswer::Later),
+            ],
+            Self::Restore(_) => [
+                ("Restore", "Enter", PromptAnswer::Yes),
+                ("Discard", "D", PromptAnswer::No),
+                ("Later", "Esc", PromptAnswer::Later),
+            ],
         }
     }
 
     /// The answer of a pressed key.
-    pub fn key(key: &Key) -> Option<Answer> {
+    pub fn key(key: &Key) -> Option<PromptAnswer> {
         match key {
-            Key::Named(NamedKey::Enter) => Some(Answer::Yes),
-            Key::Named(NamedKey::Escape) => Some(Answer::Later),
-            Key::Character(text) if text.eq_ignore_ascii_case("d") => Some(Answer::No),
+            Key::Named(NamedKey::Enter) => Some(PromptAnswer::Yes),
+            Key::Named(NamedKey::Escape) => Some(PromptAnswer::Later),
+            Key::Character(text) if text.eq_ignore_ascii_case("d") => Some(PromptAnswer::No),
             _ => None,
         }
     }
 
     /// Draws the question; returns the answer when a button is pressed.
-    pub fn show(&self, context: &Context) -> Option<Answer> {
+    pub fn show(&self, context: &Context) -> Option<PromptAnswer> {
         let (heading, explanation) = self.text();
         let mut answer = None;
         let frame = Frame::window(&context.style()).inner_margin(16.0);
@@ -94,16 +98,16 @@ mod tests {
 
     #[test]
     fn every_choice_has_the_key_that_stands_beside_it() {
-        let question = Question::Leave { title: "gallery".to_owned(), file: "gallery-0001.ron".to_owned(), then: None };
+        let question = Prompt::Leave { title: "gallery".to_owned(), file: "gallery-0001.ron".to_owned(), then: None };
         for (_, name, answer) in question.choices() {
             let key = match name {
                 "Enter" => Key::Named(NamedKey::Enter),
                 "Esc" => Key::Named(NamedKey::Escape),
                 letter => Key::Character(letter.into()),
             };
-            assert_eq!(Question::key(&key), Some(answer), "{name}");
+            assert_eq!(Prompt::key(&key), Some(answer), "{name}");
         }
-        assert_eq!(Question::key(&Key::Named(NamedKey::Space)), None);
-        assert_eq!(Question::key(&Key::Character("x".into())), None);
+        assert_eq!(Prompt::key(&Key::Named(NamedKey::Space)), None);
+        assert_eq!(Prompt::key(&Key::Character("x".into())), None);
     }
 }

@@ -6,7 +6,7 @@ use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
 };
-use firstlight::report::{ConvergenceCurve, CurveLimits, Key, LinearPicture, ReferenceStore, measure_curve};
+use firstlight::report::{ConvergenceCurve, CurveLimits, LinearPicture, ReferenceKey, ReferenceStore, measure_curve};
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
@@ -109,7 +109,7 @@ fn references_are_kept_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let store = ReferenceStore::in_folder(&folder.path().join("deep"));
     let (room, settings) = (room(), RenderSettings { seed: 1, ..RenderSettings::default() });
-    let key = Key::new("scenes/my room.ron", Fingerprint(7), &settings, (16, 8));
+    let key = ReferenceKey::new("scenes/my room.ron", Fingerprint(7), &settings, (16, 8));
     assert!(store.find(&key, 1).is_none());
     let (made, trouble) = store.make(&key, &room, &settings, 16, &mut |_| (), &|| false).unwrap();
     assert_eq!(trouble, None);
@@ -119,9 +119,9 @@ fn references_are_kept_and_found_again() {
     assert!(store.find(&key, 32).is_none(), "too few samples");
     let longer = RenderSettings { max_depth: 3, ..settings };
     for other in [
-        Key::new("scenes/my room.ron", Fingerprint(8), &settings, (16, 8)),
-        Key::new("scenes/my room.ron", Fingerprint(7), &longer, (16, 8)),
-        Key::new("scenes/my room.ron", Fingerprint(7), &settings, (8, 16)),
+        ReferenceKey::new("scenes/my room.ron", Fingerprint(8), &settings, (16, 8)),
+        ReferenceKey::new("scenes/my room.ron", Fingerprint(7), &longer, (16, 8)),
+        ReferenceKey::new("scenes/my room.ron", Fingerprint(7), &settings, (8, 16)),
     ] {
         assert!(store.find(&other, 1).is_none());
     }

@@ -293,7 +293,7 @@ impl Document {
         let mut room = self.most_decoded();
         for (i, view) in self.root.buffer_views.iter().enumerate() {
             let Some(compressed) = meshopt::of_view(&view.extensions) else { continue };
-            let decode = |compressed: meshopt::View| {
+            let decode = |compressed: meshopt::MeshoptView| {
                 let inner = BufferView {
                     buffer: compressed.buffer,
                     byte_offset: compressed.byte_offset,

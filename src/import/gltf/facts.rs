@@ -46,9 +46,9 @@ impl Document {
             name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("animation {i}"))
         };
         let kind = |light: &crate::import::gltf::assembly::PlacedLight| match light.light.kind {
-            crate::import::gltf::lights::LightKind::Point => "point",
-            crate::import::gltf::lights::LightKind::Spot { .. } => "spot",
-            crate::import::gltf::lights::LightKind::Directional => "directional",
+            crate::import::gltf::lights::GltfLightKind::Point => "point",
+            crate::import::gltf::lights::GltfLightKind::Spot { .. } => "spot",
+            crate::import::gltf::lights::GltfLightKind::Directional => "directional",
         };
         let occluded = surfaces.materials.iter().filter(|surface| surface.has_occlusion);
         let occluded = occluded.map(|surface| {

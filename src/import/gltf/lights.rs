@@ -10,7 +10,7 @@ use serde_json::Value;
 const NAME: &str = "KHR_lights_punctual";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum LightKind {
+pub(crate) enum GltfLightKind {
     Point,
     /// Angles from the axis, radians.
     Spot {
@@ -23,7 +23,7 @@ pub(crate) enum LightKind {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GltfLight {
     pub name: Option<String>,
-    pub kind: LightKind,
+    pub kind: GltfLightKind,
     /// Colour times intensity: W·sr⁻¹; of directional lights, W·m⁻².
     pub intensity: Vec3,
     /// Whether it has a maximum range, which is not physical and is ignored.
@@ -54,14 +54,14 @@ impl Document {
             _ => Vec3::ONE,
         };
         let kind = match light.get("type").and_then(Value::as_str) {
-            Some("point") => LightKind::Point,
-            Some("directional") => LightKind::Directional,
+            Some("point") => GltfLightKind::Point,
+            Some("directional") => GltfLightKind::Directional,
             Some("spot") => {
                 let spot = light.get("spot").unwrap_or(&Value::Null);
                 let outer = number(spot, "outerConeAngle", std::f64::consts::FRAC_PI_4);
                 let outer = outer.clamp(0.0, std::f64::consts::FRAC_PI_2);
                 let inner = number(spot, "innerConeAngle", 0.0).clamp(0.0, outer);
-                LightKind::Spot { inner, outer }
+                GltfLightKind::Spot { inner, outer }
             }
             other => {
                 let (what, found) = ("type", other.unwrap_or_default().to_owned());

@@ -27,7 +27,7 @@ pub(crate) struct TextureUse {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) enum Alpha {
+pub(crate) enum AlphaMode {
     #[default]
     Opaque,
     /// Visible where alpha is at least this.
@@ -54,7 +54,7 @@ pub(crate) struct GltfMaterial {
     /// `emissiveFactor` times `emissiveStrength`.
     pub emission: Vec3,
     pub emissive_texture: Option<TextureUse>,
-    pub alpha: Alpha,
+    pub alpha: AlphaMode,
     pub double_sided: bool,
     pub unlit: bool,
     pub ior: f32,
@@ -166,9 +166,9 @@ impl Document {
             emission: (Vec3::from(emission) * strength).min(Vec3::splat(f32::MAX)),
             emissive_texture: texture(json.emissive_texture.as_ref()),
             alpha: match json.alpha_mode.as_deref() {
-                Some("MASK") => Alpha::Mask(json.alpha_cutoff.unwrap_or(0.5) as f32),
-                Some("BLEND") => Alpha::Blend,
-                _ => Alpha::Opaque,
+                Some("MASK") => AlphaMode::Mask(json.alpha_cutoff.unwrap_or(0.5) as f32),
+                Some("BLEND") => AlphaMode::Blend,
+                _ => AlphaMode::Opaque,
             },
             double_sided: json.double_sided,
             unlit: json.extensions.contains_key("KHR_materials_unlit"),

@@ -16,7 +16,7 @@ const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 /// The extension object of a view.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(crate) struct View {
+pub(crate) struct MeshoptView {
     pub buffer: u32,
     pub byte_offset: u64,
     pub byte_length: u64,
@@ -30,9 +30,9 @@ pub(crate) struct View {
 ///
 /// # Errors
 /// If the object is invalid.
-pub(crate) fn of_view(extensions: &Extensions) -> Option<Result<View, GltfProblem>> {
+pub(crate) fn of_view(extensions: &Extensions) -> Option<Result<MeshoptView, GltfProblem>> {
     let (name, object) = NAMES.iter().find_map(|name| Some((name, extensions.get(*name)?)))?;
-    Some(View::deserialize(object).map_err(|error| GltfProblem::Json(format!("{name}: {error}"))))
+    Some(MeshoptView::deserialize(object).map_err(|error| GltfProblem::Json(format!("{name}: {error}"))))
 }
 
 /// The decoded bytes of a view.
@@ -41,7 +41,7 @@ pub(crate) fn of_view(extensions: &Extensions) -> Option<Result<View, GltfProble
 ///
 /// # Errors
 /// If the data is invalid.
-pub(crate) fn decode(view: &View, data: &[u8], most_bytes: u64) -> Result<Vec<u8>, GltfProblem> {
+pub(crate) fn decode(view: &MeshoptView, data: &[u8], most_bytes: u64) -> Result<Vec<u8>, GltfProblem> {
     let wrong = GltfProblem::Compressed;
     let decoded = view.count.checked_mul(view.byte_stride).ok_or(GltfProblem::Count { count: view.count })?;
     // One byte says that four bytes of 256 elements stay the same.
@@ -336,11 +336,17 @@ fn sequence(data: &[u8], count: usize) -> Option<Vec<u32>> {
 mod tests {
     use super::*;
 
-    fn view(mode: &str, filter: Option<&str>, count: u64, byte_stride: u64) -> View {
-        View { mode: mode.to_owned(), filter: filter.map(str::to_owned), count, byte_stride, ..View::default() }
+    fn view(mode: &str, filter: Option<&str>, count: u64, byte_stride: u64) -> MeshoptView {
+        MeshoptView {
+            mode: mode.to_owned(),
+            filter: filter.map(str::to_owned),
+            count,
+            byte_stride,
+            ..MeshoptView::default()
+        }
     }
 
-    fn decode(view: &View, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
+    fn decode(view: &MeshoptView, data: &[u8]) -> Result<Vec<u8>, GltfProblem> {
         super::decode(view, data, 1 << 20)
     }
 

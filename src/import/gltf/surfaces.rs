@@ -13,7 +13,7 @@ use crate::format::sources::TextureSource;
 use crate::format::value::{ColorValue, Rgb, ScalarValue};
 use crate::import::error::gltf::Located;
 use crate::import::gltf::document::Document;
-use crate::import::gltf::material::{Alpha, GltfMaterial, TextureUse};
+use crate::import::gltf::material::{AlphaMode, GltfMaterial, TextureUse};
 use crate::import::gltf::uri::{Uri, is_data};
 use crate::render::{Channel, Encoding, Material};
 use glam::{DVec2, Vec3};
@@ -192,7 +192,7 @@ impl Textures<'_> {
     fn base(&mut self, material: &GltfMaterial, vertex_colors: bool) -> (ColorValue, ScalarValue) {
         let [r, g, b, alpha] = material.base_color;
         let (rgb, tint) = (Vec3::new(r, g, b), Rgb(Vec3::splat(alpha)));
-        let is_cut = material.alpha != Alpha::Opaque;
+        let is_cut = material.alpha != AlphaMode::Opaque;
         match &material.base_color_texture {
             Some(used) => {
                 let role = |what, channel, tint| {
@@ -300,8 +300,8 @@ fn surface(
     let usual = Material::principled(base.clone());
     let Material::Principled { .. } = &usual else { return usual };
     let cutoff = match material.alpha {
-        Alpha::Mask(cutoff) => Some(cutoff.clamp(0.0, 1.0)),
-        Alpha::Opaque | Alpha::Blend => None,
+        AlphaMode::Mask(cutoff) => Some(cutoff.clamp(0.0, 1.0)),
+        AlphaMode::Opaque | AlphaMode::Blend => None,
     };
     let mut part = usual;
     let Material::Principled {
@@ -407,7 +407,7 @@ fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
         && material.metallic == 0.0
         && material.metallic_roughness_texture.is_none()
         && material.normal_texture.is_none()
-        && material.alpha == Alpha::Opaque
+        && material.alpha == AlphaMode::Opaque
         && material.specular == 1.0
         && material.specular_texture.is_none()
         && material.specular_color == Vec3::ONE

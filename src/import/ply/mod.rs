@@ -24,7 +24,7 @@ use crate::import::model::texture_map::TextureMap;
 use crate::import::ply::faces::{Faces, NOWHERE};
 use crate::import::ply::header::{Element, Encoding, Header};
 use crate::import::ply::rows::{Bytes, Located, Rows, Text, skip_row};
-use crate::import::ply::vertices::Vertices;
+use crate::import::ply::vertices::PlyVertices;
 use std::path::{Path, PathBuf};
 
 /// [`load_ply_with`] with the default options.
@@ -189,7 +189,7 @@ fn materials(
 /// The contents of a file.
 #[derive(Debug, Default)]
 struct Contents {
-    vertices: Vertices,
+    vertices: PlyVertices,
     faces: Faces,
     /// Unsupported elements and properties.
     unused: Vec<String>,

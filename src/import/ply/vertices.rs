@@ -10,9 +10,9 @@ use crate::render::decode_srgb;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::sync::LazyLock;
 
-/// Vertices as in the file: positions may be anything.
+/// PlyVertices as in the file: positions may be anything.
 #[derive(Debug, Default)]
-pub(crate) struct Vertices {
+pub(crate) struct PlyVertices {
     /// Without triangles.
     pub indexed: Indexed,
     pub colours: Colours,
@@ -92,7 +92,7 @@ pub(crate) fn has_colours(element: &Element) -> bool {
     colour_of(element).is_some()
 }
 
-impl Vertices {
+impl PlyVertices {
     /// Reads all rows; returns the number of those with more numbers than declared.
     ///
     /// - `ignored`: receives the indices of properties that are not used.

@@ -3,7 +3,7 @@
 use crate::frame::{Command, Edit};
 use crate::viewer::app::{App, FRAME, Wake};
 use crate::viewer::help::{Help, ListKey};
-use crate::viewer::question::Question;
+use crate::viewer::question::Prompt;
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -72,7 +72,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
                 let pressed = event.state.is_pressed();
                 if pressed && self.leaving.question.is_some() {
-                    if let Some(answer) = Question::key(&event.logical_key).filter(|_| !event.repeat) {
+                    if let Some(answer) = Prompt::key(&event.logical_key).filter(|_| !event.repeat) {
                         self.answer(answer, now, event_loop);
                     }
                     return;

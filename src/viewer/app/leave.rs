@@ -3,7 +3,7 @@
 
 use crate::frame::Command;
 use crate::viewer::app::{App, short_name};
-use crate::viewer::question::{Answer, Question};
+use crate::viewer::question::{Prompt, PromptAnswer};
 use crate::viewer::saver::new_scene_file;
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
@@ -53,7 +53,7 @@ impl App {
             && is_shown
             && let Some(left) = self.leaving.left_behind.pop_front()
         {
-            self.ask(Question::Restore(left), now);
+            self.ask(Prompt::Restore(left), now);
         }
         self.keep_edits(unsaved, now);
     }
@@ -82,14 +82,14 @@ impl App {
     fn ask_to_leave(&mut self, then: Option<Command>, now: Instant) {
         let title = short_name(&self.session.status().scene);
         let file = short_name(&self.scene_path(false).to_string_lossy());
-        self.ask(Question::Leave { title, file, then }, now);
+        self.ask(Prompt::Leave { title, file, then }, now);
     }
 
-    fn ask(&mut self, question: Question, now: Instant) {
+    fn ask(&mut self, question: Prompt, now: Instant) {
         self.capture_mouse(false, now);
         self.input.release_all(now);
-        if matches!(question, Question::Leave { .. })
-            && let Some(Question::Restore(left)) = self.leaving.question.take()
+        if matches!(question, Prompt::Leave { .. })
+            && let Some(Prompt::Restore(left)) = self.leaving.question.take()
         {
             self.leaving.left_behind.push_front(left);
         }
@@ -98,29 +98,29 @@ impl App {
     }
 
     /// Executes the user's answer.
-    pub(super) fn answer(&mut self, answer: Answer, now: Instant, event_loop: &ActiveEventLoop) {
+    pub(super) fn answer(&mut self, answer: PromptAnswer, now: Instant, event_loop: &ActiveEventLoop) {
         let Some(question) = self.leaving.question.take() else { return };
         self.repaint_at = Some(now);
         self.needs_tick = true;
         match (question, answer) {
-            (Question::Leave { then, .. }, Answer::Yes) => {
+            (Prompt::Leave { then, .. }, PromptAnswer::Yes) => {
                 self.save_scene(false);
                 self.leaving.saving = Some(then);
             }
-            (Question::Leave { then: Some(command), .. }, Answer::No) => self.session.send(command),
-            (Question::Leave { then: None, .. }, Answer::No) => {
+            (Prompt::Leave { then: Some(command), .. }, PromptAnswer::No) => self.session.send(command),
+            (Prompt::Leave { then: None, .. }, PromptAnswer::No) => {
                 self.leaving.discarded = true;
                 event_loop.exit();
             }
             // It is offered again by the next window.
-            (_, Answer::Later) => {}
-            (Question::Restore(left), Answer::Yes) => {
+            (_, PromptAnswer::Later) => {}
+            (Prompt::Restore(left), PromptAnswer::Yes) => {
                 let path = new_scene_file(&self.options.folder, &left.title);
                 if let Err(reason) = self.leaving.restore(left, path) {
                     self.toasts.add(Tone::Problem, reason, now);
                 }
             }
-            (Question::Restore(left), Answer::No) => left.discard(),
+            (Prompt::Restore(left), PromptAnswer::No) => left.discard(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! State of closing the window and of edits that were not saved.
 
 use crate::frame::{Command, LeftBehind, Recovery, Waker};
-use crate::viewer::question::{Answer, Question};
+use crate::viewer::question::{Prompt, PromptAnswer};
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -11,9 +11,9 @@ pub(super) struct Leaving {
     /// The window is to be closed.
     pub wanted: bool,
     /// The question that is shown.
-    pub question: Option<Question>,
+    pub question: Option<Prompt>,
     /// The answer given by a button of the question.
-    pub answer: Option<Answer>,
+    pub answer: Option<PromptAnswer>,
     /// What follows once the scene is saved: a command that opens another scene, or closing the window.
     pub saving: Option<Option<Command>>,
     /// Closed without saving, as requested by the user.

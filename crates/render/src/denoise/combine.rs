@@ -12,13 +12,13 @@ use crate::denoise::blur::{Apart, RADIUS};
 use crate::denoise::denoised::Denoised;
 use crate::denoise::energy::given_back;
 use crate::denoise::input::DenoiseInput;
-use crate::denoise::noise::{Filtered, Noise, squared_bias};
+use crate::denoise::noise::{FilteredNoise, Noise, squared_bias};
 use crate::denoise::parallel::{Stop, each};
 use crate::denoise::risk::error_of;
 use glam::Vec3;
 
 /// Returns `None` if `stop` returned true.
-pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, stop: Stop) -> Option<Denoised> {
+pub(super) fn combine(input: &DenoiseInput, noise: &Noise, filtered: &FilteredNoise, stop: Stop) -> Option<Denoised> {
     let n = input.n_pixels();
     let by_filtered = |i: usize| (filtered.color[i] * filtered.color[i] + 0.01).recip();
     let apart = Apart::of(input, &noise.at_emitters, RADIUS, stop)?;

@@ -7,7 +7,7 @@
 
 use crate::denoise::blur::{Apart, n_averaged};
 use crate::denoise::input::DenoiseInput;
-use crate::denoise::noise::{Filtered, Noise};
+use crate::denoise::noise::{FilteredNoise, Noise};
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use glam::Vec3;
 
@@ -22,7 +22,7 @@ const SIGNIFICANCE: f32 = 6.0;
 pub(super) fn given_back(
     input: &DenoiseInput,
     noise: &Noise,
-    filtered: &Filtered,
+    filtered: &FilteredNoise,
     share: &[f32],
     stop: Stop,
 ) -> Option<Vec<Vec3>> {

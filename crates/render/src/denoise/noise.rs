@@ -17,7 +17,7 @@ pub(super) struct Noise {
 }
 
 /// A filtered image.
-pub(super) struct Filtered {
+pub(super) struct FilteredNoise {
     /// Radiance of each pixel.
     pub color: Vec<Vec3>,
     /// Covariance of raw and filtered value, per channel: the part of the noise that is common to both; noisy.
@@ -64,7 +64,7 @@ impl Noise {
         input: &DenoiseInput,
         filter: &mut dyn FnMut(&[Vec3]) -> Option<Vec<Vec3>>,
         stop: Stop,
-    ) -> Option<Filtered> {
+    ) -> Option<FilteredNoise> {
         let n = input.n_pixels();
         let noise = |i: usize| match input.half_steps {
             Some(halves) => halves.noise(i),
@@ -79,6 +79,6 @@ impl Noise {
         let covariance: Vec<Vec3> = each(n, stop, |i| (of_changed[i] - color[i]) * noise(i) / PROBE)?;
         // Good filters let bias and variance grow alike.
         let misfit = each(n, stop, |i| MISFIT_PER_VARIANCE * covariance[i])?;
-        Some(Filtered { color, covariance, misfit })
+        Some(FilteredNoise { color, covariance, misfit })
     }
 }

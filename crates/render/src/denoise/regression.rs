@@ -14,7 +14,7 @@ use crate::denoise::fit::Fits;
 use crate::denoise::input::DenoiseInput;
 use crate::denoise::limit::limit;
 use crate::denoise::moments::{Blocks, N_FEATURES, Samples};
-use crate::denoise::noise::{Filtered, Noise};
+use crate::denoise::noise::{FilteredNoise, Noise};
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -219,7 +219,7 @@ pub(super) fn pick(
     candidates: &[[Candidate; 2]],
     of_raw: &Noise,
     stop: Stop,
-) -> Option<Filtered> {
+) -> Option<FilteredNoise> {
     let n = input.n_pixels();
     let level = |i: usize| (candidates[i][0].color * candidates[i][0].color + 0.01).recip();
     let smooth = |of: &(dyn Fn(usize) -> f32 + Sync)| blur(&each(n, stop, of)?, input.width, input.height, 1, stop);
@@ -250,7 +250,7 @@ pub(super) fn pick(
         let [all, small] = candidates[i].map(|of| of.color);
         small.lerp(all, share[i])
     };
-    Some(Filtered {
+    Some(FilteredNoise {
         color: each(n, stop, color)?,
         covariance: each(n, stop, |i| own(i) * of_raw.variance[i])?,
         misfit: each(n, stop, misfit)?,

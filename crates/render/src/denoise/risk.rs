@@ -15,7 +15,7 @@
 
 use crate::denoise::blur::{Apart, RADIUS};
 use crate::denoise::input::DenoiseInput;
-use crate::denoise::noise::{Filtered, Noise, squared_bias};
+use crate::denoise::noise::{FilteredNoise, Noise, squared_bias};
 use crate::denoise::parallel::{Stop, each};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -46,7 +46,7 @@ const TILE: usize = 32;
 pub(super) fn error_of(
     input: &DenoiseInput,
     noise: &Noise,
-    filtered: &Filtered,
+    filtered: &FilteredNoise,
     share: &[f32],
     stop: Stop,
 ) -> Option<(f64, [f64; 2])> {
@@ -101,7 +101,7 @@ pub(super) fn error_of(
 /// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its
 /// samples if that is brighter. A single bright sample is in one half only. Relative to a filtered image that blurs
 /// lights, their noise would dominate the error of the whole image.
-fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &Filtered, i: usize) -> Vec3 {
+fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &FilteredNoise, i: usize) -> Vec3 {
     let darker_half = match input.half_steps {
         // The filter has no information about pixels that show a light in part.
         Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.spread(i),

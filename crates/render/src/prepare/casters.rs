@@ -13,7 +13,7 @@ use crate::core::material::Material;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::bodies::Bodies;
-use crate::prepare::delta_lines::{self, DeltaLine, Outside};
+use crate::prepare::delta_lines::{self, DeltaLine, OutsideSample};
 use crate::prepare::guide::Guide;
 use crate::prepare::light::LightTable;
 use crate::prepare::light::emitter::Light;
@@ -46,7 +46,7 @@ pub(crate) struct CasterTable {
     /// Per object: the first of its casters, and whether each of its primitives is a caster.
     by_object: Vec<(u32, bool)>,
     pairs: Pairs,
-    outside: Outside,
+    outside: OutsideSample,
     /// Media that contain each delta light, indexed like all lights; see [`crate::prepare::bodies::Bodies::around`].
     /// Empty if there are none.
     media: Vec<Vec<u32>>,
@@ -123,7 +123,7 @@ impl CasterTable {
             return None;
         }
         let pairs = Pairs::new(&casters, lights)?;
-        let outside = Outside::of(&geometry.tree);
+        let outside = OutsideSample::of(&geometry.tree);
         Some(Self {
             casters,
             by_object,

@@ -14,7 +14,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Obstacles of directional light on its way to a caster.
 #[derive(Debug)]
-pub(crate) struct Outside {
+pub(crate) struct OutsideSample {
     /// Bounding sphere of all finite objects.
     center: Vec3,
     radius: f32,
@@ -37,7 +37,7 @@ pub(crate) struct DeltaLine {
 ///
 /// - `center`, `radius`: bounding sphere of the caster, metres, possibly infinite;
 /// - `u`: two independent uniform numbers in `[0, 1)`.
-pub(crate) fn sample(light: &Light, outside: &Outside, center: Vec3, radius: f32, u: Vec2) -> Option<DeltaLine> {
+pub(crate) fn sample(light: &Light, outside: &OutsideSample, center: Vec3, radius: f32, u: Vec2) -> Option<DeltaLine> {
     match light.shape {
         LightShape::Point { position, cone } => {
             let (mut axis, mut one_minus_cos_max) = (Vec3::Z, 2.0);
@@ -97,7 +97,7 @@ pub(crate) fn coupling(shape: &LightShape, center: Vec3, radius: f32) -> f64 {
     }
 }
 
-impl Outside {
+impl OutsideSample {
     pub fn of(tree: &SceneTree) -> Self {
         let bounds = tree.bounds();
         let (center, radius) = (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).length());

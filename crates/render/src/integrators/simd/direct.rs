@@ -18,7 +18,7 @@ use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select, select_vector};
 
 /// Hits that lights may reach.
-pub(crate) struct LitLanes<'a, S: Simd> {
+pub(crate) struct DirectLanes<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,
     /// Number of segments so far.
@@ -46,7 +46,7 @@ struct LightCandidate<S: Simd> {
     light: Vector<S>,
 }
 
-impl<S: Simd> LitLanes<'_, S> {
+impl<S: Simd> DirectLanes<'_, S> {
     /// Appends shadow rays to points on lights.
     #[inline(always)]
     pub fn add<const KIND: usize>(&self, s: S, sets: &mut MediumSets, shadows: &mut ShadowBatch) {

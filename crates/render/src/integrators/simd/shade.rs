@@ -4,7 +4,7 @@ use crate::core::techniques::Techniques;
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::resampling::{CANDIDATES, is_resampled};
 use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
-use crate::integrators::simd::direct::LitLanes;
+use crate::integrators::simd::direct::DirectLanes;
 use crate::integrators::simd::track::BounceMisStates;
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
@@ -37,7 +37,7 @@ pub(crate) struct KindHits<'a> {
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut ShadowBatch,
-    /// See [`LitLanes::thresholds`].
+    /// See [`DirectLanes::thresholds`].
     pub shadow_thresholds: &'a [f32],
     pub sets: &'a mut MediumSets,
 }
@@ -119,7 +119,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
             if lit != 0 {
                 let (mask, place, surface, hints, media, sampler) = (lit, &place, &surface, &hints, &media, &sampler);
                 let thresholds = shadow_thresholds;
-                LitLanes {
+                DirectLanes {
                     scene,
                     techniques,
                     depth,

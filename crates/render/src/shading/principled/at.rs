@@ -4,7 +4,7 @@ use crate::core::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, Sc
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lookups::Lookups;
-use crate::shading::principled::iridescence::Film;
+use crate::shading::principled::iridescence::ThinFilm;
 use crate::shading::principled::layers::{Inside, Principled, Transmission};
 use crate::shading::sheen;
 use crate::shading::sides::Sides;
@@ -63,7 +63,7 @@ pub(crate) fn principled_at(
     let film_share = share(iridescence);
     let (facing, metal) = if film_share > 0.0 {
         let nanometres = iridescence_min + (iridescence_max - iridescence_min) * share(iridescence_map);
-        let film = Film { share: film_share, ior: *iridescence_ior, thickness: 1e-9 * nanometres };
+        let film = ThinFilm { share: film_share, ior: *iridescence_ior, thickness: 1e-9 * nanometres };
         let cos = vertex.normal.dot(vertex.wo).clamp(0.0, 1.0);
         (film.tint(facing, cos), film.tint(base, cos))
     } else {

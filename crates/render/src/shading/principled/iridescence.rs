@@ -9,7 +9,7 @@ use std::f32::consts::{PI, TAU};
 
 /// A thin film on a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Film {
+pub(super) struct ThinFilm {
     /// Share of the surface with the film, 0..1.
     pub share: f32,
     /// Index of refraction, above 0.
@@ -18,7 +18,7 @@ pub(super) struct Film {
     pub thickness: f32,
 }
 
-impl Film {
+impl ThinFilm {
     /// Returns the reflectance at normal incidence for which Schlick's approximation gives that of the film at this
     /// angle.
     ///
@@ -104,7 +104,7 @@ mod tests {
     /// of wavelengths: red and blue at different thicknesses.
     #[test]
     fn colors_follow_the_path_difference() {
-        let film = |nm: f32| Film { share: 1.0, ior: 1.33, thickness: nm * 1e-9 };
+        let film = |nm: f32| ThinFilm { share: 1.0, ior: 1.33, thickness: nm * 1e-9 };
         let seen = |nm: f32, cos: f32| film(nm).reflectance(Vec3::splat(0.04), cos);
         // Head-on, light of 550 nm in a film of water on glass is bright at half a wavelength, dark at a quarter.
         let (bright, dark) = (seen(550.0 / 1.33 / 2.0, 1.0).y, seen(550.0 / 1.33 / 4.0, 1.0).y);
@@ -123,10 +123,10 @@ mod tests {
         for nm in [0.0, 10.0, 100.0, 300.0, 1000.0] {
             for cos in [0.0, 0.01, 0.3, 0.7, 1.0] {
                 for ior in [1.0, 1.3, 2.0, 0.8] {
-                    let film = Film { share: 1.0, ior, thickness: nm * 1e-9 };
+                    let film = ThinFilm { share: 1.0, ior, thickness: nm * 1e-9 };
                     let tint = film.tint(facing, cos);
                     assert!(tint.is_finite() && tint.min_element() >= 0.0 && tint.max_element() <= 1.0, "{tint}");
-                    assert_eq!(Film { share: 0.0, ..film }.tint(facing, cos), facing);
+                    assert_eq!(ThinFilm { share: 0.0, ..film }.tint(facing, cos), facing);
                 }
             }
         }
