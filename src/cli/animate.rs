@@ -4,7 +4,7 @@ use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
 use crate::cli::frames::FramesArg;
 use crate::cli::job::RenderJob;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::RenderArgs;
 use crate::cli::sequence::{Sequence, SequenceMotion};
 use crate::cli::stop::Stop;
@@ -21,7 +21,7 @@ use std::path::Path;
 pub(super) fn animate(
     args: &RenderArgs,
     mut job: RenderJob,
-    mut progress: ProgressBars,
+    mut progress: RenderProgress,
     sequence: &Sequence,
     stop: &Stop,
 ) -> Result<(), Failure> {

@@ -6,7 +6,7 @@
 use crate::cli::denoising::DenoiserArg;
 use crate::cli::failure::Failure;
 use crate::cli::job::RenderJob;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render::Command;
 use crate::cli::render_args::RenderArgs;
 use firstlight::render::{Denoised, Film, GuideGatherer};
@@ -34,7 +34,7 @@ impl FilmDenoiser {
             Command::parse(&["--denoise".to_owned()])?.render.jobs()?.pop().expect("there is a scene by default");
         args.scene.scene = path.as_os_str().to_owned();
         args.denoise.denoiser = denoiser;
-        let job = RenderJob::new(&args, Some(shot), files, &ProgressBars::new())?;
+        let job = RenderJob::new(&args, Some(shot), files, &RenderProgress::new())?;
         Ok(Self { path: path.to_path_buf(), args, job })
     }
 

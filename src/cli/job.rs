@@ -3,7 +3,7 @@
 use crate::cli::console::{inform, print_bytes, remark, tell};
 use crate::cli::denoising::ImageDenoiser;
 use crate::cli::failure::Failure;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
 use crate::cli::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
@@ -46,7 +46,7 @@ impl RenderJob {
         args: &RenderArgs,
         kept: Option<&ImageMetadata>,
         files: &mut Files,
-        progress: &ProgressBars,
+        progress: &RenderProgress,
     ) -> Result<Self, Failure> {
         let denoiser = ImageDenoiser::of(&args.denoise, args.wants_denoised())?;
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));

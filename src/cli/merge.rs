@@ -11,7 +11,7 @@ use crate::cli::film_denoiser::FilmDenoiser;
 use crate::cli::layers::LayerArgs;
 use crate::cli::number::percent;
 use crate::cli::part::numbered;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::parse_range;
 use crate::cli::stop::Stop;
 use clap::Args;
@@ -129,7 +129,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         true => Some(FilmDenoiser::open(&first, &read_film_summary(&first)?.shot, args.denoiser, &mut files)?),
         false => None,
     };
-    let progress = ProgressBars::new();
+    let progress = RenderProgress::new();
     let told = |done, n| progress.at(done as f64 / n as f64, format!("{done} of {n} films"));
     let FilmFile { film, shot, features, .. } = set.add_up(&told)?;
     drop(progress);

@@ -7,7 +7,7 @@ use crate::cli::animate::animate;
 use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
 use crate::cli::job::RenderJob;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::{PartBy, RenderArgs};
 use crate::cli::sequence::Sequence;
 use crate::cli::stop::Stop;
@@ -56,7 +56,7 @@ fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     let sequence = sequence.part(frames);
     let args = &sequence.opened(args)?;
     let mut files = args.overwrite.files();
-    let progress = ProgressBars::new();
+    let progress = RenderProgress::new();
     let job = load(args, &mut files, &progress)?;
     animate(args, job, progress, &sequence, stop).map_err(Failure::of_part)
 }
@@ -80,7 +80,7 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     }
     let mut files = args.overwrite.files();
     let claim = files.go_on(&path).map_err(|error| Failure::from(error).of_part())?;
-    let progress = ProgressBars::new();
+    let progress = RenderProgress::new();
     let job = load(args, &mut files, &progress)?;
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
@@ -114,7 +114,13 @@ struct PartWork<'a> {
 }
 
 impl PartWork<'_> {
-    fn render(&self, mut film: Film, claim: WholeFile, mut progress: ProgressBars, stop: &Stop) -> Result<(), Failure> {
+    fn render(
+        &self,
+        mut film: Film,
+        claim: WholeFile,
+        mut progress: RenderProgress,
+        stop: &Stop,
+    ) -> Result<(), Failure> {
         let Self { args, job, samples, region, .. } = self;
         let (region, goal) = (region.as_ref(), samples.end - samples.start);
         let target = Target { spp: Some(goal), ..Target::default() };
@@ -231,7 +237,7 @@ pub fn numbered(path: &Path, part: Part) -> PathBuf {
 }
 
 /// Loads the scene; its errors are permanent unless its file is temporarily unreachable.
-fn load(args: &RenderArgs, files: &mut Files, progress: &ProgressBars) -> Result<RenderJob, Failure> {
+fn load(args: &RenderArgs, files: &mut Files, progress: &RenderProgress) -> Result<RenderJob, Failure> {
     RenderJob::new(args, None, files, progress).map_err(|failure| match args.scene.source() {
         Ok(SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path)) => {
             match InputFile::open_within(&path, FileKind::Film, u64::MAX) {

@@ -1,15 +1,15 @@
-//! ProgressBars of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
+//! RenderProgress of rendering: a bar on a terminal, a line every few seconds in a pipe or a log.
 
 use crate::cli::console::Bar;
 use crate::cli::waiting::Waiting;
 
 /// Ends when it is dropped.
-pub struct ProgressBars {
+pub struct RenderProgress {
     bar: Bar,
     lines: Option<Waiting>,
 }
 
-impl ProgressBars {
+impl RenderProgress {
     pub fn new() -> Self {
         Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("loading")) }
     }
@@ -44,7 +44,7 @@ impl ProgressBars {
     }
 }
 
-impl Drop for ProgressBars {
+impl Drop for RenderProgress {
     fn drop(&mut self) {
         self.finish();
     }

@@ -8,7 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::job::{RenderJob, room_to_write};
 use crate::cli::number::{percent, samples_per_pixel};
 use crate::cli::part;
-use crate::cli::progress::ProgressBars;
+use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::{RenderArgs, RenderCommand};
 use crate::cli::sequence::Sequence;
 use crate::cli::stop::Stop;
@@ -132,7 +132,7 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
 
 fn render_sequence(args: &RenderArgs, sequence: &Sequence, files: &mut Files, stop: &Stop) -> Result<(), Failure> {
     let args = &sequence.opened(args)?;
-    let progress = ProgressBars::new();
+    let progress = RenderProgress::new();
     let job = RenderJob::new(args, None, files, &progress)?;
     animate(args, job, progress, sequence, stop)
 }
@@ -174,7 +174,7 @@ fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
 
 /// - `film_file`: file of the film if it is saved; no other process can write it in the meantime.
 fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, stop: &Stop) -> Result<(), Failure> {
-    let mut progress = ProgressBars::new();
+    let mut progress = RenderProgress::new();
     let film_path = film_file.as_ref().map(|file| file.path().to_path_buf());
     let film_path = film_path.as_deref();
     let mut kept = match film_path.filter(|_| args.resume) {

@@ -71,3 +71,23 @@ fn a_line_of_libraries_is_read_up_to_the_limit() {
     let warnings: Vec<String> = scene.warnings.iter().map(|warning| warning.to_string()).collect();
     assert!(warnings.iter().any(|text| text.contains("names more than 256 libraries")), "{warnings:?}");
 }
+
+#[test]
+fn a_long_name_is_cut_and_lists_of_instances_are_compared_before_they_are_read() {
+    const NODES: usize = 2000;
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let many = writer.view(&vec![0; 1_200_000], None);
+    let of =
+        |kind: &str, count: usize| json!({ "bufferView": many, "componentType": 5126, "count": count, "type": kind });
+    let (moves, turns) = (writer.accessor(of("VEC3", 100_000)), writer.accessor(of("VEC4", 3)));
+    let broken = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": moves, "ROTATION": turns } } });
+    let whole = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": turns } } });
+    let mut nodes = vec![json!({ "mesh": 0, "extensions": broken }); NODES];
+    nodes.push(json!({ "mesh": 0, "name": "n".repeat(1_000_000), "extensions": whole }));
+    writer.json["scenes"] = json!([{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }]);
+    writer.json["nodes"] = json!(nodes);
+    let scene = opened(&writer);
+    let names: Vec<usize> = scene.file.objects.iter().filter_map(|object| object.name()).map(str::len).collect();
+    assert!(names.iter().all(|&length| length <= 1100), "{names:?}");
+}

@@ -128,7 +128,12 @@ impl Document {
     /// # Errors
     /// If an element has another number of components, is outside of its buffer, or is not finite.
     pub(crate) fn floats<const N: usize>(&self, index: u32) -> Result<Vec<[f32; N]>, Located> {
-        let values = self.raw_floats(index)?;
+        self.first_floats(index, usize::MAX)
+    }
+
+    /// Like [`Self::floats`], at most so many elements.
+    pub(crate) fn first_floats<const N: usize>(&self, index: u32, most: usize) -> Result<Vec<[f32; N]>, Located> {
+        let values = self.raw_floats_within(index, most)?;
         match values.iter().position(|value| !value.iter().all(|number| number.is_finite())) {
             Some(element) => Err((place("accessors", index), GltfProblem::NotFinite { element: element as u64 })),
             None => Ok(values),
@@ -148,6 +153,10 @@ impl Document {
 
     /// Like [`Self::floats`], but also elements that are not finite, as they are.
     pub(crate) fn raw_floats<const N: usize>(&self, index: u32) -> Result<Vec<[f32; N]>, Located> {
+        self.raw_floats_within(index, usize::MAX)
+    }
+
+    fn raw_floats_within<const N: usize>(&self, index: u32, most: usize) -> Result<Vec<[f32; N]>, Located> {
         let accessor = self.accessor(index)?;
         let here = |problem| (place("accessors", index), problem);
         let found = self.n_components(index)?;
@@ -156,7 +165,7 @@ impl Document {
             return Err(here(GltfProblem::Length { what, found: found as u64, expected: N as u64 }));
         }
         let elements = self.elements(index, accessor)?;
-        let mut values = vec![[0.0; N]; elements.count];
+        let mut values = vec![[0.0; N]; elements.count.min(most)];
         let (component, normalized) = (elements.component, elements.normalized);
         let read = |elements: &Elements, i: usize| -> [f32; N] {
             std::array::from_fn(|k| elements.at(i, k).map_or(0.0, |bytes| component.float(bytes, normalized)))
@@ -168,7 +177,9 @@ impl Document {
         }
         if let Some((places, sparse)) = self.sparse(index, accessor)? {
             for (i, &place) in places.iter().enumerate() {
-                values[place as usize] = read(&sparse, i);
+                if let Some(value) = values.get_mut(place as usize) {
+                    *value = read(&sparse, i);
+                }
             }
         }
         Ok(values)

@@ -18,7 +18,7 @@ use crate::import::gltf::uri::{Uri, resolve};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Extensions that are supported, or that change nothing that is shown.
 pub(crate) const SUPPORTED: &[&str] = &[
@@ -89,6 +89,8 @@ pub struct Document {
     pub(crate) decoded: HashMap<u32, Vec<u8>>,
     /// For each image the first one with the same bytes.
     pub(crate) first_equal_image: Vec<u32>,
+    /// For each material the texture coordinates that its textures use, once something needs them.
+    pub(crate) uv_sets: Vec<OnceLock<[bool; 2]>>,
     /// Total size of the buffers, bytes.
     n_bytes: u64,
     /// The file and the files of its buffers.
@@ -120,8 +122,10 @@ impl Document {
         }
         let binary = found.binary.map(|range| Bytes { data: Arc::new(bytes), range });
         let first_equal_image = first_equal_images(&root);
+        let uv_sets = vec![OnceLock::new(); root.materials.len()];
         let mut document = Self {
             first_equal_image,
+            uv_sets,
             path: path.to_owned(),
             options,
             root,

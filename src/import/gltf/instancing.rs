@@ -18,15 +18,19 @@ impl Document {
             number.map(|number| u32::try_from(number).unwrap_or(u32::MAX))
         };
         let [moves, turns, scales] = ["TRANSLATION", "ROTATION", "SCALE"].map(accessor);
+        // Compared before anything is read: many nodes may share such lists.
+        let declared = [moves, turns, scales].into_iter().flatten();
+        let lengths = declared.map(|index| Ok(self.accessor(index)?.count)).collect::<Result<Vec<_>, Located>>()?;
+        let expected = lengths.first().copied().unwrap_or(0);
+        if let Some(&found) = lengths.iter().find(|&&length| length != expected) {
+            let what = format!("an attribute of {NAME}");
+            return Err((place("nodes", node), GltfProblem::Length { what, found, expected }));
+        }
         let moves = moves.map(|index| self.floats::<3>(index)).transpose()?;
         let turns = turns.map(|index| self.floats::<4>(index)).transpose()?;
         let scales = scales.map(|index| self.floats::<3>(index)).transpose()?;
-        let lengths = [moves.as_ref().map(Vec::len), turns.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
-        let count = lengths.into_iter().flatten().next().unwrap_or(0);
-        if let Some(found) = lengths.into_iter().flatten().find(|&length| length != count) {
-            let (what, found, expected) = (format!("an attribute of {NAME}"), found as u64, count as u64);
-            return Err((place("nodes", node), GltfProblem::Length { what, found, expected }));
-        }
+        let lists = [moves.as_ref().map(Vec::len), turns.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
+        let count = lists.into_iter().flatten().min().unwrap_or(0);
         let three = |list: &Option<Vec<[f32; 3]>>, i: usize, default: DVec3| {
             list.as_ref().map_or(default, |list| DVec3::from(list[i].map(f64::from)))
         };

@@ -10,6 +10,20 @@ use serde_json::{Map, Value};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::{Deref, DerefMut};
 
+/// Characters of a name that are kept: many objects may copy it.
+const MOST_OF_A_NAME: usize = 1024;
+
+/// Reads a name, cut at [`MOST_OF_A_NAME`] characters.
+fn short_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    let name: Option<String> = Deserialize::deserialize(deserializer)?;
+    Ok(name.map(|mut name| {
+        if let Some((end, _)) = name.char_indices().nth(MOST_OF_A_NAME) {
+            name.truncate(end);
+        }
+        name
+    }))
+}
+
 /// Extensions of an object, by name. Whole numbers in them are integers, also where the file has `4.0`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Extensions(Map<String, Value>);
@@ -86,13 +100,13 @@ pub(crate) struct Asset {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Scene {
-    pub name: Option<String>,
     pub nodes: Vec<u32>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Node {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     pub children: Vec<u32>,
     /// Column-major.
@@ -111,6 +125,7 @@ pub(crate) struct Node {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Mesh {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     pub primitives: Vec<Primitive>,
     pub weights: Vec<f64>,
@@ -178,6 +193,7 @@ pub(crate) struct Buffer {
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Material {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     pub pbr_metallic_roughness: Option<Pbr>,
     pub normal_texture: Option<TextureRef>,
@@ -213,7 +229,6 @@ pub(crate) struct TextureRef {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Texture {
-    pub name: Option<String>,
     pub sampler: Option<u32>,
     pub source: Option<u32>,
     pub extensions: Extensions,
@@ -222,6 +237,7 @@ pub(crate) struct Texture {
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Image {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     pub uri: Option<String>,
     pub mime_type: Option<String>,
@@ -239,6 +255,7 @@ pub(crate) struct Sampler {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Camera {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     #[serde(rename = "type")]
     pub kind: String,
@@ -270,6 +287,7 @@ pub(crate) struct Skin {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Animation {
+    #[serde(default, deserialize_with = "short_name")]
     pub name: Option<String>,
     pub channels: Vec<Channel>,
     pub samplers: Vec<AnimationSampler>,

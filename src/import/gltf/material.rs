@@ -306,9 +306,11 @@ impl Document {
 
     /// Whether the textures of a material use the first and the second texture coordinates.
     pub(crate) fn uv_sets(&self, index: Option<u32>) -> [bool; 2] {
-        if index.and_then(|index| self.root.materials.get(index as usize)).is_none() {
-            return [false; 2];
-        }
+        let known = index.and_then(|index| self.uv_sets.get(index as usize));
+        known.map_or([false; 2], |known| *known.get_or_init(|| self.uv_sets_of(index)))
+    }
+
+    fn uv_sets_of(&self, index: Option<u32>) -> [bool; 2] {
         let material = self.material(index);
         let textures = [
             &material.base_color_texture,

@@ -44,7 +44,7 @@ impl Document {
         let json = self.root.skins.get(skin as usize);
         let json = json.ok_or_else(|| here(GltfProblem::Index { list: "skins", index: skin, count }))?;
         let inverse = match json.inverse_bind_matrices {
-            Some(accessor) => self.floats::<16>(accessor)?,
+            Some(accessor) => self.first_floats::<16>(accessor, json.joints.len())?,
             None => Vec::new(),
         };
         if json.inverse_bind_matrices.is_some() && inverse.len() < json.joints.len() {

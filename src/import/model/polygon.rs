@@ -37,6 +37,8 @@ pub(crate) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
         return fan(&all, triangles);
     }
     let mut ring = all;
+    // The next ear is most often near the last one.
+    let mut first = 0;
     while ring.len() > 3 {
         let n = ring.len();
         let at = |i: usize| ring[i % n];
@@ -48,9 +50,10 @@ pub(crate) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
                     apart && turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0
                 })
         };
-        let Some(ear) = (0..n).find(is_ear) else { break };
+        let Some(ear) = (first..n).chain(0..first.min(n)).find(is_ear) else { break };
         triangles.push([at(ear + n - 1), at(ear), at(ear + 1)]);
         ring.remove(ear);
+        first = ear.saturating_sub(1);
     }
     fan(&ring, triangles);
 }
