@@ -27,7 +27,7 @@
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | the world: components, loading, saving, animation, extraction of the snapshot |
 //! | [`import`] | OBJ, PLY, STL and glTF as meshes and parts of a scene file |
-//! | [`format`] | the scene file: values, checks and their limits, placements, lights, keys |
+//! | [`format`](mod@format) | the scene file: values, checks and their limits, placements, lights, keys |
 //! | [`files`], `console` (feature `cli`) | bounded reading, whole-file writing, escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |

@@ -1,7 +1,7 @@
 //! Models of other programs: OBJ, PLY, STL and glTF, as meshes and as parts of a scene file.
 //!
 //! A reader ([`obj`], [`ply`], [`stl`], [`gltf`]) returns an [`ImportedModel`] or an error with its location in the
-//! file; [`model`] has what the readers share. Knows no world. Start reading at [`load_model`].
+//! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`].
 
 pub(crate) mod documents;
 pub(crate) mod error;

@@ -43,8 +43,8 @@ pub struct LoadOptions<'a> {
     pub aspect: Option<f64>,
     /// Camera, time and variant of a glTF model.
     pub choice: Option<&'a ModelChoice>,
-    /// Whether large meshes first get trees that are faster to build ([`crate::scene::world::trees::Trees::hasty`]), for a quick
-    /// first image.
+    /// Whether large meshes first get trees that are faster to build, for a quick first image; see
+    /// [`Trees::preview`](crate::scene::Trees::preview).
     pub preview: bool,
     /// The previous state of the scene: files that have not changed on disk are not read again.
     pub known: Option<&'a LoadedScene>,

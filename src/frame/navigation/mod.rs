@@ -24,7 +24,7 @@ pub struct Surroundings {
     pub center: DVec3,
     /// Radius of that sphere, metres; 0 if nothing is finite.
     pub radius: f64,
-    /// The view of [`Command::Home`].
+    /// The view of [`Command::Home`](crate::frame::Command::Home).
     pub home: Rig,
     /// Width of the image over its height.
     pub aspect: f64,

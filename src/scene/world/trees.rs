@@ -40,7 +40,7 @@ impl Trees {
     }
 
     /// Like [`Self::add`], but for a quick first image: the tree of a large mesh is built several times as fast and
-    /// gives the same hits with slower traversal. [`Self::hasty`] lists such meshes.
+    /// gives the same hits with slower traversal. [`Self::preview`] lists such meshes.
     ///
     /// # Errors
     /// Like [`Self::add`].
