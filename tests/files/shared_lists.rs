@@ -85,9 +85,14 @@ fn a_long_name_is_cut_and_lists_of_instances_are_compared_before_they_are_read()
     let whole = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": turns } } });
     let mut nodes = vec![json!({ "mesh": 0, "extensions": broken }); NODES];
     nodes.push(json!({ "mesh": 0, "name": "n".repeat(1_000_000), "extensions": whole }));
+    let light = json!({ "name": "l".repeat(1_000_000), "type": "point" });
+    writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [light] } });
+    nodes.push(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
     writer.json["scenes"] = json!([{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }]);
     writer.json["nodes"] = json!(nodes);
     let scene = opened(&writer);
+    let names: Vec<usize> = scene.file.lights.iter().filter_map(|light| light.name()).map(str::len).collect();
+    assert_eq!(names, [1024]);
     let names: Vec<usize> = scene.file.objects.iter().filter_map(|object| object.name()).map(str::len).collect();
     assert!(names.iter().all(|&length| length <= 1100), "{names:?}");
 }

@@ -16,12 +16,12 @@ const MOST_OF_A_NAME: usize = 1024;
 /// Reads a name, cut at [`MOST_OF_A_NAME`] characters.
 fn short_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
     let name: Option<String> = Deserialize::deserialize(deserializer)?;
-    Ok(name.map(|mut name| {
-        if let Some((end, _)) = name.char_indices().nth(MOST_OF_A_NAME) {
-            name.truncate(end);
-        }
-        name
-    }))
+    Ok(name.map(|name| shortened(&name).to_owned()))
+}
+
+/// The first [`MOST_OF_A_NAME`] characters of a name.
+pub(crate) fn shortened(name: &str) -> &str {
+    name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
 }
 
 /// Extensions of an object, by name. Whole numbers in them are integers, also where the file has `4.0`.

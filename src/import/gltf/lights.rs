@@ -4,6 +4,7 @@
 
 use crate::import::error::gltf::{GltfProblem, Located, place};
 use crate::import::gltf::document::Document;
+use crate::import::gltf::json::shortened;
 use glam::Vec3;
 use serde_json::Value;
 
@@ -68,7 +69,8 @@ impl Document {
                 return Err((at(), GltfProblem::Value { what, found, expected: "point, spot or directional" }));
             }
         };
-        let name = light.get("name").and_then(Value::as_str).filter(|name| !name.is_empty()).map(str::to_owned);
+        let name = light.get("name").and_then(Value::as_str).filter(|name| !name.is_empty());
+        let name = name.map(|name| shortened(name).to_owned());
         let intensity = color * number(light, "intensity", 1.0).max(0.0) as f32;
         if !intensity.is_finite() {
             let (what, found) = ("intensity", intensity.to_string());
