@@ -2,6 +2,7 @@
 //! for each part, these files take minutes.
 
 use super::gltf_writer::{Writer, quad};
+use firstlight::scene::file::ObjectPart;
 use firstlight::scene::{LoadOptions, LoadedScene, ModelChoice, SceneSource, load};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -45,7 +46,8 @@ fn keys_that_many_channels_share_are_read_once() {
     writer.json["scenes"] = json!([{ "nodes": [0] }]);
     writer.json["animations"] =
         json!([{ "samplers": vec![json!({ "input": times, "output": values }); CHANNELS], "channels": channels }]);
-    opened(&writer);
+    let facts = opened(&writer).facts.unwrap();
+    assert_eq!(facts.animation_length, Some(0.0), "all keys are at 0");
 }
 
 #[test]
@@ -57,7 +59,9 @@ fn a_skin_that_many_nodes_use_is_posed_once() {
     writer.json["skins"] = json!([{ "joints": vec![0; JOINTS] }]);
     writer.json["nodes"] = json!(vec![json!({ "mesh": 0, "skin": 0 }); NODES]);
     writer.json["scenes"] = json!([{ "nodes": (0..NODES).collect::<Vec<_>>() }]);
-    opened(&writer);
+    let scene = opened(&writer);
+    let meshes = scene.file.objects.iter().filter(|object| matches!(object, ObjectPart::Mesh { .. })).count();
+    assert_eq!(meshes, NODES);
 }
 
 #[test]
@@ -84,7 +88,7 @@ fn a_long_name_is_cut_and_lists_of_instances_are_compared_before_they_are_read()
     let broken = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": moves, "ROTATION": turns } } });
     let whole = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": turns } } });
     let mut nodes = vec![json!({ "mesh": 0, "extensions": broken }); NODES];
-    nodes.push(json!({ "mesh": 0, "name": "n".repeat(1_000_000), "extensions": whole }));
+    nodes.push(json!({ "mesh": 0, "name": "n".repeat(1_000_000), "translation": [5, 0, 0], "extensions": whole }));
     let light = json!({ "name": "l".repeat(1_000_000), "type": "point" });
     writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [light] } });
     nodes.push(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
@@ -94,5 +98,6 @@ fn a_long_name_is_cut_and_lists_of_instances_are_compared_before_they_are_read()
     let names: Vec<usize> = scene.file.lights.iter().filter_map(|light| light.name()).map(str::len).collect();
     assert_eq!(names, [1024]);
     let names: Vec<usize> = scene.file.objects.iter().filter_map(|object| object.name()).map(str::len).collect();
+    assert!(names.iter().any(|&length| length >= 1024), "the mesh with the long name is there: {names:?}");
     assert!(names.iter().all(|&length| length <= 1100), "{names:?}");
 }

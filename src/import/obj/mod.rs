@@ -27,7 +27,7 @@ use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Further `mtllib` lines are ignored.
+/// Further names in `mtllib` lines are ignored, with a warning.
 const MAX_LIBRARIES: usize = 256;
 
 /// [`load_obj_with`] with the default options.

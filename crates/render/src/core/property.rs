@@ -120,7 +120,7 @@ impl Domain {
         }
     }
 
-    /// The range of a slider, in the unit that it shows; values beyond it can be typed. `None` for what is no number.
+    /// The range of a slider, in the unit that it shows, within which the window sets it. `None` for what is no number.
     pub fn slider(self) -> Option<RangeInclusive<f64>> {
         match self {
             Self::Share => Some(0.0..=1.0),
