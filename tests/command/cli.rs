@@ -316,3 +316,14 @@ fn the_cases_of_stability_are_listed_for_machines_too() {
     let listed: Vec<&str> = text.lines().map(|line| line.split(' ').next().unwrap()).collect();
     assert!(code == Some(0) && names.len() > 10 && names == listed, "{names:?} {listed:?}");
 }
+
+#[test]
+fn info_lists_the_materials_with_what_differs_from_their_defaults() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = firstlight(folder.path(), &["info", "cornell", "--materials"]);
+    let rows: Vec<&str> = text.lines().filter(|line| line.trim_start().starts_with("material ")).collect();
+    assert!(rows.iter().any(|row| row.contains("`red`: diffuse, albedo (0.63")), "{text}");
+    let json = firstlight(folder.path(), &["info", "cornell", "--materials", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["material_list"].as_array().unwrap().len(), rows.len(), "{json}");
+}
