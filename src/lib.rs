@@ -35,7 +35,9 @@
 
 pub use bevy_ecs;
 pub use embed::{Error, Image, RenderOptions, Scene};
-pub use files::printable;
+pub use firstlight_files::{self as files, printable};
+pub use firstlight_format as format;
+pub use firstlight_import as import;
 pub use firstlight_kdtree::{self as kdtree, geometry};
 pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
@@ -50,10 +52,7 @@ pub mod cluster;
 #[allow(missing_docs)]
 pub mod console;
 pub mod embed;
-pub mod files;
-pub mod format;
 pub mod frame;
-pub mod import;
 pub mod prelude;
 // Hidden like `console`.
 #[cfg(feature = "cli")]

@@ -123,10 +123,9 @@ impl SceneReport<'_> {
         let pictures = scene.picture_bytes() as f64 / f64::from(1 << 20);
         let pictures = if pictures > 0.0 { format!(", images {pictures:.1} MiB") } else { String::new() };
         row("textures", format!("{}{pictures}", shading.textures.len()));
-        let [points, spots, directional] = self.lights();
-        let mut lights = format!("{}, {}", counted(self.emitters(), "emissive object"), counted(points, "point light"));
-        for (n, kind) in [(spots, "spot light"), (directional, "directional light")] {
-            if n > 0 {
+        let mut lights = counted(self.emitters(), "emissive object");
+        for (i, (n, kind)) in self.lights().into_iter().enumerate() {
+            if n > 0 || i == 0 {
                 lights += &format!(", {}", counted(n, kind));
             }
         }
@@ -186,7 +185,7 @@ impl SceneReport<'_> {
         let shading = &extraction.prepared.shading;
         let lens = self.lens();
         let [meshes, trees, film_bytes] = self.bytes();
-        serde_json::json!({
+        let mut json = serde_json::json!({
             "scene": scene.source.title(),
             "denoised": scene.shot.as_ref().and_then(|shot| shot.denoised.as_deref()),
             "fingerprint": scene.fingerprint().to_string(),
@@ -196,9 +195,6 @@ impl SceneReport<'_> {
             "materials": self.materials(),
             "textures": shading.textures.len(),
             "emissive_objects": self.emitters(),
-            "point_lights": self.lights()[0],
-            "spot_lights": self.lights()[1],
-            "directional_lights": self.lights()[2],
             "environment": environment(&shading.environment),
             "lens_radius": if lens.enabled { lens.radius } else { 0.0 },
             "width": film.width,
@@ -217,7 +213,11 @@ impl SceneReport<'_> {
             "warnings": texts_of(&scene.warnings, Severity::Warning),
             "notices": texts_of(&scene.warnings, Severity::Notice),
             "problems": extraction.problems,
-        })
+        });
+        for (n, kind) in self.lights() {
+            json[kind.replace(' ', "_") + "s"] = n.into();
+        }
+        json
     }
 
     /// Unsupported features of the scene's files, one text each.
@@ -251,17 +251,10 @@ impl SceneReport<'_> {
         self.inputs.objects.iter().filter(glows).count()
     }
 
-    /// Numbers of point, spot and directional lights.
-    fn lights(&self) -> [usize; 3] {
-        let mut counts = [0; 3];
-        for light in &self.inputs.lights {
-            counts[match light.light {
-                LightKind::Point(_) => 0,
-                LightKind::Spot(_) => 1,
-                LightKind::Directional(_) => 2,
-            }] += 1;
-        }
-        counts
+    /// The number of lights of each kind.
+    fn lights(&self) -> [(usize, &'static str); LightKind::NAMES.len()] {
+        LightKind::NAMES
+            .map(|kind| (self.inputs.lights.iter().filter(|light| light.light.name() == kind).count(), kind))
     }
 
     fn lens(&self) -> Lens {

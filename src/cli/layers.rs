@@ -2,6 +2,7 @@
 
 use crate::cli::console::remark;
 use crate::cli::failure::Failure;
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use firstlight::frame::{FeatureLayers, PictureLayer};
 use firstlight::render::Film;
@@ -16,51 +17,34 @@ pub struct LayerArgs {
     layers: Vec<LayerArg>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LayerArg {
-    /// All of these.
-    All,
-    /// Colour without light, seen through mirrors and glass.
-    Albedo,
-    /// Shading normal in world space.
-    Normal,
-    /// Metres along the view axis.
-    Depth,
-    /// Metres in world space.
-    Position,
-    /// Share of samples that see a surface.
-    Coverage,
-    /// Cryptomatte of objects.
-    Object,
-    /// Cryptomatte of materials.
-    Material,
-    /// Variance of albedo, normal, depth and position, of those that are given.
-    Variance,
-    /// Number of samples of each pixel.
-    Samples,
-    /// Estimated relative error of each pixel: 0.05 is 5 %.
-    Error,
-    /// Light without most of its noise: raw and filtered combined.
-    Denoised,
+/// One layer, or all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayerArg(Option<PictureLayer>);
+
+impl ValueEnum for LayerArg {
+    fn value_variants<'a>() -> &'a [Self] {
+        const VARIANTS: [LayerArg; PictureLayer::ALL.len() + 1] = {
+            let mut variants = [LayerArg(None); PictureLayer::ALL.len() + 1];
+            let mut i = 0;
+            while i < PictureLayer::ALL.len() {
+                variants[i + 1] = LayerArg(Some(PictureLayer::ALL[i]));
+                i += 1;
+            }
+            variants
+        };
+        &VARIANTS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = self.0.map_or(("all", "All of these"), |layer| (layer.name(), layer.help()));
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 impl LayerArg {
     /// The layers of this name.
-    fn layers(self) -> Vec<PictureLayer> {
-        vec![match self {
-            Self::All => return PictureLayer::ALL.to_vec(),
-            Self::Albedo => PictureLayer::Albedo,
-            Self::Normal => PictureLayer::Normal,
-            Self::Depth => PictureLayer::Depth,
-            Self::Position => PictureLayer::Position,
-            Self::Coverage => PictureLayer::Coverage,
-            Self::Object => PictureLayer::Object,
-            Self::Material => PictureLayer::Material,
-            Self::Variance => PictureLayer::Variance,
-            Self::Samples => PictureLayer::Samples,
-            Self::Error => PictureLayer::Error,
-            Self::Denoised => PictureLayer::Denoised,
-        }]
+    fn layers(&self) -> &[PictureLayer] {
+        self.0.as_ref().map_or(&PictureLayer::ALL, std::slice::from_ref)
     }
 }
 
@@ -68,7 +52,7 @@ impl LayerArgs {
     /// Turns `--denoise` into the layer `denoised`, if there are layers: the light of an image with layers stays raw.
     pub fn denoise(&mut self, denoise: &mut bool) {
         if !self.is_empty() && std::mem::take(denoise) {
-            self.layers.push(LayerArg::Denoised);
+            self.layers.push(LayerArg(Some(PictureLayer::Denoised)));
         }
     }
 
@@ -80,7 +64,7 @@ impl LayerArgs {
     /// All that are requested, in the order of the first mention.
     fn wanted(&self) -> Vec<PictureLayer> {
         let mut wanted = Vec::new();
-        for layer in self.layers.iter().flat_map(|name| name.layers()) {
+        for &layer in self.layers.iter().flat_map(LayerArg::layers) {
             if !wanted.contains(&layer) {
                 wanted.push(layer);
             }

@@ -1,7 +1,9 @@
 //! What a model gets that is opened by itself: a camera that frames it, ground, environment, key light.
 
-use crate::format::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart, SceneFile, TransformPart};
-use crate::format::source::UpAxis;
+use crate::format::bounds;
+use crate::format::choice::UpAxis;
+use crate::format::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart, TransformPart};
+use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
 use crate::format::value::Named;
 use crate::format::value::{ColorValue, Rgb};
@@ -54,13 +56,13 @@ fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
 
 /// The nearest point that a scene file may have: models may be larger.
 fn within(point: DVec3) -> DVec3 {
-    point.clamp(DVec3::splat(-SceneFile::MAX_COORDINATE), DVec3::splat(SceneFile::MAX_COORDINATE))
+    point.clamp(DVec3::splat(-bounds::MAX_COORDINATE), DVec3::splat(bounds::MAX_COORDINATE))
 }
 
 /// - `side`: signs of the direction of the front.
 fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> ObjectPart {
     let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).clamp(SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
+    let radius = (0.5 * (max - min).length()).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE);
     ObjectPart::Sphere {
         name: Some(KEY_LIGHT.to_owned()),
         center: within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()),

@@ -10,10 +10,9 @@ use crate::format::camera::camera_part;
 use crate::format::film_size::FilmSize;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::names::Names;
-use crate::format::parts::{
-    DisplayPart, FilmPart, InFile, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart,
-};
+use crate::format::parts::{DisplayPart, FilmPart, InFile, MaterialPart, ObjectPart, RadiiPart, TransformPart};
 use crate::format::placement::Placement;
+use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::format::units::radians;
 use crate::format::value::Named;

@@ -3,9 +3,9 @@
 //! Placements are `f64`; the snapshot is `f32` relative to an [`origin`](Extraction::origin) near the camera. Each part
 //! is rebuilt on its own ([`SnapshotPart`]), and the kd-trees of meshes and groups of spheres are cached ([`Trees`]).
 
+use crate::format::camera::render_camera;
 use crate::format::light::LightKind;
 use crate::format::placement::Placement;
-use crate::format::units::radians;
 use crate::format::view::{Lens, Projection, View};
 use crate::kdtree::{self};
 use crate::mesh::Mesh;
@@ -228,18 +228,7 @@ fn camera_of(inputs: &SceneInputs) -> CameraInput {
 }
 
 fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: DVec3) -> Camera {
-    Camera {
-        eye: (view.eye - origin).as_vec3(),
-        right: view.forward.cross(view.up).as_vec3(),
-        up: view.up.as_vec3(),
-        forward: view.forward.as_vec3(),
-        tan_half_vfov: (0.5 * projection.vfov_deg).to_radians().tan() as f32,
-        orthographic: projection.orthographic_height.map(|height| (0.5 * height) as f32),
-        lens_radius: if lens.enabled { lens.radius as f32 } else { 0.0 },
-        focus_distance: lens.focus_distance as f32,
-        blades: lens.blades,
-        blade_rotation: radians(lens.blade_rotation_deg),
-    }
+    render_camera(view, projection, lens, origin)
 }
 
 /// The shape for the kd-tree, relative to `origin`, or why it is invalid.

@@ -2,7 +2,8 @@
 
 use crate::files::hash::Fingerprint;
 use crate::format::camera::CameraPart;
-use crate::format::parts::{DisplayPart, FilmPart, ObjectPart, SceneFile};
+use crate::format::parts::{DisplayPart, FilmPart, ObjectPart};
+use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::mesh::Mesh;
 use crate::render::{Environment, ImageTexture, Integrator, Texels, TexturePattern};
@@ -139,7 +140,7 @@ impl SceneContent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::source::SceneSource;
+    use crate::scene::SceneSource;
     use crate::scene::load;
     use crate::scene::load::LoadOptions;
 

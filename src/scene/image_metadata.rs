@@ -12,9 +12,12 @@ use crate::files::write_error::WriteError;
 use crate::format::bounds::{check_film_size, check_max_depth};
 use crate::format::camera::CameraPart;
 use crate::format::camera::camera;
-use crate::format::parts::{DisplayPart, FilmPart, SceneFile};
-use crate::format::source::{SceneSource, UpAxis};
+use crate::format::choice::UpAxis;
+use crate::format::parts::{DisplayPart, FilmPart};
+use crate::format::scene_file::SceneFile;
 use crate::render::{Film, Integrator, SampleAllocation};
+use crate::scene::animation::edited::show_camera;
+use crate::scene::source::SceneSource;
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
@@ -300,7 +303,7 @@ impl ImageMetadata {
     /// Sets camera, film, integrator, depth and display of a scene file to those of the image. Its camera is the one that
     /// was rendered, whatever the tracks of the scene say.
     pub fn apply(&self, file: &mut SceneFile) {
-        file.show_camera(self.camera.clone());
+        show_camera(file, self.camera.clone());
         file.film = self.film;
         file.integrator = self.integrator;
         file.max_depth = self.max_depth;

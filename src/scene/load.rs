@@ -6,14 +6,14 @@ use crate::files::stamp::{Stamp, stamp};
 use crate::files::warnings::Warnings;
 use crate::format::animation::TrackPart;
 use crate::format::bounds::{check_moment, check_shutter_share};
-use crate::format::builtin::{BUILTIN_SCENES, builtin_text};
 use crate::format::choice::ModelChoice;
+use crate::format::choice::UpAxis;
 use crate::format::error::{Problem, SceneError, suggestion};
 use crate::format::locate;
 use crate::format::material_textures::{emits, without_lost_textures};
 use crate::format::model_format::ModelFormat;
-use crate::format::parts::{ObjectPart, RadiiPart, SceneFile, ball_grid};
-use crate::format::source::{SceneSource, UpAxis};
+use crate::format::parts::{ObjectPart, RadiiPart, ball_grid};
+use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::format::value::Rgb;
 use crate::import::documents::Documents;
@@ -21,10 +21,13 @@ use crate::import::gltf::images::part_of_model;
 use crate::import::gltf_scene;
 use crate::import::meshes::{LoadedMesh, load_mesh};
 use crate::render::ImageTexture;
+use crate::scene::animation::edited::show_time;
+use crate::scene::builtin::{BUILTIN_SCENES, builtin_text};
 use crate::scene::default_scene;
 use crate::scene::image_metadata::{ImageMetadata, MetadataError};
 use crate::scene::loaded::LoadedScene;
 use crate::scene::model_light::{Model, light_as_in, light_model};
+use crate::scene::source::SceneSource;
 use crate::scene::world::components::{Balls, Shape};
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -402,7 +405,7 @@ impl LoadedScene {
                 if let Some(ignored) = gltf_scene::beyond_animation(at.max(0.0), Some(end)) {
                     self.warnings.push(format!("{}: {ignored}", self.source.title()));
                 }
-                self.file.show_moment(at);
+                show_time(&mut self.file, at);
             }
             None => {}
         }

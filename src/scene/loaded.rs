@@ -3,13 +3,14 @@
 use crate::files::stamp::Stamp;
 use crate::files::warnings::Warnings;
 use crate::format::choice::ModelChoice;
-use crate::format::parts::SceneFile;
-use crate::format::source::{SceneSource, UpAxis};
+use crate::format::choice::UpAxis;
+use crate::format::scene_file::SceneFile;
 use crate::import::gltf::facts::GltfFacts;
 use crate::import::gltf_motion::GltfMotion;
 use crate::import::meshes::LoadedMesh;
 use crate::render::ImageTexture;
 use crate::scene::image_metadata::ImageMetadata;
+use crate::scene::source::SceneSource;
 use crate::scene::world::components::Balls;
 use crate::scene::world::trees::Trees;
 use std::collections::HashMap;

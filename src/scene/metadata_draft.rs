@@ -2,13 +2,16 @@
 
 use crate::files::hash::Fingerprint;
 use crate::files::relative::{absolute, relative_path};
-use crate::format::parts::{DisplayPart, FilmPart, SceneFile};
-use crate::format::source::{SceneSource, UpAxis};
+use crate::format::choice::UpAxis;
+use crate::format::parts::{DisplayPart, FilmPart};
+use crate::format::scene_file::SceneFile;
 use crate::render::SampleAllocation;
+use crate::scene::animation::edited::shown_camera;
 use crate::scene::describe::Description;
 use crate::scene::fingerprint::SceneContent;
 use crate::scene::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
 use crate::scene::loaded::LoadedScene;
+use crate::scene::source::SceneSource;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -93,7 +96,7 @@ impl MetadataDraft {
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
             fingerprint: content.to_string(),
-            camera: file.shown_camera().clone(),
+            camera: shown_camera(file).clone(),
             film,
             integrator: file.integrator,
             max_depth: file.max_depth,

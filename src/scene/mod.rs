@@ -5,6 +5,7 @@
 //! (entities) → [`Extraction`] (a [`crate::render::Prepared`] relative to an origin near the camera).
 
 pub mod animation;
+mod builtin;
 mod default_scene;
 mod describe;
 mod extract;
@@ -18,6 +19,7 @@ mod model_light;
 mod open_shutter;
 mod read_files;
 mod save;
+mod source;
 mod spawn;
 mod texture_names;
 mod unpacked_files;
@@ -39,16 +41,14 @@ pub use crate::files::warnings::{Severity, Warning, Warnings};
 pub use crate::files::write_error::WriteError;
 pub use crate::format::bad_value::BadValue;
 pub use crate::format::bounds::{check_film_size, check_fps, check_max_depth, check_stops};
-pub use crate::format::builtin::{BUILTIN_SCENES, builtin_text};
 pub use crate::format::camera::camera_part;
-pub use crate::format::choice::ModelChoice;
+pub use crate::format::choice::{ModelChoice, UpAxis};
 pub use crate::format::error::{Problem, SceneError, suggestion};
 pub use crate::format::film_size::FilmSize;
 pub use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
 pub use crate::format::material_property::MaterialProperty;
 pub use crate::format::paths::each_path;
 pub use crate::format::placement::{Linear, Placement};
-pub use crate::format::source::{SceneSource, UpAxis};
 pub use crate::format::sources::{
     BUILTIN_NAMES as BUILTIN_MESHES, EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource,
 };
@@ -63,12 +63,13 @@ pub use crate::scene::world::components::{
     ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 pub use crate::scene::world::extent::{Extent, ExtentCache};
-pub use crate::scene::world::inputs::{
-    CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries, WithLight,
-};
+pub use crate::scene::world::inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use crate::scene::world::inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
+pub use crate::scene::world::lights::{WithLight, light_of, put_light};
+pub use crate::scene::world::material_value::material_value;
 pub use crate::scene::world::trees::Trees;
 pub use animation::{Animation, Moment, camera_follows, show_moment};
+pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use describe::Description;
 pub use extract::{Extraction, SnapshotPart, origin_for};
 pub use fingerprint::SceneContent;
@@ -78,4 +79,5 @@ pub use loaded::LoadedScene;
 pub use metadata_draft::MetadataDraft;
 pub use read_files::ReadFiles;
 pub use save::{SavedScene, save_scene};
+pub use source::SceneSource;
 pub(crate) use spawn::texture_of;

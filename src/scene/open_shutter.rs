@@ -59,7 +59,7 @@ impl Extraction {
 mod tests {
     use super::*;
     use crate::format::placement::Placement;
-    use crate::format::source::SceneSource;
+    use crate::scene::SceneSource;
     use crate::scene::animation::Shutter;
     use crate::scene::animation::moment::show_moment;
     use crate::scene::load;

@@ -14,6 +14,7 @@ use crate::format::view::View;
 use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
 use crate::scene::animation::Animation;
 use crate::scene::animation::edited::Edited;
+use crate::scene::animation::edited::shown_camera;
 use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::moment::{Moment, show_first};
 use crate::scene::animation::written::{Entities, of_part};
@@ -22,7 +23,7 @@ use crate::scene::world::components::{
     ColorParam, DisplaySettings, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam, SceneEnvironment,
     Shape, SurfaceMaterial, SurfaceTexture,
 };
-use crate::scene::world::inputs::WithLight;
+use crate::scene::world::lights::{WithLight, put_light};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
@@ -102,11 +103,11 @@ impl LoadedScene {
                 entity.insert(Name::new(name.to_owned()));
             }
             let entity = entity.id();
-            LightKind::put(Some(light), world, entity);
+            put_light(world, entity, light);
             entities.lights.extend(part.name().map(|name| (name, entity)));
             entities.all_lights.push(entity);
         }
-        let (view, projection, lens) = camera(self.file.shown_camera());
+        let (view, projection, lens) = camera(shown_camera(&self.file));
         world.spawn((view, projection, lens, Name::new("camera"), next()));
         self.insert_resources(world);
         self.animate(world, &entities);

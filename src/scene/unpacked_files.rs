@@ -6,8 +6,8 @@ use crate::files::input_file::{FileKind, InputFile};
 use crate::files::relative::{absolute, path_to_text, text_to_path};
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::files::write_error::WriteError;
-use crate::format::parts::SceneFile;
 use crate::format::paths::each_path;
+use crate::format::scene_file::SceneFile;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 

@@ -75,8 +75,8 @@ fn a_moment_has_the_values_of_its_tracks() {
     // Two turns in four seconds: one by now.
     let ring = world.get::<Placement>(ring).unwrap().to_part();
     assert_eq!((ring.rotate, ring.scale.unwrap().0), (Some(DVec3::new(0.0, 360.0, 0.0)), DVec3::new(0.75, 0.5, 0.5)));
-    assert_eq!(LightKind::of(&world, lamp).unwrap().strength(), Vec3::new(30.0, 20.0, 10.0));
-    let Some(LightKind::Spot(spot)) = LightKind::of(&world, spot) else { panic!() };
+    assert_eq!(firstlight::scene::light_of(&world, lamp).unwrap().strength(), Vec3::new(30.0, 20.0, 10.0));
+    let Some(LightKind::Spot(spot)) = firstlight::scene::light_of(&world, spot) else { panic!() };
     assert_eq!((spot.inner_angle_deg, spot.outer_angle_deg), (50.0, 60.0));
     let material = SurfaceMaterial::of(&world, red).unwrap();
     assert_eq!(format!("{material:?}"), "Diffuse { albedo: Rgb(Vec3(0.4, 0.4, 0.4)) }");

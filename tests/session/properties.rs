@@ -95,7 +95,7 @@ fn every_property_is_edited_and_undone() {
             materials.iter().find(|material| material.name.as_deref() == Some("m")).unwrap().clone()
         };
         let before = material(&driver);
-        let value = match (property.value, name.get(&before.material)) {
+        let value = match (property.value, firstlight::scene::material_value(name, &before.material)) {
             (ValueType::Flag | ValueType::Fresnel, Some(old)) => 1.0 - old.x,
             _ => 0.875,
         };
@@ -103,7 +103,11 @@ fn every_property_is_edited_and_undone() {
         let (id, property) = (before.entity.to_bits(), EditProperty::Material(name));
         driver.session.send(Command::Edit(Edit::Set { id, property, value: DVec3::splat(value) }));
         driver.frame();
-        assert_eq!(name.get(&material(&driver).material), Some(DVec3::splat(value)), "{about}");
+        assert_eq!(
+            firstlight::scene::material_value(name, &material(&driver).material),
+            Some(DVec3::splat(value)),
+            "{about}"
+        );
         driver.session.send(Command::Edit(Edit::Undo));
         driver.frame();
         assert_eq!(material(&driver), before, "{about}");

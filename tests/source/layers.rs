@@ -18,10 +18,11 @@ const INTEGRATORS: &str = "crates/render/src/integrators";
 const FILM: &str = "crates/render/src/film";
 const DENOISE: &str = "crates/render/src/denoise";
 const DRIVER: &str = "crates/render/src/driver";
-const FILES: &str = "src/files";
+const RENDER: &str = "crates/render/src";
+const FILES: &str = "crates/files/src";
 const CONSOLE: &str = "src/console";
-const FORMAT: &str = "src/format";
-const IMPORT: &str = "src/import";
+const FORMAT: &str = "crates/format/src";
+const IMPORT: &str = "crates/import/src";
 const SCENE: &str = "src/scene";
 const FRAME: &str = "src/frame";
 const EMBED: &str = "src/embed";
@@ -43,11 +44,11 @@ const LAYERS: [(&str, &[&str]); 27] = [
     (DENOISE, &[SIMD, SAMPLING, FILM]),
     (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM, DENOISE]),
     // `lib.rs`, which shows what the folders have.
-    ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),
+    (RENDER, &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),
     (FILES, &[]),
+    (FORMAT, &[FILES, RENDER]),
+    (IMPORT, &[FILES, FORMAT, RENDER, MESH, KDTREE, GEOMETRY]),
     (CONSOLE, &[FILES]),
-    (FORMAT, &[FILES]),
-    (IMPORT, &[FILES, FORMAT]),
     (SCENE, &[FILES, CONSOLE, FORMAT, IMPORT]),
     (FRAME, &[FILES, CONSOLE, FORMAT, IMPORT, SCENE]),
     ("src/cluster", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME]),
@@ -62,7 +63,7 @@ const LAYERS: [(&str, &[&str]); 27] = [
 ];
 
 /// The folders in which no files may import each other in a circle.
-const PACKAGES: [&str; 5] = [SIMD, KDTREE, MESH, "crates/render/src", "src"];
+const PACKAGES: [&str; 8] = [SIMD, KDTREE, MESH, RENDER, FILES, FORMAT, IMPORT, "src"];
 
 /// The path of a module below `src`, in its parts.
 type Module = Vec<String>;

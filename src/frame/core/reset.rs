@@ -12,8 +12,8 @@
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    CameraInput, Lens, LightInput, LightKind, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape,
-    SnapshotPart, View, origin_for,
+    CameraInput, Lens, LightInput, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape, SnapshotPart,
+    View, origin_for,
 };
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
@@ -205,8 +205,7 @@ fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut
     let is_sphere = |light: &LightInput| light.light.radius() > 0.0;
     let level = if is_sphere(old) || is_sphere(new) { Level::TopTree } else { Level::Shading };
     let place = |light: &LightInput| {
-        let shines_everywhere = matches!(light.light, LightKind::Directional(_));
-        let position = (!shines_everywhere).then_some(light.placement.translation);
+        let position = light.light.has_position().then_some(light.placement.translation);
         (position, light.light.direction(&light.placement))
     };
     if place(old) != place(new) {
@@ -218,14 +217,10 @@ fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut
     if old.light.strength() != new.light.strength() {
         changes.add(Level::Shading, format!("power of {label}"));
     }
-    match (old.light, new.light) {
-        (LightKind::Point(_), LightKind::Point(_)) | (LightKind::Directional(_), LightKind::Directional(_)) => {}
-        (LightKind::Spot(old), LightKind::Spot(new)) => {
-            if (old.inner_angle_deg, old.outer_angle_deg) != (new.inner_angle_deg, new.outer_angle_deg) {
-                changes.add(Level::Shading, format!("cone of {label}"));
-            }
-        }
-        _ => changes.add(level, format!("kind of {label}")),
+    if old.light.name() != new.light.name() {
+        changes.add(level, format!("kind of {label}"));
+    } else if old.light.cone_deg() != new.light.cone_deg() {
+        changes.add(Level::Shading, format!("cone of {label}"));
     }
     // Invalid lights are reported when everything is rebuilt.
     let problem = |light: &LightInput| light.light.check(&light.placement).err();

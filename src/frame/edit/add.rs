@@ -8,10 +8,11 @@ use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
 use crate::frame::state::selection::Selection;
 use crate::mesh::procedural;
+use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
-    ColorParam, DirectionalLight, GREY, LightKind, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource,
-    Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
+    ColorParam, DirectionalLight, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
+    PointLight, Shape, SpotLight, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -39,9 +40,22 @@ pub enum NewThing {
     Mesh(MeshSource),
 }
 
+impl NewThing {
+    /// What can be added without a file, by its name in the window.
+    pub const NAMED: [(&str, Self); 7] = [
+        ("Sphere", Self::Sphere),
+        ("Plane", Self::Plane),
+        ("Cube", Self::Cube),
+        ("Area light", Self::AreaLight),
+        ("Point light", Self::PointLight),
+        ("Spot light", Self::SpotLight),
+        ("Directional light", Self::DirectionalLight),
+    ];
+}
+
 /// Whether the entity is an object or a light of the scene.
 pub fn is_thing(world: &World, entity: Entity) -> bool {
-    world.get::<Shape>(entity).is_some() || LightKind::of(world, entity).is_some()
+    world.get::<Shape>(entity).is_some() || light_of(world, entity).is_some()
 }
 
 pub fn add(world: &mut World, new: &NewThing) {

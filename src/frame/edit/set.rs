@@ -6,6 +6,7 @@ use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
 use crate::scene::animation::{LightProperty, ObjectProperty};
 use crate::scene::{ColorParam, LightKind, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial};
+use crate::scene::{light_of, put_light};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
@@ -42,7 +43,7 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             set_if_different(world, entity, Shape::Sphere { radius: value.x });
         }
         Property::Light(property) => {
-            let mut light = LightKind::of(world, entity).ok_or_else(wrong)?;
+            let mut light = light_of(world, entity).ok_or_else(wrong)?;
             let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
             if property == LightProperty::Direction && value == DVec3::ZERO {
                 return Err("a direction must have a length".to_owned());
@@ -50,7 +51,7 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             let [least, most] = property.info().range;
             let value = value.clamp(DVec3::splat(least), DVec3::splat(most));
             property.set(&mut light, &mut placement, value).ok_or_else(wrong)?;
-            LightKind::put(Some(limited(light)), world, entity);
+            put_light(world, entity, limited(light));
             set_if_different(world, entity, placement);
         }
         Property::Material(property) => {

@@ -16,14 +16,14 @@ use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::frame::image::cryptomatte::Cryptomatte;
 use crate::frame::image::feature_layers::{FeatureLayers, channels_of};
 use crate::frame::image::picture_file::mean_channels;
-use crate::render::{Film, NoRoom, Purpose, Room, relative_errors};
+use crate::render::{Film, Purpose, Room, relative_errors};
 use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_channels, exr_text};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
 };
 use glam::Vec3;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Depth in metres of pixels without a surface: programs that blur or scale a layer cannot use infinity.
@@ -72,21 +72,31 @@ impl PictureLayer {
         Self::Denoised,
     ];
 
+    /// Name on the command line, in lower case, and what it holds.
+    const fn about(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Albedo => ("albedo", "Colour without light, seen through mirrors and glass"),
+            Self::Normal => ("normal", "Shading normal in world space"),
+            Self::Depth => ("depth", "Metres along the view axis"),
+            Self::Position => ("position", "Metres in world space"),
+            Self::Coverage => ("coverage", "Share of samples that see a surface"),
+            Self::Object => ("object", "Cryptomatte of objects"),
+            Self::Material => ("material", "Cryptomatte of materials"),
+            Self::Variance => ("variance", "Variance of albedo, normal, depth and position, of those that are given"),
+            Self::Samples => ("samples", "Number of samples of each pixel"),
+            Self::Error => ("error", "Estimated relative error of each pixel: 0.05 is 5 %"),
+            Self::Denoised => ("denoised", "Light without most of its noise: raw and filtered combined"),
+        }
+    }
+
     /// Name for the user, lower case.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Albedo => "albedo",
-            Self::Normal => "normal",
-            Self::Depth => "depth",
-            Self::Position => "position",
-            Self::Coverage => "coverage",
-            Self::Object => "object",
-            Self::Material => "material",
-            Self::Variance => "variance",
-            Self::Samples => "samples",
-            Self::Error => "error",
-            Self::Denoised => "denoised",
-        }
+        self.about().0
+    }
+
+    /// What it holds, a phrase.
+    pub fn help(self) -> &'static str {
+        self.about().1
     }
 
     /// Returns the layers of an EXR file, an image or a film with feature buffers; empty for other files.
@@ -149,7 +159,7 @@ impl LayeredPicture<'_> {
     /// # Errors
     /// If the error layer is requested and not known yet, or there is not enough memory.
     pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, WriteError> {
-        drop(self.room()?);
+        drop(self.room().map_err(WriteError::Memory)?);
         let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
         self.encode(channels).map_err(|error| WriteError::Encode(Box::new(error)))
     }
@@ -168,8 +178,8 @@ impl LayeredPicture<'_> {
         out.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
 
-    fn room(&self) -> Result<Room, NoRoom> {
-        Room::for_files(self.film.width(), self.film.height(), &[Purpose::Layers])
+    fn room(&self) -> io::Result<Room> {
+        Ok(Room::for_files(self.film.width(), self.film.height(), &[Purpose::Layers])?)
     }
 
     fn has(&self, layer: PictureLayer) -> bool {

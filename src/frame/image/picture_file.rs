@@ -4,14 +4,14 @@
 //! can be opened from it.
 
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
-use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, develop_colors, relative_errors};
+use crate::render::{Display, Film, Purpose, Room, develop, develop_colors, relative_errors};
 use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_text};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,
 };
 use glam::Vec3;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Image file formats.
@@ -117,7 +117,7 @@ impl Print<'_> {
     /// # Errors
     /// If there is not enough memory.
     pub fn bytes(&self, format: PictureFormat) -> Result<Vec<u8>, WriteError> {
-        drop(self.room(format)?);
+        drop(self.room(format).map_err(WriteError::Memory)?);
         let mut bytes = Vec::new();
         match format {
             PictureFormat::Png => self.png(&mut bytes).map_err(|error| WriteError::Encode(Box::new(error)))?,
@@ -128,11 +128,11 @@ impl Print<'_> {
     }
 
     /// Reserves the memory for encoding: the encoders do not check for it.
-    fn room(&self, format: PictureFormat) -> Result<Room, NoRoom> {
-        match format {
-            PictureFormat::Png | PictureFormat::Jpeg => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
-            PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
-        }
+    fn room(&self, format: PictureFormat) -> io::Result<Room> {
+        Ok(match format {
+            PictureFormat::Png | PictureFormat::Jpeg => Room::for_files(self.size.0, self.size.1, &[Purpose::Png])?,
+            PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr])?,
+        })
     }
 
     /// Writes the image to a temporary file in the folder of `path`.

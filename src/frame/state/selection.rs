@@ -4,7 +4,8 @@ use crate::frame::core::rig::Rig;
 use crate::frame::state::resources::RenderState;
 use crate::geometry::Ray;
 use crate::render::Camera;
-use crate::scene::{Extraction, LightKind, Placement, Projection, View};
+use crate::scene::light_of;
+use crate::scene::{Extraction, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
@@ -114,7 +115,7 @@ impl OwnBox {
 
 /// The box around an object or a light as it is rendered; for infinite ones, its reference point.
 pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
-    if let Some(light) = LightKind::of(world, entity) {
+    if let Some(light) = light_of(world, entity) {
         let (min, max) = (DVec3::splat(-light.radius()), DVec3::splat(light.radius()));
         let at = world.get::<Placement>(entity)?.translation;
         return Some(OwnBox { min, max, world_from_box: DAffine3::from_translation(at) });

@@ -6,7 +6,7 @@
 use crate::format::animation::EditedPart;
 use crate::format::camera::CameraPart;
 use crate::format::camera::camera;
-use crate::format::parts::SceneFile;
+use crate::format::scene_file::SceneFile;
 use crate::scene::animation::moment::rest_camera;
 use crate::scene::animation::written::{Entities, of_part};
 use crate::scene::animation::{Animation, Channel};
@@ -70,33 +70,31 @@ impl Animation {
     }
 }
 
-impl SceneFile {
-    /// The camera that is shown, in a file that describes a world.
-    pub(in crate::scene) fn shown_camera(&self) -> &CameraPart {
-        self.animation.edited.camera.as_ref().unwrap_or(&self.camera)
-    }
+/// The camera that is shown, in a file that describes a world.
+pub(in crate::scene) fn shown_camera(file: &SceneFile) -> &CameraPart {
+    file.animation.edited.camera.as_ref().unwrap_or(&file.camera)
+}
 
-    /// Shows this camera at the time of the file, whatever its tracks say.
-    pub(in crate::scene) fn show_camera(&mut self, shown: CameraPart) {
-        let animation = self.animation_of_camera();
-        self.animation.edited.camera = None;
-        if !animation.has_camera_track() {
-            self.camera = shown;
-        } else if camera(&animation.camera_at(self.animation.at)) != camera(&shown) {
-            self.animation.edited.camera = Some(shown);
-        }
+/// Shows this camera at the time of the file, whatever its tracks say.
+pub(in crate::scene) fn show_camera(file: &mut SceneFile, shown: CameraPart) {
+    let animation = animation_of_camera(file);
+    file.animation.edited.camera = None;
+    if !animation.has_camera_track() {
+        file.camera = shown;
+    } else if camera(&animation.camera_at(file.animation.at)) != camera(&shown) {
+        file.animation.edited.camera = Some(shown);
     }
+}
 
-    /// Shows another time: of what was edited only properties of the camera without tracks stay.
-    pub(in crate::scene) fn show_moment(&mut self, seconds: f64) {
-        if let Some(shown) = std::mem::take(&mut self.animation.edited).camera {
-            let (view, projection, lens) = camera(&shown);
-            self.camera = rest_camera(&self.animation_of_camera(), self.animation.at, &view, &projection, &lens);
-        }
-        self.animation.at = seconds;
+/// Shows another time: of what was edited only properties of the camera without tracks stay.
+pub(in crate::scene) fn show_time(file: &mut SceneFile, seconds: f64) {
+    if let Some(shown) = std::mem::take(&mut file.animation.edited).camera {
+        let (view, projection, lens) = camera(&shown);
+        file.camera = rest_camera(&animation_of_camera(file), file.animation.at, &view, &projection, &lens);
     }
+    file.animation.at = seconds;
+}
 
-    fn animation_of_camera(&self) -> Animation {
-        of_part(&self.animation, &self.camera, &Entities::default())
-    }
+fn animation_of_camera(file: &SceneFile) -> Animation {
+    of_part(&file.animation, &file.camera, &Entities::default())
 }

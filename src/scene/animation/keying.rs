@@ -9,6 +9,7 @@ use crate::format::property::{CameraProperty, LightProperty, ObjectProperty};
 use crate::scene::animation::moment::{Moment, place, rest_camera};
 use crate::scene::animation::{Animation, Channel, Shutter, Track};
 use crate::scene::world::inputs::{CameraInput, SceneInputs};
+use crate::scene::world::material_value::material_value;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -195,7 +196,7 @@ fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> 
         }
         for property in MaterialProperty::animatable(&material.material) {
             let channel = Channel::Material(material.entity, property);
-            compare(channel, property.get(&old.material), property.get(&material.material));
+            compare(channel, material_value(property, &old.material), material_value(property, &material.material));
         }
     }
     new
@@ -267,8 +268,8 @@ mod tests {
     use super::*;
     use crate::format::key::KeyValue;
     use crate::format::placement::Placement;
-    use crate::format::source::SceneSource;
     use crate::format::view::View;
+    use crate::scene::SceneSource;
     use crate::scene::describe::Description;
     use crate::scene::load;
     use crate::scene::load::LoadOptions;

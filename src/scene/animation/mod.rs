@@ -15,7 +15,8 @@ pub(crate) mod moment;
 pub(crate) mod written;
 
 pub use crate::format::key::{Curve, Interpolation, Key, KeyValue};
-pub use crate::format::property::{CameraProperty, LightProperty, ObjectProperty, PropertyInfo, Quantity};
+pub use crate::format::property::{CameraProperty, LightProperty, ObjectProperty, PropertyInfo};
+pub use crate::format::quantity::Quantity;
 pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys};
 pub(super) use model::ModelMotion;
 pub use moment::{Moment, camera_follows, show_moment};

@@ -1,12 +1,12 @@
 //! The animations of a glTF file on the entities of the scene that was made from it.
 
 use crate::format::camera::CameraPart;
-use crate::format::light::LightKind;
-use crate::format::property_set::put;
 use crate::format::sources::{MeshSource, Seconds};
 use crate::import::gltf_motion::GltfMotion;
+use crate::scene::world::components::put;
 use crate::scene::world::components::{MeshOrigin, Shape};
 use crate::scene::world::inputs::SceneInputs;
+use crate::scene::world::lights::{light_of, put_light};
 use bevy_ecs::prelude::{Entity, World};
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
@@ -100,8 +100,8 @@ impl ModelMotion {
         }
         for (i, light, placement) in moment.lights {
             let Some(&entity) = self.lights.get(i) else { continue };
-            if LightKind::of(world, entity).is_some() {
-                LightKind::put(Some(light), world, entity);
+            if light_of(world, entity).is_some() {
+                put_light(world, entity, light);
                 put(world, entity, placement);
             }
         }

@@ -2,15 +2,15 @@
 
 use crate::format::camera::CameraPart;
 use crate::format::camera::{camera, camera_part};
-use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::property::CameraProperty;
-use crate::format::property_set::put;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::{Animation, Channel};
+use crate::scene::world::components::put;
 use crate::scene::world::components::{Shape, SurfaceMaterial};
 use crate::scene::world::inputs::{CameraInput, SceneInputs};
+use crate::scene::world::lights::{light_of, put_light};
 use bevy_ecs::prelude::{Entity, Mut, Resource, World};
 use std::collections::HashMap;
 
@@ -122,10 +122,10 @@ fn place_as(world: &mut World, animation: &Animation, seconds: f64) {
                 }
             }
             Channel::Light(entity, property) => {
-                let (light, placement) = (LightKind::of(world, entity), world.get::<Placement>(entity).copied());
+                let (light, placement) = (light_of(world, entity), world.get::<Placement>(entity).copied());
                 if let (Some(mut light), Some(mut placement)) = (light, placement) {
                     property.set(&mut light, &mut placement, value);
-                    LightKind::put(Some(light), world, entity);
+                    put_light(world, entity, light);
                     put(world, entity, placement);
                 }
             }

@@ -13,6 +13,7 @@ use crate::format::placement::Placement;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::mesh::Mesh;
 use crate::render::{self, Display, Param, Params, RenderSettings};
+use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, Entity, Resource, World};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -268,3 +269,12 @@ pub struct Rendering(pub RenderSettings);
 /// Exposure and tone curve; they do not affect the samples.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplaySettings(pub Display);
+
+/// Replaces a component by another value; one that is equal is not touched.
+pub(crate) fn put<T: Component<Mutability = Mutable> + PartialEq>(world: &mut World, entity: Entity, value: T) {
+    if let Some(mut old) = world.get_mut::<T>(entity)
+        && *old != value
+    {
+        *old = value;
+    }
+}

@@ -79,7 +79,7 @@ impl SceneChanges<'_, '_> {
 impl EntityState {
     /// Its light, if it is one that is no object.
     pub fn light(&self) -> Option<LightKind> {
-        LightKind::first(self.point_light.as_ref(), self.spot_light.as_ref(), self.directional_light.as_ref())
+        LightKind::first((self.point_light.as_ref(), self.spot_light.as_ref(), self.directional_light.as_ref()))
     }
 
     /// Whether it is an object or a light.

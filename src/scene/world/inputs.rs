@@ -1,12 +1,13 @@
 //! All data that the image depends on, copied from the world in a fixed order.
 
 use crate::format::bad_value::BadValue;
-use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
+use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::world::components::{Material, MaterialSlots, Ordinal, SceneEnvironment, Shape, SurfaceMaterial};
+use crate::scene::world::lights::{LightParts, WithLight};
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Entity, Or, Query, Res, With, World};
+use bevy_ecs::prelude::{Entity, Query, Res, World};
 use bevy_ecs::system::{SystemParam, SystemState};
 use std::collections::HashSet;
 
@@ -89,11 +90,6 @@ impl CameraInput {
 
 type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 
-type LightParts = (Option<&'static PointLight>, Option<&'static SpotLight>, Option<&'static DirectionalLight>);
-
-/// Matches lights that are not objects.
-pub type WithLight = Or<(With<PointLight>, With<SpotLight>, With<DirectionalLight>)>;
-
 /// Read access to all data that the image depends on.
 #[derive(SystemParam)]
 pub struct SceneQueries<'w, 's> {
@@ -124,10 +120,10 @@ impl SceneQueries<'_, '_> {
                 material: material.0.clone(),
             }),
             objects,
-            lights: in_order(self.lights.iter(), |entity, name, ((point, spot, directional), placement)| LightInput {
+            lights: in_order(self.lights.iter(), |entity, name, (parts, placement)| LightInput {
                 entity,
                 name: text(name),
-                light: LightKind::first(point, spot, directional).expect("the query asks for one of them"),
+                light: LightKind::first(parts).expect("the query asks for one of them"),
                 placement: *placement,
             }),
             camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(

@@ -6,27 +6,24 @@ use crate::render::{Fresnel, Param};
 use crate::scene::world::components::{ColorParam, Material, ScalarParam};
 use glam::DVec3;
 
-impl MaterialProperty {
-    /// The value for a material, a number in all three components; `None` if it has none, or a texture in its place.
-    pub fn get(self, material: &Material) -> Option<DVec3> {
-        let (_, param) = material.params().into_iter().find(|(property, _)| property.name == self.name())?;
-        Some(match param {
-            Param::Color(ColorParam::Rgb(rgb)) | Param::Rgb(rgb) => short_color(*rgb),
-            Param::Scalar(ScalarParam::Number(number)) | Param::Number(number) => DVec3::splat(short(*number)),
-            Param::Cutoff(number) => DVec3::splat(short((*number)?)),
-            Param::Flag(on) => DVec3::splat(f64::from(u8::from(*on))),
-            Param::Fresnel(fresnel) => DVec3::splat(f64::from(u8::from(*fresnel == Fresnel::Schlick))),
-            Param::Color(ColorParam::Texture(_)) | Param::Scalar(ScalarParam::Texture(_)) | Param::Part(_) => {
-                return None;
-            }
-        })
-    }
+/// The value of a property of a material, a number in all three components; `None` if it has none, or a texture in its
+/// place.
+pub fn material_value(property: MaterialProperty, material: &Material) -> Option<DVec3> {
+    let (_, param) = material.params().into_iter().find(|(known, _)| known.name == property.name())?;
+    Some(match param {
+        Param::Color(ColorParam::Rgb(rgb)) | Param::Rgb(rgb) => short_color(*rgb),
+        Param::Scalar(ScalarParam::Number(number)) | Param::Number(number) => DVec3::splat(short(*number)),
+        Param::Cutoff(number) => DVec3::splat(short((*number)?)),
+        Param::Flag(on) => DVec3::splat(f64::from(u8::from(*on))),
+        Param::Fresnel(fresnel) => DVec3::splat(f64::from(u8::from(*fresnel == Fresnel::Schlick))),
+        Param::Color(ColorParam::Texture(_)) | Param::Scalar(ScalarParam::Texture(_)) | Param::Part(_) => return None,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::property::Quantity;
+    use crate::format::quantity::Quantity;
     use crate::render::{self, MaterialKind, ValueType};
     use glam::Vec3;
 
@@ -42,10 +39,10 @@ mod tests {
                     (_, Quantity::Color) => value,
                     _ => DVec3::splat(0.3),
                 };
-                assert_eq!(property.get(&material), Some(expected), "{kind:?} {property:?}");
+                assert_eq!(material_value(property, &material), Some(expected), "{kind:?} {property:?}");
                 property.set(&mut material, DVec3::splat(-7.0)).unwrap();
                 let limits = property.description().domain.limits();
-                match property.get(&material) {
+                match material_value(property, &material) {
                     Some(value) => assert!(limits.contains(&(value.x as f32)), "{kind:?} {property:?} {value}"),
                     None => assert_eq!(property.description().value, ValueType::Cutoff),
                 }

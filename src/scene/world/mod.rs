@@ -5,5 +5,6 @@ pub(crate) mod entity_state;
 pub(crate) mod extent;
 pub(crate) mod inputs;
 pub(crate) mod inventory;
-mod material_value;
+pub(crate) mod lights;
+pub(crate) mod material_value;
 pub(crate) mod trees;

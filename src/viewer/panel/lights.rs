@@ -3,7 +3,8 @@
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::{Environment, MaterialKind};
 use crate::scene::animation::LightProperty;
-use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, MaterialProperty, SurfaceMaterial};
+use crate::scene::light_of;
+use crate::scene::{ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SurfaceMaterial};
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
@@ -53,13 +54,10 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
     });
     ui.horizontal(|ui| {
         ui.weak("add");
-        for (label, thing) in [
-            ("Area", NewThing::AreaLight),
-            ("Point", NewThing::PointLight),
-            ("Spot", NewThing::SpotLight),
-            ("Directional", NewThing::DirectionalLight),
-        ] {
-            if ui.button(label).clicked() {
+        for (label, thing) in NewThing::NAMED {
+            if let Some(kind) = label.strip_suffix(" light")
+                && ui.button(kind).clicked()
+            {
                 asked.edit(Edit::Add(thing));
             }
         }
@@ -70,12 +68,9 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
 fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Asked) {
     let world = session.world();
     ui.spacing_mut().interact_size.x = 30.0;
-    if let Some(light) = LightKind::of(world, entry.entity) {
+    if let Some(light) = light_of(world, entry.entity) {
         if let Some(value) = color(ui, light.strength(), true) {
-            let property = match light {
-                LightKind::Point(_) | LightKind::Spot(_) => LightProperty::Intensity,
-                LightKind::Directional(_) => LightProperty::Irradiance,
-            };
+            let property = LightProperty::strength_of(&light);
             asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Light(property), value });
         }
         return;

@@ -60,15 +60,7 @@ pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked
 
 pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
-        for (label, thing) in [
-            ("Sphere", NewThing::Sphere),
-            ("Plane", NewThing::Plane),
-            ("Cube", NewThing::Cube),
-            ("Area light", NewThing::AreaLight),
-            ("Point light", NewThing::PointLight),
-            ("Spot light", NewThing::SpotLight),
-            ("Directional light", NewThing::DirectionalLight),
-        ] {
+        for (label, thing) in NewThing::NAMED {
             if ui.button(label).clicked() {
                 asked.edit(Edit::Add(thing));
             }

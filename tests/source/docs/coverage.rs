@@ -5,13 +5,14 @@ use super::page::{expect_none, files, read};
 use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
-const GRAMMAR: [(&str, &[&str]); 12] = [
-    ("src/format/parts.rs", &[]),
-    ("src/format/camera.rs", &[]),
-    ("src/format/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
-    ("src/format/key.rs", &["Interpolation"]),
-    ("src/format/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
-    ("src/format/sources.rs", &[]),
+const GRAMMAR: [(&str, &[&str]); 13] = [
+    ("crates/format/src/parts.rs", &[]),
+    ("crates/format/src/scene_file.rs", &[]),
+    ("crates/format/src/camera.rs", &[]),
+    ("crates/format/src/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
+    ("crates/format/src/key.rs", &["Interpolation"]),
+    ("crates/format/src/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
+    ("crates/format/src/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
     ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
     ("crates/render/src/core/image_texture.rs", &["Encoding"]),

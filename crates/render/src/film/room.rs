@@ -17,6 +17,12 @@ pub struct NoRoom {
     pub bytes: u64,
 }
 
+impl From<NoRoom> for std::io::Error {
+    fn from(error: NoRoom) -> Self {
+        Self::new(std::io::ErrorKind::OutOfMemory, error)
+    }
+}
+
 /// Memory that is reserved until it is dropped. It is never written, so the reservation takes no time.
 #[derive(Debug)]
 pub struct Room {

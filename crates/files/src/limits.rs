@@ -1,0 +1,126 @@
+//! Limits for files of unknown origin, and the variable that scales all of them.
+
+use crate::printable::name;
+
+/// Bytes of an image file besides its pixels and its metadata: profiles, thumbnails, tables.
+const BESIDE: u64 = 64 << 20;
+
+/// Sizes above which files are rejected. `docs/stability.md` gives the memory that corresponds to each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of a model; loading takes up to about 25 bytes of memory per byte.
+    pub model_bytes: u64,
+    /// Bytes of a material library.
+    pub library_bytes: u64,
+    /// Bytes of the text of a scene; reading takes up to about 25 bytes of memory per byte.
+    pub scene_bytes: u64,
+    /// Pixels of an image; decoding takes up to 32 bytes of memory per pixel.
+    pub picture_pixels: u64,
+    /// Bytes of all images of a scene together, as they stay in memory.
+    pub scene_image_bytes: u64,
+    /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
+    pub film_pixels: u64,
+    /// Bytes of the metadata in an image.
+    pub note_bytes: u64,
+    /// Bytes of a recording; reading takes up to about 10 bytes of memory per byte.
+    pub recording_bytes: u64,
+    /// Bytes of all files of an archive.
+    pub archive_bytes: u64,
+    /// Bytes of settings, saved views and other small files of the program.
+    pub settings_bytes: u64,
+}
+
+impl Limits {
+    /// The environment variable that multiplies all limits.
+    pub const VARIABLE: &str = "FIRSTLIGHT_LIMITS";
+
+    /// The default limits, for current desktop computers.
+    pub const USUAL: Self = Self {
+        model_bytes: 1 << 30,
+        library_bytes: 16 << 20,
+        scene_bytes: 256 << 20,
+        picture_pixels: 1 << 27,
+        scene_image_bytes: 4 << 30,
+        film_pixels: 1 << 26,
+        note_bytes: 64 << 20,
+        recording_bytes: 256 << 20,
+        archive_bytes: 16 << 30,
+        settings_bytes: 1 << 20,
+    };
+
+    /// The default limits times the number in [`Self::VARIABLE`], if it is set.
+    pub fn of_this_process() -> Self {
+        Self::USUAL.times(std::env::var(Self::VARIABLE).ok().and_then(|text| factor_of(&text)).unwrap_or(1.0))
+    }
+
+    /// A warning if [`Self::VARIABLE`] is set to an invalid value.
+    pub fn misunderstood() -> Option<String> {
+        let text = std::env::var_os(Self::VARIABLE)?;
+        let text = text.to_string_lossy();
+        factor_of(&text).is_none().then(|| {
+            format!("{} is `{}`, which is not a positive number: using the default limits", Self::VARIABLE, name(&text))
+        })
+    }
+
+    /// Scales all limits.
+    ///
+    /// - `factor`: positive and finite; any other value counts as 1.
+    pub fn times(self, factor: f64) -> Self {
+        let factor = if is_factor(factor) { factor } else { 1.0 };
+        // The conversion saturates.
+        let scaled = |limit: u64| (limit as f64 * factor) as u64;
+        Self {
+            model_bytes: scaled(self.model_bytes),
+            library_bytes: scaled(self.library_bytes),
+            scene_bytes: scaled(self.scene_bytes),
+            picture_pixels: scaled(self.picture_pixels),
+            scene_image_bytes: scaled(self.scene_image_bytes),
+            film_pixels: scaled(self.film_pixels),
+            note_bytes: scaled(self.note_bytes),
+            recording_bytes: scaled(self.recording_bytes),
+            archive_bytes: scaled(self.archive_bytes),
+            settings_bytes: scaled(self.settings_bytes),
+        }
+    }
+
+    /// Bytes of an image file: the maximum number of pixels, uncompressed, plus metadata and other data.
+    pub fn picture_bytes(&self) -> u64 {
+        const BYTES_A_PIXEL: u64 = 16;
+        self.picture_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
+    }
+
+    /// Bytes of a film file, likewise.
+    pub fn film_bytes(&self) -> u64 {
+        /// About thirty channels of four bytes, and the overhead of compression.
+        const BYTES_A_PIXEL: u64 = 160;
+        self.film_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
+    }
+
+    /// How to raise the limits.
+    pub fn advice() -> String {
+        format!("set {}=2 in the environment to double all limits", Self::VARIABLE)
+    }
+}
+
+fn is_factor(factor: f64) -> bool {
+    factor > 0.0 && factor.is_finite()
+}
+
+fn factor_of(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|&factor| is_factor(factor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_scales_all_limits_and_nonsense_none() {
+        let twice = Limits::USUAL.times(2.0);
+        assert_eq!((twice.model_bytes, twice.picture_pixels), (2 << 30, 1 << 28));
+        for nonsense in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(Limits::USUAL.times(nonsense), Limits::USUAL);
+        }
+        assert_eq!(Limits::USUAL.times(1e30).model_bytes, u64::MAX);
+    }
+}

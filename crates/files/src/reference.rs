@@ -1,0 +1,287 @@
+//! Names of other files in a model: which file of this computer is meant, and whether it may be read.
+//!
+//! One rule for all formats. A model may come from anywhere, so what it names stays in its own folder and below, unless
+//! the user allows more; hidden files and addresses of the network are never meant. Names are spelt as programs of other
+//! systems do: with `\`, with `%20`, in another case, or from the root of another computer.
+//! Start reading at [`References::resolve`].
+
+use crate::printable::name;
+use crate::relative::{path_to_text, text_to_path};
+use std::path::{Component, Path, PathBuf};
+
+/// Entries of a folder that are compared with a name, at most.
+const MAX_ENTRIES: usize = 20_000;
+
+/// What the names in a model may refer to.
+#[derive(Clone, Copy, Debug)]
+pub struct References<'a> {
+    /// The folder of the model.
+    folder: &'a Path,
+    allow_outside: bool,
+}
+
+/// What a name refers to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Referred {
+    /// Relative to the folder that the name counts from, or absolute where that is allowed; it need not exist.
+    pub path: PathBuf,
+    /// Whether it differs from the name by the case of letters.
+    pub is_renamed: bool,
+}
+
+impl Referred {
+    /// What the user is told if the file differs from its name in the model by case.
+    pub fn difference(&self, name_in_model: &str) -> Option<String> {
+        let [wanted, found] = [name_in_model, &path_to_text(&self.path)].map(|it| name(it).into_owned());
+        self.is_renamed.then(|| format!("there is no `{wanted}`: `{found}` is read, which differs by case"))
+    }
+}
+
+impl From<PathBuf> for Referred {
+    fn from(path: PathBuf) -> Self {
+        Self { path, is_renamed: false }
+    }
+}
+
+/// A name that refers to a file that may not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{}` is {why}: only files in the folder of the model and below are read; \
+     --allow-outside reads others on this computer as well, never the network",
+    name(name_in_model)
+)]
+pub struct Outside {
+    /// The name in the model.
+    pub name_in_model: String,
+    /// In which way it is outside.
+    pub why: &'static str,
+}
+
+impl<'a> References<'a> {
+    /// - `model`: the file of the model.
+    /// - `allow_outside`: whether files outside of its folder may be read.
+    pub fn of(model: &'a Path, allow_outside: bool) -> Self {
+        Self { folder: model.parent().unwrap_or(Path::new("")), allow_outside }
+    }
+
+    /// Whether files outside of the model's folder may be read.
+    pub fn allow_outside(&self) -> bool {
+        self.allow_outside
+    }
+
+    /// The file that is meant.
+    ///
+    /// - `base`: the folder that names count from: of the model, or of its material library.
+    ///
+    /// # Errors
+    /// If it may not be read.
+    pub fn resolve(&self, base: &Path, name: &str) -> Result<Referred, Outside> {
+        let refused = |why| Err(Outside { name_in_model: name.to_owned(), why });
+        if name.starts_with("//") || name.starts_with("\\\\") {
+            return refused("an address of the network");
+        }
+        let decoded = percent_decoded(name);
+        let spellings = [&decoded, name, &decoded.replace('\\', "/"), &name.replace('\\', "/")].map(text_to_path);
+        let last = &spellings[2];
+        if self.allow_outside {
+            return Ok(existing(base, &spellings));
+        }
+        if let Some(why) = spellings.iter().find_map(|path| self.leaves(base, path)) {
+            // Files are moved together with the model; where they were on its computer is of no use here.
+            let beside = last.file_name().map(PathBuf::from).filter(|file| self.leaves(base, file).is_none());
+            return match beside {
+                Some(file) if why == ABSOLUTE && (!last.exists() || base.join(&file).is_file()) => {
+                    self.without_link(base, file.into(), name)
+                }
+                _ => refused(why),
+            };
+        }
+        self.without_link(base, existing(base, &spellings), name)
+    }
+
+    /// Why a path is not one in the folder of the model, by its text.
+    fn leaves(&self, base: &Path, path: &Path) -> Option<&'static str> {
+        let is_drive =
+            matches!(path.as_os_str().as_encoded_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
+        if path.is_absolute() || path.has_root() || is_drive {
+            return Some(ABSOLUTE);
+        }
+        let mut depth = base.strip_prefix(self.folder).map_or(0, |below| below.components().count());
+        for part in path.components() {
+            match part {
+                Component::CurDir => {}
+                Component::ParentDir if depth == 0 => return Some("a path out of the folder"),
+                Component::ParentDir => depth -= 1,
+                // With `.\\` it is here, as its spelling with `/` says.
+                Component::Normal(part) if part.as_encoded_bytes().starts_with(b".\\") => {}
+                Component::Normal(part) if part.as_encoded_bytes().starts_with(b".") => return Some("a hidden file"),
+                Component::Normal(_) => depth += 1,
+                Component::Prefix(_) | Component::RootDir => return Some(ABSOLUTE),
+            }
+        }
+        None
+    }
+
+    /// Refuses what leads out of the folder by a symbolic link.
+    fn without_link(&self, base: &Path, referred: Referred, name: &str) -> Result<Referred, Outside> {
+        let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { self.folder };
+        // `model.glb#3` is an image inside a model.
+        let full = base.join(&referred.path);
+        let file = full.to_str().filter(|_| !full.exists()).and_then(|text| text.rsplit_once('#'));
+        let file = file.map_or(full.as_path(), |(file, _)| Path::new(file));
+        match (file.canonicalize(), folder.canonicalize()) {
+            (Ok(real), Ok(folder)) if !real.starts_with(&folder) => {
+                Err(Outside { name_in_model: name.to_owned(), why: "a link out of the folder" })
+            }
+            _ => Ok(referred),
+        }
+    }
+}
+
+const ABSOLUTE: &str = "an absolute path";
+
+/// The first of these paths that exists, or what differs from the last one by case.
+fn existing(base: &Path, spellings: &[PathBuf; 4]) -> Referred {
+    let last = &spellings[2];
+    match spellings.iter().find(|path| base.join(path).exists()) {
+        Some(path) => path.clone().into(),
+        None => match in_any_case(base, last) {
+            Some(path) => Referred { path, is_renamed: true },
+            None => last.clone().into(),
+        },
+    }
+}
+
+/// The file below `base` whose name differs in upper and lower case only. If there are several, none of them is meant.
+fn in_any_case(base: &Path, path: &Path) -> Option<PathBuf> {
+    let mut found = PathBuf::new();
+    for part in path.components() {
+        let here = base.join(&found);
+        match part {
+            Component::Normal(wanted) if !here.join(wanted).exists() => {
+                let wanted = wanted.to_str()?.to_lowercase();
+                let folder = if here.as_os_str().is_empty() { Path::new(".") } else { &here };
+                let entries =
+                    std::fs::read_dir(folder).ok()?.take(MAX_ENTRIES).flatten().map(|entry| entry.file_name());
+                let mut same = entries.filter(|entry| entry.to_str().is_some_and(|it| it.to_lowercase() == wanted));
+                match (same.next(), same.next()) {
+                    (Some(name), None) => found.push(name),
+                    _ => return None,
+                }
+            }
+            part => found.push(part),
+        }
+    }
+    base.join(&found).exists().then_some(found)
+}
+
+/// Decodes `%20` and the like; sequences that are invalid, not UTF-8 or zero stay unchanged.
+pub fn percent_decoded(text: &str) -> String {
+    let bytes = text.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        let hex = |byte: u8| char::from(byte).to_digit(16);
+        if bytes[i] == b'%'
+            && let Some(Some(high)) = bytes.get(i + 1).map(|&byte| hex(byte))
+            && let Some(Some(low)) = bytes.get(i + 2).map(|&byte| hex(byte))
+            && high * 16 + low != 0
+        {
+            out.push((high * 16 + low) as u8);
+            i += 3;
+        } else {
+            out.push(bytes[i]);
+            i += 1;
+        }
+    }
+    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resolve(model: &Path, base: &Path, name: &str, allow_outside: bool) -> Result<String, &'static str> {
+        let found = References::of(model, allow_outside).resolve(base, name);
+        found.map(|found| found.path.to_string_lossy().into_owned()).map_err(|outside| outside.why)
+    }
+
+    #[test]
+    fn only_paths_within_the_folder_are_read() {
+        let at = |name: &str| resolve(Path::new("nowhere/a.obj"), Path::new("nowhere"), name, false);
+        for (name, path) in [
+            ("a.bin", "a.bin"),
+            ("textures/a b.png", "textures/a b.png"),
+            ("a%20b/%E7%BA%B9.png", "a b/纹.png"),
+            ("./a.bin", "./a.bin"),
+            ("a/../b.bin", "a/../b.bin"),
+            ("100%.png", "100%.png"),
+            ("maps\\a.png", "maps/a.png"),
+            ("C:\\art\\a.png", "a.png"),
+            ("/no such folder/a.png", "a.png"),
+        ] {
+            assert_eq!(at(name), Ok(path.to_owned()), "{name}");
+        }
+        for name in [
+            "../a.bin",
+            "a/../../b.bin",
+            "%2e%2e/a.bin",
+            "..\\a.bin",
+            "a\\..\\..\\b",
+            "..%5ca.bin",
+            "/etc/passwd",
+            "//server/share/a.bin",
+            "\\\\server\\a.bin",
+            ".ssh/id_rsa",
+            ".env",
+            "maps/.env",
+            "a/%2eenv",
+            "/tmp/..",
+        ] {
+            let error = at(name).expect_err(name);
+            assert!(!error.is_empty());
+        }
+    }
+
+    #[test]
+    fn names_count_from_a_library_and_stay_in_the_folder_of_the_model() {
+        let at = |name: &str| resolve(Path::new("m/a.obj"), Path::new("m/lib"), name, false);
+        assert_eq!(at("../maps/a.png"), Ok("../maps/a.png".to_owned()));
+        assert_eq!(at("../../maps/a.png"), Err("a path out of the folder"));
+    }
+
+    #[test]
+    fn the_network_is_never_read_and_other_files_where_that_is_allowed() {
+        let at = |name: &str| resolve(Path::new("m/a.obj"), Path::new("m"), name, true);
+        assert_eq!(at("../a.bin"), Ok("../a.bin".to_owned()));
+        assert_eq!(at("/a/b%20c.bin"), Ok("/a/b c.bin".to_owned()));
+        assert_eq!(at("//server/a.bin"), Err("an address of the network"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn files_are_found_in_any_case_and_not_through_links_out_of_the_folder() {
+        let outer = tempfile::tempdir().unwrap();
+        let inner = outer.path().join("inner");
+        std::fs::create_dir_all(inner.join("Maps")).unwrap();
+        for file in ["Maps/Wood.PNG", "moved.png", "100%25.png", "../secret.png"] {
+            std::fs::write(inner.join(file), "").unwrap();
+        }
+        std::os::unix::fs::symlink(outer.path().join("secret.png"), inner.join("link.png")).unwrap();
+        std::os::unix::fs::symlink(outer.path(), inner.join("up")).unwrap();
+        std::fs::write(outer.path().join("secret.glb"), "").unwrap();
+        std::os::unix::fs::symlink(outer.path().join("secret.glb"), inner.join("link.glb")).unwrap();
+        let model = inner.join("a.obj");
+        let at = |name: &str| resolve(&model, &inner, name, false);
+        assert_eq!(at("maps\\wood.png"), Ok("Maps/Wood.PNG".to_owned()));
+        assert!(References::of(&model, false).resolve(&inner, "MOVED.png").unwrap().is_renamed);
+        assert_eq!(at("/elsewhere/moved.png"), Ok("moved.png".to_owned()));
+        assert_eq!(at(outer.path().join("moved.png").to_str().unwrap()), Ok("moved.png".to_owned()));
+        assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));
+        assert_eq!(at(".\\moved.png"), Ok("./moved.png".to_owned()));
+        assert_eq!(at(".\\.moved.png"), Err("a hidden file"));
+        for link in ["link.png", "up/secret.png", "LINK.png", "/away/link.png", "link.glb#0", "up/secret.glb#12"] {
+            assert_eq!(at(link), Err("a link out of the folder"), "{link}");
+        }
+    }
+}

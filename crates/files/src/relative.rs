@@ -1,0 +1,161 @@
+//! Paths relative to another file, and lossless conversion of paths to text, even if they are not UTF-8.
+
+use std::path::{Component, Path, PathBuf};
+
+/// A path as text that converts back ([`text_to_path`]): unchanged if it is UTF-8. Bytes that are not UTF-8 become the
+/// characters U+EF80 to U+EFFF, like in OPTU-8 (as do bytes that encode such characters).
+pub fn path_to_text(path: &Path) -> String {
+    bytes_to_text(path.as_os_str().as_encoded_bytes())
+}
+
+/// The same for a name in a file with system-specific bytes.
+pub fn bytes_to_text(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len());
+    let letter =
+        |byte: u8| char::from_u32(FIRST_LETTER - 0x80 + u32::from(byte)).unwrap_or(char::REPLACEMENT_CHARACTER);
+    for chunk in bytes.utf8_chunks() {
+        for c in chunk.valid().chars() {
+            if is_byte(c) {
+                text.extend(c.encode_utf8(&mut [0; 4]).bytes().map(letter));
+            } else {
+                text.push(c);
+            }
+        }
+        text.extend(chunk.invalid().iter().map(|&byte| letter(byte)));
+    }
+    text
+}
+
+/// The inverse of [`path_to_text`].
+pub fn text_to_path(text: &str) -> PathBuf {
+    if !text.contains(is_byte) {
+        return PathBuf::from(text);
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStringExt;
+        let mut bytes = Vec::with_capacity(text.len());
+        for c in text.chars() {
+            if is_byte(c) {
+                bytes.push((c as u32 - FIRST_LETTER + 0x80) as u8);
+            } else {
+                bytes.extend(c.encode_utf8(&mut [0; 4]).bytes());
+            }
+        }
+        PathBuf::from(std::ffi::OsString::from_vec(bytes))
+    }
+    // There, names are not bytes.
+    #[cfg(not(unix))]
+    PathBuf::from(text)
+}
+
+/// Represents the byte 0x80.
+const FIRST_LETTER: u32 = 0xef80;
+
+fn is_byte(c: char) -> bool {
+    (FIRST_LETTER..FIRST_LETTER + 0x80).contains(&(c as u32))
+}
+
+/// For fields that are serialised as text: `#[serde(with = "path_text")]`.
+pub mod path_text {
+    use crate::relative::{path_to_text, text_to_path};
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::path::{Path, PathBuf};
+
+    /// Writes a path like [`path_to_text`].
+    pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&path_to_text(path))
+    }
+
+    /// Reads a path like [`text_to_path`].
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
+        String::deserialize(deserializer).map(|text| text_to_path(&text))
+    }
+}
+
+/// The absolute path; symbolic links are resolved as far as possible.
+pub fn absolute(path: &Path) -> PathBuf {
+    if let Ok(path) = path.canonicalize() {
+        return path;
+    }
+    /// The limit of common systems.
+    const MAX_LINKS: usize = 40;
+    // The file need not exist yet, but its folder does.
+    let mut absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    for _ in 0..MAX_LINKS {
+        match (std::fs::read_link(&absolute), absolute.parent()) {
+            (Ok(target), Some(folder)) => absolute = folder.join(target),
+            _ => break,
+        }
+    }
+    match (absolute.parent().and_then(|folder| folder.canonicalize().ok()), absolute.file_name()) {
+        (Some(folder), Some(name)) => folder.join(name),
+        _ => absolute,
+    }
+}
+
+/// `path` relative to `folder`, with `/` as separator; the absolute path if they have only the root in common.
+pub fn relative_path(folder: &Path, path: &Path) -> String {
+    let (folder, path) = (absolute(folder), absolute(path));
+    let (from, to): (Vec<Component>, Vec<Component>) = (folder.components().collect(), path.components().collect());
+    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let is_name = |component: &&Component| matches!(component, Component::Normal(_));
+    if !from[..shared].iter().any(|component| is_name(&component)) && !from[shared..].is_empty() {
+        return path_to_text(&path);
+    }
+    let up = std::iter::repeat_n("..".to_owned(), from.len() - shared);
+    let down = to[shared..].iter().map(|component| path_to_text(component.as_ref()));
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn every_path_has_words_that_lead_back_to_it() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt;
+        assert_eq!(path_to_text(Path::new("a/b é.obj")), "a/b é.obj");
+        let names: [&[u8]; 7] = [
+            b"a\xff",
+            b"\xffa",
+            b"\xc3/\xa9",
+            "\u{ef80}".as_bytes(),
+            b"\xef\xbe",
+            b"\x80\xef\xbe\x80\x80",
+            "\u{efff}\u{e000}é".as_bytes(),
+        ];
+        for name in names {
+            let path = Path::new(OsStr::from_bytes(name));
+            assert_eq!(text_to_path(&path_to_text(path)), path, "{name:?}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let odd = folder.path().join(OsStr::from_bytes(b"odd\xfe"));
+        std::fs::create_dir(&odd).unwrap();
+        let words = relative_path(folder.path(), &odd.join("a.obj"));
+        assert_eq!(folder.path().join(text_to_path(&words)), odd.join("a.obj"));
+    }
+
+    #[test]
+    fn paths_lead_from_one_folder_to_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for name in ["a/b", "c"] {
+            std::fs::create_dir_all(root.join(name)).unwrap();
+        }
+        for (from, to, expected) in [
+            ("a", "a/room.ron", "room.ron"),
+            ("a", "a/b/room.ron", "b/room.ron"),
+            ("a/b", "c/new.ron", "../../c/new.ron"),
+            ("", "c/new.ron", "c/new.ron"),
+        ] {
+            let relative = relative_path(&root.join(from), &root.join(to));
+            assert_eq!(relative, expected);
+            assert_eq!(absolute(&root.join(from).join(relative)), absolute(&root.join(to)));
+        }
+        #[cfg(unix)]
+        assert_eq!(relative_path(Path::new("/proc"), Path::new("/etc/none")), "/etc/none");
+    }
+}

@@ -1,0 +1,208 @@
+//! Lights that are not objects: conversion between scene file and world, and validation.
+
+use crate::bad_value::BadValue;
+use crate::bounds::{check_cone, check_light, check_light_radius};
+use crate::parts::{LightPart, TransformPart};
+use crate::placement::Placement;
+use crate::value::Rgb;
+use crate::view::unit_direction;
+use glam::{DVec3, Vec3};
+
+/// Emits uniformly in all directions; rendered as an emissive sphere, or as a point if its radius is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
+#[cfg_attr(feature = "ecs", require(Placement))]
+pub struct PointLight {
+    /// Radiant intensity, W·sr⁻¹.
+    pub intensity: Vec3,
+    /// Metres. With 0 it is a point: its shadows are hard, and rays cannot hit it.
+    pub radius: f64,
+}
+
+/// Emits from a point into a cone; rays cannot hit it.
+///
+/// At the angle a from the axis its intensity is `intensity` · t², with t = (cos a − cos outer) / (cos inner − cos
+/// outer), clamped to 0..1.
+///
+/// Source: glTF 2.0, KHR_lights_punctual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
+#[cfg_attr(feature = "ecs", require(Placement))]
+pub struct SpotLight {
+    /// Radiant intensity within the inner cone, W·sr⁻¹.
+    pub intensity: Vec3,
+    /// Axis of the cone, away from its apex, in object space: its [`Placement`] rotates it. Any length but 0.
+    pub direction: DVec3,
+    /// Degrees from the axis, 0 to the outer angle; the intensity falls off from here on.
+    pub inner_angle_deg: f64,
+    /// Degrees from the axis, above 0 and at most 90; no light beyond.
+    pub outer_angle_deg: f64,
+}
+
+/// Emits parallel light from infinitely far away; rays cannot hit it. Like the light of the environment, it is not
+/// absorbed by the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
+#[cfg_attr(feature = "ecs", require(Placement))]
+pub struct DirectionalLight {
+    /// Irradiance of a surface that faces the light, W·m⁻².
+    pub irradiance: Vec3,
+    /// Direction of propagation, in object space: its [`Placement`] rotates it. Any length but 0.
+    pub direction: DVec3,
+}
+
+/// A light that is not an object. Each kind is a component; if an entity has several, the first in this order counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Emits uniformly from a point or a small sphere.
+    Point(PointLight),
+    /// Emits from a point into a cone.
+    Spot(SpotLight),
+    /// Emits parallel light from infinitely far away.
+    Directional(DirectionalLight),
+}
+
+impl LightKind {
+    /// The first of the components of an entity.
+    pub fn first(
+        (point, spot, directional): (Option<&PointLight>, Option<&SpotLight>, Option<&DirectionalLight>),
+    ) -> Option<Self> {
+        (point.map(|&light| Self::Point(light)))
+            .or(spot.map(|&light| Self::Spot(light)))
+            .or(directional.map(|&light| Self::Directional(light)))
+    }
+
+    /// Names of all kinds, as in [`Self::name`].
+    pub const NAMES: [&'static str; 3] = ["point light", "spot light", "directional light"];
+
+    /// Name of the kind of light, for the user interface.
+    pub fn name(&self) -> &'static str {
+        Self::NAMES[match self {
+            Self::Point(_) => 0,
+            Self::Spot(_) => 1,
+            Self::Directional(_) => 2,
+        }]
+    }
+
+    /// Whether it emits from one place, and not from infinitely far away.
+    pub fn has_position(&self) -> bool {
+        !matches!(self, Self::Directional(_))
+    }
+
+    /// Inner and outer angle of its cone, degrees; `None` if it has no cone.
+    pub fn cone_deg(&self) -> Option<(f64, f64)> {
+        match self {
+            Self::Spot(light) => Some((light.inner_angle_deg, light.outer_angle_deg)),
+            Self::Point(_) | Self::Directional(_) => None,
+        }
+    }
+
+    /// Radiant intensity, W·sr⁻¹; for directional lights the irradiance, W·m⁻².
+    pub fn strength(&self) -> Vec3 {
+        match self {
+            Self::Point(light) => light.intensity,
+            Self::Spot(light) => light.intensity,
+            Self::Directional(light) => light.irradiance,
+        }
+    }
+
+    /// The light with another [`Self::strength`].
+    #[must_use]
+    pub fn with_strength(self, strength: Vec3) -> Self {
+        match self {
+            Self::Point(light) => Self::Point(PointLight { intensity: strength, ..light }),
+            Self::Spot(light) => Self::Spot(SpotLight { intensity: strength, ..light }),
+            Self::Directional(light) => Self::Directional(DirectionalLight { irradiance: strength, ..light }),
+        }
+    }
+
+    /// Radius of the emissive sphere, metres; 0 for delta lights, which rays cannot hit.
+    pub fn radius(&self) -> f64 {
+        match self {
+            Self::Point(light) => light.radius,
+            Self::Spot(_) | Self::Directional(_) => 0.0,
+        }
+    }
+
+    /// Direction of emission, unit vector in the world; `None` for point lights, and if the direction is degenerate.
+    pub fn direction(&self, placement: &Placement) -> Option<DVec3> {
+        let own = match self {
+            Self::Point(_) => return None,
+            Self::Spot(light) => light.direction,
+            Self::Directional(light) => light.direction,
+        };
+        unit_direction(placement.affine().transform_vector3(own))
+    }
+
+    /// # Errors
+    /// If a parameter is out of range, or the direction is degenerate.
+    pub fn check(&self, placement: &Placement) -> Result<(), BadValue> {
+        match self {
+            // Spheres of any radius that is a normal `f32` get the checks of emissive objects.
+            Self::Point(light) if light.radius > 0.0 && (light.radius as f32).is_normal() => {}
+            Self::Point(light) => check_light("intensity", light.intensity).and(check_light_radius(light.radius))?,
+            Self::Spot(light) => {
+                check_light("intensity", light.intensity)?;
+                check_cone(light.inner_angle_deg, light.outer_angle_deg)?;
+            }
+            Self::Directional(light) => check_light("irradiance", light.irradiance)?,
+        }
+        if !matches!(self, Self::Point(_)) && self.direction(placement).is_none() {
+            return Err(BadValue::unfit("direction", "`direction` must be finite and have a length"));
+        }
+        if !placement.translation.as_vec3().is_finite() {
+            return Err(BadValue::unfit("position", "`position` must be finite"));
+        }
+        Ok(())
+    }
+
+    /// The light of a scene file and its placement.
+    pub fn from_part(part: &LightPart) -> (Self, Placement) {
+        match part {
+            LightPart::Point { position, intensity, radius, .. } => {
+                (Self::Point(PointLight { intensity: intensity.0, radius: *radius }), Placement::at(*position))
+            }
+            LightPart::Spot { position, direction, intensity, inner_angle, outer_angle, transform, .. } => {
+                let light = SpotLight {
+                    intensity: intensity.0,
+                    direction: *direction,
+                    inner_angle_deg: *inner_angle,
+                    outer_angle_deg: *outer_angle,
+                };
+                let placement = Placement::from_part(transform);
+                let translation = placement.affine().transform_point3(*position);
+                (Self::Spot(light), Placement { translation, ..placement })
+            }
+            LightPart::Directional { direction, irradiance, transform, .. } => {
+                let light = DirectionalLight { irradiance: irradiance.0, direction: *direction };
+                (Self::Directional(light), Placement::from_part(transform))
+            }
+        }
+    }
+
+    /// The light as in a scene file.
+    pub fn to_part(self, name: Option<String>, placement: &Placement) -> LightPart {
+        // Lights with a position need no transform if they are not rotated.
+        let (position, transform) = match *placement == Placement::at(placement.translation) {
+            true => (placement.translation, TransformPart::default()),
+            false => (DVec3::ZERO, placement.to_part()),
+        };
+        match self {
+            Self::Point(PointLight { intensity, radius }) => {
+                LightPart::Point { name, position: placement.translation, intensity: Rgb(intensity), radius }
+            }
+            Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg }) => LightPart::Spot {
+                name,
+                position,
+                direction,
+                intensity: Rgb(intensity),
+                inner_angle: inner_angle_deg,
+                outer_angle: outer_angle_deg,
+                transform,
+            },
+            Self::Directional(DirectionalLight { irradiance, direction }) => {
+                LightPart::Directional { name, direction, irradiance: Rgb(irradiance), transform: placement.to_part() }
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Transforms of objects from object space to the world, in `f64`.
+
+use crate::parts::{ScalePart, TransformPart};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// From object space to the world: `linear` is applied first, then `translation`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
+pub struct Placement {
+    /// Metres.
+    pub translation: DVec3,
+    /// Rotation, scale and shear.
+    pub linear: Linear,
+}
+
+/// The linear part of a placement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Linear {
+    /// Scaled along the axes of object space, then rotated.
+    Turned {
+        /// Degrees about the fixed axes X, then Y, then Z.
+        rotation_deg: DVec3,
+        /// Factors; negative ones mirror.
+        scale: DVec3,
+    },
+    /// Any other matrix, including shear.
+    Matrix(DMat3),
+}
+
+impl Default for Linear {
+    fn default() -> Self {
+        Self::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::ONE }
+    }
+}
+
+impl Placement {
+    /// At a point, without rotation or scale.
+    pub fn at(translation: DVec3) -> Self {
+        Self { translation, linear: Linear::default() }
+    }
+
+    /// The placement that a transform in a scene file describes.
+    pub fn from_part(part: &TransformPart) -> Self {
+        if let Some([x, y, z]) = part.matrix {
+            let row = |row: [f64; 4]| DVec3::new(row[0], row[1], row[2]);
+            let linear = DMat3::from_cols(row(x), row(y), row(z)).transpose();
+            return Self { translation: DVec3::new(x[3], y[3], z[3]), linear: Linear::Matrix(linear) };
+        }
+        let scale = part.scale.map_or(DVec3::ONE, |scale| scale.0);
+        Self {
+            translation: part.translate.unwrap_or(DVec3::ZERO),
+            linear: Linear::Turned { rotation_deg: part.rotate.unwrap_or(DVec3::ZERO), scale },
+        }
+    }
+
+    /// The placement as in a scene file.
+    pub fn to_part(&self) -> TransformPart {
+        let differs = |value: DVec3, from: DVec3| (value != from).then_some(value);
+        match self.linear {
+            Linear::Turned { rotation_deg, scale } => TransformPart {
+                translate: differs(self.translation, DVec3::ZERO),
+                rotate: differs(rotation_deg, DVec3::ZERO),
+                scale: differs(scale, DVec3::ONE).map(ScalePart),
+                matrix: None,
+            },
+            Linear::Matrix(linear) => {
+                let rows = linear.transpose();
+                let row = |i: usize| {
+                    let DVec3 { x, y, z } = rows.col(i);
+                    [x, y, z, self.translation[i]]
+                };
+                TransformPart { matrix: Some([row(0), row(1), row(2)]), ..TransformPart::default() }
+            }
+        }
+    }
+
+    /// The linear part as a matrix.
+    pub fn linear(&self) -> DMat3 {
+        match self.linear {
+            Linear::Turned { rotation_deg, scale } => {
+                let [about_x, about_y, about_z] = rotation_deg.to_array().map(sin_cos_deg);
+                let ((sx, cx), (sy, cy), (sz, cz)) = (about_x, about_y, about_z);
+                let x = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cx, sx), DVec3::new(0.0, -sx, cx));
+                let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));
+                let z = DMat3::from_cols(DVec3::new(cz, sz, 0.0), DVec3::new(-sz, cz, 0.0), DVec3::Z);
+                z * y * x * DMat3::from_diagonal(scale)
+            }
+            Linear::Matrix(linear) => linear,
+        }
+    }
+
+    /// The whole transform.
+    pub fn affine(&self) -> DAffine3 {
+        DAffine3 { matrix3: self.linear(), translation: self.translation }
+    }
+
+    /// The scale factor, if it is the same in all directions.
+    pub fn even_scale(&self) -> Option<f64> {
+        let linear = self.linear();
+        let squared = linear.x_axis.length_squared();
+        // Rounding in a rotation changes dot products of the axes by a few parts in 10¹⁶.
+        let tolerance = 1e-12 * squared;
+        let even =
+            [linear.y_axis, linear.z_axis].iter().all(|axis| (axis.length_squared() - squared).abs() <= tolerance);
+        let square = [(linear.x_axis, linear.y_axis), (linear.y_axis, linear.z_axis), (linear.z_axis, linear.x_axis)]
+            .iter()
+            .all(|(a, b)| a.dot(*b).abs() <= tolerance);
+        (even && square && squared > 0.0).then(|| squared.sqrt())
+    }
+}
+
+/// Sine and cosine; exact for multiples of 90 degrees.
+fn sin_cos_deg(angle: f64) -> (f64, f64) {
+    match angle.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        other => other.to_radians().sin_cos(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DQuat, EulerRot};
+
+    #[test]
+    fn scale_comes_first_then_x_y_z_then_the_move() {
+        let placement = Placement {
+            translation: DVec3::new(10.0, 0.0, 0.0),
+            linear: Linear::Turned { rotation_deg: DVec3::new(90.0, 90.0, 0.0), scale: DVec3::new(1.0, 2.0, 3.0) },
+        };
+        // (0, 1, 0) → scaled (0, 2, 0) → about X (0, 0, 2) → about Y (2, 0, 0) → translated (12, 0, 0).
+        let point = placement.affine().transform_point3(DVec3::Y);
+        assert!(point.abs_diff_eq(DVec3::new(12.0, 0.0, 0.0), 1e-12), "{point}");
+    }
+
+    #[test]
+    fn turning_agrees_with_quaternions() {
+        for rotation_deg in
+            [DVec3::new(10.0, 20.0, 30.0), DVec3::new(-100.0, 181.0, 720.5), DVec3::new(90.0, -90.0, 180.0)]
+        {
+            let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
+            let expected = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, z, y, x));
+            let placement =
+                Placement { translation: DVec3::ZERO, linear: Linear::Turned { rotation_deg, scale: DVec3::ONE } };
+            assert!(placement.linear().abs_diff_eq(expected, 1e-12), "{rotation_deg}");
+        }
+    }
+
+    #[test]
+    fn a_matrix_says_the_same_as_its_parts() {
+        let turned = Placement {
+            translation: DVec3::new(1.0, 2.0, 3.0),
+            linear: Linear::Turned { rotation_deg: DVec3::new(10.0, 20.0, 30.0), scale: DVec3::splat(0.5) },
+        };
+        let matrix = Placement { linear: Linear::Matrix(turned.linear()), ..turned };
+        assert_eq!(Placement::from_part(&matrix.to_part()).affine(), turned.affine());
+        assert_eq!(Placement::from_part(&turned.to_part()), turned);
+        assert!((turned.even_scale().unwrap() - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn stretched_or_sheared_is_not_even() {
+        let stretched = Linear::Turned { rotation_deg: DVec3::splat(20.0), scale: DVec3::new(1.0, 1.0, 1.001) };
+        assert_eq!(Placement { translation: DVec3::ZERO, linear: stretched }.even_scale(), None);
+        let sheared = Linear::Matrix(DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0).normalize(), DVec3::Z));
+        assert_eq!(Placement { translation: DVec3::ZERO, linear: sheared }.even_scale(), None);
+    }
+}

@@ -1,0 +1,154 @@
+//! The glTF files of a scene while it is loaded: each file is read once, and each of its meshes is built once.
+
+use crate::error::gltf::{GltfError, GltfProblem, Located};
+use crate::gltf::assembly::{MeshKey, Posed};
+use crate::gltf::document::{Document, ReadOptions};
+use crate::gltf::images::part_of_model;
+use crate::gltf::mesh::BuiltMesh;
+use crate::gltf::surfaces::Surfaces;
+use crate::model::imported::ModelNormals;
+use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
+use firstlight_files::limits::Limits;
+use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_render::ImageTexture;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// An image with an optional warning, or why it could not be read.
+type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
+
+/// Open files, by path.
+#[derive(Debug, Default)]
+pub struct Documents {
+    options: ReadOptions,
+    open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
+    /// Of all images that are decoded.
+    pixels: ImageBudget,
+    /// Images that were decoded and not yet taken, by path.
+    decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
+}
+
+/// An open file.
+#[derive(Debug)]
+pub struct Opened {
+    /// The file.
+    pub document: Document,
+    /// All files that were read for it, each with its stamp from before it was read.
+    pub files: Vec<(PathBuf, Stamp)>,
+    /// By the bits of the time.
+    posed: Mutex<HashMap<Option<u64>, Arc<Posed>>>,
+    /// By the path of the model in texture paths.
+    surfaces: Mutex<HashMap<String, Arc<Surfaces>>>,
+    meshes: Mutex<HashMap<(MeshKey, Option<u64>), Arc<BuiltMesh>>>,
+    /// Number of their vertices and indices, as the file states it.
+    made: AtomicU64,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Documents {
+    /// No file yet; `allow_outside`: files outside of the folder of a model may be read.
+    pub fn new(allow_outside: bool) -> Self {
+        Self { options: ReadOptions { allow_outside, ..ReadOptions::default() }, ..Self::default() }
+    }
+
+    /// Whether models may refer to files outside of their folders.
+    pub(crate) fn allow_outside(&self) -> bool {
+        self.options.allow_outside
+    }
+
+    /// The file at `path`, read on first use.
+    pub(crate) fn open(&self, path: &Path) -> Result<Arc<Opened>, GltfError> {
+        let mut open = lock(&self.open);
+        if let Some(opened) = open.get(path) {
+            return Ok(opened.clone());
+        }
+        // Taken before reading, so that a change in the meantime is noticed.
+        let before = stamp(path);
+        let document = Document::read(path, self.options)?;
+        let others = document.files()[1..].iter().map(|file| (file.clone(), stamp(file)));
+        let files = std::iter::once((path.to_owned(), before)).chain(others).collect();
+        let opened = Arc::new(Opened {
+            document,
+            files,
+            posed: Mutex::default(),
+            surfaces: Mutex::default(),
+            meshes: Mutex::default(),
+            made: AtomicU64::default(),
+        });
+        open.insert(path.to_owned(), opened.clone());
+        Ok(opened)
+    }
+
+    /// A mesh with the normals of its file.
+    pub(crate) fn mesh(&self, opened: &Opened, key: MeshKey, at: Option<f64>) -> Result<Arc<BuiltMesh>, Located> {
+        let known = (key, at.map(f64::to_bits));
+        if let Some(mesh) = lock(&opened.meshes).get(&known) {
+            return Ok(mesh.clone());
+        }
+        let limit = opened.document.most_own_numbers();
+        let (built, kept) = opened.document.numbers_of(key.mesh);
+        if built > limit || opened.made.fetch_add(kept, Ordering::Relaxed).saturating_add(kept) > limit {
+            return Err((String::new(), GltfProblem::TooLarge { limit }));
+        }
+        let posed = opened.posed(at);
+        let mesh =
+            Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
+        Ok(lock(&opened.meshes).entry(known).or_insert(mesh).clone())
+    }
+
+    /// An image in a file of its own, or inside a model.
+    pub fn picture(&self, path: &Path) -> ReadPicture {
+        let Some((model, number)) = part_of_model(path) else { return read_picture_of_scene(path, &self.pixels) };
+        let failed = |error: GltfError| PictureError::Model(error.to_string());
+        let opened = self.open(&model).map_err(failed)?;
+        let bytes = opened.document.picture_bytes(number).map_err(|located| failed(opened.document.error(located)))?;
+        picture_of_bytes(&bytes, &Limits::of_this_process(), &self.pixels)
+    }
+
+    /// Decodes images in parallel, for [`take_picture`](Self::take_picture).
+    pub fn decode(&self, paths: Vec<PathBuf>) {
+        paths.into_par_iter().for_each(|path| {
+            let before = stamp(&part_of_model(&path).map_or_else(|| path.clone(), |(model, _)| model));
+            let read = self.picture(&path);
+            lock(&self.decoded).insert(path, (before, read));
+        });
+    }
+
+    /// Removes and returns a decoded image, with the stamp of its file from before it was read.
+    pub fn take_picture(&self, path: &Path) -> Option<(Stamp, ReadPicture)> {
+        lock(&self.decoded).remove(path)
+    }
+
+    /// Builds meshes in parallel; errors are reported when a mesh is requested individually.
+    pub(crate) fn make(&self, wanted: &[(Arc<Opened>, MeshKey, Option<f64>)]) {
+        wanted.par_iter().for_each(|(opened, key, at)| {
+            let _ = self.mesh(opened, *key, *at);
+        });
+    }
+}
+
+impl Opened {
+    pub(crate) fn posed(&self, at: Option<f64>) -> Arc<Posed> {
+        let key = at.map(f64::to_bits);
+        if let Some(posed) = lock(&self.posed).get(&key) {
+            return posed.clone();
+        }
+        let posed = Arc::new(self.document.posed(at));
+        lock(&self.posed).entry(key).or_insert(posed).clone()
+    }
+
+    /// - `file`: path of the model in texture paths.
+    pub(crate) fn surfaces(&self, file: &str) -> Arc<Surfaces> {
+        if let Some(surfaces) = lock(&self.surfaces).get(file) {
+            return surfaces.clone();
+        }
+        let surfaces = Arc::new(self.document.surfaces(file));
+        lock(&self.surfaces).entry(file.to_owned()).or_insert(surfaces).clone()
+    }
+}

@@ -1,0 +1,30 @@
+//! Models of other programs: OBJ, PLY, STL and glTF, as meshes and as parts of a scene file.
+//!
+//! A reader ([`obj`], [`ply`], [`stl`], [`gltf`]) returns an [`ImportedModel`] or an error with its location in the
+//! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`].
+
+pub mod documents;
+pub(crate) mod error;
+pub mod framing;
+pub mod gltf;
+pub(crate) mod gltf_mesh;
+pub mod gltf_motion;
+pub(crate) mod gltf_parts;
+pub mod gltf_scene;
+mod ktx2;
+mod load_model;
+pub mod meshes;
+pub(crate) mod model;
+pub(crate) mod mtl_material;
+pub mod obj;
+pub mod orientation;
+pub mod picture;
+pub mod ply;
+pub mod stl;
+pub mod up_axis;
+
+pub use error::{ModelError, ModelProblem, Place};
+pub use firstlight_files::reference::Outside;
+pub use firstlight_format::model_format::ModelFormat;
+pub use load_model::load_model;
+pub use model::imported::{ImportedModel, ModelNormals, ModelOptions};

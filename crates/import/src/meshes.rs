@@ -1,0 +1,280 @@
+//! The meshes of a scene: from files or built in, shaded as specified, with the materials of their files.
+
+use crate::documents::Documents;
+use crate::gltf::assembly::MeshKey;
+use crate::gltf_mesh::GltfMesh;
+use crate::load_model::load_model;
+use crate::model::imported::{ImportedModel, ModelNormals, ModelOptions};
+use crate::model::material::ImportedMaterial;
+use crate::mtl_material::MtlMaterials;
+use firstlight_files::relative::text_to_path;
+use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_files::warnings::Warnings;
+use firstlight_format::error::SceneError;
+use firstlight_format::model_format::ModelFormat;
+use firstlight_format::parts::MaterialPart;
+use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
+use firstlight_mesh::{Mesh, NormalWeight, procedural, simplify};
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Crease angle for recomputed normals of glTF meshes, radians: edges are hard beyond it.
+const CREASE: f32 = std::f32::consts::FRAC_PI_3;
+
+/// The mesh of that name, and its crease angle in radians; `None` smooths every edge.
+fn builtin_mesh(name: &str) -> Option<(Mesh, Option<f32>)> {
+    let sharp = Some(40_f32.to_radians());
+    Some(match name {
+        "asteroid" => (procedural::displaced_sphere(&procedural::DisplacedSphere::default()), None),
+        "blob-in-bowl" => (procedural::blob_in_bowl(), sharp),
+        "bored-block" => (procedural::bored_block(64), sharp),
+        "cube" => (procedural::cuboid(DVec3::ONE), sharp),
+        "icosphere" => (procedural::icosphere(32), None),
+        "room" => (procedural::room(), sharp),
+        "serpent-knot" => (procedural::serpent_knot(&procedural::SerpentKnot::default()), None),
+        "slivers" => (procedural::slivers(10_000, 1), sharp),
+        "terrain" => (procedural::terrain(&procedural::Terrain::default()), None),
+        "torus" => (procedural::torus(1.0, 0.35, 192, 64), None),
+        _ => return None,
+    })
+}
+
+/// A mesh and the materials that its file assigns to its slots.
+#[derive(Clone, Debug)]
+pub struct LoadedMesh {
+    /// The triangles.
+    pub mesh: Arc<Mesh>,
+    /// One per slot; empty if the file has no materials.
+    pub slots: Vec<(String, MaterialPart)>,
+    /// The textures of `slots`, with the paths of their images.
+    pub textures: Vec<(String, TextureSource, PathBuf)>,
+    /// What was repaired or left out.
+    pub warnings: Warnings,
+    /// Warnings about `slots`, for objects that use them.
+    pub material_warnings: Warnings,
+    /// All files that were read for it, each with its stamp.
+    pub files: Vec<(PathBuf, Stamp)>,
+}
+
+/// Reads or generates a mesh, then simplifies and shades it.
+pub fn load_mesh(
+    source: &MeshSource,
+    shading: MeshShading,
+    simplify: Option<f64>,
+    folder: &Path,
+    documents: &Documents,
+) -> Result<LoadedMesh, SceneError> {
+    if let MeshSource::Gltf { file, mesh, node, at } = source {
+        let path = folder.join(text_to_path(file));
+        let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
+        let read = GltfMesh { path: &path, key, at: at.map(|at| at.0), shading, simplified: simplify.is_some() };
+        let base = read.base(documents).map_err(|error| SceneError::new(error.to_string()))?;
+        let mesh = Arc::new(finish(base.mesh, source, shading, simplify, Some(CREASE))?);
+        let (slots, textures, files) = (base.slots, base.textures, base.files);
+        let (warnings, material_warnings) = (base.warnings, base.material_warnings);
+        return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
+    }
+    match source.file() {
+        Some((_, file)) => {
+            let path = folder.join(text_to_path(file));
+            read_file(source, &path, shading, simplify, documents.allow_outside())
+        }
+        None => {
+            let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
+            Ok(LoadedMesh {
+                mesh: Arc::new(mesh),
+                slots: Vec::new(),
+                textures: Vec::new(),
+                warnings: Warnings::default(),
+                material_warnings: Warnings::default(),
+                files: Vec::new(),
+            })
+        }
+    }
+}
+
+/// A mesh before simplification and shading, so that both can be changed without reading it again.
+#[derive(Clone, Debug)]
+pub struct MeshBase {
+    source: MeshSource,
+    /// Determines whether the normals of the file are kept.
+    shading: MeshShading,
+    simplified: bool,
+    folder: PathBuf,
+    mesh: Mesh,
+    /// Crease angle of automatic shading, radians; `None` smooths every edge.
+    crease: Option<f32>,
+}
+
+impl MeshBase {
+    /// Reads or generates the mesh: the first step of `load_mesh`.
+    ///
+    /// # Errors
+    /// If there is no such mesh, or its file cannot be read.
+    pub fn read(
+        source: &MeshSource,
+        shading: MeshShading,
+        simplify: Option<f64>,
+        folder: &Path,
+    ) -> Result<Self, SceneError> {
+        let (mesh, crease) = match source.file() {
+            Some((ModelFormat::Gltf, file)) => {
+                let MeshSource::Gltf { mesh, node, at, .. } = source else { unreachable!("the format is glTF") };
+                let path = folder.join(text_to_path(file));
+                let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
+                let at = at.map(|at| at.0);
+                let read = GltfMesh { path: &path, key, at, shading, simplified: simplify.is_some() };
+                let base = read.base(&Documents::default()).map_err(|error| SceneError::new(error.to_string()))?;
+                (base.mesh, Some(CREASE))
+            }
+            Some((format, file)) => {
+                let path = folder.join(text_to_path(file));
+                // Materials, which may lie elsewhere, are not used here.
+                let (imported, crease) = read_base(&path, format, shading, simplify.is_some(), false)?;
+                (imported.mesh, crease)
+            }
+            None => {
+                let name = source.name();
+                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
+            }
+        };
+        let (source, folder) = (source.clone(), folder.to_owned());
+        Ok(Self { source, shading, simplified: simplify.is_some(), folder, mesh, crease })
+    }
+
+    /// Whether [`Self::read`] would give the same for these arguments.
+    pub fn serves(&self, source: &MeshSource, shading: MeshShading, simplify: Option<f64>, folder: &Path) -> bool {
+        (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
+    }
+
+    /// Simplifies and shades the mesh: the last step of `load_mesh`.
+    ///
+    /// # Errors
+    /// If it cannot be simplified by this ratio.
+    pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
+        finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
+    }
+
+    /// The mesh before [`Self::finish`].
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+}
+
+fn finish(
+    mesh: Mesh,
+    source: &MeshSource,
+    shading: MeshShading,
+    simplify: Option<f64>,
+    crease: Option<f32>,
+) -> Result<Mesh, SceneError> {
+    let (had_tangents, is_gltf) = (!mesh.tangents.is_empty(), matches!(source, MeshSource::Gltf { .. }));
+    let mesh = simplified(mesh, simplify)?;
+    // glTF meshes without normals have flat shading.
+    if is_gltf && shading == MeshShading::Auto && simplify.is_none() {
+        return Ok(mesh);
+    }
+    // The normals of an imported mesh are already the specified ones.
+    let keeps = shading != MeshShading::Flat && source.file().is_some() && !mesh.normals.is_empty();
+    let mesh = if keeps { mesh } else { shaded(mesh, shading, crease) };
+    Ok(if had_tangents && mesh.tangents.is_empty() { mesh.with_tangents() } else { mesh })
+}
+
+fn read_file(
+    source: &MeshSource,
+    path: &Path,
+    shading: MeshShading,
+    simplify: Option<f64>,
+    allow_outside: bool,
+) -> Result<LoadedMesh, SceneError> {
+    // Taken before reading, so that a change in the meantime is noticed.
+    let before = stamp(path);
+    let format = source.file().map_or(ModelFormat::Obj, |(format, _)| format);
+    let (mut imported, crease) = read_base(path, format, shading, simplify.is_some(), allow_outside)?;
+    imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
+    let mesh = Arc::new(imported.mesh);
+    let files = std::iter::once((path.to_owned(), before))
+        .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
+        .collect();
+    let (slots, textures) = (Vec::new(), Vec::new());
+    let (warnings, material_warnings) = (imported.warnings, imported.material_warnings);
+    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files };
+    // If the file has no materials, the slots stay empty.
+    if imported.materials.iter().any(|material| !material.name.is_empty()) {
+        let mut converted = MtlMaterials::default();
+        let slot = |material: &ImportedMaterial| (material.name.clone(), converted.part(material));
+        loaded.slots = imported.materials.iter().map(slot).collect();
+        loaded.textures = converted.textures;
+    }
+    Ok(loaded)
+}
+
+/// The mesh as simplification needs it, and the crease angle for normals that are still to be computed.
+fn read_base(
+    path: &Path,
+    format: ModelFormat,
+    shading: MeshShading,
+    simplify: bool,
+    allow_outside: bool,
+) -> Result<(ImportedModel, Option<f32>), SceneError> {
+    let read = |normals| {
+        load_model(path, format, &ModelOptions { normals, allow_outside, ..ModelOptions::default() })
+            .map_err(|error| SceneError::new(error.to_string()))
+    };
+    let computed = ModelOptions::default().normals;
+    let ModelNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
+    let mut imported = read(match shading {
+        MeshShading::Auto => computed,
+        MeshShading::Smooth if !simplify => ModelNormals::OfPositions,
+        MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
+    })?;
+    // Computed normals would prevent simplification at creases: they are computed afterwards.
+    if shading == MeshShading::Auto && simplify && !imported.normals_from_file {
+        imported.mesh = read(ModelNormals::Ignore)?.mesh;
+    }
+    Ok((imported, Some(crease_angle)))
+}
+
+fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
+    match ratio {
+        Some(ratio) if ratio < 1.0 => {
+            let simple = simplify::simplify(&mesh, simplify::Method::default(), simplify::Target::Ratio(ratio))
+                .map_err(|error| SceneError::new(format!("the mesh cannot be simplified: {error}")))?;
+            Ok(simple.with_colors_of(&mesh))
+        }
+        _ => Ok(mesh),
+    }
+}
+
+/// - `crease`: crease angle of automatic shading, radians; `None` smooths every edge.
+fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
+    match shading {
+        MeshShading::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
+        MeshShading::Smooth => mesh.with_vertex_normals(),
+        MeshShading::Flat => mesh.flat(),
+    }
+}
+
+impl LoadedMesh {
+    /// Whether the files that it was read from have not changed.
+    pub fn is_fresh(&self) -> bool {
+        self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firstlight_format::sources::BUILTIN_NAMES;
+
+    #[test]
+    fn every_builtin_mesh_can_be_had() {
+        for name in BUILTIN_NAMES {
+            let source = MeshSource::Builtin((*name).to_owned());
+            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new(""), &Documents::default()).unwrap();
+            loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+        assert!(BUILTIN_NAMES.is_sorted());
+    }
+}

@@ -1,0 +1,194 @@
+//! Guesses the up axis of a model if the file does not say: the one on which the model would stand.
+
+use firstlight_format::choice::UpAxis;
+use firstlight_mesh::Mesh;
+use glam::{DVec2, DVec3};
+
+/// For formats of either axis (PLY, STL): Y, unless the model would tip over that way and stands on its lower Z side.
+///
+/// A model stands if the centroid of its surface is above the convex hull of its lowest 2 %. For Z, this hull must also
+/// have more than twice the relative area of that of Y.
+pub fn guess_up(mesh: &Mesh) -> UpAxis {
+    let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
+    let (on_y, on_z) = (model.stand(1, Side::Lower), model.stand(2, Side::Lower));
+    if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// For OBJ, a format of Y up: Z only for a tall model with a broad base, such as a bust, that would tip over on all other
+/// sides along Y and Z.
+pub fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
+    const BROAD: f64 = 0.25;
+    const POINTED: f64 = 0.02;
+    let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
+    let size = model.max - model.min;
+    let has_no_base = |stand: Stand| !stand.stable && stand.support < POINTED;
+    let has_base = |stand: Stand| stand.stable && stand.support >= BROAD;
+    let is_sure = size.z >= size.x.max(size.y)
+        && has_base(model.stand(2, Side::Lower))
+        && !model.stand(2, Side::Upper).stable
+        && has_no_base(model.stand(1, Side::Lower))
+        && has_no_base(model.stand(1, Side::Upper));
+    if is_sure { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// What is needed to stand a model on its sides.
+struct Stands<'a> {
+    mesh: &'a Mesh,
+    /// Centroid of the surface.
+    center: DVec3,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// The end of an axis that is below.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Lower,
+    Upper,
+}
+
+/// Stability of a model on one of its sides.
+struct Stand {
+    stable: bool,
+    /// Area of the hull of the lowest points over the area of the floor of the bounding box.
+    support: f64,
+}
+
+/// The corners of each triangle.
+fn triangles(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> {
+    mesh.triangles.iter().map(|corners| corners.map(|vertex| mesh.positions[vertex as usize].as_dvec3()))
+}
+
+impl<'a> Stands<'a> {
+    /// `None` if the surface has no area.
+    fn of(mesh: &'a Mesh) -> Option<Self> {
+        let center = surface_center(mesh)?;
+        let corners = triangles(mesh).flatten();
+        let (min, max) = corners.fold((center, center), |(min, max), corner| (min.min(corner), max.max(corner)));
+        Some(Self { mesh, center, min, max })
+    }
+
+    fn stand(&self, axis: usize, side: Side) -> Stand {
+        let seen_from_below = |point: DVec3| DVec2::new(point[(axis + 1) % 3], point[(axis + 2) % 3]);
+        let margin = 0.02 * (self.max[axis] - self.min[axis]);
+        let is_lowest = |corner: &DVec3| match side {
+            Side::Lower => corner[axis] <= self.min[axis] + margin,
+            Side::Upper => corner[axis] >= self.max[axis] - margin,
+        };
+        let lowest = triangles(self.mesh).flatten().filter(is_lowest);
+        let hull = convex_hull(lowest.map(seen_from_below).collect());
+        let size = seen_from_below(self.max - self.min);
+        Stand { stable: contains(&hull, seen_from_below(self.center)), support: area(&hull) / (size.x * size.y) }
+    }
+}
+
+/// The centroid of the surface; `None` if its area is 0.
+fn surface_center(mesh: &Mesh) -> Option<DVec3> {
+    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+    for [a, b, c] in triangles(mesh) {
+        let area = (b - a).cross(c - a).length();
+        sum += area * (a + b + c) / 3.0;
+        total += area;
+    }
+    (total > 0.0).then(|| sum / total)
+}
+
+/// Convex hull, counter-clockwise, by Andrew's monotone chain.
+fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut chain: Vec<DVec2> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain[..]
+                && (b - a).perp_dot(point - a) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        // The last point is the first of the other chain.
+        chain.pop();
+        chain
+    };
+    let mut hull = chain(&mut points.iter().copied());
+    hull.extend(chain(&mut points.iter().rev().copied()));
+    hull
+}
+
+fn edges(hull: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> {
+    hull.iter().zip(hull.iter().cycle().skip(1)).map(|(&a, &b)| (a, b))
+}
+
+fn area(hull: &[DVec2]) -> f64 {
+    0.5 * edges(hull).map(|(a, b)| a.perp_dot(b)).sum::<f64>()
+}
+
+fn contains(hull: &[DVec2], point: DVec2) -> bool {
+    hull.len() > 2 && edges(hull).all(|(a, b)| (b - a).perp_dot(point - a) >= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A table: a top and four legs, standing along +Z or +Y.
+    fn table(up: UpAxis) -> Mesh {
+        let mut positions = Vec::new();
+        let mut triangles = Vec::new();
+        let mut block = |center: DVec3, size: DVec3| {
+            let cube = firstlight_mesh::procedural::cuboid(size);
+            let first = positions.len() as u32;
+            positions.extend(cube.positions.iter().map(|position| position.as_dvec3() + cube.center + center));
+            triangles.extend(cube.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+        };
+        block(DVec3::new(0.0, 1.0, 0.1), DVec3::new(2.0, 0.1, 1.2));
+        for (x, z) in [(-0.9, -0.4), (0.9, -0.4), (-0.9, 0.6), (0.9, 0.6)] {
+            block(DVec3::new(x, 0.5, z), DVec3::new(0.1, 1.0, 0.1));
+        }
+        if up == UpAxis::Z {
+            positions.iter_mut().for_each(|p| *p = DVec3::new(p.x, -p.z, p.y));
+        }
+        Mesh::from_f64(&positions, triangles).unwrap()
+    }
+
+    #[test]
+    fn a_table_stands_on_its_legs() {
+        assert_eq!(guess_up(&table(UpAxis::Y)), UpAxis::Y);
+        assert_eq!(guess_up(&table(UpAxis::Z)), UpAxis::Z);
+    }
+
+    /// A cone on a base along +Z, with a tip that leans towards +Y.
+    fn bust(height: f64) -> Mesh {
+        let ring = (0..16).map(|i| DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 16.0).extend(0.0));
+        let positions: Vec<DVec3> = ring.chain([DVec3::new(0.0, 1.2, height), DVec3::ZERO]).collect();
+        let sides = (0..16).flat_map(|i| [[i, (i + 1) % 16, 16], [(i + 1) % 16, i, 17]]);
+        Mesh::from_f64(&positions, sides.collect()).unwrap()
+    }
+
+    #[test]
+    fn obj_is_y_up_unless_the_model_can_stand_on_nothing_else() {
+        assert_eq!(guess_up_of_obj(&bust(3.0)), UpAxis::Z);
+        assert_eq!(guess_up_of_obj(&bust(1.0)), UpAxis::Y, "a relief with a flat back");
+        for mesh in [table(UpAxis::Y), table(UpAxis::Z), firstlight_mesh::procedural::cuboid(DVec3::new(1.0, 1.0, 3.0))]
+        {
+            assert_eq!(guess_up_of_obj(&mesh), UpAxis::Y);
+        }
+    }
+
+    #[test]
+    fn what_stands_either_way_is_y_up() {
+        assert_eq!(guess_up(&firstlight_mesh::procedural::cuboid(DVec3::ONE)), UpAxis::Y);
+        assert_eq!(guess_up(&firstlight_mesh::procedural::icosphere(8)), UpAxis::Y);
+    }
+
+    #[test]
+    fn a_hull_holds_its_points() {
+        let points: Vec<DVec2> = (0..50).map(|i| DVec2::from_angle(f64::from(i) * 2.4) * f64::from(i % 7)).collect();
+        let hull = convex_hull(points.clone());
+        assert!(area(&hull) > 0.0);
+        assert!(points.iter().all(|&point| contains(&hull, point)));
+        assert!(!contains(&hull, DVec2::new(6.5, 0.0)));
+        assert_eq!(area(&convex_hull(vec![DVec2::ZERO, DVec2::ONE])), 0.0);
+    }
+}
