@@ -1,8 +1,9 @@
 //! Camera paths, one view per frame: a turntable, or an interpolation of bookmarks.
 
+use crate::format::view::by_factor;
 use crate::frame::core::rig::{Rig, Turning};
 use crate::frame::navigation::orbit;
-use crate::scene::{Lens, Projection, View};
+use crate::scene::View;
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::TAU;
 
@@ -40,27 +41,13 @@ fn between(stops: &[Rig], leg: usize, t: f64) -> Rig {
     let after = stops[(leg + 2).min(stops.len() - 1)].view.eye;
     let (turned_a, turned_b) = (rotation(&a.view), rotation(&b.view));
     let turned = turned_a.slerp(turned_b, t);
-    let by_factor = |a: f64, b: f64| a * (b / a).powf(t);
     let view = View {
         eye: catmull_rom(before, a.view.eye, b.view.eye, after, t),
         forward: turned * DVec3::NEG_Z,
         up: turned * DVec3::Y,
-        pivot_distance: by_factor(a.view.pivot_distance, b.view.pivot_distance),
+        pivot_distance: by_factor(a.view.pivot_distance, b.view.pivot_distance, t),
     };
-    let even = |a: f64, b: f64| a + t * (b - a);
-    let lens = Lens {
-        radius: even(a.lens.effective_radius(), b.lens.effective_radius()),
-        focus_distance: even(a.lens.focus_distance.recip(), b.lens.focus_distance.recip()).recip(),
-        enabled: a.lens.enabled || b.lens.enabled,
-        blade_rotation_deg: even(a.lens.blade_rotation_deg, b.lens.blade_rotation_deg),
-        ..a.lens
-    };
-    let heights = a.projection.orthographic_height.zip(b.projection.orthographic_height);
-    let projection = Projection {
-        vfov_deg: by_factor(a.projection.vfov_deg, b.projection.vfov_deg),
-        // Perspective and orthographic cameras cannot be interpolated: the first stop's kind is used.
-        orthographic_height: heights.map_or(a.projection.orthographic_height, |(a, b)| Some(by_factor(a, b))),
-    };
+    let (projection, lens) = (a.projection.between(&b.projection, t), a.lens.between(&b.lens, t));
     Rig { view: view.orthonormalized(), projection, lens }
 }
 
@@ -80,6 +67,7 @@ fn catmull_rom(a: DVec3, b: DVec3, c: DVec3, d: DVec3, t: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Lens, Projection};
 
     fn stop(eye: DVec3, look_at: DVec3) -> Rig {
         let view = View::look_at(eye, look_at, DVec3::Y).unwrap();

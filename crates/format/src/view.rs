@@ -162,6 +162,17 @@ impl Projection {
         Self { vfov_deg, orthographic_height: None }
     }
 
+    /// Interpolates to another projection, `t` in 0..=1. A perspective and an orthographic one cannot be interpolated:
+    /// the kind of the first is used.
+    #[must_use]
+    pub fn between(&self, other: &Self, t: f64) -> Self {
+        let heights = self.orthographic_height.zip(other.orthographic_height);
+        Self {
+            vfov_deg: by_factor(self.vfov_deg, other.vfov_deg, t),
+            orthographic_height: heights.map_or(self.orthographic_height, |(a, b)| Some(by_factor(a, b, t))),
+        }
+    }
+
     /// Half the height of the visible region at a depth along the view direction; both metres.
     pub fn half_height(&self, depth: f64) -> f64 {
         self.orthographic_height.map_or_else(|| self.tan_half_vfov() * depth, |height| 0.5 * height)
@@ -206,6 +217,19 @@ impl Lens {
         Self { radius, enabled: radius > 0.0, ..Self::pinhole(focus_distance) }
     }
 
+    /// Interpolates to another lens, `t` in 0..=1: the focus in the reciprocal of its distance, as one focuses by hand.
+    #[must_use]
+    pub fn between(&self, other: &Self, t: f64) -> Self {
+        let even = |a: f64, b: f64| a + t * (b - a);
+        Self {
+            radius: even(self.effective_radius(), other.effective_radius()),
+            focus_distance: even(self.focus_distance.recip(), other.focus_distance.recip()).recip(),
+            enabled: self.enabled || other.enabled,
+            blade_rotation_deg: even(self.blade_rotation_deg, other.blade_rotation_deg),
+            ..*self
+        }
+    }
+
     /// The radius for rendering: 0 if depth of field is off.
     pub fn effective_radius(&self) -> f64 {
         if self.enabled { self.radius } else { 0.0 }
@@ -216,6 +240,11 @@ impl Default for Lens {
     fn default() -> Self {
         Self::pinhole(View::default().pivot_distance)
     }
+}
+
+/// Interpolates two positive numbers by a factor, `t` in 0..=1.
+pub fn by_factor(a: f64, b: f64, t: f64) -> f64 {
+    a * (b / a).powf(t)
 }
 
 #[cfg(test)]

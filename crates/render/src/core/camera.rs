@@ -220,10 +220,16 @@ impl Camera {
         self.lens_radius * self.aperture_point(u)
     }
 
+    /// Whether points of the lens are those of a disc.
+    #[inline]
+    pub fn has_round_lens(&self) -> bool {
+        self.blades < 3
+    }
+
     /// Like [`Self::lens_offset`], over the radius of the lens.
     #[inline]
     fn aperture_point(&self, u: Vec2) -> Vec2 {
-        if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
+        if self.has_round_lens() { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
     /// Connects a point through a lens position to the film: the inverse of [`Self::ray`]. `None` for points behind the

@@ -199,7 +199,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             return [zero, zero];
         }
         let u = self.sampler.pair(self.dimension + DIM_LENS);
-        if camera.blades < 3 {
+        if camera.has_round_lens() {
             let [x, y] = uniform_disc(u);
             return [x * camera.lens_radius, y * camera.lens_radius];
         }

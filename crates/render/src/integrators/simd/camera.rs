@@ -33,7 +33,7 @@ pub(crate) struct CameraRays<'a> {
 impl CameraRays<'_> {
     /// Whether [`Self::start_paths`] supports filter and aperture.
     pub fn is_plain(&self) -> bool {
-        self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.blades < 3)
+        self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.has_round_lens())
     }
 
     /// Samples a ray through a film position, by the pixel's filter, and a lens position; returns it with its sampler
