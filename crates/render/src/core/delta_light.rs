@@ -72,7 +72,25 @@ impl Cone {
     }
 }
 
+/// Where a delta light is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Origin {
+    /// At a point in metres, within its cone if it has one.
+    At(Vec3, Option<Cone>),
+    /// Infinitely far away: the unit direction in which its light travels.
+    Far(Vec3),
+}
+
 impl DeltaLight {
+    /// Where it is.
+    pub fn origin(&self) -> Origin {
+        match *self {
+            Self::Point { position, .. } => Origin::At(position, None),
+            Self::Spot { position, cone, .. } => Origin::At(position, Some(cone)),
+            Self::Directional { direction, .. } => Origin::Far(direction),
+        }
+    }
+
     /// Radiant intensity, W·sr⁻¹, or for a directional light its irradiance, W·m⁻².
     pub fn strength(&self) -> Vec3 {
         match *self {

@@ -4,7 +4,7 @@
 //! and where a shadow ray is unoccluded. With one path per slot, the change of a slot between two observations is the
 //! contribution of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
 
-use crate::core::delta_light::DeltaLight;
+use crate::core::delta_light::{DeltaLight, Origin};
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::{PathBatch, ShadowBatch};
 use firstlight_kdtree::HitBatch;
@@ -182,13 +182,13 @@ impl Record {
 /// Returns the delta light to which a shadow ray leads; the first one if several coincide.
 fn delta_light_of(scene: &Prepared, ray: &Ray) -> Option<u32> {
     let end = ray.at(ray.t_max);
-    let is_its = |light: &DeltaLight| match *light {
+    let is_its = |light: &DeltaLight| match light.origin() {
         // Shadow rays end before a point by a few roundings.
-        DeltaLight::Point { position, .. } | DeltaLight::Spot { position, .. } => {
+        Origin::At(position, _) => {
             let size = position.length() + ray.origin.length() + ray.dir.length();
             ray.t_max.is_finite() && end.distance(position) <= gamma(64) * size
         }
-        DeltaLight::Directional { direction, .. } => ray.t_max.is_infinite() && ray.dir == -direction,
+        Origin::Far(direction) => ray.t_max.is_infinite() && ray.dir == -direction,
     };
     scene.shading.delta_lights.iter().position(is_its).map(|light| light as u32)
 }

@@ -1,7 +1,7 @@
 //! A light, and its samples from a point.
 
 use crate::core::color::luminance;
-use crate::core::delta_light::DeltaLight;
+use crate::core::delta_light::{DeltaLight, Origin};
 use crate::core::material::{ColorInput, ScalarInput};
 use crate::core::material_queries::Emission;
 use crate::core::techniques::Techniques;
@@ -113,10 +113,9 @@ impl Light {
     ///
     /// - `reach`: radius of the scene, metres.
     pub fn without_size(light: &DeltaLight, reach: f32) -> Self {
-        let shape = match *light {
-            DeltaLight::Point { position, .. } => LightShape::Point { position, cone: None },
-            DeltaLight::Spot { position, cone, .. } => LightShape::Point { position, cone: Some(cone) },
-            DeltaLight::Directional { direction, .. } => LightShape::Directional { to_light: -direction, reach },
+        let shape = match light.origin() {
+            Origin::At(position, cone) => LightShape::Point { position, cone },
+            Origin::Far(direction) => LightShape::Directional { to_light: -direction, reach },
         };
         let strength = light.strength();
         let emission = Emission::even(strength);
