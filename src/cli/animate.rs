@@ -10,9 +10,12 @@ use crate::cli::sequence::{Sequence, SequenceMotion};
 use crate::cli::stop::Stop;
 use crate::cli::video;
 use firstlight::frame::navigation::Rig;
-use firstlight::frame::{SettingsStore, Target, along, read_film_summary, turntable, write_film_with_features};
+use firstlight::frame::{
+    SettingsStore, Target, along, check_replaced_film, is_whole_picture, read_film_file, turntable,
+    write_film_with_features,
+};
 use firstlight::render::GuideGatherer;
-use firstlight::scene::whole_file::WholeFile;
+use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{ImageMetadata, ImageSamples};
 use std::path::Path;
 
@@ -51,8 +54,12 @@ pub(super) fn animate(
             let film = job.picture(args, target)?;
             let features = job.features(args, None)?;
             if let Some(path) = &film_path {
-                let claim = WholeFile::claim(path, replace)?;
-                write_film_with_features(&film, features.as_ref(), &job.note(&film, path), claim)?;
+                let claim = WholeFile::claim(path, Replace::Anything)?;
+                let note = job.note(&film, path);
+                if replace == Replace::AllButFilms {
+                    check_replaced_film(&film, features.as_ref(), &note, path)?;
+                }
+                write_film_with_features(&film, features.as_ref(), &note, claim)?;
             }
             let denoised = job.denoised(&film, &mut GuideGatherer::default(), &|| false)?;
             job.write(args, (&film, features.as_ref()), denoised.as_ref(), &path, replace)?;
@@ -70,7 +77,7 @@ pub(super) fn animate(
     inform(format_args!("{} to {}: {n} frames{kept}{replaced}", first.display(), last.display()));
     if let Some(path) = &args.video {
         let images = sequence.numbers.clone().map(|number| sequence.path(&args.output, number));
-        video::write(path, images, job.fps(args), replace)?;
+        video::write(path, images, job.fps(args), replace, stop)?;
         inform(format_args!("{}: {n} frames at {} per second", path.display(), job.fps(args)));
     }
     Ok(())
@@ -94,13 +101,13 @@ fn is_complete(
     let note = job.draft.note(path, job.size, samples, job.display.into());
     let ours = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
     let ours = ImageMetadata { denoised: args.denoise.denoise.then(|| args.denoise.name()), ..ours };
-    if ours != there || target.spp.is_some_and(|spp| spp != there.spp) {
+    if ours != there || target.spp.is_some_and(|spp| spp != there.spp) || !is_whole_picture(path) {
         return Ok(false);
     }
     let Some(film) = film else { return Ok(true) };
     // An image is written after its film: what is missing is a film that was not asked for then, or deleted.
     Ok(ImageMetadata::read(film).is_ok_and(|there| ours.differs_from(&there).is_none() && there.spp == ours.spp)
-        && read_film_summary(film).is_ok())
+        && read_film_file(film).is_ok())
 }
 
 /// Where the camera is in each frame.

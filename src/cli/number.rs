@@ -64,6 +64,14 @@ pub fn parse_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses the time between two events in seconds. Times of the system clock can be added up to it.
+pub fn parse_interval(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 1e9 => Ok(value),
+        _ => Err("must be a positive number of seconds, at most 1e9".to_owned()),
+    }
+}
+
 /// Parses a relative error: `0.05` or `5%`. Values from 1 on need the percent sign, since 5 usually means 5 %.
 pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = number_and_unit(text);
@@ -223,6 +231,17 @@ mod tests {
         }
         assert_eq!((parse_ratio("0.25"), parse_ratio("25%")), (Ok(0.25), Ok(0.25)));
         assert!(parse_ratio("150%").is_err() && parse_ratio("0 %").is_err());
+    }
+
+    #[test]
+    fn intervals_fit_into_the_clock() {
+        for text in ["1e-9", "60", "1e9"] {
+            let wait = std::time::Duration::from_secs_f64(parse_interval(text).unwrap());
+            assert!(std::time::Instant::now().checked_add(2 * wait).is_some(), "{text}");
+        }
+        for text in ["0", "-1", "nan", "inf", "1e19", "1e20", ""] {
+            assert!(parse_interval(text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -101,7 +101,10 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     };
     match &sequence {
         Some(sequence) => {
-            files.write_all(sequence.paths(args))?;
+            files.write_all(sequence.paths(&args.output), files.replace())?;
+            // Those of frames that are complete stay; of each other one it is checked that no samples are lost.
+            let films = args.film.iter().flat_map(|path| sequence.paths(path));
+            files.write_all(films, Replace::Anything)?;
             args.video.iter().try_for_each(|path| files.write(path))?;
         }
         None if args.to_stdout() => {}

@@ -5,7 +5,9 @@ use crate::cli::denoising::DenoiseArgs;
 use crate::cli::failure::Failure;
 use crate::cli::frames::{FramesArg, parse_frames};
 use crate::cli::layers::LayerArgs;
-use crate::cli::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
+use crate::cli::number::{
+    at_least_one, between, parse_fps, parse_interval, parse_positive, parse_share, parse_size, parse_stops,
+};
 use clap::{Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
@@ -118,7 +120,7 @@ pub struct RenderArgs {
     #[arg(help_heading = "Films and parts", long, value_name = "WHAT", value_enum, requires = "part")]
     pub part_by: Option<PartBy>,
     /// Seconds between two saves of the film of a part.
-    #[arg(help_heading = "Films and parts", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive, default_value_t = 60.0, requires = "part")]
+    #[arg(help_heading = "Films and parts", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_interval, default_value_t = 60.0, requires = "part")]
     pub save_every: f64,
     /// Resume the film given by --film, or a film given as the scene.
     #[arg(long, help_heading = "Films and parts")]

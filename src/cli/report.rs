@@ -6,6 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::number::{between, parse_positive, parse_size};
 use crate::cli::stop::Stop;
 use clap::Args;
+use firstlight::cluster::engine::shell_word;
 use firstlight::frame::oidn::{Oidn, OidnError};
 use firstlight::render::{
     ErrorMetric, GuideGatherer, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
@@ -88,7 +89,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     let (html, table) = (args.output.join("index.html"), args.output.join("steps.csv"));
     let mut files = OverwriteArgs::default().files();
     files.read_all(args.reference.clone())?;
-    files.write_all([html.clone(), table.clone()])?;
+    files.write_all([html.clone(), table.clone()], files.replace())?;
     let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
@@ -99,7 +100,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     }
     folder.keep();
 
-    write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes())?;
+    write_whole(&html, page(&outcomes, &command_line(std::env::args_os().skip(1)), missing.as_deref()).as_bytes())?;
     write_whole(&table, csv(&outcomes).as_bytes())?;
     print(lines(summary_text(&outcomes).trim_end()))?;
     print(lines(denoised_text(&outcomes).trim_end()))?;
@@ -418,9 +419,23 @@ impl ReportProgress {
     }
 }
 
-/// The command line for the page, with the program's plain name.
-fn command_line() -> String {
-    let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
-    let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
+/// The command line for the page, with the program's plain name, to be copied into a shell.
+///
+/// - `words`: the arguments.
+fn command_line(words: impl Iterator<Item = OsString>) -> String {
+    let words = words.map(|word| shell_word(&word.to_string_lossy()));
     std::iter::once("firstlight".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_the_command_run_nothing() {
+        let words = ["report", "./x';touch PWNED;'.ron", "$(id)", "a b", "-o", "out"].map(OsString::from);
+        let line = command_line(words.clone().into_iter());
+        let again = shlex::split(&line).unwrap();
+        assert_eq!(again[1..], words.map(|word| word.into_string().unwrap()), "{line}");
+    }
 }

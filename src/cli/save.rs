@@ -4,7 +4,7 @@ use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
 use crate::cli::console::inform;
 use crate::cli::failure::Failure;
 use clap::Args;
-use firstlight::scene::save_scene;
+use firstlight::scene::{Description, WriteError};
 use std::path::PathBuf;
 
 #[derive(Args, Clone, Debug)]
@@ -30,13 +30,16 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     files.write(&args.output)?;
     // It may have been written by hand.
     if !args.overwrite && !files.replaced().is_empty() {
-        let message = "already exists: replace it with --overwrite, or choose another name";
-        return Err(Failure::Failed(format!("{}: {message}", args.output.display())));
+        return Err(WriteError::Exists(args.output.clone()).into());
     }
     let scene = args.scene.load(None, &mut files, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
-    let saved = save_scene(&mut world, Some(&scene), &args.output)?;
+    let description = Description::of(&mut world, Some(&scene));
+    let saved = match args.overwrite {
+        true => description.save(&args.output)?,
+        false => description.save_new(&args.output)?,
+    };
     inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced())));
     for note in &saved.notes {
         inform(format_args!("note: {note}"));

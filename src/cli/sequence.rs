@@ -67,10 +67,11 @@ impl Sequence {
         path.with_file_name(name)
     }
 
-    /// The names of all images, and of the films beside them.
-    pub fn paths(&self, args: &RenderArgs) -> impl Iterator<Item = PathBuf> {
-        let of = |path: &Path| self.numbers.clone().map(|number| self.path(path, number)).collect::<Vec<_>>();
-        [Some(&args.output), args.film.as_ref()].into_iter().flatten().flat_map(move |path| of(path))
+    /// The names of all of its files.
+    ///
+    /// - `path`: of the images, or of the films beside them.
+    pub fn paths(&self, path: &Path) -> impl Iterator<Item = PathBuf> {
+        self.numbers.clone().map(move |number| self.path(path, number))
     }
 
     /// What the scene is to be opened with: a glTF file at its first moment, whichever frames are rendered, so that all have

@@ -43,6 +43,9 @@ pub struct SimplifyArgs {
     /// Cost function of the edge collapses.
     #[arg(long, value_enum, default_value = "quadric")]
     method: MethodArg,
+    /// Allow the model to name a material library outside of its own folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
@@ -82,8 +85,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     files.write(&args.output)?;
     let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals are not written: without normals in the file, the next program computes its own.
-    // Libraries are named again, not copied.
-    let options = ModelOptions { allow_outside: true, ..ModelOptions::default() };
+    let options = ModelOptions { allow_outside: args.allow_outside, ..ModelOptions::default() };
     let mut model = load_model(&args.input, format, &options).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
         let options = ModelOptions { normals: ModelNormals::Ignore, ..options };

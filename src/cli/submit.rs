@@ -13,10 +13,11 @@ use clap::{Args, ValueEnum};
 use firstlight::cluster::engine::{EngineOptions, SlurmOption, files, job_name, shell_word};
 use firstlight::cluster::job::{Engine, Job};
 use firstlight::cluster::job_option::{JobOption, OptionName};
-use firstlight::cluster::pack::Package;
+use firstlight::cluster::pack::{PackError, Package};
 use firstlight::render::Film;
 use firstlight::scene::whole_file::write_whole;
-use firstlight::scene::{Files, SceneSource, WriteError, absolute};
+use firstlight::scene::{Files, NewFolder, SceneSource, WriteError, absolute};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 pub const EXAMPLES: &str = "\
@@ -177,14 +178,10 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("--parts: {} parts of {spp} samples: use at most {spp} parts", args.parts)));
     }
     let package = package(&args.scene)?;
-    make_folders(&folder, frames.is_some())?;
-    let (scene, environment) = match package {
-        Ok(package) => {
-            package.write_folder(&folder.join("scene"))?;
-            let inside = |name: &str| format!("scene/{name}");
-            (inside(&package.scene), package.environment.as_deref().map(inside))
-        }
-        Err(builtin) => (builtin, None),
+    let inside = |name: &str| format!("scene/{name}");
+    let (scene, environment) = match &package {
+        Ok(package) => (inside(&package.scene), package.environment.as_deref().map(inside)),
+        Err(builtin) => (builtin.clone(), None),
     };
     let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
     let job = Job {
@@ -215,18 +212,7 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         image: args.image.clone(),
         claim: args.claim.clone(),
     };
-    for file in files(&job, &options) {
-        let path = folder.join(file.name);
-        write_whole(&path, file.text.as_bytes())?;
-        #[cfg(unix)]
-        if file.is_script {
-            use std::os::unix::fs::PermissionsExt;
-            // Without this, the script can still be run by naming the shell.
-            let _ = std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755));
-        }
-    }
-    // Last: this file marks the folder as a job.
-    job.write(&folder)?;
+    write_job(&folder, &job, &options, package.ok())?;
     let (name, parts) = (folder.display(), job.parts);
     let frames = job.frames.map_or_else(String::new, |(start, end)| format!("{} frames, ", end - start));
     inform(format_args!(
@@ -235,6 +221,33 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         if job.error.is_some() { " in the first round" } else { "" }
     ));
     hand_over(engine, &options.folder, args.dry_run)
+}
+
+/// Writes the folder of a job, all of it or nothing.
+fn write_job(folder: &Path, job: &Job, options: &EngineOptions, package: Option<Package>) -> Result<(), Failure> {
+    let new = NewFolder::begin(folder)?;
+    let failed = |error| Failure::from(new.error(error));
+    let part = new.part();
+    make_folders(part, job.frames.is_some()).map_err(failed)?;
+    if let Some(package) = package {
+        package.write_folder(&part.join("scene")).map_err(|error| match error {
+            PackError::Write(error) => failed(error),
+            error => error.into(),
+        })?;
+    }
+    for file in files(job, options) {
+        let path = part.join(file.name);
+        write_whole(&path, file.text.as_bytes()).map_err(failed)?;
+        #[cfg(unix)]
+        if file.is_script {
+            use std::os::unix::fs::PermissionsExt;
+            // Without this, the script can still be run by naming the shell.
+            let _ = std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755));
+        }
+    }
+    job.write(part).map_err(failed)?;
+    // This file marks the folder as a job.
+    Ok(new.finish(OsStr::new("job.json"))?)
 }
 
 /// Refuses a folder that has a job, or anything that a job would replace.
@@ -263,9 +276,9 @@ fn not_utf8(path: &Path) -> Failure {
     Failure::Failed(format!("{}: the name of the folder is not UTF-8", path.display()))
 }
 
-fn make_folders(folder: &Path, has_frames: bool) -> Result<(), Failure> {
+fn make_folders(folder: &Path, has_frames: bool) -> Result<(), WriteError> {
     for folder in [folder.join(if has_frames { "frames" } else { "parts" }), folder.join("log")] {
-        std::fs::create_dir_all(&folder).map_err(|source| Failure::from(WriteError::NoFolder { folder, source }))?;
+        std::fs::create_dir_all(&folder).map_err(|source| WriteError::NoFolder { folder, source })?;
     }
     Ok(())
 }

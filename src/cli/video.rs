@@ -1,11 +1,16 @@
 //! A video of numbered images, encoded by `ffmpeg` where that is installed: its standard input gets raw RGB.
 
 use crate::cli::failure::Failure;
+use crate::cli::stop::Stop;
+use firstlight::scene::NewFolder;
 use firstlight::scene::input_file::{FileKind, InputFile};
 use firstlight::scene::whole_file::{Replace, check_writable};
-use std::io::{BufReader, Write};
+use std::ffi::{OsStr, OsString};
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 const PROGRAM: &str = "ffmpeg";
 
@@ -31,21 +36,70 @@ pub fn check(args: &crate::cli::render_args::RenderArgs) -> Result<(), Failure> 
 /// Encodes images in their order.
 ///
 /// - `fps`: frames per second.
-pub fn write(path: &Path, images: impl Iterator<Item = PathBuf>, fps: f64, replace: Replace) -> Result<(), Failure> {
+pub fn write(
+    path: &Path,
+    images: impl Iterator<Item = PathBuf>,
+    fps: f64,
+    replace: Replace,
+    stop: &Stop,
+) -> Result<(), Failure> {
     check_writable(path, replace)?;
-    // Under another name until it is whole; the extension tells the format.
-    let mut name = std::ffi::OsString::from(".unfinished-");
-    name.push(path.file_name().unwrap_or_default());
-    let unfinished = path.with_file_name(name);
-    let result = encode(&unfinished, images, fps);
-    if result.is_err() {
-        let _ = std::fs::remove_file(&unfinished);
-    }
-    result?;
-    std::fs::rename(&unfinished, path).map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))
+    // In a folder of its own until it is whole: a name beside the images could be a link to any file. The extension
+    // tells the format.
+    let folder = NewFolder::begin(path)?;
+    let name = OsString::from_iter([OsStr::new("video."), path.extension().unwrap_or_default()]);
+    encode(&folder.part().join(&name), images, fps, stop)?;
+    Ok(folder.finish_file(&name)?)
 }
 
-fn encode(path: &Path, images: impl Iterator<Item = PathBuf>, fps: f64) -> Result<(), Failure> {
+/// A program that runs; if this is dropped, or the command is abandoned, it is ended.
+struct Encoder(Arc<Mutex<Child>>);
+
+impl Encoder {
+    fn new(child: Child, stop: &Stop) -> Self {
+        let child = Arc::new(Mutex::new(child));
+        let abandoned = child.clone();
+        stop.undo(move || kill(&abandoned));
+        Self(child)
+    }
+
+    /// Waits for its end.
+    fn wait(&self) -> io::Result<ExitStatus> {
+        loop {
+            // Not locked for long, so that it can be ended meanwhile.
+            if let Some(status) = self.0.lock().unwrap_or_else(PoisonError::into_inner).try_wait()? {
+                return Ok(status);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Encoder {
+    fn drop(&mut self) {
+        kill(&self.0);
+    }
+}
+
+fn kill(child: &Mutex<Child>) {
+    let mut child = child.lock().unwrap_or_else(PoisonError::into_inner);
+    // It may have ended.
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+/// Reads all that a program says, which would else wait to be heard, and keeps the last kilobytes.
+fn last_words(mut from: impl Read) -> String {
+    const KEPT: usize = 1 << 14;
+    let (mut kept, mut buffer) = (Vec::new(), vec![0; KEPT]);
+    while let Ok(n @ 1..) = from.read(&mut buffer) {
+        kept.extend_from_slice(&buffer[..n]);
+        kept.drain(..kept.len().saturating_sub(KEPT));
+    }
+    String::from_utf8_lossy(&kept).into_owned()
+}
+
+fn encode(path: &Path, images: impl Iterator<Item = PathBuf>, fps: f64, stop: &Stop) -> Result<(), Failure> {
     let failed = |what: String| Failure::Failed(format!("{PROGRAM}: {what}"));
     let mut images = images.map(|path| rgb_of(&path)).peekable();
     let (width, height) = match images.peek() {
@@ -64,6 +118,9 @@ fn encode(path: &Path, images: impl Iterator<Item = PathBuf>, fps: f64) -> Resul
         .spawn()
         .map_err(|error| failed(error.to_string()))?;
     let mut input = child.stdin.take().expect("it was asked for");
+    let errors = child.stderr.take().expect("it was asked for");
+    let encoder = Encoder::new(child, stop);
+    let said = std::thread::spawn(move || last_words(errors));
     let mut sent = Ok(());
     for image in images {
         let (size, rgb) = image?;
@@ -77,9 +134,9 @@ fn encode(path: &Path, images: impl Iterator<Item = PathBuf>, fps: f64) -> Resul
         }
     }
     drop(input);
-    let output = child.wait_with_output().map_err(|error| failed(error.to_string()))?;
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
+    let status = encoder.wait().map_err(|error| failed(error.to_string()))?;
+    if !status.success() {
+        let said = said.join().unwrap_or_default();
         return Err(failed(said.lines().last().unwrap_or("it failed without a message").to_owned()));
     }
     sent.map_err(failed)
@@ -98,4 +155,17 @@ fn rgb_of(path: &Path) -> Result<((u32, u32), Vec<u8>), Failure> {
     let mut rgb = vec![0; size.0 as usize * size.1 as usize * 3];
     reader.next_frame(&mut rgb).map_err(|error| failed(&error))?;
     Ok((size, rgb))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Longer than a pipe holds.
+    #[test]
+    fn of_many_words_the_last_are_kept() {
+        let words = "e\n".repeat(100_000) + "no such codec\n";
+        let said = last_words(words.as_bytes());
+        assert_eq!((said.lines().last(), said.len()), (Some("no such codec"), 1 << 14));
+    }
 }

@@ -14,6 +14,7 @@
 use crate::cluster::job_option::JobOption;
 use crate::cluster::part::Part;
 use crate::files::whole_file::write_whole;
+use crate::frame::is_whole_picture;
 use crate::scene::{FileKind, InputFile, ReadError, WriteError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -149,7 +150,7 @@ impl Job {
     /// The version of the file that this program writes.
     pub const FORMAT: u32 = FORMAT;
     /// The largest number of parts of a round.
-    pub const MOST_PARTS: u32 = 1_000_000;
+    pub const MOST_PARTS: u32 = Part::MOST;
     /// The largest number of frames.
     pub const MOST_FRAMES: u32 = 100_000;
 
@@ -203,10 +204,10 @@ impl Job {
         frame.map_or_else(|| "frames/frame.png".to_owned(), |frame| format!("frames/frame-{frame:0digits$}.png"))
     }
 
-    /// Frames whose images are not there.
+    /// Frames whose images are not there, or were cut short.
     pub fn missing_frames(&self, folder: &Path) -> Vec<u32> {
         let (start, end) = self.frames.unwrap_or_default();
-        (start..end).filter(|&frame| !folder.join(self.image_of(Some(frame))).is_file()).collect()
+        (start..end).filter(|&frame| !is_whole_picture(&folder.join(self.image_of(Some(frame))))).collect()
     }
 
     /// The parts of a round with these samples whose films are there, ascending.
@@ -355,7 +356,13 @@ mod tests {
         assert_eq!((job.parts_of(&(0..16)), job.image_of(Some(9))), (4, "frames/frame-0009.png".to_owned()));
         assert_eq!(Job { frames: Some((0, 20_000)), ..job.clone() }.image_of(Some(9)), "frames/frame-00009.png");
         std::fs::create_dir(folder.path().join("frames")).unwrap();
-        std::fs::write(folder.path().join(job.image_of(Some(9))), "").unwrap();
+        let pixels = image::RgbImage::new(2, 2);
+        [9, 10].iter().for_each(|&frame| pixels.save(folder.path().join(job.image_of(Some(frame)))).unwrap());
+        assert_eq!(job.missing_frames(folder.path()), [8, 11]);
+        // One that was cut short while it was copied.
+        let path = folder.path().join(job.image_of(Some(10)));
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(path, &bytes[..bytes.len() - 1]).unwrap();
         assert_eq!(job.missing_frames(folder.path()), [8, 10, 11]);
     }
 

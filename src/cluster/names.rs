@@ -32,6 +32,19 @@ pub(super) fn checksum_line(sum: &str, name: &str) -> String {
 /// Where a file lies, from the root of the system, without `.` and `..`; links in it are not followed, so that what is
 /// named relative to it is found.
 pub(super) fn place(path: &Path) -> PathBuf {
+    place_behind_link(path).unwrap_or_else(|| as_named(path))
+}
+
+/// Where a file lies whose path has a `..` behind a symbolic link, and so leads elsewhere than its text says.
+pub(super) fn place_behind_link(path: &Path) -> Option<PathBuf> {
+    match (as_named(path).canonicalize(), path.canonicalize()) {
+        (Ok(a), Ok(b)) if a != b => Some(b),
+        _ => None,
+    }
+}
+
+/// The absolute path without `.` and `..`, by its text.
+fn as_named(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let mut place = PathBuf::new();
     for part in absolute.components() {
@@ -41,11 +54,14 @@ pub(super) fn place(path: &Path) -> PathBuf {
             part => place.push(part),
         }
     }
-    // Behind a link, `..` leads elsewhere.
-    match (place.canonicalize(), absolute.canonicalize()) {
-        (Ok(a), Ok(b)) if a != b => b,
-        _ => place,
-    }
+    place
+}
+
+/// Whether a name goes into a folder and back: a package need not have that folder.
+pub(super) fn turns_back(name: &str) -> bool {
+    let path = text_to_path(name);
+    let is_back = |part: &Component| *part == Component::ParentDir;
+    path.components().skip_while(is_back).any(|part| is_back(&part))
 }
 
 /// The innermost folder that all files are below.
@@ -223,6 +239,11 @@ mod tests {
         assert_eq!(relative_to(Path::new("a/b"), Path::new("a/d/e")), "../d/e");
         assert_eq!(relative_to(Path::new(""), Path::new("c/d")), "c/d");
         assert_eq!(place_in(Path::new("a"), "../b/./c"), Some("b/c".to_owned()));
+        for (name, turns) in
+            [("a.png", false), ("../../b/a.png", false), ("./a", false), ("b/../a", true), ("../b/../a", true)]
+        {
+            assert_eq!(turns_back(name), turns, "{name}");
+        }
         assert_eq!((place_in(Path::new("a"), "../../b"), place_in(Path::new("a"), "/b")), (None, None));
     }
 

@@ -8,7 +8,8 @@
 //! for is packed. The package of the same files has the same bytes. Start reading at [`Package::of`].
 
 use crate::cluster::names::{
-    ArchiveNames, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_in, relative_to,
+    ArchiveNames, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_behind_link, place_in,
+    relative_to, turns_back,
 };
 use crate::files::printable;
 use crate::files::whole_file::{WholeFile, unwritable, write_whole};
@@ -72,6 +73,12 @@ pub enum PackError {
         /// What is named.
         file: PathBuf,
     },
+    /// A model names a file by a way that a package does not have.
+    #[error("{}: is named through a symbolic link and out of it again: name its own path", .0.display())]
+    ThroughLink(PathBuf),
+    /// A file has the name of the list of checksums.
+    #[error("{}: would be `{CHECKSUMS}` in the package, the list of checksums: rename it", .0.display())]
+    Reserved(PathBuf),
     /// The scene in an image names files that would not be found, and is not to be rewritten.
     #[error("{}: its scene would not find its files in a package: pack what `firstlight save` makes of it", .0.display())]
     Image(PathBuf),
@@ -133,6 +140,10 @@ impl Package {
             if !read.name.is_empty() {
                 named.insert(scene.path_of_name(&read.name).to_owned(), packed[0].clone());
             }
+            // The names in a model are not rewritten.
+            if let Some(path) = read.files.iter().skip(1).find(|path| place_behind_link(path).is_some()) {
+                return Err(PackError::ThroughLink(path.clone()));
+            }
             for (path, name) in read.files.iter().zip(packed) {
                 let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
                 if extension == "mtl" || extension == "gltf" {
@@ -163,7 +174,9 @@ impl Package {
             }
             SceneSource::Picture(path) => {
                 let folder = Path::new(&scene_name).parent().unwrap_or(Path::new(""));
-                let is_found = |(name, packed): (&String, &String)| place_in(folder, name).as_ref() == Some(packed);
+                let is_found = |(name, packed): (&String, &String)| {
+                    !turns_back(name) && place_in(folder, name).as_ref() == Some(packed)
+                };
                 if has_text && !named.iter().all(is_found) {
                     return Err(PackError::Image(path.clone()));
                 }
@@ -171,6 +184,9 @@ impl Package {
                 put(&mut files, scene_name.clone(), path)?;
             }
             SceneSource::Scene(_) | SceneSource::Model(_) => {}
+        }
+        if let Some(PackedContent::File(path)) = files.get(CHECKSUMS) {
+            return Err(PackError::Reserved(path.clone()));
         }
         Ok(Self { scene: scene_name, environment, files, outside: names.outside })
     }
@@ -192,7 +208,7 @@ impl Package {
         const LARGE: u64 = u32::MAX as u64;
         let path = out.path().to_path_buf();
         let failed = |error: zip::result::ZipError| PackError::Write(unwritable(&path, error));
-        let mut zip = ZipWriter::new_stream(&mut out);
+        let mut zip = ZipWriter::new_stream(UntilFailure { out: &mut out, has_failed: false });
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .last_modified_time(zip::DateTime::default())
@@ -234,6 +250,28 @@ impl Package {
             sums += &checksum_line(&sum, name);
         }
         Ok(write_whole(&folder.join(CHECKSUMS), sums.as_bytes())?)
+    }
+}
+
+/// Fails once: after a failure, which has been told by then, an archive that is dropped tries to write its end, and
+/// would complain in its own words.
+struct UntilFailure<'a> {
+    out: &'a mut WholeFile,
+    has_failed: bool,
+}
+
+impl Write for UntilFailure<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if self.has_failed {
+            return Ok(bytes.len());
+        }
+        let result = self.out.write(bytes);
+        self.has_failed = result.as_ref().is_err_and(|error| error.kind() != std::io::ErrorKind::Interrupted);
+        result
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        if self.has_failed { Ok(()) } else { self.out.flush() }
     }
 }
 
@@ -342,7 +380,7 @@ fn renamed(
         let path = scene.path_of_name(name);
         let inside = match named.get(path) {
             // Where it is, it is found under its own name.
-            Some(packed) if place_in(folder, path).as_deref() == Some(packed) => return,
+            Some(packed) if !turns_back(path) && place_in(folder, path).as_deref() == Some(packed) => return,
             Some(packed) => packed.clone(),
             // Not read, because another image lights the scene.
             None if place_in(folder, path).is_some() => return,
@@ -356,4 +394,69 @@ fn renamed(
         has_changed = true;
     });
     Ok(has_changed.then(|| file.to_ron()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{LoadOptions, load};
+
+    /// The package of what is opened, in a folder elsewhere, and how many of its textures are found there.
+    fn textures_of_packed(path: &Path) -> Result<usize, PackError> {
+        let loaded = |path: &Path| {
+            let source = SceneSource::parse(path).unwrap();
+            (load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")), source)
+        };
+        let (scene, source) = loaded(path);
+        let package = Package::of(&scene, &source)?;
+        let there = tempfile::tempdir().unwrap();
+        package.write_folder(there.path())?;
+        let reads = loaded(&there.path().join(&package.scene)).0.read_files();
+        let is_texture = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "png");
+        Ok(reads.iter().flat_map(|read| &read.files).filter(is_texture).count())
+    }
+
+    fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
+        std::fs::write(folder.join(name), text).unwrap();
+        folder.join(name)
+    }
+
+    fn scene(texture: &str) -> String {
+        format!(
+            "(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), textures: {{\"t\": image(file: \"{texture}\")}}, \
+             materials: {{\"m\": diffuse(albedo: \"t\")}}, objects: [sphere(radius: 1, material: \"m\")])"
+        )
+    }
+
+    /// A package has files, and the folders that these are in: no others.
+    #[test]
+    fn names_that_lead_through_a_folder_and_back_are_found_in_a_package() {
+        let root = tempfile::tempdir().unwrap();
+        let home = root.path().join("home");
+        std::fs::create_dir_all(home.join("x/y")).unwrap();
+        let image = image::RgbImage::new(2, 2);
+        for name in ["home/t.png", "home/SHA256SUMS.png", "t.png"] {
+            image.save(root.path().join(name)).unwrap();
+        }
+        for name in ["t.png", "x/../t.png", "x/y/../../t.png", "../home/x/../t.png", "x/../../t.png"] {
+            assert_eq!(textures_of_packed(&write(&home, "s.ron", &scene(name))).unwrap(), 1, "{name}");
+        }
+        let mesh = "mtllib x/../m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
+        let model = write(&home, "m.obj", mesh);
+        for name in ["t.png", "x/../t.png", "x/y/../../t.png"] {
+            write(&home, "m.mtl", &format!("newmtl a\nmap_Kd {name}\n"));
+            assert_eq!(textures_of_packed(&model).unwrap(), 1, "{name}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("x/y", home.join("link")).unwrap();
+            image.save(home.join("x/t.png")).unwrap();
+            assert_eq!(textures_of_packed(&write(&home, "s.ron", &scene("link/../t.png"))).unwrap(), 1);
+            write(&home, "m.mtl", "newmtl a\nmap_Kd link/../t.png\n");
+            assert!(matches!(textures_of_packed(&model), Err(PackError::ThroughLink(_))));
+        }
+        std::fs::rename(home.join("SHA256SUMS.png"), home.join(CHECKSUMS)).unwrap();
+        let reserved = textures_of_packed(&write(&home, "s.ron", &scene(CHECKSUMS)));
+        assert!(reserved.unwrap_err().to_string().ends_with("the list of checksums: rename it"));
+    }
 }

@@ -30,6 +30,9 @@ pub enum PartError {
         /// Of the parts.
         count: u64,
     },
+    /// There are more parts than anything is divided into.
+    #[error("{0} parts: use at most {most}", most = Part::MOST)]
+    Many(u64),
     /// No variable tells the part.
     #[error(
         "auto needs an engine that numbers its tasks: none of FIRSTLIGHT_PART, SLURM_ARRAY_TASK_ID and \
@@ -60,6 +63,9 @@ pub enum PartError {
 }
 
 impl Part {
+    /// The largest number of parts: the samples of all of them are listed to find those of one.
+    pub const MOST: u32 = 1_000_000;
+
     /// The part that `text` names, as `3/64`, or the one that the environment tells where it is `auto`.
     ///
     /// # Errors
@@ -76,6 +82,7 @@ impl Part {
     /// - `number`: from 1.
     fn numbered(number: u64, count: u64) -> Result<Self, PartError> {
         match (u32::try_from(number), u32::try_from(count)) {
+            _ if count > u64::from(Self::MOST) => Err(PartError::Many(count)),
             (Ok(number), Ok(count)) if (1..=count).contains(&number) => Ok(Self { index: number - 1, count }),
             _ => Err(PartError::Range { number, count }),
         }
@@ -301,6 +308,10 @@ mod tests {
         assert_eq!(Part::parse("3/64"), Ok(Part { index: 2, count: 64 }));
         for wrong in ["", "3", "0/4", "5/4", "a/4", "1/0", "-1/4", "Auto", "1/99999999999"] {
             assert!(Part::parse(wrong).is_err(), "{wrong}");
+        }
+        assert!(Part::parse("1/1000000").is_ok());
+        for many in ["1/1000001", "1/2147483647", "5/99999999999"] {
+            assert!(Part::parse(many).unwrap_err().to_string().ends_with("parts: use at most 1000000"), "{many}");
         }
         let of = |variables: &[(&str, &str)]| {
             let variables: HashMap<_, _> = variables.iter().copied().collect();

@@ -53,7 +53,7 @@ pub use crate::frame::image::film_file::{
     read_film_file_within, read_film_summary, write_film_file, write_film_into, write_film_with_features,
 };
 pub use crate::frame::image::layered_picture::{LayeredPicture, PictureLayer};
-pub use crate::frame::image::picture_file::{PictureFormat, Print, write_errors, write_film};
+pub use crate::frame::image::picture_file::{PictureFormat, Print, is_whole_picture, write_errors, write_film};
 pub use crate::frame::image::snapshot_names::SnapshotNames;
 pub use crate::frame::state::explain::{
     End, Explaining, LightRow, PathRecord, PixelStory, SeenObject, Stop, brightness,

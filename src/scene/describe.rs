@@ -65,6 +65,11 @@ impl Description {
         let animation_part = animation.as_ref().map_or_else(Default::default, |animation| {
             moved.part((animation, at), (world, &inputs), &writer.names, &mut writer.losses)
         });
+        let is_blurred = |it: &Animation| it.model.is_some() && it.open_shutter(at).is_some();
+        if animation.as_ref().is_some_and(is_blurred) {
+            let loss = "the motion blur of the glTF model is left out: a scene file shows one moment of its animation";
+            writer.losses.push(loss.to_owned());
+        }
         let environment = writer.environment(&inputs.environment);
         let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();

@@ -364,7 +364,9 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
         return chunk.get_text().map_err(unreadable);
     }
     if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {
-        return note_in(&exr_header(file, limits)?).ok_or(MetadataError::Missing);
+        let note = note_in(&exr_header(file, limits)?).ok_or(MetadataError::Missing)?;
+        let is_long = note.len() as u64 > limits.note_bytes;
+        return if is_long { Err(MetadataError::Damaged("its metadata is too long".into())) } else { Ok(note) };
     }
     Err(MetadataError::Format)
 }

@@ -34,6 +34,7 @@ pub use crate::files::archive_cache::{archive_cache, unpacked_folder};
 pub use crate::files::hash::Fingerprint;
 pub use crate::files::input_file::{FileKind, InputFile, ReadError, plain_io};
 pub use crate::files::limits::Limits;
+pub use crate::files::new_folder::NewFolder;
 pub use crate::files::outputs::{Files, FilesError};
 pub use crate::files::relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
 pub use crate::files::stamp::{Stamp, stamp};

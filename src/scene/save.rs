@@ -2,7 +2,7 @@
 
 use crate::files::input_file::{FileKind, InputFile};
 use crate::files::relative::{path_to_text, text_to_path};
-use crate::files::whole_file::write_whole;
+use crate::files::whole_file::{write_new, write_whole};
 use crate::files::write_error::WriteError;
 use crate::format::parts::ObjectPart;
 use crate::format::paths::move_paths;
@@ -11,7 +11,7 @@ use crate::format::sources::MeshSource;
 use crate::import::obj::write::{NewObj, ObjExtras, save_new_obj};
 use crate::scene::describe::Description;
 use crate::scene::loaded::LoadedScene;
-use crate::scene::unpacked_files::keep_unpacked;
+use crate::scene::unpacked_files::{Copies, keep_unpacked};
 use bevy_ecs::prelude::World;
 use std::path::Path;
 
@@ -41,7 +41,15 @@ impl Description {
     /// # Errors
     /// Like [`save_scene`].
     pub fn save(self, path: &Path) -> Result<SavedScene, WriteError> {
-        save(self, path, true)
+        save(self, path, true, write_whole)
+    }
+
+    /// Like [`Self::save`], but replaces no file.
+    ///
+    /// # Errors
+    /// Like [`save_scene`], and if there is a file already.
+    pub fn save_new(self, path: &Path) -> Result<SavedScene, WriteError> {
+        save(self, path, true, write_new)
     }
 
     /// Like [`Self::save`], for a scene that is saved again later: refers to the files of an archive where they are.
@@ -49,19 +57,26 @@ impl Description {
     /// # Errors
     /// Like [`save_scene`].
     pub fn save_draft(self, path: &Path) -> Result<SavedScene, WriteError> {
-        save(self, path, false)
+        save(self, path, false, write_whole)
     }
 }
 
-fn save(mut description: Description, path: &Path, keeps_files: bool) -> Result<SavedScene, WriteError> {
+fn save(
+    mut description: Description,
+    path: &Path,
+    keeps_files: bool,
+    write: fn(&Path, &[u8]) -> Result<(), WriteError>,
+) -> Result<SavedScene, WriteError> {
     let failed = |error| WriteError::Scene { path: path.to_path_buf(), source: Box::new(error) };
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);
     let stem = path.file_stem().map_or_else(|| "scene".to_owned(), |stem| path_to_text(stem.as_ref()));
-    if keeps_files {
-        notes.extend(keep_unpacked(&mut description.file, &folder, &stem)?);
-    }
+    let mut copies = match keeps_files {
+        true => keep_unpacked(&mut description.file, &folder, &stem)?,
+        false => Copies::default(),
+    };
+    notes.append(&mut copies.notes);
     let mut number = 0;
     for (object, mesh) in &description.loose_meshes {
         let comment = format!("a mesh of {}", path.display());
@@ -92,7 +107,7 @@ fn save(mut description: Description, path: &Path, keeps_files: bool) -> Result<
     if InputFile::open(path, FileKind::Scene).and_then(InputFile::text).is_ok_and(|old| has_comments(&old)) {
         notes.push("comments of the previous file were removed".to_owned());
     }
-    write_whole(path, text.as_bytes())?;
+    copies.finish(|| write(path, text.as_bytes()))?;
     Ok(SavedScene { text, notes })
 }
 

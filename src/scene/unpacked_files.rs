@@ -3,29 +3,53 @@
 
 use crate::files::archive_cache::unpacked_folder;
 use crate::files::input_file::{FileKind, InputFile};
+use crate::files::new_folder::NewFolder;
 use crate::files::relative::{absolute, path_to_text, text_to_path};
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::files::write_error::WriteError;
 use crate::format::paths::each_path;
 use crate::format::scene_file::SceneFile;
+use std::ffi::OsStr;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Copies the archives that a scene file in `folder` refers to into folders beside it, and refers to the copies. Returns
-/// a remark for each.
+/// Copies of archives beside a scene file.
+#[derive(Default)]
+pub(super) struct Copies {
+    /// A remark for each.
+    pub notes: Vec<String>,
+    /// Those that do not have their names yet.
+    begun: Vec<(NewFolder, PathBuf)>,
+}
+
+impl Copies {
+    /// Gives the copies their names, then calls `write` for the scene; without a scene there are no copies.
+    pub fn finish(self, write: impl FnOnce() -> Result<(), WriteError>) -> Result<(), WriteError> {
+        let mut finished = Vec::new();
+        let finish = |(copy, path): (NewFolder, PathBuf)| copy.finish(OsStr::new("")).map(|()| finished.push(path));
+        let result = self.begun.into_iter().try_for_each(finish).and_then(|()| write());
+        if result.is_err() {
+            finished.iter().for_each(|path| drop(std::fs::remove_dir_all(path)));
+        }
+        result
+    }
+}
+
+/// Copies the archives that a scene file in `folder` refers to into folders beside it, and refers to the copies.
 ///
 /// - `stem`: name of the scene file without its extension.
-pub(super) fn keep_unpacked(file: &mut SceneFile, folder: &Path, stem: &str) -> Result<Vec<String>, WriteError> {
+pub(super) fn keep_unpacked(file: &mut SceneFile, folder: &Path, stem: &str) -> Result<Copies, WriteError> {
     if unpacked_folder(&folder.join("scene")).is_some() {
-        return Ok(Vec::new());
+        return Ok(Copies::default());
     }
+    let mut begun = Vec::new();
     let mut copies: Vec<(PathBuf, String)> = Vec::new();
     let mut failed = None;
     each_path(file, |path| {
         let place = folder.join(text_to_path(path));
         let Some(root) = unpacked_folder(&place).filter(|_| !path.is_empty() && failed.is_none()) else { return };
         let known = copies.iter().find(|(of, _)| *of == root).map(|(_, name)| name.clone());
-        let name = match known.map_or_else(|| copy(&root, folder, stem), Ok) {
+        let name = match known.map_or_else(|| copy(&root, folder, stem, &mut begun), Ok) {
             Ok(name) => name,
             Err(error) => return failed = Some(error),
         };
@@ -38,12 +62,16 @@ pub(super) fn keep_unpacked(file: &mut SceneFile, folder: &Path, stem: &str) -> 
     });
     match failed {
         Some(error) => Err(error),
-        None => Ok(copies.into_iter().map(|(_, name)| format!("the files of the archive are in {name}")).collect()),
+        None => {
+            let note = |(_, name)| format!("the files of the archive are in {name}");
+            Ok(Copies { notes: copies.into_iter().map(note).collect(), begun })
+        }
     }
 }
 
-/// Copies a folder to one beside the scene; one that has the same files already is used. Returns its name.
-fn copy(root: &Path, folder: &Path, stem: &str) -> Result<String, WriteError> {
+/// Copies a folder to one beside the scene, which is added to `begun`; one that has the same files already is used.
+/// Returns its name.
+fn copy(root: &Path, folder: &Path, stem: &str, begun: &mut Vec<(NewFolder, PathBuf)>) -> Result<String, WriteError> {
     let files = files_below(root).map_err(|source| unwritable(root, source))?;
     let mut names = (1..=u32::MAX).map(|number| match number {
         1 => format!("{stem}-files"),
@@ -51,20 +79,24 @@ fn copy(root: &Path, folder: &Path, stem: &str) -> Result<String, WriteError> {
     });
     let usable = |name: &String| {
         let copy = folder.join(text_to_path(name));
-        !copy.exists() || files.iter().all(|file| has_same_bytes(&root.join(file), &copy.join(file)))
+        let is_begun = begun.iter().any(|(_, path)| *path == copy);
+        !is_begun && (!copy.exists() || files.iter().all(|file| has_same_bytes(&root.join(file), &copy.join(file))))
     };
     let name = names.find(usable).ok_or_else(|| WriteError::NoFreeName(folder.join(stem)))?;
     let copy = folder.join(text_to_path(&name));
-    for file in files.iter().filter(|file| !copy.join(file).exists()) {
-        let (from, to) = (root.join(file), copy.join(file));
-        let parent = to.parent().unwrap_or(&copy);
-        let no_folder = |source| WriteError::NoFolder { folder: parent.to_path_buf(), source };
-        std::fs::create_dir_all(parent).map_err(no_folder)?;
+    if copy.exists() {
+        return Ok(name);
+    }
+    let new = NewFolder::begin(&copy)?;
+    let copy_one = |file: &PathBuf| {
+        let (from, to) = (root.join(file), new.part().join(file));
         let mut input = InputFile::open_within(&from, FileKind::Film, u64::MAX).map_err(|e| unwritable(&to, e))?;
         let mut output = WholeFile::begin(&to, Replace::AllButFilms)?;
         io::copy(&mut input, &mut output).map_err(|error| unwritable(&to, error))?;
-        output.finish()?;
-    }
+        output.finish()
+    };
+    files.iter().try_for_each(copy_one).map_err(|error| new.error(error))?;
+    begun.push((new, copy));
     Ok(name)
 }
 
@@ -77,10 +109,7 @@ fn files_below(root: &Path) -> io::Result<Vec<PathBuf>> {
             let (kind, path) = (entry.file_type()?, folder.join(entry.file_name()));
             if kind.is_dir() {
                 folders.push(path);
-            } else if kind.is_file()
-                && path.extension().is_none_or(|end| end != "ron")
-                && path != Path::new("SHA256SUMS")
-            {
+            } else if kind.is_file() && path != Path::new("SHA256SUMS") {
                 found.push(path);
             }
         }

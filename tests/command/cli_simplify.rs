@@ -137,6 +137,21 @@ fn texture_coordinates_normals_and_materials_are_kept() {
     }
 }
 
+/// A model of somebody else may name any file as its library.
+#[test]
+fn a_library_outside_of_the_folder_is_read_only_where_that_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("in")).unwrap();
+    std::fs::write(path.join("paint.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    std::fs::write(path.join("in/strip.obj"), strip("red").replace("paint.mtl", "../paint.mtl")).unwrap();
+    for (options, is_read) in [(&[][..], false), (&["--allow-outside"], true)] {
+        report(path, &[&["in/strip.obj", "-o", "in/out.obj", "--faces", "2"], options].concat());
+        let text = std::fs::read_to_string(path.join("in/out.obj")).unwrap();
+        assert_eq!([text.contains("paint.mtl"), text.contains("usemtl red")], [is_read; 2], "{text}");
+    }
+}
+
 /// Colours of vertices need no library, and no material.
 #[test]
 fn vertex_colours_are_kept() {

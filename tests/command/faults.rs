@@ -35,6 +35,53 @@ fn a_full_disk_leaves_the_old_picture_and_nothing_else() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "something was left behind");
 }
 
+/// Of folders as well: the first of two files can be written, the second one cannot.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_no_half_of_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let noise = |x: u32, y: u32| image::Rgb([x * 89 + y * 57, x * 13 + y * 31, x * y].map(|n| (n % 251) as u8));
+    image::RgbImage::from_fn(2, 2, noise).save(folder.path().join("a.png")).unwrap();
+    image::RgbImage::from_fn(64, 64, noise).save(folder.path().join("b.png")).unwrap();
+    let text = "(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), \
+        textures: {\"a\": image(file: \"a.png\"), \"b\": image(file: \"b.png\")}, \
+        materials: {\"a\": diffuse(albedo: \"a\"), \"b\": diffuse(albedo: \"b\")}, \
+        objects: [sphere(radius: 1, material: \"a\"), sphere(radius: 2, material: \"b\")])";
+    std::fs::write(folder.path().join("s.ron"), text).unwrap();
+    std::fs::create_dir(folder.path().join("there")).unwrap();
+    let run = |line: &str, is_full: bool| {
+        let limit = if is_full { "trap '' XFSZ; ulimit -f 4;" } else { "" };
+        let script = format!("{limit} exec '{PROGRAM}' {line}");
+        let mut command = Command::new("sh");
+        command.args(["-c", &script]).current_dir(folder.path()).env("XDG_CACHE_HOME", folder.path().join("cache"));
+        command.output().unwrap()
+    };
+    assert!(run("pack s.ron -o s.zip", false).status.success());
+    // Unpacks it.
+    assert!(run("info s.zip", false).status.success());
+    let names = || {
+        let names =
+            |folder: &Path| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        let [mut here, there]: [Vec<_>; 2] = [names(folder.path()), names(&folder.path().join("there"))];
+        here.sort();
+        (here, there)
+    };
+    let before = names();
+    for (line, name) in [
+        ("pack s.ron -o t.zip", "t.zip"),
+        ("save s.zip -o x.ron", "x-files/b.png"),
+        ("submit slurm s.ron --parts 2 --spp 4 --dry-run -o job", "job/scene/b.png"),
+        ("submit slurm s.ron --parts 2 --spp 4 --dry-run -o there", "there/scene/b.png"),
+    ] {
+        let output = run(line, true);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(said.starts_with(&format!("error: {name}: cannot be written")), "{line}: {said}");
+        assert_eq!(said.lines().count(), 1, "{line}: {said}");
+        assert_eq!(names(), before, "{line}");
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn help_that_cannot_be_written_is_a_failure() {

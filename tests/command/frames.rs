@@ -43,18 +43,26 @@ fn frames_are_moments_and_parts_are_the_same_frames() {
 fn what_is_complete_stays_and_the_rest_is_rendered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let line = format!("render carousel {SMALL} --frames 3 -o f.png");
+    let line = format!("render carousel {SMALL} --frames 4 -o f.png --film f.exr");
     does(path, &line);
-    let first = std::fs::read(path.join("f-0001.png")).unwrap();
-    let before = [0, 1, 2].map(|number| time(path, &format!("f-000{number}.png")));
-    std::fs::remove_file(path.join("f-0001.png")).unwrap();
+    let names = || (0..4).flat_map(|number| ["png", "exr"].map(|end| format!("f-000{number}.{end}")));
+    let bytes = || names().map(|name| std::fs::read(path.join(name)).unwrap()).collect::<Vec<_>>();
+    let whole = bytes();
+    let before = time(path, "f-0000.png");
+    // As after an interruption, and after copying to a disk that was full.
+    for name in ["f-0001.png", "f-0001.exr", "f-0002.png"] {
+        std::fs::remove_file(path.join(name)).unwrap();
+    }
+    std::fs::write(path.join("f-0003.png"), &whole[6][..whole[6].len() - 5]).unwrap();
     let said = does(path, &line);
-    assert!(said.contains("3 frames, 2 complete already"), "{said}");
-    assert_eq!([0, 2].map(|number| time(path, &format!("f-000{number}.png"))), [before[0], before[2]]);
-    assert_eq!(std::fs::read(path.join("f-0001.png")).unwrap(), first);
-    // Other samples, another speed: other frames.
-    let said = does(path, &format!("{line} --fps 12"));
-    assert!(said.contains("3 frames, replacing 3 existing files"), "{said}");
+    assert!(said.contains("4 frames, 1 complete already, replacing 1 existing file"), "{said}");
+    assert_eq!(time(path, "f-0000.png"), before);
+    assert!(bytes() == whole);
+    // Other samples, another speed: other frames, which would lose the films.
+    let said = fails(path, &format!("{line} --fps 12"), 1);
+    assert!(said.contains(".exr: a film with a different") && said.contains("would be lost"), "{said}");
+    let said = does(path, &format!("{line} --fps 12 --overwrite"));
+    assert!(said.contains("4 frames, replacing 4 existing files"), "{said}");
     does(path, &format!("render carousel {SMALL} --frames 2..3 -o at24.png"));
     let pixels = |name: &str| image::open(path.join(name)).unwrap().to_rgb8().into_raw();
     assert_eq!(pixels("f-0001.png"), pixels("at24-0002.png"));
@@ -104,14 +112,21 @@ fn a_video_is_made_of_the_frames_by_ffmpeg() {
 
     let program = bin.join("ffmpeg");
     let script =
-        "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\necho \"$@\" > words\nfor last; do :; done\n/bin/cat > \"$last\"\n";
+        // More words than a pipe holds.
+        "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\necho \"$@\" > words\n/usr/bin/head -c 200000 /dev/zero >&2\n\
+         for last; do :; done\n/bin/cat > \"$last\"\n";
     std::fs::write(&program, script).unwrap();
+    // The temporary name of an older version, as the project of somebody else may have it.
+    std::fs::write(path.join("thesis.txt"), "my only copy").unwrap();
+    std::os::unix::fs::symlink("thesis.txt", path.join(".unfinished-f.mp4")).unwrap();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     let output = run(&line);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success() && said.contains("f.mp4: 3 frames at 24 per second"), "{said}");
     let words = std::fs::read_to_string(path.join("words")).unwrap();
     assert!(words.contains("-f rawvideo -pix_fmt rgb24 -video_size 48x27 -framerate 24 -i -"), "{words}");
+    assert_eq!(std::fs::read_to_string(path.join("thesis.txt")).unwrap(), "my only copy");
+    std::fs::remove_file(path.join(".unfinished-f.mp4")).unwrap();
     let sent = std::fs::read(path.join("f.mp4")).unwrap();
     let frames = [0, 1, 2].map(|number| image::open(path.join(format!("f-000{number}.png"))).unwrap().to_rgb8());
     assert_eq!(sent, frames.map(|frame| frame.into_raw()).concat());
@@ -121,5 +136,31 @@ fn a_video_is_made_of_the_frames_by_ffmpeg() {
     let output = run(&line);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && said.contains("ffmpeg: no such codec"), "{said}");
-    assert!(!path.join("f.mp4").exists() && !path.join(".unfinished-f.mp4").exists());
+    let left = || std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let is_rest = |name: &String| name.contains("mp4") || name.contains(".part");
+    assert_eq!(left().find(is_rest), None);
+    // A stop ends it.
+    let script = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nfor last; do :; done\necho > \"$last\"\necho $$ > pid\nexec /bin/sleep 600\n";
+    std::fs::write(&program, script).unwrap();
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("firstlight"))
+        .args(line.split(' '))
+        .current_dir(path)
+        .env("PATH", &bin)
+        .spawn()
+        .unwrap();
+    let pid = loop {
+        match std::fs::read_to_string(path.join("pid")) {
+            Ok(pid) if pid.ends_with('\n') => break pid.trim().to_owned(),
+            _ => assert!(child.try_wait().unwrap().is_none(), "ffmpeg was not run"),
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    };
+    let signal = |name: &str, pid: &str| {
+        let kill = std::process::Command::new("kill").args([name, pid]).stderr(std::process::Stdio::null()).status();
+        kill.unwrap().success()
+    };
+    assert!(signal("-TERM", &child.id().to_string()));
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!signal("-0", &pid), "ffmpeg still runs");
+    assert_eq!(left().find(is_rest), None);
 }

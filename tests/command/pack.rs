@@ -232,6 +232,31 @@ fn an_archive_opens_directly_and_only_whole() {
     assert!(!left.exists());
 }
 
+/// Copies beside the scene, wherever that is to be and whatever the files are called: the cache may be deleted.
+#[test]
+fn a_scene_that_is_saved_from_an_archive_needs_the_cache_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    image::RgbImage::new(2, 2).save_with_format(path.join("t.ron"), image::ImageFormat::Png).unwrap();
+    let text = "(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), textures: {\"t\": image(file: \"t.ron\")}, \
+                materials: {\"m\": diffuse(albedo: \"t\")}, objects: [sphere(radius: 1, material: \"m\")])";
+    std::fs::write(path.join("s.ron"), text).unwrap();
+    does(path, "pack s.ron -o s.zip");
+    let cache = path.join("cache");
+    let variables = [("XDG_CACHE_HOME", cache.to_str().unwrap())];
+    for name in ["new/x.ron", "far/z/../x.ron"] {
+        let output = super::parts::run_in(path, &format!("save s.zip -o {name}"), &variables);
+        assert!(output.status.success(), "{name}: {output:?}");
+    }
+    std::fs::remove_dir_all(cache).unwrap();
+    for name in ["new", "far"] {
+        let text = std::fs::read_to_string(path.join(name).join("x.ron")).unwrap();
+        assert!(text.contains("\"x-files/t.ron\""), "{text}");
+        let image = std::fs::read(path.join(name).join("x-files/t.ron")).unwrap();
+        assert!(image == std::fs::read(path.join("t.ron")).unwrap());
+    }
+}
+
 #[test]
 fn the_environment_image_of_an_archive_counts() {
     let folder = tempfile::tempdir().unwrap();

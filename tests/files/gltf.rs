@@ -641,6 +641,26 @@ fn a_saved_scene_and_its_model_say_the_same() {
     assert_eq!(corners(&again), corners(&scene));
 }
 
+/// Of motion blur a scene file keeps nothing: that is told, where there is any.
+#[test]
+fn motion_blur_that_is_not_saved_is_told() {
+    let kept = keep("a.glb", &animated().glb());
+    for (at, shutter, is_told) in
+        [(1.0, Some(1.0), true), (1.0, None, false), (1.0, Some(0.0), false), (9.0, Some(1.0), false)]
+    {
+        let scene = open(&kept.1, &ModelChoice { at: Some(at), shutter, ..ModelChoice::default() }).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let saved = save_scene(&mut world, Some(&scene), &kept.0.path().join("b.ron")).unwrap();
+        let notes = saved.notes.join("; ");
+        assert_eq!(
+            notes.contains("the motion blur of the glTF model is left out"),
+            is_told,
+            "{at} {shutter:?}: {notes}"
+        );
+    }
+}
+
 #[test]
 fn the_whole_scene_is_a_mesh_too() {
     let mut writer = Writer::default();

@@ -6,6 +6,7 @@ pub mod archive_cache;
 pub mod hash;
 pub mod input_file;
 pub mod limits;
+pub mod new_folder;
 pub mod outputs;
 pub mod printable;
 pub mod reference;

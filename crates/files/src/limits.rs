@@ -12,7 +12,8 @@ pub struct Limits {
     pub model_bytes: u64,
     /// Bytes of a material library.
     pub library_bytes: u64,
-    /// Bytes of the text of a scene; reading takes up to about 25 bytes of memory per byte.
+    /// Bytes of the text of a scene; objects of twenty bytes take about 100 bytes of memory per byte to read, and 220 to
+    /// render.
     pub scene_bytes: u64,
     /// Pixels of an image; decoding takes up to 32 bytes of memory per pixel.
     pub picture_pixels: u64,
@@ -20,7 +21,7 @@ pub struct Limits {
     pub scene_image_bytes: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
-    /// Bytes of the metadata in an image.
+    /// Bytes of the metadata in an image, with the scene that it may hold.
     pub note_bytes: u64,
     /// Bytes of a recording; reading takes up to about 10 bytes of memory per byte.
     pub recording_bytes: u64,
@@ -42,7 +43,7 @@ impl Limits {
         picture_pixels: 1 << 27,
         scene_image_bytes: 4 << 30,
         film_pixels: 1 << 26,
-        note_bytes: 64 << 20,
+        note_bytes: 16 << 20,
         recording_bytes: 256 << 20,
         archive_bytes: 16 << 30,
         settings_bytes: 1 << 20,

@@ -104,16 +104,16 @@ impl Files {
 
     /// Registers outputs in one folder; only the first one is tested for writing.
     ///
+    /// - `replace`: what they may overwrite.
+    ///
     /// # Errors
     /// Like [`Self::write`].
-    pub fn write_all(&mut self, paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FilesError> {
-        for (i, path) in paths.into_iter().enumerate() {
-            if i == 0 {
-                self.write(&path)?;
-            } else {
-                self.add_output(&path, Use::Written)?;
-                check_replaceable(&path, self.replace).map_err(FilesError::Unwritable)?;
-            }
+    pub fn write_all(&mut self, paths: impl IntoIterator<Item = PathBuf>, replace: Replace) -> Result<(), FilesError> {
+        let mut check: fn(&Path, Replace) -> Result<(), WriteError> = check_writable;
+        for path in paths {
+            self.add_output(&path, Use::Written)?;
+            check(&path, replace).map_err(FilesError::Unwritable)?;
+            check = check_replaceable;
         }
         Ok(())
     }
@@ -194,7 +194,10 @@ mod tests {
             files.read(&root.join("in.obj")).unwrap();
             files.read(spelling).unwrap();
             assert!(matches!(files.write(spelling), Err(FilesError::Collision(_))), "{spelling:?}");
-            assert!(matches!(files.write_all([spelling.clone()]), Err(FilesError::Collision(_))), "{spelling:?}");
+            assert!(
+                matches!(files.write_all([spelling.clone()], Replace::Anything), Err(FilesError::Collision(_))),
+                "{spelling:?}"
+            );
             assert!(matches!(files.claim(spelling, Replace::Anything), Err(FilesError::Collision(_))), "{spelling:?}");
             // Also if the input is registered later, like the meshes of a scene.
             let mut files = Files::new(Replace::Anything);
@@ -208,8 +211,11 @@ mod tests {
             let path = PathBuf::from(format!("{}/{folder_like}", root.display()));
             let mut files = Files::new(Replace::Anything);
             files.read(&root.join("in.obj")).unwrap();
-            let refused =
-                [files.write(&path), files.claim(&path, Replace::Anything).map(drop), files.write_all([path])];
+            let refused = [
+                files.write(&path),
+                files.claim(&path, Replace::Anything).map(drop),
+                files.write_all([path], Replace::Anything),
+            ];
             assert!(refused.iter().all(Result::is_err), "{folder_like}: {refused:?}");
         }
         // Files that do not exist yet.
@@ -218,6 +224,9 @@ mod tests {
         let error = files.write(&root.join("sub/../new.png")).unwrap_err();
         assert!(error.to_string().contains("two outputs have the same name"), "{error}");
         files.write(&root.join("sub/new.png")).unwrap();
+        // Nor their folders.
+        files.write(&root.join("far/v/new.png")).unwrap();
+        assert!(matches!(files.write(&root.join("far/z/../v/new.png")), Err(FilesError::Collision(_))));
         assert_eq!(files.replaced(), [] as [PathBuf; 0]);
         assert_eq!(std::fs::read_to_string(root.join("in.obj")).unwrap(), "here");
     }

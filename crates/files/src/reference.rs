@@ -140,16 +140,30 @@ impl<'a> References<'a> {
 
 const ABSOLUTE: &str = "an absolute path";
 
-/// The first of these paths that exists, or what differs from the last one by case.
+/// The first of these paths that exists, where a folder that is not there may be left out (`missing/../a.png`), or what
+/// differs from the last one by case.
 fn existing(base: &Path, spellings: &[PathBuf; 4]) -> Referred {
     let last = &spellings[2];
-    match spellings.iter().find(|path| base.join(path).exists()) {
+    let direct = direct(last);
+    match spellings.iter().chain([&direct]).find(|path| base.join(path).exists()) {
         Some(path) => path.clone().into(),
         None => match in_any_case(base, last) {
             Some(path) => Referred { path, is_renamed: true },
             None => last.clone().into(),
         },
     }
+}
+
+/// A path without the folders that it enters and leaves again.
+fn direct(path: &Path) -> PathBuf {
+    let mut direct = PathBuf::new();
+    for part in path.components() {
+        match (part, direct.components().next_back()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => drop(direct.pop()),
+            (part, _) => direct.push(part),
+        }
+    }
+    direct
 }
 
 /// The file below `base` whose name differs in upper and lower case only. If there are several, none of them is meant.

@@ -73,25 +73,34 @@ pub mod path_text {
     }
 }
 
-/// The absolute path; symbolic links are resolved as far as possible.
+/// The absolute path without `..` and symbolic links, also of what does not exist yet: its missing folders will be made as
+/// they are named, so a `..` behind them leads back.
 pub fn absolute(path: &Path) -> PathBuf {
     if let Ok(path) = path.canonicalize() {
         return path;
     }
     /// The limit of common systems.
     const MAX_LINKS: usize = 40;
-    // The file need not exist yet, but its folder does.
-    let mut absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    for _ in 0..MAX_LINKS {
-        match (std::fs::read_link(&absolute), absolute.parent()) {
-            (Ok(target), Some(folder)) => absolute = folder.join(target),
-            _ => break,
+    let parts_of = |path: &Path| path.components().rev().map(|part| part.as_os_str().to_owned()).collect::<Vec<_>>();
+    let mut ahead = parts_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
+    let (mut absolute, mut n_links) = (PathBuf::new(), 0);
+    while let Some(part) = ahead.pop() {
+        if part == ".." {
+            absolute.pop();
+            continue;
+        }
+        match std::fs::read_link(absolute.join(&part)) {
+            Ok(target) if n_links < MAX_LINKS => {
+                n_links += 1;
+                ahead.extend(parts_of(&target));
+            }
+            // The root takes the place of what is before it.
+            _ => absolute.push(part),
         }
     }
-    match (absolute.parent().and_then(|folder| folder.canonicalize().ok()), absolute.file_name()) {
-        (Some(folder), Some(name)) => folder.join(name),
-        _ => absolute,
-    }
+    // As the system writes the part that exists.
+    let written = |folder: &Path| Some(folder.canonicalize().ok()?.join(absolute.strip_prefix(folder).ok()?));
+    absolute.ancestors().find_map(written).unwrap_or(absolute)
 }
 
 /// `path` relative to `folder`, with `/` as separator; the absolute path if they have only the root in common.
@@ -157,5 +166,39 @@ mod tests {
         }
         #[cfg(unix)]
         assert_eq!(relative_path(Path::new("/proc"), Path::new("/etc/none")), "/etc/none");
+    }
+
+    /// What a path means before its folders are made is what it leads to once they are there.
+    #[cfg(unix)]
+    #[test]
+    fn folders_that_are_made_later_lie_where_they_were_expected() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap();
+        std::fs::create_dir_all(root.join("deep/x/y")).unwrap();
+        symlink("deep/x/y", root.join("link")).unwrap();
+        symlink("deep/later/z", root.join("broken")).unwrap();
+        symlink("round", root.join("round")).unwrap();
+        for (path, place) in [
+            ("new/a.ron", "new/a.ron"),
+            ("new/../cache/a.png", "cache/a.png"),
+            ("n/m/../../a.ron", "a.ron"),
+            ("link/n1/n2/a.ron", "deep/x/y/n1/n2/a.ron"),
+            ("link/../n1/a.ron", "deep/x/n1/a.ron"),
+            ("new/../link/../n1/n2/a.ron", "deep/x/n1/n2/a.ron"),
+            ("broken/n1/a.ron", "deep/later/z/n1/a.ron"),
+            ("round/a.ron", "round/a.ron"),
+        ] {
+            let before = absolute(&root.join(path));
+            assert_eq!(before, root.join(place), "{path}");
+            let parent = before.parent().unwrap();
+            if !path.starts_with("round") {
+                std::fs::create_dir_all(parent).unwrap();
+                assert_eq!(parent.canonicalize().unwrap(), parent, "{path}");
+                std::fs::remove_dir_all(root.join("new")).unwrap_or_default();
+            }
+        }
+        std::fs::remove_dir_all(root.join("deep/x/y/n1")).unwrap();
+        assert_eq!(relative_path(&root.join("link/n1/n2"), &root.join("t.png")), "../../../../../t.png");
     }
 }

@@ -45,7 +45,7 @@ pub struct WholeFile {
     in_progress: InProgress,
 }
 
-/// The temporary files of this process, and whether the program is about to exit without finishing them.
+/// The temporary files and folders of this process, and whether the program is about to exit without finishing them.
 static PARTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 
@@ -53,17 +53,17 @@ fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Registers a temporary file in `PARTS` during its lifetime.
-struct InProgress(PathBuf);
+/// Registers a temporary file or folder in `PARTS` during its lifetime.
+pub(crate) struct InProgress(PathBuf);
 
 impl InProgress {
-    fn of(part: &Path) -> Self {
+    pub(crate) fn of(part: &Path) -> Self {
         parts().insert(part.to_path_buf());
         Self(part.to_path_buf())
     }
 
-    fn check(&self) -> io::Result<()> {
-        if GIVEN_UP.load(Ordering::SeqCst) { Err(io::Error::other("the program is shutting down")) } else { Ok(()) }
+    pub(crate) fn check(&self) -> io::Result<()> {
+        check_in_time()
     }
 }
 
@@ -73,12 +73,21 @@ impl Drop for InProgress {
     }
 }
 
-/// For exiting while other threads write: no file is renamed any more, and all temporary files are removed.
+fn check_in_time() -> io::Result<()> {
+    if GIVEN_UP.load(Ordering::SeqCst) { Err(io::Error::other("the program is shutting down")) } else { Ok(()) }
+}
+
+/// Nothing is begun when the temporary files are being removed.
+fn in_time(path: &Path) -> Result<(), WriteError> {
+    check_in_time().map_err(|error| unwritable(path, error))
+}
+
+/// For exiting while other threads write: nothing is renamed any more, and all temporary files and folders are removed.
 pub fn give_up() {
     GIVEN_UP.store(true, Ordering::SeqCst);
     for part in std::mem::take(&mut *parts()) {
-        // A file that has just been renamed is complete.
-        let _ = std::fs::remove_file(part);
+        // What has just been renamed is complete.
+        let _ = std::fs::remove_file(&part).or_else(|_| std::fs::remove_dir_all(part));
     }
 }
 
@@ -111,6 +120,17 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     file.write_all(bytes).map_err(|error| unwritable(path, error))?;
     file.finish()
+}
+
+/// Like [`write_whole`], but replaces nothing, even what another process writes at the same time.
+///
+/// # Errors
+/// If it cannot be written, or there is a file already.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
+    file.write_all(bytes).map_err(|error| unwritable(path, error))?;
+    let target = file.target.clone();
+    file.finish_new(std::iter::once(target))?.map(drop).ok_or_else(|| WriteError::Exists(path.to_path_buf()))
 }
 
 /// Lets a pipe be opened without another end.
@@ -165,6 +185,7 @@ impl WholeFile {
     pub fn begin(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
+        in_time(path)?;
         // It may be claimed.
         let claimed = part_name(&target, None);
         if let Ok(file) = without_waiting(OpenOptions::new().read(true)).open(&claimed) {
@@ -195,6 +216,7 @@ impl WholeFile {
     pub fn claim(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
+        in_time(path)?;
         match open_part(&target, None) {
             Ok(Some(part)) => Ok(Self::new(part, path, target)),
             Ok(None) => Err(busy(path)),
@@ -487,6 +509,20 @@ mod tests {
         write_whole(&path, b"new").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_new_file_replaces_nothing_even_what_came_meanwhile() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/a.txt");
+        let late = WholeFile::begin(&path, Replace::AllButFilms).unwrap();
+        write_new(&path, b"first").unwrap();
+        assert!(matches!(write_new(&path, b"second"), Err(WriteError::Exists(_))));
+        assert_eq!(late.finish_new(std::iter::once(path.clone())).unwrap(), None);
+        assert_eq!(
+            (std::fs::read(&path).unwrap(), names(path.parent().unwrap())),
+            (b"first".to_vec(), vec!["a.txt".to_owned()])
+        );
     }
 
     #[test]

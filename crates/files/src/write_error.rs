@@ -3,7 +3,7 @@
 use crate::input_file::may_pass;
 use std::error::Error;
 use std::io::{self, ErrorKind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a file was not written; an existing file is unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +38,9 @@ pub enum WriteError {
         /// How the film differs; the text follows "a film".
         film: String,
     },
+    /// The file exists, and was not to be replaced.
+    #[error("{}: already exists: replace it with --overwrite, or choose another name", .0.display())]
+    Exists(PathBuf),
     /// The file exists and is not a recording.
     #[error("{}: exists and is not a recording: choose another name", .0.display())]
     NotRecording(PathBuf),
@@ -119,6 +122,26 @@ impl WriteError {
             Self::Failed { source, .. } => io_kind(&**source).is_some_and(may_pass),
             _ => false,
         }
+    }
+}
+
+impl WriteError {
+    /// The same error of a file below `from`, which the user knows as one below `to`.
+    pub(crate) fn of_moved(mut self, from: &Path, to: &Path) -> Self {
+        if let Self::FolderName(path)
+        | Self::Folder(path)
+        | Self::NotRegular(path)
+        | Self::ReadOnly(path)
+        | Self::BrokenLink(path)
+        | Self::Busy(path)
+        | Self::NoFolder { folder: path, .. }
+        | Self::Begin { path, .. }
+        | Self::Failed { path, .. } = &mut self
+            && let Ok(below) = path.strip_prefix(from)
+        {
+            *path = to.join(below);
+        }
+        self
     }
 }
 

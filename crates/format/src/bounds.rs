@@ -15,6 +15,9 @@ pub const MAX_GRID_BALLS: u64 = 4_000_000;
 /// Maximum number of spheres in all grids together.
 pub const MAX_BALLS: u64 = 4 * MAX_GRID_BALLS;
 
+/// Maximum number of objects: one takes about 2,000 bytes to read, and 4,500 to render.
+pub const MAX_OBJECTS: usize = 4_000_000;
+
 /// Maximum number of ratios to which one mesh is simplified.
 pub const MAX_RATIOS: usize = 256;
 /// Maximum number of pixels along one side of a film.

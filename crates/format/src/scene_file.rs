@@ -1,10 +1,11 @@
 //! The scene file as written: its parts by name.
 
 use crate::animation::AnimationPart;
+use crate::bounds::MAX_OBJECTS;
 use crate::camera::CameraPart;
 use crate::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart};
 use crate::sources::{EnvironmentSource, TextureSource};
-use crate::value::{Named, Rgb};
+use crate::value::{Named, Rgb, list_within};
 use firstlight_render::Integrator;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +43,7 @@ pub struct SceneFile {
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub materials: Named<MaterialPart>,
     /// Objects, in the order in which they are spawned.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "list_within::<_, _, { MAX_OBJECTS }>")]
     pub objects: Vec<ObjectPart>,
     /// Lights that are no objects; all other emitters are objects with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

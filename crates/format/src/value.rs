@@ -280,9 +280,45 @@ impl<T: Serialize> Serialize for Named<T> {
     }
 }
 
+/// Reads a list of at most `MOST` entries, and nothing beyond.
+pub(crate) fn list_within<'de, D: Deserializer<'de>, T: Deserialize<'de>, const MOST: usize>(
+    deserializer: D,
+) -> Result<Vec<T>, D::Error> {
+    struct List<T, const MOST: usize>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>, const MOST: usize> Visitor<'de> for List<T, MOST> {
+        type Value = Vec<T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a sequence")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<Vec<T>, A::Error> {
+            let mut list = Vec::new();
+            while let Some(entry) = entries.next_element()? {
+                if list.len() == MOST {
+                    return Err(A::Error::custom(format!("more than {MOST} entries: a scene may have up to {MOST}")));
+                }
+                list.push(entry);
+            }
+            Ok(list)
+        }
+    }
+    deserializer.deserialize_seq(List::<T, MOST>(PhantomData))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_list_ends_where_it_may_have_no_more() {
+        #[derive(Debug, PartialEq, Deserialize)]
+        struct Two(#[serde(deserialize_with = "list_within::<_, _, 2>")] Vec<u32>);
+        assert_eq!(ron::from_str("([1, 2])"), Ok(Two(vec![1, 2])));
+        // What is not read need not be right.
+        let error = ron::from_str::<Two>("([1, 2, 3, what])").unwrap_err().to_string();
+        assert!(error.contains("more than 2 entries"), "{error}");
+    }
 
     #[test]
     fn hexadecimal_colours_are_srgb() {

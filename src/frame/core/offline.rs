@@ -150,8 +150,10 @@ fn render(
     /// Approximate seconds between reports.
     const SLICE: f64 = 0.25;
     let start = Instant::now();
-    let deadline =
-        target.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).map(|limit| start + limit);
+    let deadline = target
+        .seconds
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .and_then(|limit| start.checked_add(limit));
     let goal = target.spp.unwrap_or(u32::MAX);
     let mut report = OfflineReport::default();
     let mut step = 1;

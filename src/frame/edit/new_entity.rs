@@ -25,15 +25,20 @@ pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity
 /// Returns `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among everything else.
 pub fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
     let mut named = world.query::<(&Name, Has<SurfaceMaterial>)>();
-    let taken: std::collections::HashSet<String> = (named.iter(world))
+    // Numbers in place of names: a recording may make thousands of one name.
+    let number_of = |taken: &str| match taken.strip_prefix(name)? {
+        "" => Some(1),
+        rest => rest.strip_prefix(' ').filter(|digits| digits.starts_with(|c| matches!(c, '1'..='9')))?.parse().ok(),
+    };
+    let taken: std::collections::HashSet<u64> = (named.iter(world))
         .filter(|(_, is_material)| *is_material == of_materials)
-        .map(|(name, _)| name.as_str().to_owned())
+        // `name 1` is another name.
+        .filter_map(|(taken, _)| number_of(taken).filter(|&number| number > 1 || taken.as_str() == name))
         .collect();
-    let numbered = (2..).map(|i| format!("{name} {i}"));
-    std::iter::once(name.to_owned())
-        .chain(numbered)
-        .find(|name| !taken.contains(name))
-        .expect("the iterator is infinite")
+    match (1..).find(|number| !taken.contains(number)) {
+        Some(1) => name.to_owned(),
+        number => format!("{name} {}", number.expect("more numbers than names")),
+    }
 }
 
 pub fn next_ordinal(world: &mut World) -> Ordinal {
@@ -63,6 +68,14 @@ mod tests {
     fn names_are_numbered_and_copies_do_not_pile_up_numbers() {
         let mut world = World::new();
         for expected in ["ball", "ball 2", "ball 3"] {
+            let entity = spawn(&mut world, "ball", Placement::default());
+            assert_eq!(world.get::<Name>(entity).unwrap().as_str(), expected);
+        }
+        // Names that look like numbers, and are not those that would be given.
+        for other in ["ball 1", "ball 04", "ball +4", "ball 4 ", "ball 99999999999999999999", "ball 6"] {
+            world.spawn(Name::new(other));
+        }
+        for expected in ["ball 4", "ball 5", "ball 7"] {
             let entity = spawn(&mut world, "ball", Placement::default());
             assert_eq!(world.get::<Name>(entity).unwrap().as_str(), expected);
         }

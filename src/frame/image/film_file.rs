@@ -316,6 +316,7 @@ fn summary(path: &Path, limits: &Limits) -> Result<FilmSummary, FilmProblem> {
     let meta = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| damaged(&error))?;
     let layout = layout_in(&meta)?;
     check_film_size(layout.width, layout.height)?;
+    check_layout(&layout)?;
     let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
     let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its metadata is missing or too long"))?)?;
     Ok(FilmSummary { shot, layout })
@@ -334,6 +335,25 @@ fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
         return Err(FilmProblem::Newer);
     }
     Ok(ron::from_str::<FilmHeader>(&text).map_err(damaged)?.layout)
+}
+
+/// Rejects a layout that no film has: without the checksum of the whole file, its numbers may be anyone's.
+fn check_layout(layout: &FilmLayout) -> Result<(), FilmProblem> {
+    let FilmLayout { width, height, tile_size, ref tiles, .. } = *layout;
+    let per_side = |side: u32| u64::from(side.div_ceil(tile_size.max(1)));
+    let n_blocks: usize = tiles.iter().map(|tile| tile.blocks.len()).sum();
+    let fits = tile_size > 0
+        && tiles.len() as u64 == per_side(width) * per_side(height)
+        && n_blocks as u64 <= u64::from(width) * u64::from(height);
+    let is_ascending = |ranges: &[(u32, u32)]| {
+        ranges.windows(2).all(|pair| pair[0].1 < pair[1].0)
+            && ranges.iter().all(|(start, end)| start <= end)
+            && ranges.last().is_some_and(|(_, end)| *end <= Film::MAX_SAMPLES)
+    };
+    match fits && tiles.iter().flat_map(|tile| &tile.blocks).all(|block| is_ascending(&block.samples)) {
+        true => Ok(()),
+        false => Err(FilmProblem::Damaged("its samples are not those of a film of its size".to_owned())),
+    }
 }
 
 /// Reads a film exactly.
@@ -521,6 +541,37 @@ mod tests {
             let mut changed = whole.clone();
             changed.splice(at..at + from.len(), to);
             assert!(read_bytes(&changed).is_err(), "{}", String::from_utf8_lossy(&from));
+        }
+    }
+
+    /// The summary is read without the checksum: a few kilobytes must not stand for the work of gigabytes.
+    #[test]
+    fn samples_that_no_film_of_its_size_has_are_refused_by_the_summary_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let (film, note) = tiny(4);
+        write_film_file(&film, &note, &path).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        let layout = read_film_summary(&path).unwrap().layout;
+        let mut forged = vec![layout.clone(); 5];
+        let block = layout.tiles[0].blocks[0].clone();
+        forged[0].tiles[0].blocks = vec![block; 7];
+        forged[1].tiles.push(layout.tiles[0].clone());
+        forged[2].tiles[0].blocks[0].samples = vec![(2, 4), (0, 1)];
+        forged[3].tiles[0].blocks[0].samples = vec![(0, u32::MAX)];
+        forged[4].tile_size = 0;
+        for layout in forged {
+            let header = |layout| {
+                ron::to_string(&FilmHeader { format: FORMAT, check: NO_CHECK.to_owned(), layout, features: None })
+            };
+            let text = header(layout).unwrap();
+            let key = [FILM_KEY.as_bytes(), b"\0string\0"].concat();
+            let at = whole.windows(key.len()).position(|part| part == key).unwrap() + key.len();
+            let length = u32::from_le_bytes(whole[at..at + 4].try_into().unwrap()) as usize;
+            let mut bytes = whole.clone();
+            bytes.splice(at..at + 4 + length, [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat());
+            std::fs::write(&path, bytes).unwrap();
+            assert!(read_film_summary(&path).unwrap_err().is_damaged(), "{text}");
         }
     }
 

@@ -5,13 +5,13 @@
 
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::render::{Display, Film, Purpose, Room, develop, develop_colors, relative_errors};
-use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_text};
+use crate::scene::{FileKind, InputFile, WriteError, read_picture};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,
 };
 use glam::Vec3;
-use std::io::{self, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Image file formats.
@@ -66,6 +66,26 @@ pub struct Print<'a> {
     pub note: Option<&'a str>,
     /// Radiance to write in place of the film's, one entry per pixel, row by row from the top.
     pub denoised: Option<&'a [Vec3]>,
+}
+
+/// Whether an image file has its end, without which it was cut short. The pixels of an EXR have no mark at their end: they
+/// are decoded.
+pub fn is_whole_picture(path: &Path) -> bool {
+    let ends_with = |mark: &[u8]| {
+        let mut file = InputFile::open(path, FileKind::Image).ok()?;
+        let mut end = vec![0; mark.len()];
+        file.seek(SeekFrom::End(-(mark.len() as i64))).ok()?;
+        file.read_exact(&mut end).ok()?;
+        Some(end == mark)
+    };
+    let is_whole = match PictureFormat::of(path) {
+        // The last chunk: no data, its name, its checksum.
+        Ok(PictureFormat::Png) => ends_with(b"\0\0\0\0IEND\xae\x42\x60\x82"),
+        Ok(PictureFormat::Jpeg) => ends_with(b"\xff\xd9"),
+        Ok(PictureFormat::Exr) => Some(read_picture(path).is_ok()),
+        Err(_) => None,
+    };
+    is_whole.unwrap_or(false)
 }
 
 /// Writes a film in the format of the file name, without metadata.
@@ -247,5 +267,22 @@ mod tests {
         let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
         assert_eq!(linear, (5, 3));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
+    }
+
+    #[test]
+    fn images_that_are_cut_short_are_not_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "a.jpg", "a.exr"] {
+            let path = folder.path().join(name);
+            write_film(&Film::new(33, 20), &Display::default(), &path).unwrap();
+            assert!(is_whole_picture(&path), "{name}");
+            let bytes = std::fs::read(&path).unwrap();
+            for length in [bytes.len() - 1, bytes.len() - 9, bytes.len() / 2, 3, 0] {
+                std::fs::write(&path, &bytes[..length]).unwrap();
+                assert!(!is_whole_picture(&path), "{name}, {length} of {} bytes", bytes.len());
+            }
+            std::fs::remove_file(&path).unwrap();
+            assert!(!is_whole_picture(&path), "{name}");
+        }
     }
 }

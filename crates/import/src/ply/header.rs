@@ -3,6 +3,7 @@
 use crate::error::ply::PlyProblem;
 use firstlight_files::printable;
 use firstlight_files::relative::bytes_to_text;
+use std::collections::HashSet;
 
 /// Encoding of the data after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +130,7 @@ impl Header {
             (false, false) => return Err((1, PlyProblem::NotPly)),
         };
         let (mut encoding, mut elements, mut at, mut lines) = (None, Vec::<Element>::new(), 0, 0);
-        let (mut textures, mut unknown_lines) = (Vec::new(), None);
+        let (mut textures, mut unknown_lines, mut names) = (Vec::new(), None, HashSet::new());
         while let Some(length) = head[at..].iter().position(|&byte| byte == end) {
             let line = bytes_to_text(&head[at..at + length]);
             at += length + 1;
@@ -159,7 +160,7 @@ impl Header {
                 ["format", ..] => return Err(located(PlyProblem::Format)),
                 ["element", name, count] => {
                     let count = count.parse().map_err(|_| unknown("`element NAME COUNT` with a whole number"))?;
-                    if elements.iter().any(|element| element.name == name) {
+                    if !names.insert(name.to_owned()) {
                         let name = printable::name(name).to_string();
                         return Err(located(PlyProblem::Twice { name }));
                     }
