@@ -82,8 +82,17 @@ pub fn gltf(bytes: &[u8]) {
     open_model(path, Some(&choice));
 }
 
+/// A scene of pbrt.
+pub fn pbrt(bytes: &[u8]) {
+    open(SceneSource::Foreign(write("fuzz.pbrt", bytes)), None);
+}
+
 fn open_model(path: PathBuf, choice: Option<&ModelChoice>) {
-    match load(&SceneSource::Model(path), &LoadOptions { choice, preview: true, ..LoadOptions::default() }) {
+    open(SceneSource::Model(path), choice);
+}
+
+fn open(source: SceneSource, choice: Option<&ModelChoice>) {
+    match load(&source, &LoadOptions { choice, preview: true, ..LoadOptions::default() }) {
         Ok(scene) => {
             scene.file.check().expect("a scene that was made is sound");
             scene.spawn(&mut World::new());

@@ -184,6 +184,11 @@ fn scenes() {
 }
 
 #[test]
+fn pbrt_scenes() {
+    assault("pbrt", drive::pbrt, 2500, 64 * MIB, 512);
+}
+
+#[test]
 fn pictures() {
     assault("picture", drive::picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8);
 }

@@ -18,8 +18,8 @@ use std::sync::{Mutex, PoisonError};
 /// The scene to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), image rendered by firstlight (.png,
-    /// .exr), or archive of `firstlight pack` (.zip).
+    /// Built-in scene, scene file (.ron, .pbrt), model (.obj, .ply, .stl, .glb, .gltf), image rendered by firstlight
+    /// (.png, .exr), or archive of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
@@ -29,8 +29,8 @@ pub struct SceneArgs {
 /// Several scenes to open with the same options.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), images rendered by firstlight (.png,
-    /// .exr), or archives of `firstlight pack` (.zip).
+    /// Built-in scenes, scene files (.ron, .pbrt), models (.obj, .ply, .stl, .glb, .gltf), images rendered by
+    /// firstlight (.png, .exr), or archives of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]
@@ -191,7 +191,7 @@ impl SceneArgs {
             }
             SceneSource::Model(_) | SceneSource::Picture(_) => return,
             SceneSource::Builtin(_) => "a built-in scene",
-            SceneSource::Scene(_) => "a scene file",
+            SceneSource::Scene(_) | SceneSource::Foreign(_) => "a scene file",
         };
         remark(format_args!("warning: {}: --up has no effect on {what}", source.title()));
     }

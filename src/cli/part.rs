@@ -18,7 +18,7 @@ use firstlight::frame::{
 };
 use firstlight::render::{Film, Region, worker_threads};
 use firstlight::scene::whole_file::{Replace, WholeFile};
-use firstlight::scene::{FileKind, Files, InputFile, SceneSource};
+use firstlight::scene::{FileKind, Files, InputFile};
 use glam::UVec2;
 use std::mem::ManuallyDrop;
 use std::ops::Range;
@@ -238,13 +238,11 @@ pub fn numbered(path: &Path, part: Part) -> PathBuf {
 
 /// Loads the scene; its errors are permanent unless its file is temporarily unreachable.
 fn load(args: &RenderArgs, files: &mut Files, progress: &RenderProgress) -> Result<RenderJob, Failure> {
-    RenderJob::new(args, None, files, progress).map_err(|failure| match args.scene.source() {
-        Ok(SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path)) => {
-            match InputFile::open_within(&path, FileKind::Film, u64::MAX) {
-                Err(error) if error.may_pass() => Failure::Retry(format!("error: {}: {error}", path.display())),
-                _ => failure.of_part(),
-            }
-        }
+    RenderJob::new(args, None, files, progress).map_err(|failure| match &args.scene.source() {
+        Ok(source) if let Some(path) = source.path() => match InputFile::open_within(path, FileKind::Film, u64::MAX) {
+            Err(error) if error.may_pass() => Failure::Retry(format!("error: {}: {error}", path.display())),
+            _ => failure.of_part(),
+        },
         _ => failure.of_part(),
     })
 }

@@ -37,7 +37,8 @@ const DEFAULT_PIXELS: f64 = 50_000.0;
 
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// Built-in scenes, scene files (.ron) or models (.obj, .ply, .stl, .glb, .gltf) [default: all built-in scenes].
+    /// Built-in scenes, scene files (.ron, .pbrt) or models (.obj, .ply, .stl, .glb, .gltf)
+    /// [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,
     /// Converged linear image (.exr) of the scene [default: rendered with 16 times the samples and cached].

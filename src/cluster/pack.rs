@@ -14,6 +14,7 @@ use crate::cluster::names::{
 use crate::files::printable;
 use crate::files::whole_file::{WholeFile, unwritable, write_whole};
 use crate::format::SceneFile;
+use crate::format::scene_format::SceneFormat;
 use crate::scene::{
     FileKind, ImageMetadata, ImageScene, InputFile, LoadedScene, ReadError, ReadFiles, SceneError, SceneSource,
     WriteError, builtin_text, each_path, path_to_text, text_to_path,
@@ -122,7 +123,7 @@ impl Package {
         let home = source.path().map(|path| common_folder([place(path)].iter()));
         let has_text = scene.shot.as_ref().is_some_and(|shot| shot.text.is_some());
         // Nothing in a model is rewritten: all that it names keeps its place, wherever the user lets it read.
-        let is_model = matches!(scene.source, SceneSource::Model(_)) && !has_text;
+        let is_model = matches!(scene.source, SceneSource::Model(_) | SceneSource::Foreign(_)) && !has_text;
         let of_model = reads.iter().flat_map(|read| &read.files).map(|path| place(path)).filter(|_| is_model);
         let base = base_of(scene, source, home.clone(), of_model.collect())?;
         let is_new = |path: &PathBuf| reads.iter().all(|read| read.files.first() != Some(path));
@@ -146,7 +147,7 @@ impl Package {
             }
             for (path, name) in read.files.iter().zip(packed) {
                 let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-                if extension == "mtl" || extension == "gltf" {
+                if extension == "mtl" || extension == "gltf" || SceneFormat::of(path).is_some() {
                     check_names(path, all.iter())?;
                 }
                 put(&mut files, name, path)?;
@@ -183,7 +184,7 @@ impl Package {
                 scene_name = names.opened(path)?;
                 put(&mut files, scene_name.clone(), path)?;
             }
-            SceneSource::Scene(_) | SceneSource::Model(_) => {}
+            SceneSource::Scene(_) | SceneSource::Foreign(_) | SceneSource::Model(_) => {}
         }
         if let Some(PackedContent::File(path)) = files.get(CHECKSUMS) {
             return Err(PackError::Reserved(path.clone()));
@@ -351,7 +352,7 @@ fn put(files: &mut BTreeMap<String, PackedContent>, name: String, path: &Path) -
 /// Refuses a model or a library that names one of the files by its absolute path.
 fn check_names<'a>(path: &Path, files: impl Iterator<Item = &'a PathBuf>) -> Result<(), PackError> {
     let failed = |source| PackError::Read { path: path.to_path_buf(), source };
-    let text = InputFile::open(path, FileKind::Library).and_then(InputFile::bytes).map_err(failed)?;
+    let text = InputFile::open(path, FileKind::Scene).and_then(InputFile::bytes).map_err(failed)?;
     let text = String::from_utf8_lossy(&text);
     for file in files {
         if file.to_str().is_some_and(|file| text.contains(file)) {

@@ -8,6 +8,7 @@ use crate::cluster::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
 use crate::files::printable;
 use crate::files::whole_file::lock_file;
 use crate::format::model_format::ModelFormat;
+use crate::format::scene_format::SceneFormat;
 use crate::scene::{FileKind, InputFile, Limits, ReadError, WriteError, path_to_text, text_to_path};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -277,7 +278,8 @@ fn sums_of(zip: &mut ZipArchive<InputFile>) -> Result<BTreeMap<String, String>, 
     Ok(sums)
 }
 
-/// The scene, and the environment image: as the comment says, or else the only scene file or model.
+/// The scene, and the environment image: as the comment says, or else the only scene file, scene of another renderer or
+/// model.
 fn scene_in(comment: &[u8], sums: &BTreeMap<String, String>) -> Result<(String, Option<String>), UnpackError> {
     let comment = String::from_utf8_lossy(comment);
     let named = |what: &str| comment.lines().find_map(|line| line.strip_prefix(what)).map(str::to_owned);
@@ -290,8 +292,11 @@ fn scene_in(comment: &[u8], sums: &BTreeMap<String, String>) -> Result<(String, 
         names.next().filter(|_| names.next().is_none()).cloned()
     };
     let is_scene = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron"));
-    let has_scene = sums.keys().any(|name| is_scene(Path::new(name)));
-    let found = if has_scene { only(&is_scene) } else { only(&|path| ModelFormat::of(path).is_some()) };
+    let is_foreign = |path: &Path| SceneFormat::of(path).is_some();
+    let is_model = |path: &Path| ModelFormat::of(path).is_some();
+    let kinds: [&dyn Fn(&Path) -> bool; 3] = [&is_scene, &is_foreign, &is_model];
+    let kind = kinds.into_iter().find(|kind| sums.keys().any(|name| kind(Path::new(name))));
+    let found = kind.and_then(only);
     found.map(|scene| (scene, None)).ok_or(UnpackError::NoScene)
 }
 
@@ -309,6 +314,7 @@ mod tests {
         assert_eq!(lit, Some(("s.ron".to_owned(), Some("e.hdr".to_owned()))));
         assert_eq!(open("scene: ../x.ron", &["m.glb", "s.ron"]), only("s.ron"));
         assert_eq!(open("", &["m.glb", "m.png"]), only("m.glb"));
+        assert_eq!(open("", &["a.pbrt", "m.ply"]), only("a.pbrt"));
         assert_eq!(open("", &["a.ron", "b.ron", "m.glb"]), None);
     }
 }

@@ -26,9 +26,10 @@ impl Session {
         let folder = folder_of(path);
         let scene = match source {
             SceneSource::Builtin(name) => SceneWord::Builtin(name.clone()),
-            SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
-                SceneWord::File(relative_path(&folder, path))
-            }
+            SceneSource::Scene(path)
+            | SceneSource::Foreign(path)
+            | SceneSource::Model(path)
+            | SceneSource::Picture(path) => SceneWord::File(relative_path(&folder, path)),
         };
         let PictureSize { width, height } = *self.world().resource();
         let header = RecordingHeader {

@@ -218,9 +218,10 @@ fn options() -> ron::Options {
 fn name_of(source: &SceneSource) -> String {
     match source {
         SceneSource::Builtin(name) => name.clone(),
-        SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
-            path_to_text(&absolute(path))
-        }
+        SceneSource::Scene(path)
+        | SceneSource::Foreign(path)
+        | SceneSource::Model(path)
+        | SceneSource::Picture(path) => path_to_text(&absolute(path)),
     }
 }
 

@@ -299,10 +299,14 @@ impl<'a> Writer<'a> {
             (Environment::Gradient { zenith, horizon, ground }, _) => {
                 EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
             }
-            (Environment::Image { scale, rotation, .. }, EnvironmentSource::Image { file, rotate, .. }) => {
+            (
+                Environment::Image { scale, rotation, .. },
+                EnvironmentSource::Image { file, rotate, layout, axes, .. },
+            ) => {
                 let kept = radians(*rotate) == *rotation;
                 let rotate = if kept { *rotate } else { f64::from(*rotation).to_degrees() };
-                EnvironmentSource::Image { file: file.clone(), scale: Rgb(*scale), rotate }
+                let (file, scale) = (file.clone(), Rgb(*scale));
+                EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
             }
             (Environment::Image { .. }, _) => {
                 self.losses.push("the image around the scene came from no file and is left out".to_owned());

@@ -93,6 +93,8 @@ impl Extraction {
                     geometry.1.push(Object { mesh, materials, turned, is_point_light: false });
                     entities.push(object.entity);
                 }
+                // What is left out was told when it was loaded.
+                Err(reason) if reason.is_empty() => {}
                 Err(reason) => {
                     let name = object.name.clone().unwrap_or_else(|| object.entity.to_string());
                     problems.push(format!("object `{name}` is ignored: {reason}"));

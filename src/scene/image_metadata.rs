@@ -255,7 +255,7 @@ impl ImageMetadata {
         };
         Ok(match &self.scene {
             ImageScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
-            ImageScene::Scene(path) => Some(SceneSource::Scene(find(path)?)),
+            ImageScene::Scene(path) => Some(SceneSource::of_scene(find(path)?)),
             ImageScene::Model { path, .. } => Some(SceneSource::Model(find(path)?)),
             ImageScene::None => None,
         })

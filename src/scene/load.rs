@@ -1,6 +1,7 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
 use crate::files::input_file::{FileKind, InputFile};
+use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
 use crate::files::stamp::{Stamp, stamp};
 use crate::files::warnings::Warnings;
@@ -14,9 +15,9 @@ use crate::format::material_textures::{emits, without_lost_textures};
 use crate::format::model_format::ModelFormat;
 use crate::format::parts::{ObjectPart, RadiiPart, ball_grid};
 use crate::format::scene_file::SceneFile;
-use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
-use crate::format::value::Rgb;
+use crate::format::sources::{EnvironmentLayout, EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::import::documents::Documents;
+use crate::import::environment_image::equirectangular;
 use crate::import::gltf::images::part_of_model;
 use crate::import::gltf_scene;
 use crate::import::meshes::{LoadedMesh, load_mesh};
@@ -25,11 +26,15 @@ use crate::scene::animation::edited::show_time;
 use crate::scene::builtin::{BUILTIN_SCENES, builtin_text};
 use crate::scene::default_scene;
 use crate::scene::image_metadata::{ImageMetadata, MetadataError};
+use crate::scene::load_meshes::{LoadedMeshKey, LostMesh, ObjectMeshes, load_meshes, mesh_key};
 use crate::scene::loaded::LoadedScene;
 use crate::scene::model_light::{Model, light_as_in, light_model};
 use crate::scene::source::SceneSource;
 use crate::scene::world::components::{Balls, Shape};
-use glam::{DVec3, Vec3};
+use crate::scene::world::extent::{Extent, ExtentCache};
+use crate::scene::world::inputs::SceneInputs;
+use bevy_ecs::world::World;
+use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,6 +100,20 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let text = read_text(path)?;
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             resolve(source, SceneFile::parse(&text, path)?, Some(&text), folder, options, &documents)?
+        }
+        SceneSource::Foreign(path) => {
+            let read = documents.scene(path)?;
+            let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+            let mut scene = resolve(source, read.file.clone(), None, folder, options, &documents)?;
+            let of_files = std::mem::replace(&mut scene.warnings, read.warnings.clone());
+            scene.warnings.append(&of_files);
+            scene.text_files = read.files.clone();
+            let bounds = scene.look_at_middle();
+            if !scene.has_light() {
+                model =
+                    Some(Model { bounds, side: DVec3::ONE, emits: false, has_camera: true, aspect: options.aspect() });
+            }
+            scene
         }
         SceneSource::Model(path) if ModelFormat::of(path) == Some(ModelFormat::Gltf) => {
             let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
@@ -173,9 +192,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
             let source = source.unwrap_or_else(|| own.clone());
             let folder = match &source {
                 SceneSource::Builtin(_) => PathBuf::new(),
-                SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
-                    path.parent().map(Path::to_path_buf).unwrap_or_default()
-                }
+                file => file.path().and_then(Path::parent).map(Path::to_path_buf).unwrap_or_default(),
             };
             let mut scene = {
                 let documents = Documents::new(options.choice().allow_outside);
@@ -248,26 +265,31 @@ fn resolve(
         }
     };
     let before = options.known.map(KnownMeshes::new);
-    let mut known: HashMap<LoadedMeshKey, Result<LoadedMesh, SceneError>> = HashMap::new();
-    for (i, object) in scene.file.objects.iter().enumerate() {
-        let (mut mesh, mut balls) = (None, None);
+    let ObjectMeshes { meshes, lost } = load_meshes(
+        &scene.file,
+        &scene.folder,
+        documents,
+        |object| before.as_ref()?.fresh_mesh(&scene.folder, object),
+        |source| options.say(&format!("loading {}", source.name())),
+    );
+    for mesh in meshes.iter().flatten() {
+        scene.warnings.append(&mesh.warnings);
+    }
+    let is_left = |mesh: &Option<LoadedMesh>| mesh.as_ref().is_none_or(|mesh| !mesh.mesh.triangles.is_empty());
+    let is_anything_left = meshes.iter().any(is_left);
+    for LostMesh { object, error } in lost {
+        let path = format!("objects/{object}/source");
+        // Without any object there is nothing to open.
+        if is_anything_left {
+            let name = scene.file.objects[object].name().map_or_else(|| "the object".to_owned(), quoted);
+            scene.warnings.push(format!("{}{error}; {name} is left out", at(text, &title, &path)));
+        } else {
+            note(path, &error);
+        }
+    }
+    for object in &scene.file.objects {
+        let mut balls = None;
         match object {
-            ObjectPart::Mesh { source, shading, simplify, .. } => {
-                let read = || {
-                    options.say(&format!("loading {}", source.name()));
-                    let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
-                    let loaded =
-                        kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder, documents), Ok);
-                    if let Ok(loaded) = &loaded {
-                        scene.warnings.append(&loaded.warnings);
-                    }
-                    loaded
-                };
-                match known.entry((source.clone(), *shading, simplify.map(f64::to_bits))).or_insert_with(read) {
-                    Ok(loaded) => mesh = Some(loaded.clone()),
-                    Err(error) => note(format!("objects/{i}/source"), error),
-                }
-            }
             ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. }
                 if let Some(same) = before.as_ref().and_then(|before| before.same_balls(object)) =>
             {
@@ -285,37 +307,45 @@ fn resolve(
             }
             _ => {}
         }
-        scene.meshes.push(mesh);
         scene.balls.push(balls);
     }
+    scene.meshes = meshes;
     let mut wanted: Vec<(String, String)> = Vec::new();
     for (name, texture) in scene.file.textures.iter() {
         if let TextureSource::Image { file, .. } = texture {
             wanted.push((format!("textures/{name}/file"), file.clone()));
         }
     }
+    const ENVIRONMENT: &str = "environment/file";
     if let EnvironmentSource::Image { file, .. } = &scene.file.environment {
-        wanted.push(("environment/file".to_owned(), file.clone()));
+        wanted.push((ENVIRONMENT.to_owned(), file.clone()));
     }
     scene.decode_ahead(wanted.iter().map(|(_, file)| file.as_str()), options, documents);
     let mut lost = HashSet::new();
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
-        if lost.contains(&file) {
-            continue;
-        }
-        if let Err(error) = scene.add_picture(&file, &path, options, documents) {
-            // A model is still useful if an image is missing.
-            match text {
-                Some(_) => note(place, &error),
-                None => {
-                    scene.warnings.push(format!("{error}; the texture is omitted"));
-                    lost.insert(file);
-                }
+        // A scene is still useful if an image is missing.
+        let at = at(text, &title, &place);
+        let is_environment = place == ENVIRONMENT;
+        match scene.add_picture(&file, &path, options, documents) {
+            Err(error) if is_environment => {
+                scene.warnings.push(format!("{at}{error}; an environment of one colour is shown"));
+                lost.insert(file);
             }
+            Err(error) if !lost.contains(&file) => {
+                scene.warnings.push(format!("{at}{error}; the texture is omitted"));
+                lost.insert(file);
+            }
+            _ => {}
         }
     }
-    leave_out_textures(&mut scene.file, &lost);
+    leave_out_pictures(&mut scene.file, &lost);
+    if let EnvironmentSource::Image { file, layout, axes, .. } = &scene.file.environment
+        && (*layout != EnvironmentLayout::default() || axes.is_some())
+        && let Some(image) = scene.pictures.get(file)
+    {
+        scene.environment_image = Some(Arc::new(equirectangular(image, *layout, *axes)));
+    }
     scene.add_mesh_pictures(options, documents);
     let mut of_materials = Warnings::default();
     scene.meshes_with_own_materials().for_each(|mesh| of_materials.append(&mesh.material_warnings));
@@ -329,7 +359,7 @@ impl LoadedScene {
         match source {
             SceneSource::Builtin(_) | SceneSource::Picture(_) => true,
             SceneSource::Scene(path) => read_text(path).and_then(|text| SceneFile::parse(&text, path)).is_ok(),
-            SceneSource::Model(path) => {
+            SceneSource::Foreign(path) | SceneSource::Model(path) => {
                 let path = absolute(path);
                 let mut files = self.meshes.iter().flatten().flat_map(|mesh| &mesh.files);
                 files.any(|(file, _)| absolute(file) == path)
@@ -433,7 +463,7 @@ impl LoadedScene {
         let is_here = self.folder.as_os_str().is_empty();
         let file = if is_here { path_to_text(path) } else { relative_path(&self.folder, path) };
         self.add_picture(&file, path, options, &Documents::default())?;
-        self.file.environment = EnvironmentSource::Image { file, scale: Rgb(Vec3::ONE), rotate: 0.0 };
+        self.file.environment = EnvironmentSource::image(file);
         self.environment = Some(path.to_path_buf());
         Ok(())
     }
@@ -498,15 +528,39 @@ impl LoadedScene {
         }
     }
 
+    /// Whether anything emits light.
+    fn has_light(&self) -> bool {
+        let of_meshes = self.meshes_with_own_materials().flat_map(|mesh| &mesh.slots).map(|(_, part)| part);
+        self.file.environment != EnvironmentSource::Black
+            || !self.file.lights.is_empty()
+            || self.file.materials.iter().map(|(_, part)| part).chain(of_meshes).any(emits)
+    }
+
+    /// Sets the pivot of a camera without one to the distance of the middle of the scene. Returns the box of the scene.
+    fn look_at_middle(&mut self) -> (DVec3, DVec3) {
+        let mut world = World::new();
+        self.spawn(&mut world);
+        let Extent { center, radius } = ExtentCache::default().extent(&SceneInputs::of(&mut world));
+        let camera = &mut self.file.camera;
+        if let (None, Some(forward)) = (camera.pivot_distance, camera.forward) {
+            let depth = (center - camera.eye).dot(forward);
+            camera.pivot_distance = Some(depth).filter(|depth| {
+                (crate::format::bounds::MIN_SIZE..crate::format::bounds::MAX_COORDINATE).contains(depth)
+            });
+        }
+        (center - DVec3::splat(radius), center + DVec3::splat(radius))
+    }
+
     /// All files that this scene was read from.
     pub fn files(&self) -> Vec<PathBuf> {
         let own = match &self.source {
-            SceneSource::Scene(path) | SceneSource::Model(path) => Some(path.clone()),
+            SceneSource::Scene(path) | SceneSource::Foreign(path) | SceneSource::Model(path) => Some(path.clone()),
             SceneSource::Builtin(_) | SceneSource::Picture(_) => None,
         };
+        let of_text = self.text_files.iter().map(|(path, _)| path.clone());
         let of_meshes = self.meshes.iter().flatten().flat_map(|mesh| mesh.files.iter().map(|(path, _)| path.clone()));
         let of_pictures = self.picture_files.values().map(|(path, _)| path.clone());
-        let mut files: Vec<PathBuf> = own.into_iter().chain(of_meshes).chain(of_pictures).collect();
+        let mut files: Vec<PathBuf> = own.into_iter().chain(of_text).chain(of_meshes).chain(of_pictures).collect();
         files.sort();
         files.dedup();
         files
@@ -526,6 +580,11 @@ impl LoadedScene {
             .chain(self.balls.iter().flatten().map(|balls| Shape::Spheres(balls.clone())));
         let shapes: Vec<Shape> = shapes.collect();
         for shape in shapes {
+            if matches!(&shape, Shape::Mesh(mesh) if mesh.triangles.is_empty()) {
+                // The user was told why.
+                self.trees.mark_unfit(&shape, String::new());
+                continue;
+            }
             if !self.trees.has(&shape) {
                 options.say(&match &shape {
                     Shape::Mesh(mesh) => format!("building a kd-tree over {} triangles", mesh.triangles.len()),
@@ -540,9 +599,26 @@ impl LoadedScene {
     }
 }
 
-/// Removes the textures of images that cannot be read. Materials get what is shown instead, so that the scene can be
-/// saved and opened again.
-fn leave_out_textures(file: &mut SceneFile, lost: &HashSet<String>) {
+/// Where in the text of a scene a remark belongs; empty for a scene without one.
+fn at(text: Option<&str>, title: &Path, path: &str) -> String {
+    text.map_or_else(String::new, |text| {
+        let (line, column) = locate(text, path);
+        format!("{}:{line}:{column}: ", title.display())
+    })
+}
+
+fn quoted(name: &str) -> String {
+    format!("`{}`", printable::name(name))
+}
+
+/// Removes the textures and the environment of images that cannot be read. Materials get what is shown instead, so that
+/// the scene can be saved and opened again.
+fn leave_out_pictures(file: &mut SceneFile, lost: &HashSet<String>) {
+    if let EnvironmentSource::Image { file: image, scale, .. } = &file.environment
+        && lost.contains(image)
+    {
+        file.environment = EnvironmentSource::Constant(*scale);
+    }
     let is_lost = |source: &TextureSource| matches!(source, TextureSource::Image { file, .. } if lost.contains(file));
     if !file.textures.iter().any(|(_, source)| is_lost(source)) {
         return;
@@ -574,9 +650,6 @@ fn known_picture<'a>(
     known.pictures.get(name)
 }
 
-/// Identity of a mesh: source, shading and bits of the simplification ratio.
-type LoadedMeshKey = (MeshSource, MeshShading, Option<u64>);
-
 /// The data that was read before, by the objects that it was read for.
 struct KnownMeshes<'a> {
     scene: &'a LoadedScene,
@@ -595,22 +668,13 @@ impl<'a> KnownMeshes<'a> {
     fn new(scene: &'a LoadedScene) -> Self {
         let mut known = Self { scene, meshes: HashMap::new(), balls: HashMap::new() };
         for (i, object) in scene.file.objects.iter().enumerate() {
-            if let Some(key) = Self::mesh_key(object) {
+            if let Some(key) = mesh_key(object) {
                 known.meshes.entry(key).or_insert(i);
             } else if let Some(key) = Self::balls_key(object) {
                 known.balls.entry(key).or_insert(i);
             }
         }
         known
-    }
-
-    fn mesh_key(object: &ObjectPart) -> Option<LoadedMeshKey> {
-        match object {
-            ObjectPart::Mesh { source, shading, simplify, .. } => {
-                Some((source.clone(), *shading, simplify.map(f64::to_bits)))
-            }
-            _ => None,
-        }
     }
 
     fn balls_key(object: &ObjectPart) -> Option<BallsKey> {
@@ -634,7 +698,7 @@ impl<'a> KnownMeshes<'a> {
 
     /// The mesh of an equal object, if its files have not changed.
     fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
-        let key = Self::mesh_key(wanted)?;
+        let key = mesh_key(wanted)?;
         let is_builtin = matches!(key.0, MeshSource::Builtin(_));
         let mesh = self.scene.meshes[*self.meshes.get(&key)?].as_ref()?;
         ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())

@@ -32,8 +32,12 @@ pub struct LoadedScene {
     pub(super) balls: Vec<Option<Arc<Balls>>>,
     /// By the path in `file`.
     pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
+    /// The image of the environment as it is rendered, if its file has another layout.
+    pub(super) environment_image: Option<Arc<ImageTexture>>,
     /// Their files, each with its stamp at the time of reading.
     pub(super) picture_files: HashMap<String, (PathBuf, Stamp)>,
+    /// The scene of another renderer that was opened and the files that it includes, each with its stamp.
+    pub(super) text_files: Vec<(PathBuf, Stamp)>,
     /// Trees of its meshes and of its groups of spheres.
     pub trees: Trees,
     /// What the user should know about how it was read.
@@ -65,7 +69,9 @@ impl LoadedScene {
             meshes: Vec::new(),
             balls: Vec::new(),
             pictures: HashMap::new(),
+            environment_image: None,
             picture_files: HashMap::new(),
+            text_files: Vec::new(),
             trees: Trees::default(),
             warnings: Warnings::default(),
             up: None,

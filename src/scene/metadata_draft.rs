@@ -75,7 +75,7 @@ impl MetadataDraft {
         let relative = |path: &Path| relative_path(&folder, path);
         let scene = match &self.source {
             Some(SceneSource::Builtin(name)) => ImageScene::Builtin(name.clone()),
-            Some(SceneSource::Scene(path)) => ImageScene::Scene(relative(path)),
+            Some(SceneSource::Scene(path) | SceneSource::Foreign(path)) => ImageScene::Scene(relative(path)),
             Some(SceneSource::Model(path)) => {
                 let up = self.up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' });
                 let camera = self.loaded.as_ref().and_then(|loaded| loaded.choice.camera.clone());

@@ -13,6 +13,7 @@ mod fingerprint;
 pub mod image_metadata;
 mod inner_light;
 mod load;
+mod load_meshes;
 mod loaded;
 mod metadata_draft;
 mod model_light;

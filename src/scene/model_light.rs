@@ -16,6 +16,7 @@ use crate::scene::default_scene::{is_inner, is_key_light};
 use crate::scene::extract::Extraction;
 use crate::scene::inner_light::{middle_of_room, sees_anything};
 use crate::scene::loaded::LoadedScene;
+use crate::scene::source::SceneSource;
 use crate::scene::world::components::Shape;
 use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::world::World;
@@ -151,7 +152,8 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
         if scene.environment.is_none() {
             let reason = if brings_light { "its own light is too weak or does not reach it" } else { "has no light" };
             // A format without lights needs no words for that.
-            if brings_light || scene.facts.is_some() {
+            let may_have_light = scene.facts.is_some() || matches!(scene.source, SceneSource::Foreign(_));
+            if brings_light || may_have_light {
                 let text = format!("{title}: {reason}: an environment and a key light are added");
                 scene.warnings.push(Warning::notice(text));
             }

@@ -3,7 +3,7 @@
 //! Only what was read as the kind of file that its name stands for: a texture that could not be decoded, or a library
 //! without a material, may be any file of the computer.
 
-use crate::files::relative::text_to_path;
+use crate::files::relative::{path_to_text, text_to_path};
 use crate::format::parts::ObjectPart;
 use crate::format::sources::{EnvironmentSource, TextureSource};
 use crate::import::gltf::images::part_of_model;
@@ -24,16 +24,22 @@ impl LoadedScene {
     /// The files of each name in the scene, in the order of the scene: models, textures, environment.
     pub fn read_files(&self) -> Vec<ReadFiles> {
         let mut found: Vec<ReadFiles> = Vec::new();
-        let mut known: HashMap<&str, usize> = HashMap::new();
+        let mut known: HashMap<String, usize> = HashMap::new();
+        if let [(first, _), ..] = &self.text_files[..] {
+            let name = first.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+            known.insert(name.clone(), 0);
+            found.push(ReadFiles { name, files: self.text_files.iter().map(|(path, _)| path.clone()).collect() });
+        }
         for (object, mesh) in self.file.objects.iter().zip(&self.meshes) {
             let (ObjectPart::Mesh { source, .. }, Some(mesh)) = (object, mesh) else { continue };
-            let Some((_, name)) = source.file() else { continue };
+            // What could not be read as a mesh may be any file of the computer.
+            let Some(name) = source.file().filter(|_| !mesh.mesh.triangles.is_empty()) else { continue };
             let of_textures = mesh.textures.iter().filter_map(|(_, source, _)| match source {
                 TextureSource::Image { file, .. } => self.picture_file(file),
                 _ => None,
             });
             let files = mesh.files.iter().map(|(path, _)| path.as_path()).chain(of_textures).map(Path::to_path_buf);
-            let first = *known.entry(name).or_insert_with(|| {
+            let first = *known.entry(name.to_owned()).or_insert_with(|| {
                 found.push(ReadFiles { name: name.to_owned(), files: Vec::new() });
                 found.len() - 1
             });
@@ -49,9 +55,9 @@ impl LoadedScene {
         };
         for name in of_textures.chain(of_environment) {
             if let Some(path) = self.picture_file(name)
-                && !known.contains_key(&**name)
+                && !known.contains_key(name)
             {
-                known.insert(name, found.len());
+                known.insert(name.clone(), found.len());
                 found.push(ReadFiles { name: name.clone(), files: vec![path.to_path_buf()] });
             }
         }

@@ -168,11 +168,15 @@ impl LoadedScene {
             EnvironmentSource::Gradient { zenith, horizon, ground } => {
                 Environment::Gradient { zenith: zenith.0, horizon: horizon.0, ground: ground.0 }
             }
-            EnvironmentSource::Image { file, scale, rotate } => match self.pictures.get(file) {
+            EnvironmentSource::Image { file, scale, rotate, .. } => match self.environment_image(file) {
                 Some(image) => Environment::Image { image: image.clone(), scale: scale.0, rotation: radians(*rotate) },
                 None => Environment::Black,
             },
         }
+    }
+
+    fn environment_image(&self, file: &str) -> Option<&Arc<ImageTexture>> {
+        self.environment_image.as_ref().or_else(|| self.pictures.get(file))
     }
 
     /// The surface of an object and its placement.

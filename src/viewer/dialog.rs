@@ -5,6 +5,7 @@
 //! that rendering continues.
 
 use crate::format::model_format::ModelFormat;
+use crate::format::scene_format::SceneFormat;
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
 use crate::scene::{MeshSource, TextureSource};
 use std::ffi::OsString;
@@ -37,7 +38,7 @@ impl DialogPurpose {
     /// File name patterns in shell syntax.
     fn patterns(self) -> String {
         match self {
-            Self::Open => format!("*.ron {} *.png *.exr", ModelFormat::patterns()),
+            Self::Open => format!("{} {} *.png *.exr", SceneFormat::patterns(), ModelFormat::patterns()),
             Self::AddMesh => ModelFormat::patterns(),
             Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }

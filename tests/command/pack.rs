@@ -349,3 +349,48 @@ fn archives_have_limits_for_all_files_together() {
     std::fs::write(path.join("bomb.zip"), bytes).unwrap();
     assert!(said().contains("damaged"), "{}", said());
 }
+
+/// With what it includes, and the meshes and images that are named there; as a scene of ours that refers to it, too.
+#[test]
+fn a_packed_scene_of_pbrt_takes_its_files_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir_all(path.join("p/parts")).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(path.join(name), text).unwrap();
+    write(
+        "p/a.pbrt",
+        "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 16\n\
+        LookAt 0 0 4  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\nWorldBegin\nInclude \"parts/b.pbrt\"\n",
+    );
+    write(
+        "p/parts/b.pbrt",
+        "LightSource \"infinite\"\n\
+        Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"parts/t.png\"\n\
+        Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"plymesh\" \"string filename\" \"parts/m.ply\"\n\
+        Shape \"disk\"\nShape \"plymesh\" \"string filename\" \"parts/none.ply\"\n",
+    );
+    write(
+        "p/parts/m.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    );
+    image::RgbImage::from_pixel(2, 2, image::Rgb([200, 100, 50])).save(path.join("p/parts/t.png")).unwrap();
+    does(path, "save p/a.pbrt -o p/own.ron");
+    for (scene, more) in [("a.pbrt", None), ("own.ron", Some("own.ron"))] {
+        does(path, &format!("render p/{scene} -o here.exr --spp 2 --overwrite"));
+        does(path, &format!("pack p/{scene} -o s.zip"));
+        let there = tempfile::tempdir().unwrap();
+        let mut names = unpack(&path.join("s.zip"), there.path());
+        names.sort();
+        let all = ["SHA256SUMS", "a.pbrt"].into_iter().chain(more);
+        let expected: Vec<&str> = all.chain(["parts/b.pbrt", "parts/m.ply", "parts/t.png"]).collect();
+        assert_eq!(names, expected);
+        does(there.path(), &format!("render {scene} -o there.exr --spp 2"));
+        let [here, there_image] = [path.join("here.exr"), there.path().join("there.exr")].map(image::open);
+        assert!(here.unwrap().into_rgb32f() == there_image.unwrap().into_rgb32f());
+    }
+    // An image names the scene that it shows.
+    does(path, "render p/a.pbrt -o p/seen.png --spp 1");
+    let said = does(path, "info p/seen.png");
+    assert!(said.contains("2 × mesh") || said.contains("3 × mesh"), "{said}");
+}

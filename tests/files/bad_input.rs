@@ -1,8 +1,9 @@
 //! Bad input: a clear error with place and advice, the right exit status, and nothing half-written.
 
 use assert_cmd::Command;
+use bevy_ecs::world::World;
 use firstlight::scene::file::SceneFile;
-use firstlight::scene::{LoadOptions, SceneSource, load};
+use firstlight::scene::{EnvironmentSource, Extraction, LoadOptions, Rgb, SceneInputs, SceneSource, load, save_scene};
 use std::path::Path;
 
 const CAMERA: &str = "camera: (eye: (0, 0, 5), look_at: (0, 0, 0))";
@@ -295,12 +296,60 @@ fn files_that_a_scene_points_at_are_named_together_with_the_line_that_does() {
     );
     write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
     assert_says(&open(r#"objects: [mesh(source: obj("nan.obj"))]"#), &["nan.obj: has no faces", "finite", "line 2"]);
-    assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr", "no such file"]);
-    write("sky.hdr", "#?RADIANCE\nnonsense");
-    assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr"]);
     std::fs::write(folder.path().join("bytes.ron"), b"(\xff\xfe)").unwrap();
     let bytes = load(&SceneSource::Scene(folder.path().join("bytes.ron")), &LoadOptions::default());
     assert_says(&bytes.unwrap_err().to_string(), &["bytes.ron", "UTF-8"]);
+}
+
+/// A broken part costs only itself; a scene of it alone is refused, see above.
+#[test]
+fn a_missing_mesh_or_image_is_left_out_and_told_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write(
+        "flat.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 1 1\n2 2 2\n3 0 1 2\n",
+    );
+    write("sky.hdr", "#?RADIANCE\nnonsense");
+    let scene = folder.path().join("scene.ron");
+    let objects = "sphere(radius: 1, material: \"m\"), mesh(source: ply(\"flat.ply\"), name: \"flat\"),\n\
+        mesh(source: ply(\"flat.ply\")), mesh(source: obj(\"none.obj\"), name: \"none\")";
+    write(
+        "scene.ron",
+        &format!(
+            "({CAMERA}, environment: image(file: \"sky.hdr\", scale: 0.5),\n\
+        textures: {{ \"t\": image(file: \"none.png\") }}, materials: {{ \"m\": diffuse(albedo: \"t\") }},\n\
+        objects: [{objects}])"
+        ),
+    );
+    let loaded = load(&SceneSource::Scene(scene.clone()), &LoadOptions::default()).unwrap();
+    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    for (line, what) in [
+        (3, "flat.ply: all 1 triangles are degenerate (zero area); `flat` is left out"),
+        (4, "none.obj: cannot be read: no such file; `none` is left out"),
+        (1, "sky.hdr: cannot be decoded"),
+        (2, "none.png: cannot be read: no such file; the texture is omitted"),
+    ] {
+        let is_told = |text: &&String| text.contains(&format!("scene.ron:{line}:")) && text.contains(what);
+        assert_eq!(told.iter().filter(is_told).count(), 1, "{what}: {told:?}");
+    }
+    assert_eq!(told.len(), 4, "{told:?}");
+    // What cannot be read may appear later, and is watched.
+    let files = loaded.files();
+    assert!(["flat.ply", "none.obj", "none.png"].iter().all(|name| files.contains(&folder.path().join(name))));
+    let mut world = World::new();
+    loaded.spawn(&mut world);
+    let inputs = SceneInputs::of(&mut world);
+    let shown = Extraction::new(&inputs, &loaded.trees);
+    assert_eq!((inputs.objects.len(), shown.entities.len()), (4, 1));
+    assert!(shown.problems.is_empty(), "{:?}", shown.problems);
+    // It is saved with its objects, and opened again.
+    let copy = folder.path().join("copy.ron");
+    save_scene(&mut world, Some(&loaded), &copy).unwrap();
+    let again = load(&SceneSource::Scene(copy), &LoadOptions::default()).unwrap();
+    assert_eq!((again.file.objects.len(), again.warnings.len()), (4, 2), "{:?}", again.warnings);
+    assert_eq!(again.file.environment, EnvironmentSource::Constant(Rgb(glam::Vec3::splat(0.5))));
 }
 
 #[test]
@@ -371,7 +420,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     for (args, expected) in [
         (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
         (&["render", "none.obj", "-o", "a.png"], "no such file"),
-        (&["render", "notes.txt", "-o", "a.png"], "expected a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf)"),
+        (&["render", "notes.txt", "-o", "a.png"], "a model (.obj, .ply, .stl, .glb, .gltf)"),
         (&["render", "cornell", "-o", "notes.txt/a.png"], "notes.txt is not a folder"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),

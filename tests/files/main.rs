@@ -12,6 +12,7 @@ mod model_light;
 mod neutral;
 mod obj;
 mod outputs;
+mod pbrt;
 mod pictures;
 mod ply_programs;
 mod ply_stl;

@@ -3,6 +3,7 @@
 //! Knows no scene. Start reading at [`input_file`] and [`whole_file`].
 
 pub mod archive_cache;
+pub mod gzip;
 pub mod hash;
 pub mod input_file;
 pub mod limits;

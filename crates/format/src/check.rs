@@ -15,7 +15,7 @@ use crate::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::value::{ColorValue, Rgb, ScalarValue};
 use crate::view::unit_direction;
 use firstlight_render::{MAX_LOBES, Param, ParamRef, Property};
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
 /// Problems of a file.
@@ -25,6 +25,12 @@ pub struct Found {
     pub told: Vec<(String, String)>,
     /// Number of further problems.
     pub untold: usize,
+}
+
+/// Whether a matrix is finite and turns no direction into nothing.
+fn is_regular(rows: &[[f64; 3]; 3]) -> bool {
+    let determinant = DMat3::from_cols_array_2d(rows).determinant();
+    rows.iter().flatten().all(|number| number.is_finite()) && determinant.is_finite() && determinant != 0.0
 }
 
 /// Returns the first `most` problems of `file`, and the number of further ones.
@@ -106,7 +112,10 @@ impl Check<'_> {
                 self.light("environment/horizon", *horizon);
                 self.light("environment/ground", *ground);
             }
-            EnvironmentSource::Image { scale, rotate, .. } => {
+            EnvironmentSource::Image { scale, rotate, axes, .. } => {
+                if axes.is_some_and(|rows| !is_regular(&rows)) {
+                    self.wrong("environment/axes", "`axes` must be finite and have an inverse");
+                }
                 self.light("environment/scale", *scale);
                 self.finite("environment/rotate", *rotate);
             }

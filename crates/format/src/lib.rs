@@ -28,6 +28,7 @@ pub mod placement;
 pub mod property;
 pub mod quantity;
 pub mod scene_file;
+pub mod scene_format;
 pub mod sources;
 pub(crate) mod syntax;
 pub mod units;

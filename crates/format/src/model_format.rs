@@ -29,9 +29,12 @@ impl ModelFormat {
         }
     }
 
-    /// The format for the extension of a path, case-insensitive.
+    /// The format for the extension of a path, case-insensitive; a PLY file may be compressed (`.ply.gz`).
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
+        if extension.eq_ignore_ascii_case("gz") {
+            return Self::of(Path::new(path.file_stem()?)).filter(|format| *format == Self::Ply);
+        }
         let has = |format: &Self| format.file_extensions().iter().any(|known| extension.eq_ignore_ascii_case(known));
         Self::ALL.into_iter().find(has)
     }
@@ -60,6 +63,8 @@ mod tests {
     fn names_tell_formats_whatever_their_case() {
         assert_eq!(ModelFormat::of(Path::new("a/b.PLY")), Some(ModelFormat::Ply));
         assert_eq!(ModelFormat::of(Path::new("a.gltf")), Some(ModelFormat::Gltf));
+        assert_eq!(ModelFormat::of(Path::new("a/b.ply.gz")), Some(ModelFormat::Ply));
+        assert_eq!(ModelFormat::of(Path::new("a.obj.gz")), None);
         assert_eq!(ModelFormat::of(Path::new("stl")), None);
         assert_eq!(ModelFormat::extensions(), ".obj, .ply, .stl, .glb, .gltf");
         assert_eq!(ModelFormat::patterns(), "*.obj *.ply *.stl *.glb *.gltf");

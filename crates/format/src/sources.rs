@@ -39,7 +39,7 @@ pub enum EnvironmentSource {
         /// From everywhere below the horizon.
         ground: Rgb,
     },
-    /// An equirectangular image (HDR, EXR, PNG or JPEG).
+    /// An image (HDR, EXR, PFM, PNG or JPEG).
     Image {
         /// Path of the image, relative to the scene file.
         file: String,
@@ -49,7 +49,24 @@ pub enum EnvironmentSource {
         /// Degrees about +Y.
         #[serde(default, skip_serializing_if = "is_default")]
         rotate: f64,
+        /// Which direction each texel stands for.
+        #[serde(default, skip_serializing_if = "is_default")]
+        layout: EnvironmentLayout,
+        /// Rows of a matrix from directions of the world to those of the image, before `rotate`; the same if not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        axes: Option<[[f64; 3]; 3]>,
     },
+}
+
+/// Which direction each texel of an environment image stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EnvironmentLayout {
+    /// Longitude and latitude; the top row is +Y, the middle column −Z.
+    #[default]
+    Equirectangular,
+    /// A square of equal areas, as pbrt has it: the middle is +Z, the corners are −Z.
+    EqualArea,
 }
 
 /// A texture as a scene file describes it.
@@ -128,6 +145,13 @@ pub enum TextureSource {
     },
 }
 
+impl EnvironmentSource {
+    /// An upright equirectangular image.
+    pub fn image(file: String) -> Self {
+        Self::Image { file, scale: white(), rotate: 0.0, layout: EnvironmentLayout::default(), axes: None }
+    }
+}
+
 impl TextureSource {
     /// An image with default settings, once across the surface.
     pub fn image(file: String) -> Self {
@@ -174,6 +198,13 @@ pub enum MeshSource {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         at: Option<Seconds>,
     },
+    /// A shape inside a scene of another renderer.
+    Part {
+        /// Path of the scene, relative to the scene file.
+        file: String,
+        /// Index of the shape in the scene, with the files that it includes, from 0.
+        shape: u32,
+    },
     /// A built-in mesh, by name.
     Builtin(String),
 }
@@ -213,13 +244,22 @@ impl MeshSource {
         Self::model(ModelFormat::of(Path::new(&file)).unwrap_or(ModelFormat::Obj), file)
     }
 
-    /// Format and path, if it is a file.
-    pub fn file(&self) -> Option<(ModelFormat, &str)> {
+    /// Its format, if it is a model file.
+    pub fn model_format(&self) -> Option<ModelFormat> {
         match self {
-            Self::Obj(file) => Some((ModelFormat::Obj, file)),
-            Self::Ply(file) => Some((ModelFormat::Ply, file)),
-            Self::Stl(file) => Some((ModelFormat::Stl, file)),
-            Self::Gltf { file, .. } => Some((ModelFormat::Gltf, file)),
+            Self::Obj(_) => Some(ModelFormat::Obj),
+            Self::Ply(_) => Some(ModelFormat::Ply),
+            Self::Stl(_) => Some(ModelFormat::Stl),
+            Self::Gltf { .. } => Some(ModelFormat::Gltf),
+            Self::Part { .. } | Self::Builtin(_) => None,
+        }
+    }
+
+    /// The path, if it is a file.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) => Some(file),
+            Self::Gltf { file, .. } | Self::Part { file, .. } => Some(file),
             Self::Builtin(_) => None,
         }
     }
@@ -227,7 +267,8 @@ impl MeshSource {
     /// The path, if it is a file.
     pub fn file_mut(&mut self) -> Option<&mut String> {
         match self {
-            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) | Self::Gltf { file, .. } => Some(file),
+            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) => Some(file),
+            Self::Gltf { file, .. } | Self::Part { file, .. } => Some(file),
             Self::Builtin(_) => None,
         }
     }
@@ -236,7 +277,7 @@ impl MeshSource {
     pub fn name(&self) -> &str {
         match self {
             Self::Obj(name) | Self::Ply(name) | Self::Stl(name) | Self::Builtin(name) => name,
-            Self::Gltf { file, .. } => file,
+            Self::Gltf { file, .. } | Self::Part { file, .. } => file,
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The glTF files of a scene while it is loaded: each file is read once, and each of its meshes is built once.
+//! The glTF files and the scenes of other renderers that a scene uses, while it is loaded: each file is read once, and
+//! each of its meshes is built once.
 
 use crate::error::gltf::{GltfError, GltfProblem, Located};
 use crate::gltf::assembly::{MeshKey, Posed};
@@ -6,10 +7,13 @@ use crate::gltf::document::{Document, ReadOptions};
 use crate::gltf::images::part_of_model;
 use crate::gltf::mesh::BuiltMesh;
 use crate::gltf::surfaces::Surfaces;
+use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::model::imported::ModelNormals;
 use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
+use crate::read_scene::read_scene;
 use firstlight_files::limits::Limits;
 use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_format::error::SceneError;
 use firstlight_render::ImageTexture;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -25,6 +29,8 @@ type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 pub struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
+    /// Scenes of other renderers.
+    scenes: Mutex<HashMap<PathBuf, Arc<ForeignScene>>>,
     /// Of all images that are decoded.
     pixels: ImageBudget,
     /// Images that were decoded and not yet taken, by path.
@@ -83,6 +89,16 @@ impl Documents {
         });
         open.insert(path.to_owned(), opened.clone());
         Ok(opened)
+    }
+
+    /// The scene of another renderer at `path`, read on first use.
+    pub fn scene(&self, path: &Path) -> Result<Arc<ForeignScene>, SceneError> {
+        if let Some(scene) = lock(&self.scenes).get(path) {
+            return Ok(scene.clone());
+        }
+        let options = ForeignOptions { allow_outside: self.options.allow_outside };
+        let scene = Arc::new(read_scene(path, &options)?);
+        Ok(lock(&self.scenes).entry(path.to_owned()).or_insert(scene).clone())
     }
 
     /// A mesh with the normals of its file.

@@ -4,8 +4,9 @@
 use crate::documents::Opened;
 use crate::error::gltf::Located;
 use crate::gltf::assembly::{MeshKey, Posed};
-use crate::gltf_parts::{camera_of, extend, light_of, transform};
+use crate::gltf_parts::{camera_of, extend, light_of};
 use crate::model::imported::ModelNormals;
+use crate::model::placing::transform;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::light::LightKind;
 use firstlight_format::parts::LightPart;

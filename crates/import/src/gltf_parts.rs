@@ -9,24 +9,6 @@ use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::value::Rgb;
 use glam::{DAffine3, DVec3};
 
-/// Whether an object may have this transform.
-pub(crate) fn is_placement(world: &DAffine3) -> bool {
-    let determinant = world.matrix3.determinant().abs();
-    world.is_finite()
-        && world.translation.abs().max_element() <= bounds::MAX_COORDINATE
-        && (bounds::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
-}
-
-pub(crate) fn transform(world: &DAffine3) -> TransformPart {
-    if *world == DAffine3::IDENTITY {
-        return TransformPart::default();
-    }
-    let (m, t) = (world.matrix3.transpose(), world.translation);
-    let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
-    let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
-    TransformPart { matrix, ..TransformPart::default() }
-}
-
 /// A camera as a scene file says it.
 ///
 /// - `center`: middle of the scene, metres, which it turns about.

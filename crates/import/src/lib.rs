@@ -1,9 +1,11 @@
-//! Models of other programs: OBJ, PLY, STL and glTF, as meshes and as parts of a scene file.
+//! Models and scenes of other programs: OBJ, PLY, STL, glTF and pbrt, as meshes and as parts of a scene file.
 //!
 //! A reader ([`obj`], [`ply`], [`stl`], [`gltf`]) returns an [`ImportedModel`] or an error with its location in the
-//! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`].
+//! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`] and, for
+//! scenes of other renderers, at [`read_scene`].
 
 pub mod documents;
+pub mod environment_image;
 pub(crate) mod error;
 pub mod framing;
 pub mod gltf;
@@ -18,8 +20,11 @@ pub(crate) mod model;
 pub(crate) mod mtl_material;
 pub mod obj;
 pub mod orientation;
+pub(crate) mod pbrt;
+pub(crate) mod pfm;
 pub mod picture;
 pub mod ply;
+pub(crate) mod read_scene;
 pub mod stl;
 pub mod up_axis;
 

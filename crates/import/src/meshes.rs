@@ -4,6 +4,7 @@ use crate::documents::Documents;
 use crate::gltf::assembly::MeshKey;
 use crate::gltf_mesh::GltfMesh;
 use crate::load_model::load_model;
+use crate::model::foreign::ForeignScene;
 use crate::model::imported::{ImportedModel, ModelNormals, ModelOptions};
 use crate::model::material::ImportedMaterial;
 use crate::mtl_material::MtlMaterials;
@@ -75,23 +76,40 @@ pub fn load_mesh(
         let (warnings, material_warnings) = (base.warnings, base.material_warnings);
         return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
     }
-    match source.file() {
-        Some((_, file)) => {
+    if let MeshSource::Part { file, shape } = source {
+        let path = folder.join(text_to_path(file));
+        let scene = documents.scene(&path)?;
+        let mesh = part_of(&scene, &path, *shape)?;
+        let is_as_in_file = shading == MeshShading::Auto && simplify.is_none();
+        let mesh = if is_as_in_file {
+            mesh.clone()
+        } else {
+            Arc::new(finish(part_base(mesh, shading), source, shading, simplify, Some(CREASE))?)
+        };
+        return Ok(LoadedMesh { mesh, ..LoadedMesh::empty(scene.files.clone()) });
+    }
+    match (source.file(), source.model_format()) {
+        (Some(file), Some(format)) => {
             let path = folder.join(text_to_path(file));
-            read_file(source, &path, shading, simplify, documents.allow_outside())
+            read_file(source, format, &path, shading, simplify, documents.allow_outside())
         }
-        None => {
+        _ => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
-            Ok(LoadedMesh {
-                mesh: Arc::new(mesh),
-                slots: Vec::new(),
-                textures: Vec::new(),
-                warnings: Warnings::default(),
-                material_warnings: Warnings::default(),
-                files: Vec::new(),
-            })
+            Ok(LoadedMesh { mesh: Arc::new(mesh), ..LoadedMesh::empty(Vec::new()) })
         }
     }
+}
+
+/// The mesh of a shape of a scene of another renderer.
+fn part_of<'a>(scene: &'a ForeignScene, path: &Path, shape: u32) -> Result<&'a Arc<Mesh>, SceneError> {
+    let none = || SceneError::in_file(path, format!("shape {shape}, counted from 0, is no mesh of this scene"));
+    scene.parts.get(&shape).ok_or_else(none)
+}
+
+/// A mesh of a scene of another renderer before [`finish`]: without the normals that are to be computed.
+fn part_base(mesh: &Mesh, shading: MeshShading) -> Mesh {
+    let normals = if shading == MeshShading::Auto { mesh.normals.clone() } else { Vec::new() };
+    Mesh { normals, ..mesh.clone() }
 }
 
 /// A mesh before simplification and shading, so that both can be changed without reading it again.
@@ -118,9 +136,8 @@ impl MeshBase {
         simplify: Option<f64>,
         folder: &Path,
     ) -> Result<Self, SceneError> {
-        let (mesh, crease) = match source.file() {
-            Some((ModelFormat::Gltf, file)) => {
-                let MeshSource::Gltf { mesh, node, at, .. } = source else { unreachable!("the format is glTF") };
+        let (mesh, crease) = match source {
+            MeshSource::Gltf { file, mesh, node, at } => {
                 let path = folder.join(text_to_path(file));
                 let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
                 let at = at.map(|at| at.0);
@@ -128,14 +145,19 @@ impl MeshBase {
                 let base = read.base(&Documents::default()).map_err(|error| SceneError::new(error.to_string()))?;
                 (base.mesh, Some(CREASE))
             }
-            Some((format, file)) => {
+            MeshSource::Part { file, shape } => {
                 let path = folder.join(text_to_path(file));
+                let scene = Documents::default().scene(&path)?;
+                (part_base(part_of(&scene, &path, *shape)?, shading), Some(CREASE))
+            }
+            MeshSource::Obj(file) | MeshSource::Ply(file) | MeshSource::Stl(file) => {
+                let path = folder.join(text_to_path(file));
+                let format = source.model_format().expect("it is a model file");
                 // Materials, which may lie elsewhere, are not used here.
                 let (imported, crease) = read_base(&path, format, shading, simplify.is_some(), false)?;
                 (imported.mesh, crease)
             }
-            None => {
-                let name = source.name();
+            MeshSource::Builtin(name) => {
                 builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
             }
         };
@@ -169,10 +191,10 @@ fn finish(
     simplify: Option<f64>,
     crease: Option<f32>,
 ) -> Result<Mesh, SceneError> {
-    let (had_tangents, is_gltf) = (!mesh.tangents.is_empty(), matches!(source, MeshSource::Gltf { .. }));
+    let had_tangents = !mesh.tangents.is_empty();
+    let is_flat_without_normals = matches!(source, MeshSource::Gltf { .. } | MeshSource::Part { .. });
     let mesh = simplified(mesh, simplify)?;
-    // glTF meshes without normals have flat shading.
-    if is_gltf && shading == MeshShading::Auto && simplify.is_none() {
+    if is_flat_without_normals && shading == MeshShading::Auto && simplify.is_none() {
         return Ok(mesh);
     }
     // The normals of an imported mesh are already the specified ones.
@@ -183,6 +205,7 @@ fn finish(
 
 fn read_file(
     source: &MeshSource,
+    format: ModelFormat,
     path: &Path,
     shading: MeshShading,
     simplify: Option<f64>,
@@ -190,7 +213,6 @@ fn read_file(
 ) -> Result<LoadedMesh, SceneError> {
     // Taken before reading, so that a change in the meantime is noticed.
     let before = stamp(path);
-    let format = source.file().map_or(ModelFormat::Obj, |(format, _)| format);
     let (mut imported, crease) = read_base(path, format, shading, simplify.is_some(), allow_outside)?;
     imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
     let mesh = Arc::new(imported.mesh);
@@ -257,6 +279,18 @@ fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
 }
 
 impl LoadedMesh {
+    /// Without triangles, materials and warnings: of an object that cannot be shown, or to be filled.
+    pub fn empty(files: Vec<(PathBuf, Stamp)>) -> Self {
+        Self {
+            mesh: Arc::default(),
+            slots: Vec::new(),
+            textures: Vec::new(),
+            warnings: Warnings::default(),
+            material_warnings: Warnings::default(),
+            files,
+        }
+    }
+
     /// Whether the files that it was read from have not changed.
     pub fn is_fresh(&self) -> bool {
         self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)

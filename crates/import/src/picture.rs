@@ -2,6 +2,7 @@
 
 use crate::gltf::images::{part_of_model, picture_of};
 use crate::ktx2;
+use crate::pfm;
 use bytemuck::allocation::try_cast_vec;
 use firstlight_files::input_file::{FileKind, InputFile, ReadError};
 use firstlight_files::limits::Limits;
@@ -30,8 +31,11 @@ pub enum PictureError {
     #[error("{0}")]
     Model(String),
     /// Not a supported image format.
-    #[error("unsupported image format: use PNG, JPEG, WebP, BMP, TGA, TIFF, GIF, DDS, PNM, KTX2, HDR or EXR")]
+    #[error("unsupported image format: use PNG, JPEG, WebP, BMP, TGA, TIFF, GIF, DDS, PNM, PFM, KTX2, HDR or EXR")]
     Format,
+    /// A PFM file that is damaged.
+    #[error("cannot be decoded: {0}")]
+    Pfm(String),
     /// A KTX2 file that is damaged, or that is no texture of Basis Universal.
     #[error("cannot be decoded: {0}")]
     Ktx2(String),
@@ -280,7 +284,19 @@ fn decode_counted<R: BufRead + Seek>(
         check_memory(width, height, bytes)?;
         return ktx2::decode(&whole).map_err(PictureError::Ktx2);
     }
-    if !bytes.fill_buf().map_err(ReadError::from)?.starts_with(HDR) {
+    let start = bytes.fill_buf().map_err(ReadError::from)?;
+    if pfm::is_pfm(start) {
+        let header = pfm::Header::read(&mut bytes).map_err(PictureError::Pfm)?;
+        let (width, height) = (header.width, header.height);
+        if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) > limits.picture_pixels {
+            return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
+        }
+        let of_texels = u64::from(width) * u64::from(height) * texel_bytes(ColorType::Rgb32F);
+        budget.take(of_texels)?;
+        check_memory(width, height, of_texels)?;
+        return header.pixels(bytes).map_err(PictureError::Pfm);
+    }
+    if !start.starts_with(HDR) {
         return Err(PictureError::Format);
     }
     decode_within(HdrDecoder::new_nonstrict(bytes)?, limits, budget)

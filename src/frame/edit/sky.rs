@@ -80,8 +80,9 @@ fn part_of(light: &Environment, old: &EnvironmentSource, angle_deg: Option<f64>)
         (Environment::Gradient { zenith, horizon, ground }, _) => {
             EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
         }
-        (Environment::Image { scale, .. }, EnvironmentSource::Image { file, rotate, .. }) => {
-            EnvironmentSource::Image { file: file.clone(), scale: Rgb(*scale), rotate: angle_deg.unwrap_or(*rotate) }
+        (Environment::Image { scale, .. }, EnvironmentSource::Image { file, rotate, layout, axes, .. }) => {
+            let (file, scale, rotate) = (file.clone(), Rgb(*scale), angle_deg.unwrap_or(*rotate));
+            EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
         }
         (Environment::Image { .. }, old) => old.clone(),
     }

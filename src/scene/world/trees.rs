@@ -83,7 +83,7 @@ impl Trees {
         meshes.into_iter().map(Shape::Mesh).collect()
     }
 
-    /// Records that no tree can be built, so that it is not tried again.
+    /// Records that no tree can be built, so that it is not tried again; without a reason if it was told already.
     pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
         if let Some(key) = shared(shape) {
             self.unfit.insert(key, (shape.clone(), reason));

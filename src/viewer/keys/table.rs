@@ -328,7 +328,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
+                effect: "open a scene (.ron, .pbrt), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
             },
         ],
     },

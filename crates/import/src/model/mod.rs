@@ -1,8 +1,11 @@
-//! What the readers of models share: triangulation, normals, and the conversion of indexed vertices to a checked mesh.
+//! What the readers of models and scenes share: triangulation, normals, the conversion of indexed vertices to a checked
+//! mesh, and placements.
 
 pub(crate) mod assemble;
+pub(crate) mod foreign;
 pub(crate) mod imported;
 pub(crate) mod material;
 pub(crate) mod number;
+pub(crate) mod placing;
 pub(crate) mod polygon;
 pub(crate) mod texture_map;

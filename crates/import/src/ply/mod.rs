@@ -1,4 +1,5 @@
-//! PLY (Stanford polygon files): ASCII and binary of both byte orders, any elements and properties in any order.
+//! PLY (Stanford polygon files): ASCII and binary of both byte orders, any elements and properties in any order; also
+//! compressed as a whole (`.ply.gz`).
 //!
 //! The header declares the rows of each element (`header`); values are read in sequence from text or bytes (`rows`),
 //! and those of the mesh are kept: `vertices` with normals, texture coordinates and colours; `faces` and triangle
@@ -21,10 +22,12 @@ use crate::ply::faces::{Faces, NOWHERE};
 use crate::ply::header::{Element, Encoding, Header};
 use crate::ply::rows::{Bytes, Located, Rows, Text, skip_row};
 use crate::ply::vertices::PlyVertices;
+use firstlight_files::gzip::{decompressed, start_of_decompressed};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::printable;
 use firstlight_files::reference::References;
 use firstlight_files::warnings::Warnings;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// [`load_ply_with`] with the default options.
@@ -45,6 +48,7 @@ pub fn load_ply(path: &Path) -> Result<ImportedModel, ModelError> {
 pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
     let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes)
         .and_then(InputFile::bytes)
+        .and_then(|bytes| decompressed(bytes, FileKind::Model, options.max_bytes))
         .map_err(|error| ModelError::of(path, Place::File, error))?;
     let at = |(place, problem): Located| ModelError::of(path, place, problem);
     let header = Header::parse(&bytes).map_err(|(line, problem)| at((Place::Line(line), problem)))?;
@@ -111,6 +115,17 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         warnings,
         material_warnings,
     })
+}
+
+/// Whether the vertices of a file have normals, by its header; `None` if it has no good header.
+pub(crate) fn has_normals(path: &Path) -> Option<bool> {
+    /// Longer headers are rare, and not read for this.
+    const MOST: u64 = 1 << 16;
+    let mut start = Vec::new();
+    InputFile::open(path, FileKind::Model).ok()?.take(MOST).read_to_end(&mut start).ok()?;
+    let header = Header::parse(&start_of_decompressed(start, MOST)).ok()?;
+    let vertex = header.elements.iter().find(|element| element.name == "vertex")?;
+    Some(vertex.properties.iter().any(|property| property.name == "nx"))
 }
 
 /// The image of each texture that the header names; `None` if it cannot be used.

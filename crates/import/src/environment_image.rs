@@ -1,0 +1,141 @@
+//! Environment images of other layouts and orientations, as the equirectangular images that are rendered.
+
+use firstlight_format::sources::EnvironmentLayout;
+use firstlight_render::ImageTexture;
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
+
+/// Height of images beyond which the result is no larger.
+const MAX_HEIGHT: u32 = 4096;
+
+/// The image as an equirectangular one about +Y whose middle column is in direction −Z, as [`firstlight_render::Environment`]
+/// has it.
+///
+/// - `axes`: rows of the matrix from directions of the world to those of the image. The pole of an image is +Y of its
+///   directions in the equirectangular layout, and +Z in the one of equal areas.
+pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Option<[[f64; 3]; 3]>) -> ImageTexture {
+    /// Samples of a texel along each side, so that no light between two of them is lost.
+    const SAMPLES: u32 = 4;
+    let height = match layout {
+        EnvironmentLayout::Equirectangular => image.height,
+        EnvironmentLayout::EqualArea => image.height.max(image.width),
+    };
+    let height = height.clamp(1, MAX_HEIGHT);
+    let width = 2 * height;
+    let image_from_world = axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
+    let texel = |x: i64, y: i64| {
+        let (x, y) = (x.clamp(0, i64::from(image.width) - 1), y.clamp(0, i64::from(image.height) - 1));
+        image.linear(x as usize + y as usize * image.width as usize)
+    };
+    let size = DVec2::new(image.width.into(), image.height.into());
+    let radiance = |direction: DVec3| {
+        let direction = (image_from_world * direction).normalize_or(DVec3::Z);
+        let point = match layout {
+            EnvironmentLayout::Equirectangular => {
+                let u = 0.5 + direction.x.atan2(-direction.z) / TAU;
+                DVec2::new(u.rem_euclid(1.0), direction.y.clamp(-1.0, 1.0).acos() / PI)
+            }
+            EnvironmentLayout::EqualArea => equal_area(direction),
+        } * size;
+        texel(point.x.floor() as i64, point.y.floor() as i64)
+    };
+    let row = |y: u32| -> Vec<Vec3> {
+        let at = |x: u32| {
+            let samples = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));
+            let sum: Vec3 = samples
+                .map(|(i, j)| {
+                    let sub = |cell: u32, k: u32, n: u32| {
+                        (f64::from(cell) + (f64::from(k) + 0.5) / f64::from(SAMPLES)) / f64::from(n)
+                    };
+                    let (azimuth, polar) = ((sub(x, i, width) - 0.5) * TAU, sub(y, j, height) * PI);
+                    radiance(DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()))
+                })
+                .sum();
+            sum / (SAMPLES * SAMPLES) as f32
+        };
+        (0..width).map(at).collect()
+    };
+    let rows: Vec<Vec<Vec3>> = (0..height).into_par_iter().map(row).collect();
+    ImageTexture::from_linear(width, height, rows.concat())
+}
+
+/// Coordinates in the unit square of a direction, by a map of equal areas: +z is the middle, −z the corners.
+///
+/// Source: Clarberg 2008, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD"; rows count from the top.
+fn equal_area(direction: DVec3) -> DVec2 {
+    let size = direction.abs();
+    // The radius in the square, and the angle as a share of a quarter turn.
+    let radius = (1.0 - size.z).max(0.0).sqrt();
+    let angle = size.y.atan2(size.x) / (2.0 * FRAC_PI_4);
+    let (mut u, mut v) = (radius * (1.0 - angle), radius * angle);
+    if direction.z < 0.0 {
+        (u, v) = (1.0 - v, 1.0 - u);
+    }
+    0.5 + 0.5 * DVec2::new(u.copysign(direction.x), v.copysign(direction.y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firstlight_render::Texels;
+
+    /// The inverse map, from the same paper.
+    fn direction_of(point: DVec2) -> DVec3 {
+        let [u, v] = (2.0 * point - 1.0).to_array();
+        let distance = 1.0 - (u.abs() + v.abs());
+        let radius = 1.0 - distance.abs();
+        let angle = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 } * FRAC_PI_4;
+        let ring = radius * (2.0 - radius * radius).sqrt();
+        let z = (1.0 - radius * radius).copysign(distance);
+        DVec3::new(angle.cos().copysign(u) * ring, angle.sin().copysign(v) * ring, z)
+    }
+
+    #[test]
+    fn the_map_of_equal_areas_is_inverse_to_its_inverse() {
+        for (i, j) in (0..40).flat_map(|i| (0..40).map(move |j| (i, j))) {
+            let point = DVec2::new(f64::from(i) + 0.5, f64::from(j) + 0.3) / 40.0;
+            let direction = direction_of(point);
+            assert!((direction.length() - 1.0).abs() < 1e-12);
+            assert!((equal_area(direction) - point).length() < 1e-9, "{point} {direction}");
+        }
+        assert_eq!(equal_area(DVec3::Z), DVec2::splat(0.5));
+    }
+
+    fn image(width: u32, height: u32, at: impl Fn(u32, u32) -> Vec3) -> ImageTexture {
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| at(x, y));
+        ImageTexture { width, height, texels: Texels::F32(texels.collect()) }
+    }
+
+    #[test]
+    fn light_of_an_image_stays_where_and_as_much_as_it_is() {
+        // One bright texel: its radiance times its share of the sphere, and its direction.
+        let n = 32;
+        let (x, y) = (20, 9);
+        let source = image(n, n, |i, j| if (i, j) == (x, y) { Vec3::ONE } else { Vec3::ZERO });
+        // The image has +z up; here +y is up and −z of the world is its +y.
+        let axes = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+        let found = equirectangular(&source, EnvironmentLayout::EqualArea, Some(axes));
+        let (mut power, mut moment) = (0.0, DVec3::ZERO);
+        for (i, j) in (0..found.width).flat_map(|i| (0..found.height).map(move |j| (i, j))) {
+            let polar = (f64::from(j) + 0.5) / f64::from(found.height) * PI;
+            let azimuth = ((f64::from(i) + 0.5) / f64::from(found.width) - 0.5) * TAU;
+            let direction = DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos());
+            let weight = polar.sin() * f64::from(found.linear((j * found.width + i) as usize).x);
+            power += weight;
+            moment += weight * direction;
+        }
+        let solid_angle = power * TAU / f64::from(found.width) * PI / f64::from(found.height);
+        assert!((solid_angle / (4.0 * PI / f64::from(n * n)) - 1.0).abs() < 0.06, "{solid_angle}");
+        let own = direction_of(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / f64::from(n));
+        let expected = DVec3::new(own.x, own.z, -own.y);
+        assert!((moment.normalize() - expected).length() < 0.03, "{} for {expected}", moment.normalize());
+    }
+
+    #[test]
+    fn an_upright_image_stays_as_it_is() {
+        let source = image(8, 4, |i, j| Vec3::new(i as f32, j as f32, 1.0));
+        let same = equirectangular(&source, EnvironmentLayout::Equirectangular, None);
+        assert!((0..source.len()).all(|i| same.linear(i) == source.linear(i)) && same.len() == source.len());
+    }
+}

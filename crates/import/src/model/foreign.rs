@@ -1,0 +1,30 @@
+//! A scene of another renderer, read: a scene file, and the meshes that stand inside of the foreign file.
+
+use firstlight_files::stamp::Stamp;
+use firstlight_files::warnings::Warnings;
+use firstlight_format::scene_file::SceneFile;
+use firstlight_mesh::Mesh;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Options for reading.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ForeignOptions {
+    /// Whether files outside of the folder of the scene may be read.
+    pub allow_outside: bool,
+}
+
+/// A scene with everything that its text says.
+#[derive(Debug)]
+pub struct ForeignScene {
+    /// Paths are relative to the folder of the scene; meshes in [`Self::parts`] are
+    /// [`MeshSource::Part`](firstlight_format::sources::MeshSource::Part) of it.
+    pub file: SceneFile,
+    /// Meshes by the index of their shape in the text.
+    pub parts: HashMap<u32, Arc<Mesh>>,
+    /// What is not shown as the file says, each kind once.
+    pub warnings: Warnings,
+    /// The scene, then the files that it includes, each with its stamp from before it was read.
+    pub files: Vec<(PathBuf, Stamp)>,
+}

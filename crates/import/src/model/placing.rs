@@ -1,0 +1,24 @@
+//! Matrices as placements of a scene file.
+
+use firstlight_format::parts::TransformPart;
+use firstlight_format::scene_file::SceneFile;
+use glam::{DAffine3, DVec3};
+
+/// Whether an object may have this transform.
+pub(crate) fn is_placement(world: &DAffine3) -> bool {
+    let determinant = world.matrix3.determinant().abs();
+    world.is_finite()
+        && world.translation.abs().max_element() <= firstlight_format::bounds::MAX_COORDINATE
+        && (firstlight_format::bounds::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
+}
+
+/// A matrix as a scene file says it.
+pub(crate) fn transform(world: &DAffine3) -> TransformPart {
+    if *world == DAffine3::IDENTITY {
+        return TransformPart::default();
+    }
+    let (m, t) = (world.matrix3.transpose(), world.translation);
+    let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
+    let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
+    TransformPart { matrix, ..TransformPart::default() }
+}

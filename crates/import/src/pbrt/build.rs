@@ -1,0 +1,537 @@
+//! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
+
+use crate::model::imported::{ModelNormals, ModelOptions};
+use crate::model::placing::{is_placement, transform};
+use crate::pbrt::lights::{Light, color, light};
+use crate::pbrt::params::{Param, Params};
+use crate::pbrt::shapes::{is_whole_sphere, mesh_of, oriented};
+use crate::pbrt::state::{Described, State};
+use crate::pbrt::textures::{Texture, Textures};
+use crate::ply::{has_normals, load_ply_with};
+use firstlight_files::limits::Limits;
+use firstlight_files::printable;
+use firstlight_files::reference::References;
+use firstlight_files::relative::{path_to_text, text_to_path};
+use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_files::warnings::Warnings;
+use firstlight_format::error::SceneError;
+use firstlight_format::names::Names;
+use firstlight_format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
+use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
+use firstlight_mesh::Mesh;
+use glam::{DAffine3, DMat3, Vec3};
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Objects that a scene may have: instances of instances are quickly said.
+const MAX_OBJECTS: usize = 1 << 20;
+/// Bytes of meshes that formulas may make, for each byte that a scene may have.
+const BYTES_MADE: u64 = 4;
+/// Characters of a name that are kept: a name is stored with everything that uses it.
+const MOST_OF_A_NAME: usize = 256;
+
+/// What a shape is made of.
+#[derive(Clone, Debug)]
+enum Geometry {
+    /// A whole sphere about the origin; its number, for a mesh of it where it is stretched or has a texture.
+    Sphere {
+        radius: f64,
+        shape: u32,
+    },
+    Mesh {
+        source: MeshSource,
+        shading: MeshShading,
+    },
+}
+
+/// A shape with its material, in the space of a world or of an object definition.
+#[derive(Clone, Debug)]
+struct Item {
+    name: String,
+    geometry: Geometry,
+    material: String,
+    local: DAffine3,
+}
+
+/// Why a scene cannot be read on.
+pub(crate) struct TooMany;
+
+pub(crate) struct Builder<'a> {
+    pub(super) path: &'a Path,
+    pub(super) folder: &'a Path,
+    pub(super) references: References<'a>,
+    pub(super) allow_outside: bool,
+    /// From the world of the file to ours.
+    pub world: DMat3,
+    pub warnings: Warnings,
+    pub textures: Textures,
+    pub objects: Vec<ObjectPart>,
+    pub lights: Vec<LightPart>,
+    pub environment: EnvironmentSource,
+    pub materials: Vec<(String, MaterialPart)>,
+    pub used_textures: Vec<(String, TextureSource)>,
+    pub parts: HashMap<u32, Arc<Mesh>>,
+    /// Meshes in files of their own that became parts.
+    pub files: Vec<(PathBuf, Stamp)>,
+    pub(super) named: HashMap<String, Arc<Described>>,
+    /// Absorption of the media without scattering, per metre.
+    pub(super) media: HashMap<String, Option<Vec3>>,
+    definitions: HashMap<String, Vec<Item>>,
+    /// The object definition that is being read.
+    open: Option<(String, Vec<Item>)>,
+    pub(super) material_names: Names,
+    pub(super) texture_names: Names,
+    /// Names of textures by what they are.
+    pub(super) texture_of: HashMap<String, String>,
+    /// Names of materials by what they were made of; `None`: nothing can be seen.
+    pub(super) material_of: HashMap<String, Option<String>>,
+    /// Places in `materials` by name.
+    pub(super) place_of: HashMap<String, usize>,
+    pub(super) lobes: HashMap<String, usize>,
+    pub(super) with_textures: HashSet<String>,
+    /// The path in the scene file of each file that was named, `None` if it must not be read.
+    pub(super) resolved: HashMap<String, Option<String>>,
+    /// Whether a PLY file has normals, by its path.
+    pub(super) with_normals: HashMap<PathBuf, Option<bool>>,
+    /// By path and whether it is turned round.
+    pub(super) ply: HashMap<(PathBuf, bool), Result<Arc<Mesh>, String>>,
+    /// Bytes of meshes that may still be made of formulas: a few letters can ask for many triangles.
+    pub(super) bytes_left: u64,
+    pub(super) n_shapes: u32,
+    pub(super) n_described: u64,
+    pub(super) depth: u32,
+}
+
+impl<'a> Builder<'a> {
+    pub(crate) fn new(path: &'a Path, allow_outside: bool) -> Self {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self {
+            path,
+            folder,
+            references: References::of(path, allow_outside),
+            allow_outside,
+            world: DMat3::IDENTITY,
+            warnings: Warnings::default(),
+            textures: Textures::default(),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            environment: EnvironmentSource::Black,
+            materials: Vec::new(),
+            used_textures: Vec::new(),
+            parts: HashMap::new(),
+            files: Vec::new(),
+            named: HashMap::new(),
+            media: HashMap::new(),
+            definitions: HashMap::new(),
+            open: None,
+            material_names: Names::default(),
+            texture_names: Names::default(),
+            texture_of: HashMap::new(),
+            material_of: HashMap::new(),
+            place_of: HashMap::new(),
+            lobes: HashMap::new(),
+            with_textures: HashSet::new(),
+            resolved: HashMap::new(),
+            with_normals: HashMap::new(),
+            ply: HashMap::new(),
+            bytes_left: Limits::of_this_process().scene_bytes.saturating_mul(BYTES_MADE),
+            n_shapes: 0,
+            n_described: 0,
+            depth: 0,
+        }
+    }
+
+    /// Remarks that something is not shown.
+    pub(crate) fn tell(&mut self, what: impl AsRef<str>) {
+        self.warnings.push(format!("{}: {}", self.path.display(), what.as_ref()));
+    }
+
+    /// The path of a file in the scene file; `None` if it must not be read, which is told.
+    pub(crate) fn file(&mut self, name: &str) -> Option<String> {
+        if let Some(known) = self.resolved.get(name) {
+            return known.clone();
+        }
+        let found = match self.references.resolve(self.folder, name) {
+            Ok(found) => {
+                let difference = found.difference(name);
+                difference.into_iter().for_each(|it| self.tell(it));
+                Some(path_to_text(&found.path))
+            }
+            Err(outside) => {
+                self.tell(outside.to_string());
+                None
+            }
+        };
+        self.resolved.insert(name.to_owned(), found.clone());
+        found
+    }
+
+    /// Like [`Self::file`], for a file that was named before.
+    pub(super) fn named_file(&self, name: &str) -> Option<String> {
+        self.resolved.get(name).cloned().flatten()
+    }
+
+    /// See [`has_normals`].
+    fn has_normals(&mut self, path: &Path) -> Option<bool> {
+        *self.with_normals.entry(path.to_owned()).or_insert_with(|| has_normals(path))
+    }
+
+    /// The mesh of a shape that is no file; see [`mesh_of`].
+    fn made(&mut self, kind: &str, params: &Params, is_reversed: bool) -> Result<Arc<Mesh>, String> {
+        let is_written = kind == "trianglemesh";
+        if !is_written && self.bytes_left == 0 {
+            return Err(format!("there are too many shapes like it: {}", Limits::advice()));
+        }
+        let mesh = mesh_of(kind, params, is_reversed, self.path, &mut self.warnings)?;
+        if !is_written {
+            let bytes = size_of::<Vec3>() * (3 * mesh.positions.len() + mesh.triangles.len());
+            self.bytes_left = self.bytes_left.saturating_sub(bytes as u64);
+        }
+        Ok(Arc::new(mesh))
+    }
+
+    pub(crate) fn begin_object(&mut self, name: &str) -> Result<(), &'static str> {
+        if self.open.is_some() {
+            return Err("an object definition inside of another one");
+        }
+        self.open = Some((cut(name).to_owned(), Vec::new()));
+        Ok(())
+    }
+
+    pub(crate) fn end_object(&mut self) -> Result<(), &'static str> {
+        let (name, items) = self.open.take().ok_or("there is no object definition to end")?;
+        self.definitions.insert(name, items);
+        Ok(())
+    }
+
+    /// An instance of an object definition.
+    pub(crate) fn instance(&mut self, name: &str, ctm: &DAffine3) -> Result<(), TooMany> {
+        if self.open.is_some() {
+            self.tell(format!("an instance of `{}` inside of an object definition is ignored", printable::name(name)));
+            return Ok(());
+        }
+        let Some(items) = self.definitions.remove(cut(name)) else {
+            self.tell(format!("there is no object `{}` to make an instance of", printable::name(name)));
+            return Ok(());
+        };
+        let all = items.iter().try_for_each(|item| self.place(item, &(*ctm * item.local)));
+        self.definitions.insert(cut(name).to_owned(), items);
+        all
+    }
+
+    /// A shape.
+    pub(crate) fn shape(&mut self, kind: &str, params: &Params, state: &State) -> Result<(), TooMany> {
+        let number = self.n_shapes;
+        self.n_shapes = self.n_shapes.saturating_add(1);
+        let file_name = params.string("filename").filter(|_| kind == "plymesh");
+        let stem = file_name.and_then(|name| Path::new(name).file_stem()).map(|stem| path_to_text(stem.as_ref()));
+        let name = cut(&stem.unwrap_or_else(|| format!("{kind} {}", u64::from(number) + 1))).to_owned();
+        let area_light = match self.open {
+            None => state.area_light.clone(),
+            Some(_) => {
+                if state.area_light.is_some() {
+                    self.tell(format!(
+                        "`{}` does not emit light: pbrt has no lights in objects",
+                        printable::name(&name)
+                    ));
+                }
+                None
+            }
+        };
+        let geometry = match self.geometry(kind, params, state, area_light.is_some(), number, file_name) {
+            Ok(geometry) => geometry,
+            Err(why) => {
+                self.tell(format!("`{}` is left out: {why}", printable::name(&name)));
+                return Ok(());
+            }
+        };
+        if params.has("displacement") || params.has("displacement.edgelength") {
+            self.tell(format!("`{}` is shown without its displacement", printable::name(&name)));
+        }
+        let opacity = self.opacity(params, &name);
+        if opacity == Some(ScalarValue::Number(0.0)) {
+            self.tell(format!("`{}` is left out: it is transparent everywhere", printable::name(&name)));
+            return Ok(());
+        }
+        let light = area_light.map(|light| self.radiance(&light, &geometry, state, params, kind, &name));
+        let Some(material) = self.surface(state, opacity, light, &name) else { return Ok(()) };
+        let item = Item { name, geometry, material, local: state.ctm };
+        match &mut self.open {
+            Some((_, items)) => {
+                if items.len() >= MAX_OBJECTS {
+                    return Err(TooMany);
+                }
+                items.push(item);
+                Ok(())
+            }
+            None => self.place(&item, &item.local),
+        }
+    }
+
+    /// What a shape is made of, or why it cannot be shown.
+    fn geometry(
+        &mut self,
+        kind: &str,
+        params: &Params,
+        state: &State,
+        emits: bool,
+        number: u32,
+        file_name: Option<&str>,
+    ) -> Result<Geometry, String> {
+        let part = || {
+            let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+            MeshSource::Part { file, shape: number }
+        };
+        if kind == "sphere" && is_whole_sphere(params) {
+            let source = part();
+            let radius = params.number("radius").unwrap_or(1.0);
+            // The front of our spheres is outside.
+            if !state.is_reversed {
+                return Ok(Geometry::Sphere { radius, shape: number });
+            }
+            let mesh = self.made(kind, params, true)?;
+            self.parts.insert(number, mesh);
+            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
+        }
+        if kind != "plymesh" {
+            let source = part();
+            let mesh = self.made(kind, params, state.is_reversed)?;
+            self.parts.insert(number, mesh);
+            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
+        }
+        let source = part();
+        let name = file_name.ok_or("it has no `filename`")?;
+        let file = self.file(name).ok_or_else(|| "its file must not be read".to_owned())?;
+        let path = self.folder.join(text_to_path(&file));
+        // Only the front of an emitter, and what is turned round, are not as in the file.
+        if emits || state.is_reversed {
+            let mesh = self.ply_mesh(&path, state.is_reversed)?;
+            self.parts.insert(number, mesh);
+            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
+        }
+        // pbrt smooths nothing by itself.
+        let shading = if self.has_normals(&path) == Some(false) { MeshShading::Flat } else { MeshShading::Auto };
+        Ok(Geometry::Mesh { source: MeshSource::Ply(file), shading })
+    }
+
+    fn ply_mesh(&mut self, path: &Path, is_reversed: bool) -> Result<Arc<Mesh>, String> {
+        let key = (path.to_owned(), is_reversed);
+        if let Some(known) = self.ply.get(&key) {
+            return known.clone();
+        }
+        let normals = match self.has_normals(path) {
+            Some(false) => ModelNormals::Ignore,
+            _ => ModelOptions::default().normals,
+        };
+        let options = ModelOptions { normals, allow_outside: self.allow_outside, ..ModelOptions::default() };
+        let before = stamp(path);
+        let read = load_ply_with(path, &options).map(|model| {
+            self.warnings.append(&model.warnings);
+            Arc::new(oriented(model.mesh, is_reversed))
+        });
+        // Also if it cannot be read, since it may appear later.
+        self.files.push((path.to_owned(), before));
+        let read = read.map_err(|error| error.to_string());
+        self.ply.insert(key, read.clone());
+        read
+    }
+
+    /// Coverage of a shape; `None` if it is opaque.
+    fn opacity(&mut self, params: &Params, name: &str) -> Option<ScalarValue> {
+        let alpha = self.textures.parameter(true, params, "alpha");
+        if alpha.is_none() && params.has("alpha") {
+            self.tell(format!("`{}` is opaque: its `alpha` is not known", printable::name(name)));
+        }
+        match alpha? {
+            Texture::Constant(alpha) if alpha.x >= 1.0 => None,
+            Texture::Constant(alpha) => Some(ScalarValue::Number(alpha.x.max(0.0))),
+            Texture::Varying(source) => Some(ScalarValue::Texture(self.texture_name("alpha", source))),
+        }
+    }
+
+    /// What a shape emits, and whether both of its sides do.
+    fn radiance(
+        &mut self,
+        light: &Params,
+        geometry: &Geometry,
+        state: &State,
+        shape: &Params,
+        kind: &str,
+        name: &str,
+    ) -> (ColorValue, bool) {
+        let is_two_sided = light.flag("twosided").unwrap_or(false);
+        let mut told = Vec::new();
+        let mut radiance = color(light, "L", &mut |what| told.push(what)) * light.number("scale").unwrap_or(1.0);
+        if let Some(power) = light.number("power").filter(|power| *power > 0.0) {
+            let world = state.ctm;
+            let (area, n_shapes) = match geometry {
+                Geometry::Sphere { radius, .. } => {
+                    let scale = world.matrix3.determinant().abs().cbrt();
+                    (4.0 * PI * (radius * scale).powi(2), 1)
+                }
+                Geometry::Mesh { source: MeshSource::Part { shape, .. }, .. } => match self.parts.get(shape) {
+                    Some(mesh) => (area_of(mesh, &world), mesh.triangles.len()),
+                    None => (1.0, 1),
+                },
+                Geometry::Mesh { .. } => (1.0, 1),
+            };
+            // In pbrt, each triangle and each patch of a mesh is a light of this power.
+            let n_lights = match kind {
+                "trianglemesh" | "plymesh" | "loopsubdiv" => n_shapes,
+                "bilinearmesh" => (shape.numbers("indices").len() / 4).max(1),
+                _ => 1,
+            };
+            let sides = if is_two_sided { 2.0 } else { 1.0 };
+            radiance *= power * n_lights as f64 / (PI * area * sides);
+        }
+        told.extend(light.complaints());
+        told.into_iter().for_each(|what| self.tell(format!("`{}`: {what}", printable::name(name))));
+        let radiance = radiance.as_vec3();
+        let radiance = if radiance.is_finite() { radiance.max(Vec3::ZERO) } else { Vec3::ZERO };
+        let value = match light.string("filename").and_then(|image| self.file(image)) {
+            Some(file) => {
+                let mut source = TextureSource::image(file);
+                if let TextureSource::Image { tint, .. } = &mut source {
+                    *tint = Rgb(radiance);
+                }
+                ColorValue::Texture(self.texture_name("light", source))
+            }
+            None => ColorValue::Rgb(radiance),
+        };
+        (value, is_two_sided)
+    }
+
+    /// Adds an item to the scene.
+    fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
+        if self.objects.len() >= MAX_OBJECTS {
+            return Err(TooMany);
+        }
+        let world = DAffine3::from_mat3(self.world) * *ctm;
+        if !is_placement(&world) {
+            self.tell(format!("`{}` is flattened or too far away, and is left out", printable::name(&item.name)));
+            return Ok(());
+        }
+        let (name, material) = (Some(item.name.clone()), item.material.clone());
+        let mesh = |source, shading| ObjectPart::Mesh {
+            name: name.clone(),
+            source,
+            shading,
+            simplify: None,
+            material: Some(material.clone()),
+            materials: None,
+            transform: transform(&world),
+        };
+        let object = match &item.geometry {
+            Geometry::Mesh { source, shading } => mesh(source.clone(), *shading),
+            Geometry::Sphere { radius, shape } => match even_scale(&world.matrix3) {
+                Some(scale) if !self.with_textures.contains(&item.material) => ObjectPart::Sphere {
+                    name,
+                    center: world.translation,
+                    radius: radius * scale,
+                    material,
+                    transform: TransformPart::default(),
+                },
+                _ => {
+                    // The same mesh, whenever the shape is read.
+                    if !self.parts.contains_key(shape) {
+                        let numbers = vec![Param::number("radius", *radius)];
+                        match self.made("sphere", &Params::new(numbers), false) {
+                            Ok(made) => drop(self.parts.insert(*shape, made)),
+                            Err(why) => {
+                                self.tell(format!("`{}` is left out: {why}", printable::name(&item.name)));
+                                return Ok(());
+                            }
+                        }
+                    }
+                    let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+                    mesh(MeshSource::Part { file, shape: *shape }, MeshShading::Auto)
+                }
+            },
+        };
+        self.objects.push(object);
+        Ok(())
+    }
+
+    /// A light that is no shape.
+    pub(crate) fn light(&mut self, kind: &str, params: &Params, ctm: &DAffine3) {
+        if let Some(image) = params.string("filename") {
+            // Tells what is wrong with it.
+            self.file(image);
+        }
+        let world = DAffine3::from_mat3(self.world) * *ctm;
+        let name = format!("{} {}", cut(kind), self.lights.len() + 1);
+        let mut told = Vec::new();
+        let made = light(kind, params, &world, name, |name| self.named_file(name), &mut |what| told.push(what));
+        told.extend(params.complaints());
+        told.into_iter().for_each(|what| self.tell(what));
+        match made {
+            Light::Nothing => {}
+            Light::Part(part) => self.lights.push(part),
+            Light::Environment(environment) => {
+                self.environment = match (&self.environment, environment) {
+                    (EnvironmentSource::Black, new) => new,
+                    (EnvironmentSource::Constant(Rgb(a)), EnvironmentSource::Constant(Rgb(b))) => {
+                        EnvironmentSource::Constant(Rgb(*a + b))
+                    }
+                    (old, new) => {
+                        let is_image = matches!(new, EnvironmentSource::Image { .. });
+                        let kept = if is_image { new } else { old.clone() };
+                        self.tell("several environments of which one is an image are not modelled: one is shown");
+                        kept
+                    }
+                };
+            }
+        }
+    }
+
+    /// Leaves out the materials that no object has.
+    pub(crate) fn keep_used_materials(&mut self) {
+        let mut used: HashSet<String> = HashSet::new();
+        let mut open: Vec<String> =
+            self.objects.iter().filter_map(|object| object.material()).map(str::to_owned).collect();
+        while let Some(name) = open.pop() {
+            if !used.insert(name.clone()) {
+                continue;
+            }
+            if let Some(MaterialPart::Blend { a, b, .. }) = self.part(&name) {
+                open.extend([a, b]);
+            }
+        }
+        self.materials.retain(|(name, _)| used.contains(name));
+    }
+
+    /// An error if nothing was described that can be seen.
+    pub(crate) fn check_any(&self) -> Result<(), SceneError> {
+        if !self.objects.is_empty() {
+            return Ok(());
+        }
+        let first = self.warnings.iter().next().map_or_else(String::new, |first| format!(": {}", &**first));
+        Err(SceneError::in_file(self.path, format!("has no shape that can be shown{first}")))
+    }
+}
+
+/// Area of a mesh in the world, square metres.
+fn area_of(mesh: &Mesh, world: &DAffine3) -> f64 {
+    let corner = |vertex: u32| world.transform_vector3(mesh.positions[vertex as usize].as_dvec3());
+    let area = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(corner);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    mesh.triangles.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE)
+}
+
+/// The scale of a matrix, if it is the same in all directions as far as seven digits in a file can say.
+fn even_scale(matrix: &DMat3) -> Option<f64> {
+    let scale = matrix.determinant().abs().cbrt();
+    let unit = *matrix * scale.recip();
+    let deviation = unit.transpose() * unit - DMat3::IDENTITY;
+    deviation.to_cols_array().iter().all(|entry| entry.abs() < 1e-5).then_some(scale)
+}
+
+/// The start of a long name.
+pub(super) fn cut(name: &str) -> &str {
+    name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
+}

@@ -1,0 +1,438 @@
+//! The directives of a scene and of the files that it includes.
+
+use crate::pbrt::build::{Builder, TooMany};
+use crate::pbrt::cursor::{Cursor, SourceText};
+use crate::pbrt::state::{MaterialRef, State};
+use crate::pbrt::transforms::{look_at, rotation};
+use crate::pbrt::view::{ViewOptions, ViewParts};
+use firstlight_files::gzip::decompressed;
+use firstlight_files::input_file::{BYTE_ORDER_MARK, FileKind, InputFile};
+use firstlight_files::limits::Limits;
+use firstlight_files::printable;
+use firstlight_files::reference::References;
+use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_format::error::{SceneError, suggestion};
+use glam::DAffine3;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Files inside of one another.
+const MAX_INCLUDES_DEEP: usize = 32;
+/// Files that are included, all together.
+const MAX_INCLUDES: usize = 10_000;
+/// `Attribute`s that count at a time.
+const MAX_ATTRIBUTES: usize = 256;
+/// States that are saved at a time.
+const MAX_STATES: usize = 1024;
+
+/// All directives, for suggestions.
+const DIRECTIVES: &[&str] = &[
+    "Accelerator",
+    "ActiveTransform",
+    "AreaLightSource",
+    "Attribute",
+    "AttributeBegin",
+    "AttributeEnd",
+    "Camera",
+    "ColorSpace",
+    "ConcatTransform",
+    "CoordSysTransform",
+    "CoordinateSystem",
+    "Film",
+    "Identity",
+    "Import",
+    "Include",
+    "Integrator",
+    "LightSource",
+    "LookAt",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "MediumInterface",
+    "NamedMaterial",
+    "ObjectBegin",
+    "ObjectEnd",
+    "ObjectInstance",
+    "Option",
+    "PixelFilter",
+    "ReverseOrientation",
+    "Rotate",
+    "Sampler",
+    "Scale",
+    "Shape",
+    "Texture",
+    "Transform",
+    "TransformBegin",
+    "TransformEnd",
+    "TransformTimes",
+    "Translate",
+    "WorldBegin",
+];
+
+/// What ends a saved state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Saved {
+    Attributes,
+    Transform,
+    Object,
+}
+
+/// Reads directives, one after the other.
+pub(crate) struct Reader<'a> {
+    path: &'a Path,
+    folder: &'a Path,
+    allow_outside: bool,
+    state: State,
+    stack: Vec<(Saved, State)>,
+    systems: HashMap<String, DAffine3>,
+    before_world: ViewOptions,
+    /// Known from `WorldBegin` on.
+    view: Option<ViewParts>,
+    builder: Builder<'a>,
+    files: Vec<(PathBuf, Stamp)>,
+    n_includes: usize,
+    /// Bytes of text that may still be read.
+    bytes_left: u64,
+}
+
+impl<'a> Reader<'a> {
+    pub(crate) fn new(path: &'a Path, allow_outside: bool) -> Self {
+        Self {
+            path,
+            folder: path.parent().unwrap_or(Path::new("")),
+            allow_outside,
+            state: State::default(),
+            stack: Vec::new(),
+            systems: HashMap::new(),
+            before_world: ViewOptions::default(),
+            view: None,
+            builder: Builder::new(path, allow_outside),
+            files: Vec::new(),
+            n_includes: 0,
+            bytes_left: Limits::of_this_process().scene_bytes,
+        }
+    }
+
+    /// Reads the whole scene.
+    pub(crate) fn read(&mut self) -> Result<(), SceneError> {
+        let source = self.text(self.path)?;
+        self.run(&source, 0)
+    }
+
+    /// What was read: camera and film, everything else, and the files.
+    pub(crate) fn finish(self) -> Result<(ViewParts, Builder<'a>, Vec<(PathBuf, Stamp)>), SceneError> {
+        let none =
+            || SceneError::in_file(self.path, "has no `WorldBegin`: it is only a part of a scene, to be included");
+        Ok((self.view.ok_or_else(none)?, self.builder, self.files))
+    }
+
+    /// The text of a file, within what may still be read.
+    fn text(&mut self, path: &Path) -> Result<SourceText, SceneError> {
+        let failed = |error: String| SceneError::in_file(path, error);
+        // Taken before reading, so that a change in the meantime is noticed.
+        let before = stamp(path);
+        let bytes = InputFile::open_within(path, FileKind::Scene, self.bytes_left).and_then(InputFile::bytes);
+        let bytes = bytes.and_then(|bytes| decompressed(bytes, FileKind::Scene, self.bytes_left));
+        let bytes = bytes.map_err(|error| failed(error.to_string()))?;
+        self.bytes_left -= bytes.len() as u64;
+        // Names in other encodings are no reason to refuse a scene.
+        let text =
+            String::from_utf8(bytes).unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned());
+        let text = text.strip_prefix(BYTE_ORDER_MARK).map(str::to_owned).unwrap_or(text);
+        if !self.files.iter().any(|(known, _)| known == path) {
+            self.files.push((path.to_owned(), before));
+        }
+        Ok(SourceText { path: path.to_owned(), text })
+    }
+
+    fn run(&mut self, source: &SourceText, depth: usize) -> Result<(), SceneError> {
+        let mut cursor = Cursor::new(source);
+        while let Some((name, at)) = cursor.directive()? {
+            self.directive(&mut cursor, name, at, depth)?;
+        }
+        Ok(())
+    }
+
+    fn directive(&mut self, cursor: &mut Cursor, name: &str, at: usize, depth: usize) -> Result<(), SceneError> {
+        let is_in_world = self.view.is_some();
+        let needs_world = ["AttributeBegin", "AreaLightSource", "LightSource", "Material", "MakeNamedMaterial"];
+        let needs_world =
+            needs_world.contains(&name) || name.starts_with("Object") || matches!(name, "Shape" | "Texture");
+        if needs_world && !is_in_world {
+            return Err(cursor.wrong(at, format!("`{name}` stands before `WorldBegin`, but belongs after it")));
+        }
+        let needs_options = matches!(name, "Camera" | "Film" | "PixelFilter" | "Integrator" | "WorldBegin");
+        if needs_options && is_in_world {
+            return Err(cursor.wrong(at, format!("`{name}` stands after `WorldBegin`, but belongs before it")));
+        }
+        match name {
+            "Identity" => {
+                if self.state.sets_start {
+                    self.state.ctm = DAffine3::IDENTITY;
+                }
+            }
+            "Translate" => {
+                let by = cursor.vector()?;
+                self.state.apply(DAffine3::from_translation(by));
+            }
+            "Scale" => {
+                let by = cursor.vector()?;
+                self.state.apply(DAffine3::from_scale(by));
+            }
+            "Rotate" => {
+                let (degrees, axis) = cursor.rotation()?;
+                self.state.apply(rotation(degrees, axis));
+            }
+            "LookAt" => {
+                let points = cursor.look_at()?;
+                match look_at(points) {
+                    Some(transform) => {
+                        self.state.apply(transform);
+                        if !is_in_world {
+                            self.before_world.up = points[2].try_normalize();
+                        }
+                    }
+                    None => {
+                        let place = cursor.place(at);
+                        self.builder.warnings.push(format!("{place}: `LookAt` without a direction is ignored"));
+                    }
+                }
+            }
+            "Transform" | "ConcatTransform" => {
+                let (matrix, is_affine) = cursor.matrix()?;
+                if !is_affine {
+                    let place = cursor.place(at);
+                    self.builder.warnings.push(format!("{place}: the perspective part of a matrix is ignored"));
+                }
+                if self.state.sets_start {
+                    let before = if name == "Transform" { DAffine3::IDENTITY } else { self.state.ctm };
+                    self.state.ctm = before * matrix;
+                }
+            }
+            "CoordinateSystem" => {
+                let system = cursor.string()?;
+                self.systems.insert(system, self.state.ctm);
+            }
+            "CoordSysTransform" => {
+                let system = cursor.string()?;
+                match self.systems.get(&system) {
+                    Some(transform) => self.state.ctm = *transform,
+                    None => {
+                        let system = printable::name(&system);
+                        self.builder.tell(format!("there is no coordinate system `{system}`: the transform stays"));
+                    }
+                }
+            }
+            "ActiveTransform" => {
+                let which = cursor.word()?;
+                self.state.sets_start = which != "EndTime";
+                if which == "EndTime" {
+                    self.builder.tell("motion is not shown: everything is where it begins");
+                }
+            }
+            "TransformTimes" => {
+                cursor.pair()?;
+            }
+            "ReverseOrientation" => self.state.is_reversed = !self.state.is_reversed,
+            "AttributeBegin" => self.save(cursor, at, Saved::Attributes)?,
+            "AttributeEnd" => self.restore(cursor, at, Saved::Attributes)?,
+            "TransformBegin" => self.save(cursor, at, Saved::Transform)?,
+            "TransformEnd" => {
+                let state = self.state.clone();
+                self.restore(cursor, at, Saved::Transform)?;
+                let (ctm, sets_start) = (self.state.ctm, self.state.sets_start);
+                self.state = State { ctm, sets_start, ..state };
+            }
+            "ObjectBegin" => {
+                let object = cursor.string()?;
+                self.save(cursor, at, Saved::Object)?;
+                self.builder.begin_object(&object).map_err(|message| cursor.wrong(at, message))?;
+            }
+            "ObjectEnd" => {
+                self.builder.end_object().map_err(|message| cursor.wrong(at, message))?;
+                self.restore(cursor, at, Saved::Object)?;
+            }
+            "ObjectInstance" => {
+                let object = cursor.string()?;
+                let ctm = self.state.ctm;
+                self.builder.instance(&object, &ctm).map_err(|error| too_many(cursor, at, error))?;
+            }
+            "Attribute" => {
+                let of = cursor.string()?;
+                let params = cursor.params()?;
+                if self.state.defaults.len() == MAX_ATTRIBUTES {
+                    return Err(cursor.wrong(at, format!("there are more than {MAX_ATTRIBUTES} `Attribute`s")));
+                }
+                Arc::make_mut(&mut self.state.defaults).push((of, params.into_list()));
+            }
+            "Include" | "Import" => {
+                let file = cursor.string()?;
+                self.include(cursor, at, &file, name == "Import", depth)?;
+            }
+            "ColorSpace" => {
+                let space = cursor.string()?;
+                if space != "srgb" {
+                    let space = printable::name(&space).into_owned();
+                    self.builder
+                        .tell(format!("the colour space `{space}` is not modelled: colours are taken for sRGB"));
+                }
+            }
+            "Option" => {
+                cursor.params()?;
+            }
+            "Sampler" | "Accelerator" => {
+                cursor.string()?;
+                cursor.params()?;
+            }
+            "Camera" => {
+                let camera = (cursor.string()?, cursor.params()?);
+                self.before_world.camera = Some(camera);
+                self.before_world.camera_from_world = self.state.ctm;
+                self.systems.insert("camera".to_owned(), self.state.ctm.inverse());
+            }
+            "Film" => self.before_world.film = Some((cursor.string()?, cursor.params()?)),
+            "PixelFilter" => self.before_world.filter = Some((cursor.string()?, cursor.params()?)),
+            "Integrator" => self.before_world.integrator = Some((cursor.string()?, cursor.params()?)),
+            "WorldBegin" => {
+                let builder = &mut self.builder;
+                let view = self.before_world.parts(|what| builder.tell(what));
+                let parts = [&self.before_world.camera, &self.before_world.film, &self.before_world.filter];
+                for (_, params) in parts.into_iter().chain([&self.before_world.integrator]).flatten() {
+                    params.complaints().into_iter().for_each(|what| builder.tell(what));
+                }
+                builder.world = view.world;
+                self.view = Some(view);
+                self.state = State { ctm: DAffine3::IDENTITY, sets_start: true, ..self.state.clone() };
+                self.systems.insert("world".to_owned(), DAffine3::IDENTITY);
+            }
+            "Texture" => {
+                let (texture, of, class) = (cursor.string()?, cursor.string()?, cursor.string()?);
+                let params = self.state.with_defaults("texture", cursor.params()?);
+                self.builder.define_texture(&texture, of == "float", &class, &params);
+            }
+            "Material" => {
+                let kind = cursor.string()?;
+                let params = self.state.with_defaults("material", cursor.params()?);
+                self.state.material = MaterialRef::Own(self.builder.described("", kind, params));
+            }
+            "MakeNamedMaterial" => {
+                let material = cursor.string()?;
+                let params = self.state.with_defaults("material", cursor.params()?);
+                self.builder.describe_material(&material, params);
+            }
+            "NamedMaterial" => self.state.material = MaterialRef::Named(cursor.string()?),
+            "MakeNamedMedium" => {
+                let medium = cursor.string()?;
+                let params = self.state.with_defaults("medium", cursor.params()?);
+                self.builder.describe_medium(&medium, &params);
+            }
+            "MediumInterface" => {
+                self.state.inside = cursor.string()?;
+                let outside = cursor.optional_string()?;
+                if let Some(outside) = outside.filter(|outside| !outside.is_empty()) {
+                    let outside = printable::name(&outside).into_owned();
+                    self.builder.tell(format!("medium `{outside}` is not shown outside of shapes"));
+                }
+            }
+            "AreaLightSource" => {
+                let kind = cursor.string()?;
+                let params = self.state.with_defaults("light", cursor.params()?);
+                if kind != "diffuse" {
+                    let kind = printable::name(&kind).into_owned();
+                    self.builder.tell(format!("area lights of the kind `{kind}` are taken for diffuse ones"));
+                }
+                self.state.area_light = Some(Arc::new(params));
+            }
+            "LightSource" => {
+                let kind = cursor.string()?;
+                let params = self.state.with_defaults("light", cursor.params()?);
+                let ctm = self.state.ctm;
+                self.builder.light(&kind, &params, &ctm);
+            }
+            "Shape" => {
+                let kind = cursor.string()?;
+                let params = self.state.with_defaults("shape", cursor.params()?);
+                let made = self.builder.shape(&kind, &params, &self.state);
+                made.map_err(|error| too_many(cursor, at, error))?;
+                let place = cursor.place(at);
+                for complaint in params.complaints() {
+                    self.builder.warnings.push(format!("{place}: {complaint}"));
+                }
+            }
+            other => {
+                let hint = suggestion(other, DIRECTIVES.iter().copied());
+                return Err(cursor.wrong(at, format!("there is no directive `{}`{hint}", printable::name(other))));
+            }
+        }
+        Ok(())
+    }
+
+    fn save(&mut self, cursor: &Cursor, at: usize, what: Saved) -> Result<(), SceneError> {
+        if self.stack.len() >= MAX_STATES {
+            return Err(cursor.wrong(at, format!("more than {MAX_STATES} attributes are open: end some of them")));
+        }
+        self.stack.push((what, self.state.clone()));
+        Ok(())
+    }
+
+    fn restore(&mut self, cursor: &Cursor, at: usize, what: Saved) -> Result<(), SceneError> {
+        let name = match what {
+            Saved::Attributes => "AttributeBegin",
+            Saved::Transform => "TransformBegin",
+            Saved::Object => "ObjectBegin",
+        };
+        match self.stack.pop() {
+            Some((saved, state)) if saved == what => {
+                self.state = state;
+                Ok(())
+            }
+            _ => Err(cursor.wrong(at, format!("there is no `{name}` that this could end"))),
+        }
+    }
+
+    fn include(
+        &mut self,
+        cursor: &Cursor,
+        at: usize,
+        file: &str,
+        is_import: bool,
+        depth: usize,
+    ) -> Result<(), SceneError> {
+        if depth >= MAX_INCLUDES_DEEP {
+            let message = format!("files include one another more than {MAX_INCLUDES_DEEP} deep: is it a circle?");
+            return Err(cursor.wrong(at, message));
+        }
+        self.n_includes += 1;
+        if self.n_includes > MAX_INCLUDES {
+            return Err(cursor.wrong(at, format!("more than {MAX_INCLUDES} files are included")));
+        }
+        let references = References::of(self.path, self.allow_outside);
+        // A part that is missing costs only itself.
+        let found = references.resolve(self.folder, file).map_err(|outside| outside.to_string());
+        let folder = self.folder;
+        let source = found.and_then(|found| self.text(&folder.join(found.path)).map_err(|error| error.to_string()));
+        let source = match source {
+            Ok(source) => source,
+            Err(error) => {
+                let place = cursor.place(at);
+                self.builder.warnings.push(format!("{place}: {error}; the included file is left out"));
+                return Ok(());
+            }
+        };
+        if !is_import {
+            return self.run(&source, depth + 1);
+        }
+        // What an imported file sets does not count outside of it.
+        let state = self.state.clone();
+        let n_open = self.stack.len();
+        self.run(&source, depth + 1)?;
+        self.stack.truncate(n_open);
+        self.state = state;
+        Ok(())
+    }
+}
+
+fn too_many(cursor: &Cursor, at: usize, TooMany: TooMany) -> SceneError {
+    cursor.wrong(at, "the scene has more objects than can be shown: use fewer instances")
+}

@@ -1,0 +1,117 @@
+//! The lights of pbrt that are no shapes.
+
+use crate::pbrt::params::Params;
+use crate::pbrt::spectrum::UnknownSpectrum;
+use firstlight_files::printable;
+use firstlight_format::parts::{LightPart, TransformPart};
+use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
+use firstlight_format::value::Rgb;
+use glam::{DAffine3, DMat3, DVec3};
+use std::f64::consts::PI;
+
+/// What a light becomes.
+pub(crate) enum Light {
+    Part(LightPart),
+    Environment(EnvironmentSource),
+    Nothing,
+}
+
+/// The colour of a light by a parameter, white if there is none.
+pub(crate) fn color(params: &Params, name: &str, tell: &mut impl FnMut(String)) -> DVec3 {
+    let color = params.spectrum(name).map_or(Ok(DVec3::ONE), |spectrum| spectrum.light());
+    color.unwrap_or_else(|UnknownSpectrum(name)| {
+        tell(format!("the spectrum `{}` is not known: white light is used", printable::name(&name)));
+        DVec3::ONE
+    })
+}
+
+fn rgb(color: DVec3) -> Rgb {
+    // What leaves the range of single precision is no light.
+    let color = color.as_vec3();
+    Rgb(if color.is_finite() { color.max(glam::Vec3::ZERO) } else { glam::Vec3::ZERO })
+}
+
+/// A light.
+///
+/// - `world`: from its space to our world; `file`: the path of an image in the scene file for its name in pbrt's, `None`
+///   if it must not be read; `tell`: called with what is not shown.
+pub(crate) fn light(
+    kind: &str,
+    params: &Params,
+    world: &DAffine3,
+    name: String,
+    file: impl Fn(&str) -> Option<String>,
+    tell: &mut impl FnMut(String),
+) -> Light {
+    let scale = params.number("scale").unwrap_or(1.0);
+    let positive = |name: &str| params.number(name).filter(|value| *value > 0.0);
+    let from = params.point("from").unwrap_or(DVec3::ZERO);
+    let towards = params.point("to").unwrap_or(DVec3::Z) - from;
+    let direction = world.transform_vector3(towards).try_normalize();
+    let (name, transform) = (Some(name), TransformPart::default());
+    match kind {
+        "point" => {
+            let power = positive("power").map_or(1.0, |power| power / (4.0 * PI));
+            let intensity = rgb(scale * power * color(params, "I", tell));
+            Light::Part(LightPart::Point { name, position: world.transform_point3(from), intensity, radius: 0.0 })
+        }
+        "spot" => {
+            let outer = params.number("coneangle").unwrap_or(30.0).clamp(0.01, 90.0);
+            let inner = (outer - params.number("conedeltaangle").unwrap_or(5.0)).clamp(0.0, outer);
+            let [cos_outer, cos_inner] = [outer, inner].map(|angle| angle.to_radians().cos());
+            let cone = 2.0 * PI * (1.0 - cos_inner + 0.5 * (cos_inner - cos_outer));
+            let power = positive("power").map_or(1.0, |power| power / cone);
+            let intensity = rgb(scale * power * color(params, "I", tell));
+            let Some(direction) = direction else { return nowhere(tell) };
+            Light::Part(LightPart::Spot {
+                name,
+                position: world.transform_point3(from),
+                direction,
+                intensity,
+                inner_angle: inner,
+                outer_angle: outer,
+                transform,
+            })
+        }
+        "distant" => {
+            let Some(direction) = direction else { return nowhere(tell) };
+            let illuminance = positive("illuminance").unwrap_or(1.0);
+            let irradiance = rgb(scale * illuminance * color(params, "L", tell));
+            Light::Part(LightPart::Directional { name, direction, irradiance, transform })
+        }
+        "infinite" => {
+            if params.has("portal") {
+                tell("portals of environments are ignored: the image is the same, with more noise".to_owned());
+            }
+            let Some(image) = params.string("filename") else {
+                let illuminance = positive("illuminance").map_or(1.0, |illuminance| illuminance / PI);
+                return Light::Environment(EnvironmentSource::Constant(rgb(scale
+                    * illuminance
+                    * color(params, "L", tell))));
+            };
+            if params.has("illuminance") {
+                tell("`illuminance` of an environment image is ignored".to_owned());
+            }
+            let Some(file) = file(image) else { return Light::Nothing };
+            let image_from_world = world.matrix3.inverse();
+            let image_from_world = if image_from_world.is_finite() { image_from_world } else { DMat3::IDENTITY };
+            let rows = image_from_world.transpose();
+            Light::Environment(EnvironmentSource::Image {
+                file,
+                scale: rgb(DVec3::splat(scale)),
+                rotate: 0.0,
+                layout: EnvironmentLayout::EqualArea,
+                axes: Some([rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.to_array())),
+            })
+        }
+        other => {
+            tell(format!("lights of the kind `{}` are not modelled", printable::name(other)));
+            Light::Nothing
+        }
+    }
+}
+
+fn nowhere(tell: &mut impl FnMut(String)) -> Light {
+    tell("a light without a direction is left out".to_owned());
+    Light::Nothing
+}

@@ -1,0 +1,63 @@
+//! pbrt, version 4: a scene in text, with PLY files beside it.
+//!
+//! Words (`tokens`), arguments (`cursor`, `params`) and directives (`directives`) with the graphics state (`state`); what
+//! they describe is collected (`build`, `surfaces`) from `shapes`, `materials`, `textures`, `lights` and `spectrum`, and the camera
+//! and film before the world are in `view`. Lengths are metres. Start reading at [`read`].
+//!
+//! Source of what a directive means: the description of the format, "pbrt-v4 Input File Format", and Pharr, Jakob and
+//! Humphreys 2023, "Physically Based Rendering", fourth edition.
+
+mod build;
+mod cie;
+mod cursor;
+mod directives;
+mod lights;
+mod materials;
+mod named_spectra;
+mod params;
+mod shapes;
+mod spectrum;
+mod state;
+mod subdivision;
+mod surfaces;
+mod textures;
+mod tokens;
+mod transforms;
+mod view;
+
+use crate::model::foreign::{ForeignOptions, ForeignScene};
+use crate::pbrt::directives::Reader;
+use firstlight_format::error::SceneError;
+use firstlight_format::scene_file::SceneFile;
+use firstlight_format::value::{Named, Rgb};
+use firstlight_render::Integrator;
+use std::path::Path;
+
+/// Reads a scene with the files that it includes.
+///
+/// # Errors
+/// If the text is not of the format, or includes what it must not; with file, line and column.
+pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene, SceneError> {
+    let mut reader = Reader::new(path, options.allow_outside);
+    reader.read()?;
+    let (view, mut builder, mut files) = reader.finish()?;
+    builder.check_any()?;
+    builder.keep_used_materials();
+    files.extend(builder.files);
+    let file = SceneFile {
+        camera: view.camera,
+        cameras: Named::default(),
+        film: view.film,
+        integrator: Integrator::default(),
+        max_depth: Some(view.max_depth),
+        display: view.display,
+        environment: builder.environment,
+        air: Rgb::default(),
+        textures: Named(builder.used_textures),
+        materials: Named(builder.materials),
+        objects: builder.objects,
+        lights: builder.lights,
+        animation: Default::default(),
+    };
+    Ok(ForeignScene { file, parts: builder.parts, warnings: builder.warnings, files })
+}

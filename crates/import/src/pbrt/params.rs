@@ -1,0 +1,201 @@
+//! The parameters of a directive: `"type name" value`, or several values in brackets.
+//!
+//! Getters return `None` for what is not there. What is there but of the wrong kind is noted, and counts as missing:
+//! a broken parameter never refuses a scene.
+
+use crate::pbrt::spectrum::Spectrum;
+use firstlight_files::printable;
+use glam::{DVec2, DVec3};
+use std::cell::RefCell;
+
+/// Values of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    Numbers(Vec<f64>),
+    Strings(Vec<String>),
+    Bools(Vec<bool>),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Param {
+    /// `float`, `rgb`, `texture` …
+    pub kind: String,
+    pub name: String,
+    pub values: Values,
+}
+
+impl Param {
+    /// A number.
+    pub(crate) fn number(name: &str, number: f64) -> Self {
+        Self { kind: "float".to_owned(), name: name.to_owned(), values: Values::Numbers(vec![number]) }
+    }
+}
+
+/// All parameters of a directive, and complaints about them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Params {
+    list: Vec<Param>,
+    complaints: RefCell<Vec<String>>,
+}
+
+impl Params {
+    pub(crate) fn new(list: Vec<Param>) -> Self {
+        Self { list, complaints: RefCell::default() }
+    }
+
+    /// Adds those of another list that this one does not have.
+    pub(crate) fn add_missing(&mut self, others: &[Param]) {
+        let missing = others.iter().filter(|other| self.list.iter().all(|own| own.name != other.name));
+        let missing: Vec<Param> = missing.cloned().collect();
+        self.list.extend(missing);
+    }
+
+    pub(crate) fn into_list(self) -> Vec<Param> {
+        self.list
+    }
+
+    /// Complaints about values that could not be used.
+    pub(crate) fn complaints(&self) -> Vec<String> {
+        std::mem::take(&mut self.complaints.borrow_mut())
+    }
+
+    pub(crate) fn find(&self, name: &str) -> Option<&Param> {
+        self.list.iter().find(|param| param.name == name)
+    }
+
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
+    fn complain<T>(&self, param: &Param, expected: &str) -> Option<T> {
+        let (kind, name) = (printable::name(&param.kind), printable::name(&param.name));
+        self.complaints.borrow_mut().push(format!("`{kind} {name}` is ignored: expected {expected}"));
+        None
+    }
+
+    /// All numbers of a parameter; empty if it is missing.
+    pub(crate) fn numbers(&self, name: &str) -> &[f64] {
+        let Some(param) = self.find(name) else { return &[] };
+        match &param.values {
+            Values::Numbers(numbers) if numbers.iter().all(|number| number.is_finite()) => numbers,
+            Values::Numbers(_) => self.complain(param, "finite numbers").unwrap_or(&[]),
+            _ => self.complain(param, "numbers").unwrap_or(&[]),
+        }
+    }
+
+    fn exactly<const N: usize>(&self, name: &str, expected: &str) -> Option<[f64; N]> {
+        let param = self.find(name)?;
+        // Names of textures and spectra are read by others.
+        if matches!(param.values, Values::Strings(_)) {
+            return None;
+        }
+        let numbers = self.numbers(name);
+        numbers.try_into().ok().or_else(|| if numbers.is_empty() { None } else { self.complain(param, expected) })
+    }
+
+    pub(crate) fn number(&self, name: &str) -> Option<f64> {
+        self.exactly::<1>(name, "one number").map(|[number]| number)
+    }
+
+    /// A whole number that is not negative.
+    pub(crate) fn count(&self, name: &str) -> Option<u32> {
+        let number = self.number(name)?;
+        if (0.0..=f64::from(u32::MAX)).contains(&number) && number.fract() == 0.0 {
+            return Some(number as u32);
+        }
+        self.find(name).and_then(|param| self.complain(param, "a whole number that is not negative"))
+    }
+
+    pub(crate) fn point(&self, name: &str) -> Option<DVec3> {
+        self.exactly::<3>(name, "three numbers").map(DVec3::from_array)
+    }
+
+    /// Groups of three numbers.
+    pub(crate) fn points(&self, name: &str) -> Vec<DVec3> {
+        let (groups, rest) = self.numbers(name).as_chunks::<3>();
+        if let (Some(param), false) = (self.find(name), rest.is_empty()) {
+            return self.complain(param, "three numbers for each of them").unwrap_or_default();
+        }
+        groups.iter().map(|&group| DVec3::from_array(group)).collect()
+    }
+
+    /// Pairs of numbers.
+    pub(crate) fn pairs(&self, name: &str) -> Vec<DVec2> {
+        let (groups, rest) = self.numbers(name).as_chunks::<2>();
+        if let (Some(param), false) = (self.find(name), rest.is_empty()) {
+            return self.complain(param, "pairs of numbers").unwrap_or_default();
+        }
+        groups.iter().map(|&group| DVec2::from_array(group)).collect()
+    }
+
+    /// Indices of vertices.
+    pub(crate) fn indices(&self, name: &str) -> Vec<u32> {
+        let numbers = self.numbers(name);
+        let is_index = |number: &f64| (0.0..=f64::from(u32::MAX)).contains(number) && number.fract() == 0.0;
+        if let (Some(param), false) = (self.find(name), numbers.iter().all(is_index)) {
+            return self.complain(param, "whole numbers that are not negative").unwrap_or_default();
+        }
+        numbers.iter().map(|&number| number as u32).collect()
+    }
+
+    pub(crate) fn flag(&self, name: &str) -> Option<bool> {
+        let param = self.find(name)?;
+        match &param.values {
+            Values::Bools(flags) if flags.len() == 1 => Some(flags[0]),
+            Values::Strings(words) if words.len() == 1 && words[0] == "true" => Some(true),
+            Values::Strings(words) if words.len() == 1 && words[0] == "false" => Some(false),
+            _ => self.complain(param, "`true` or `false`"),
+        }
+    }
+
+    pub(crate) fn strings(&self, name: &str) -> &[String] {
+        let Some(param) = self.find(name) else { return &[] };
+        match &param.values {
+            Values::Strings(words) => words,
+            _ => self.complain(param, "a string in quotes").unwrap_or(&[]),
+        }
+    }
+
+    pub(crate) fn string(&self, name: &str) -> Option<&str> {
+        self.strings(name).first().map(String::as_str)
+    }
+
+    /// Name of a texture, if the parameter is one.
+    pub(crate) fn texture(&self, name: &str) -> Option<&str> {
+        let param = self.find(name).filter(|param| param.kind == "texture")?;
+        match &param.values {
+            Values::Strings(words) => words.first().map(String::as_str),
+            _ => self.complain(param, "the name of a texture"),
+        }
+    }
+
+    /// A spectrum that is no texture.
+    pub(crate) fn spectrum(&self, name: &str) -> Option<Spectrum> {
+        let param = self.find(name).filter(|param| param.kind != "texture")?;
+        let numbers = |expected| match &param.values {
+            Values::Numbers(numbers) if numbers.iter().all(|number| number.is_finite()) => Some(numbers.as_slice()),
+            _ => self.complain(param, expected),
+        };
+        match (&*param.kind, &param.values) {
+            ("spectrum", Values::Strings(words)) => words.first().map(|word| Spectrum::Named(word.clone())),
+            ("spectrum", _) => {
+                let expected = "the name of a spectrum, or pairs of a wavelength and a value";
+                let (pairs, rest) = numbers(expected)?.as_chunks::<2>();
+                let ascends = pairs.is_sorted_by(|a, b| a[0] < b[0]);
+                if pairs.is_empty() || !rest.is_empty() || !ascends {
+                    return self.complain(param, expected);
+                }
+                Some(Spectrum::Sampled(pairs.iter().map(|&[wavelength, value]| (wavelength, value)).collect()))
+            }
+            ("blackbody", _) => match numbers("one temperature in kelvins")? {
+                [kelvins, ..] if *kelvins > 0.0 => Some(Spectrum::Blackbody(*kelvins)),
+                _ => self.complain(param, "one temperature in kelvins"),
+            },
+            _ => match numbers("a colour of three numbers")? {
+                [r, g, b] => Some(Spectrum::Rgb(DVec3::new(*r, *g, *b))),
+                [grey] => Some(Spectrum::Rgb(DVec3::splat(*grey))),
+                _ => self.complain(param, "a colour of three numbers"),
+            },
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Scenes of other renderers, of any format.
+//!
+//! What a format adds is a folder with a reader that returns a [`ForeignScene`], a line here and a line in
+//! [`SceneFormat`].
+
+use crate::model::foreign::{ForeignOptions, ForeignScene};
+use crate::pbrt;
+use firstlight_format::error::SceneError;
+use firstlight_format::scene_format::SceneFormat;
+use std::path::Path;
+
+/// Reads a scene of another renderer with the files that it includes; meshes and images in files of their own are not
+/// read.
+///
+/// # Errors
+/// If the text is not of its format, or names a file that it must not; with file, line and column.
+pub(crate) fn read_scene(path: &Path, options: &ForeignOptions) -> Result<ForeignScene, SceneError> {
+    let format = SceneFormat::of(path).ok_or_else(|| {
+        SceneError::in_file(path, format!("is no scene: expected one of {}", SceneFormat::extensions()))
+    })?;
+    let scene = match format {
+        SceneFormat::Pbrt => pbrt::read(path, options)?,
+    };
+    scene.file.check().map_err(|error| SceneError::in_file(path, error.to_string()))?;
+    Ok(scene)
+}
