@@ -416,7 +416,7 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
     // A binary tree with n leaves has fewer than 2 n nodes; more steps mean a cycle.
     for _ in 0..2 * MAX_LOBES {
         match open.pop() {
-            Some(Some(Material::Blend { weight, a, b })) => {
+            Some(Some(Material::Blend { weight, a, b, .. })) => {
                 textured |= matches!(weight, ScalarParam::Texture(_));
                 open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
             }

@@ -232,12 +232,13 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
             invert,
             uv_set,
             vertex_colors,
+            relief,
         } => {
             let (image, wrap) = (picture(file)?, [wrap, wrap_v.unwrap_or(wrap)]);
             let pattern = TexturePattern::Image { image, encoding, wrap, smooth };
             let placed = placed(pattern, repeat, offset, rotate);
             let uv_matrix = placed.uv_matrix * Mat2::from_diagonal(as_vec2(stretch));
-            Texture { channel, tint: tint.0, invert, uv_set, vertex_colors, uv_matrix, ..placed }
+            Texture { channel, tint: tint.0, invert, uv_set, vertex_colors, relief, uv_matrix, ..placed }
         }
         TextureSource::VertexColors { channel, tint } => {
             Texture { channel: *channel, tint: tint.0, vertex_colors: true, ..Texture::new(TexturePattern::White) }

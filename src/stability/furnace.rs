@@ -28,7 +28,7 @@ fn metal(alpha: f32) -> Material {
 }
 
 fn blend(weight: f32, a: u32, b: u32) -> Material {
-    Material::Blend { weight: ScalarInput::Constant(weight), a, b }
+    Material::blend(ScalarInput::Constant(weight), a, b)
 }
 
 fn classic(specular: f32, transparency: f32, ior: f32) -> Material {

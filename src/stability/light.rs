@@ -278,7 +278,7 @@ pub fn long_sums() -> Vec<LightCase> {
         .into_iter()
         .map(|albedo| {
             // The blend consists of a black body of radiance 1 with weight w and a white surface with weight 1 − w.
-            let blend = Material::Blend { weight: ScalarInput::Constant(1.0 - albedo), a: 0, b: 1 };
+            let blend = Material::blend(ScalarInput::Constant(1.0 - albedo), 0, 1);
             let materials = vec![diffuse(1.0), emissive(1.0), blend];
             let shapes = vec![
                 (Shape::Plane { point: Vec3::Y, normal: Vec3::NEG_Y }, 2),

@@ -17,7 +17,7 @@ fn mirror(reflectance: f32) -> Material {
 }
 
 fn blend(a: u32, b: u32, weight: f32) -> Material {
-    Material::Blend { weight: ScalarInput::Constant(weight), a, b }
+    Material::blend(ScalarInput::Constant(weight), a, b)
 }
 
 fn settings(seed: u32, caustics: bool) -> RenderSettings {

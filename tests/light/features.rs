@@ -183,13 +183,7 @@ fn everything() -> Prepared {
             (quad(Vec3::new(-1.0, 3.0, -5.0), Vec3::X * 2.0, Vec3::Z * 2.0), 4),
             (sphere(Vec3::new(1.2, 0.0, -4.0), 0.4), 0),
         ],
-        vec![
-            checker,
-            mirror(0.9),
-            glass(1.5, 0.1),
-            Material::Blend { weight: ScalarInput::Constant(0.3), a: 0, b: 1 },
-            emissive(3.0),
-        ],
+        vec![checker, mirror(0.9), glass(1.5, 0.1), Material::blend(ScalarInput::Constant(0.3), 0, 1), emissive(3.0)],
         Environment::Constant(Vec3::ONE),
         ahead(60.0),
     )

@@ -84,8 +84,8 @@ fn room_with(
         emissive(7.0),
         Material::Diffuse { albedo: ColorInput::Texture(1) },
         // Diffuse under metal, metal that is diffuse in places, and the classic kind.
-        Material::Blend { weight: ScalarInput::Constant(0.3), a: 6, b: 5 },
-        Material::Blend { weight: ScalarInput::Constant(0.6), a: 4, b: 10 },
+        Material::blend(ScalarInput::Constant(0.3), 6, 5),
+        Material::blend(ScalarInput::Constant(0.6), 4, 10),
         Material::Phong {
             diffuse: checker,
             ambient: 0.0,

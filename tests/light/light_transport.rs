@@ -94,7 +94,7 @@ fn inside_a_glowing_grey_room() {
     let materials = vec![
         diffuse(1.0),
         emissive(emitted / (1.0 - albedo)),
-        Material::Blend { weight: ScalarInput::Constant(1.0 - albedo), a: 0, b: 1 },
+        Material::blend(ScalarInput::Constant(1.0 - albedo), 0, 1),
     ];
     let s = 2.0;
     let walls = |material| {

@@ -71,7 +71,7 @@ fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> P
     shapes.extend(pane(Vec3::new(-0.6, 0.8, 0.4), Vec3::new(0.5, 0.6, 0.05), 2));
     shapes.push((sphere(Vec3::new(0.7, 0.5, 0.2), 0.5), 3));
     shapes.extend(others);
-    let blend = Material::Blend { weight: ScalarInput::Constant(0.6), a: 0, b: 2 };
+    let blend = Material::blend(ScalarInput::Constant(0.6), 0, 2);
     let absorbing = Material::RoughGlass {
         alpha: ScalarInput::Constant(alpha),
         ior: 1.33,

@@ -358,11 +358,7 @@ fn broken_components_are_left_out_with_a_message_and_never_a_panic() {
     world.spawn(Shape::Quad { edge_u: DVec3::X, edge_v: DVec3::X });
     let mut circle = world.spawn_empty();
     let id = circle.id();
-    circle.insert(SurfaceMaterial(Material::Blend {
-        weight: firstlight::scene::ScalarParam::Number(0.5),
-        a: id,
-        b: id,
-    }));
+    circle.insert(SurfaceMaterial(Material::blend(firstlight::scene::ScalarParam::Number(0.5), id, id)));
     world.spawn((Shape::Sphere { radius: 0.1 }, firstlight::scene::MaterialSlots(vec![id])));
     driver.run_until(|session| session.status().done && session.is_idle());
     assert_eq!(driver.say(MessageKind::Warning).len(), 6, "{:?}", driver.say(MessageKind::Warning));

@@ -129,7 +129,10 @@ impl Check<'_> {
                 self.light(&format!("{path}/b"), *b);
                 (vec![("squares", *squares)], *offset, *rotate)
             }
-            TextureSource::Image { stretch, repeat, offset, rotate, tint, uv_set, .. } => {
+            TextureSource::Image { stretch, repeat, offset, rotate, tint, uv_set, relief, .. } => {
+                if let Some(relief) = relief {
+                    self.finite(&format!("{path}/relief"), f64::from(*relief));
+                }
                 self.light(&format!("{path}/tint"), *tint);
                 if *uv_set > 1 {
                     let message = format!("`uv_set` is {uv_set}, but must be 0 or 1");

@@ -28,7 +28,7 @@ impl FieldAt<'_> {
             "scale" if in_transform => ("a factor, or one for each axis in round brackets", "(1, 2, 1)"),
             "matrix" => ("three rows of four numbers", "((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0))"),
             "rotate" => ("an angle in degrees", "30"),
-            "radius" | "pivot_distance" => ("a length in metres", "0.5"),
+            "radius" | "pivot_distance" | "relief" => ("a length in metres", "0.5"),
             "simplify" | "exposure" => ("a number", "1.5"),
             "width" | "height" | "max_depth" | "blades" => ("a whole number", "8"),
             "depth_of_field" | "smooth" | "invert" => ("true or false", "true"),

@@ -133,6 +133,9 @@ pub enum TextureSource {
         /// Whether colours are multiplied by the vertex colours.
         #[serde(default, skip_serializing_if = "is_default")]
         vertex_colors: bool,
+        /// As a normal map: how far white is above black, metres; `None`: it has normals.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        relief: Option<f32>,
     },
     /// The vertex colours of a mesh; white if it has none.
     VertexColors {
@@ -170,6 +173,7 @@ impl TextureSource {
             invert: false,
             uv_set: 0,
             vertex_colors: false,
+            relief: None,
         }
     }
 }

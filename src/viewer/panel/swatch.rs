@@ -33,6 +33,12 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
         Material::Glass { absorption, .. } | Material::RoughGlass { absorption, .. } => {
             [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2]
         }
+        // Gold, and others by their hue at normal incidence.
+        Material::Conductor { eta, k, .. } => {
+            let [less, more] = [*eta - 1.0, *eta + 1.0];
+            [(less * less + *k * *k) / (more * more + *k * *k); 2]
+        }
+        Material::ThinGlass { transmittance: ColorParam::Rgb(rgb), .. } => [*rgb * Vec3::new(0.85, 0.92, 0.95); 2],
         material => match material.color() {
             // For an emitter, the hue.
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],

@@ -38,10 +38,14 @@ fn row(property: &Property) -> String {
 fn every_property_of_a_material_has_its_row() {
     let mut wrong = String::new();
     for &kind in MaterialKind::ALL {
-        let is_principled = kind == MaterialKind::Principled;
-        let Page { text, .. } =
-            read(if is_principled { "docs/scene-principled.md" } else { "docs/scene-materials.md" });
-        let heading = if is_principled { "# ".to_owned() } else { format!("### {}\n", kind.name()) };
+        let (page, heading) = match kind {
+            MaterialKind::Principled => ("docs/scene-principled.md", "# ".to_owned()),
+            MaterialKind::Glass | MaterialKind::RoughGlass | MaterialKind::ThinGlass => {
+                ("docs/scene-glass.md", format!("### {}\n", kind.name()))
+            }
+            _ => ("docs/scene-materials.md", format!("### {}\n", kind.name())),
+        };
+        let Page { text, .. } = read(page);
         let (_, section) = text.split_once(&heading).unwrap_or_else(|| panic!("no heading {heading}"));
         let section = section.split("\n#").next().unwrap_or_default();
         let found: Vec<&str> = section.lines().filter(|line| line.starts_with("| `")).collect();

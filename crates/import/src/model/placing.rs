@@ -1,7 +1,6 @@
 //! Matrices as placements of a scene file.
 
 use firstlight_format::parts::TransformPart;
-use firstlight_format::scene_file::SceneFile;
 use glam::{DAffine3, DVec3};
 
 /// Whether an object may have this transform.

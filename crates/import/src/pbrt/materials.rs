@@ -199,7 +199,7 @@ pub(crate) fn material(
             let parts: Vec<String> =
                 params.strings("materials").iter().take(2).filter_map(|name| scope.material(name)).collect();
             match <[String; 2]>::try_from(parts) {
-                Ok([a, b]) => MaterialPart::Blend { weight: scope.scalar_value(amount), a, b },
+                Ok([a, b]) => MaterialPart::blend(scope.scalar_value(amount), a, b),
                 Err(_) => {
                     scope.tell("its two `materials` are not there: grey is shown");
                     MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
@@ -286,7 +286,7 @@ pub(crate) fn emissive(
                 emitter(ColorValue::Rgb(*light / (1.0 - diffuse))),
             ];
             let [a, b] = names;
-            LightSurface { part: MaterialPart::Blend { weight, a, b }, others }
+            LightSurface { part: MaterialPart::blend(weight, a, b), others }
         }
         _ => plain(emitter(radiance)),
     }

@@ -5,7 +5,6 @@ use crate::pbrt::transforms::world_for;
 use firstlight_files::printable;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::parts::{DisplayPart, FilmPart};
-use firstlight_format::scene_file::SceneFile;
 use firstlight_render::PixelFilter;
 use glam::{DAffine3, DMat3, DVec3};
 

@@ -28,6 +28,29 @@ materials! {
         albedo: P::Color, Color(Reflectance), "colour";
     }
 
+    /// A diffuse base under a smooth or rough dielectric: the `plastic` and `roughplastic` of Mitsuba 3, and the
+    /// `coateddiffuse` of pbrt-v4 in closed form; see `shading/plastic`.
+    Plastic "plastic" (diffuse) {
+        /// albedo of the base
+        diffuse: P::Color, Color(Reflectance), "colour";
+        /// GGX width of the coat: the square of what other programs call roughness
+        alpha: P::Scalar, Scalar(Width) = 0.0, "roughness";
+        /// index of refraction of the coat
+        ior: f32, Number(Ior) = 1.5, "IOR";
+        /// strength of the reflection of the coat
+        specular: P::Scalar, Scalar(Share) = 1.0, "specular";
+        /// the base colours light at every bounce below the coat: saturated, and exact
+        nonlinear: bool, Flag(Choice) = true, "nonlinear";
+    }
+
+    /// Lambert on both sides: light is reflected and transmitted in all directions, as by paper or a leaf.
+    Translucent "translucent" (reflectance) {
+        /// share of light that is scattered back
+        reflectance: P::Color, Color(Reflectance), "reflected";
+        /// share that is scattered to the far side; both together return at most all light
+        transmittance: P::Color, Color(Reflectance), "transmitted";
+    }
+
     /// Layers with the parameters of glTF 2.0 and of most programs: a clear coat, on a sheen, on a base that is metal,
     /// or a dielectric over a diffuse or transmissive layer; see `shading/principled`.
     Principled "principled" (base_color) {
@@ -109,6 +132,20 @@ materials! {
         compensate: bool, Flag(Choice) = false, "compensate";
     }
 
+    /// GGX microfacets of a metal with the exact Fresnel term of unpolarised light.
+    Conductor "conductor" {
+        /// GGX width: the square of what other programs call roughness
+        alpha: P::Scalar, Scalar(Width) = 0.0, "roughness";
+        /// index of refraction, per channel
+        eta: P::Rgb, Rgb(Factor) = Vec3::new(0.143, 0.375, 1.442), "eta";
+        /// extinction coefficient, per channel
+        k: P::Rgb, Rgb(Factor) = Vec3::new(3.983, 2.386, 1.603), "k";
+        /// factor of the reflection
+        reflectance: P::Color, Color(Reflectance) = Vec3::ONE, "colour";
+        /// return the energy that single scattering loses
+        compensate: bool, Flag(Choice) = false, "compensate";
+    }
+
     /// Smooth dielectric with exact Fresnel.
     Glass "glass" {
         /// index of refraction: water 1.33, glass 1.5, diamond 2.4
@@ -117,6 +154,16 @@ materials! {
         absorption: P::Rgb, Rgb(Absorption) = Vec3::ZERO, "absorption";
         /// 20 / Abbe number: 0.3 to 0.8 for glass, 0.36 for diamond
         dispersion: f32, Number(Dispersion) = 0.0, "dispersion";
+    }
+
+    /// A pane of smooth glass without thickness, with all reflections between its two sides.
+    ThinGlass "thin_glass" {
+        /// index of refraction: water 1.33, glass 1.5, diamond 2.4
+        ior: f32, Number(Ior) = 1.5, "IOR";
+        /// factor of reflected light
+        reflectance: P::Color, Color(Reflectance) = Vec3::ONE, "reflected";
+        /// factor of transmitted light
+        transmittance: P::Color, Color(Reflectance) = Vec3::ONE, "transmitted";
     }
 
     /// Dielectric with GGX microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
@@ -159,7 +206,7 @@ materials! {
     }
 
     /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
-    /// is constant: see `Emission::of`.
+    /// is constant: see `Emission::of`. Holes and normals are those of the whole: parts have none of their own.
     Blend "blend" {
         /// share of `b`: 0 is only `a`, 1 only `b`
         weight: P::Scalar, Scalar(Share), "weight";
@@ -167,6 +214,16 @@ materials! {
         a: P::Material, Part(Reference), "first";
         /// the material at weight 1, also another blend
         b: P::Material, Part(Reference), "second";
+        /// whatever the weight, `a` is the front and `b` the back
+        by_side: bool, Flag(Choice) = false, "by side";
+        /// coverage: 1 is opaque, 0 is a hole
+        opacity: P::Scalar, Scalar(Share) = 1.0, "opacity";
+        /// opaque where `opacity` is at least this, a hole elsewhere
+        opacity_cutoff: Option<f32>, Cutoff(Share) = None, "cutoff";
+        /// tangent-space normals: 0…1 for −1…1
+        normal_map: P::Color, Color(Map) = Vec3::new(0.5, 0.5, 1.0), "normals";
+        /// factor of their slope
+        normal_scale: f32, Number(Scale) = 1.0, "normal scale";
     }
 }
 
@@ -185,6 +242,15 @@ impl<P: Params> Material<P> {
         Self::of_kind(MaterialKind::Principled, base_color).expect("it is no blend")
     }
 
+    /// Returns a blend of two materials, without holes and normal map.
+    pub fn blend(weight: P::Scalar, a: P::Material, b: P::Material) -> Self {
+        let mut blend = Self::initial(MaterialKind::Blend, &Vec3::ZERO.into(), || a.clone());
+        if let Self::Blend { weight: of_second, b: second, .. } = &mut blend {
+            (*of_second, *second) = (weight, b);
+        }
+        blend
+    }
+
     /// Returns a plain material of a kind, with common parameters; `None` for a blend.
     ///
     /// - `color`: the main colour, see [`Self::color`].
@@ -198,6 +264,8 @@ impl<P: Params> Material<P> {
                 (*alpha, *fresnel, *compensate) = (0.04.into(), Fresnel::Schlick, true);
             }
             Self::RoughGlass { alpha, compensate, .. } => (*alpha, *compensate) = (0.04.into(), true),
+            Self::Conductor { alpha, compensate, .. } => (*alpha, *compensate) = (0.04.into(), true),
+            Self::Plastic { alpha, .. } => *alpha = 0.04.into(),
             Self::Phong { specular, shininess, .. } => (*specular, *shininess) = (0.2.into(), 50.0),
             _ => {}
         }

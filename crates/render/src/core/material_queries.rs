@@ -61,7 +61,7 @@ impl Material {
     pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {
             Self::Mirror { .. } | Self::Glass { .. } => true,
-            Self::Metal { alpha, .. } | Self::RoughGlass { alpha, .. } => {
+            Self::Metal { alpha, .. } | Self::Conductor { alpha, .. } | Self::RoughGlass { alpha, .. } => {
                 matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
             }
             Self::Phong { specular, transparency, .. } => {
@@ -74,28 +74,29 @@ impl Material {
                 let is_smooth = matches!(roughness, ScalarInput::Constant(r) if r * r < SMALLEST_ALPHA);
                 is_smooth && (can_be_above_zero(metallic) || can_be_above_zero(transmission))
             }
-            Self::Diffuse { .. } | Self::Emissive { .. } => false,
+            // The weak reflections of a coat and of a pane, which does not bend light, are left to camera paths.
+            Self::Plastic { .. } | Self::ThinGlass { .. } => false,
+            Self::Diffuse { .. } | Self::Translucent { .. } | Self::Emissive { .. } => false,
         }
     }
 
-    /// Whether rays may pass its surfaces.
-    pub(crate) fn is_cutout(&self) -> bool {
-        match self {
+    /// Where its surfaces are, unless they are everywhere.
+    pub(crate) fn cutout(&self) -> Option<Cutout> {
+        let (opacity, cutoff, has_back) = match self {
             Self::Principled { two_sided, opacity, opacity_cutoff, .. } => {
-                let is_whole = match opacity {
-                    ScalarInput::Constant(opacity) => *opacity >= opacity_cutoff.unwrap_or(1.0),
-                    ScalarInput::Texture(_) => false,
-                };
-                !is_whole || (!two_sided && !self.is_clear())
+                (*opacity, *opacity_cutoff, *two_sided || self.is_clear())
             }
-            _ => false,
-        }
+            Self::Blend { opacity, opacity_cutoff, .. } => (*opacity, *opacity_cutoff, true),
+            _ => return None,
+        };
+        let is_whole = matches!(opacity, ScalarInput::Constant(opacity) if opacity >= cutoff.unwrap_or(1.0));
+        (!is_whole || !has_back).then_some(Cutout { opacity, cutoff, has_back })
     }
 
     /// Whether it scatters transmitted light, so that light is sampled on both sides.
     pub(crate) fn scatters_through(&self) -> bool {
         match self {
-            Self::RoughGlass { .. } => true,
+            Self::RoughGlass { .. } | Self::Translucent { .. } => true,
             Self::Principled { transmission, .. } => can_be_above_zero(transmission),
             _ => false,
         }
@@ -108,14 +109,31 @@ impl Material {
 
     /// Whether it has normal maps or anisotropy, and so needs tangents.
     pub(crate) fn asks_for_tangents(&self) -> bool {
-        let Self::Principled { normal_map, clearcoat_normal_map, anisotropy, .. } = self else { return false };
-        normal_map.is_normal_map() || clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
+        let of_layers = match self {
+            Self::Principled { clearcoat_normal_map, anisotropy, .. } => {
+                clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
+            }
+            _ => false,
+        };
+        of_layers || self.normal_map().is_some()
+    }
+
+    /// The map of its shading normal, and the factor of its slope.
+    pub(crate) fn normal_map(&self) -> Option<(ColorInput, f32)> {
+        match self {
+            Self::Principled { normal_map, normal_scale, .. } | Self::Blend { normal_map, normal_scale, .. } => {
+                normal_map.is_normal_map().then_some((*normal_map, *normal_scale))
+            }
+            _ => None,
+        }
     }
 
     /// Whether it, or a part of it, needs tangents.
     pub(crate) fn has_tangents(&self, materials: &[Self]) -> bool {
         match self {
-            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_tangents(materials)),
+            Self::Blend { a, b, .. } => {
+                self.asks_for_tangents() || [a, b].into_iter().any(|&id| materials[id as usize].has_tangents(materials))
+            }
             _ => self.asks_for_tangents(),
         }
     }
@@ -152,6 +170,16 @@ impl ColorInput {
     pub(crate) fn is_normal_map(&self) -> bool {
         !matches!(self, Self::Constant(color) if *color == Vec3::new(0.5, 0.5, 1.0))
     }
+}
+
+/// Where the surfaces of a material are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cutout {
+    pub opacity: ScalarInput,
+    /// The opacity from which on the surface is present; `None` if opacity is a probability.
+    pub cutoff: Option<f32>,
+    /// Whether the surface can be hit from behind.
+    pub has_back: bool,
 }
 
 /// Whether a parameter may be positive somewhere, without evaluating textures.
@@ -194,10 +222,15 @@ impl Emission {
                 two_sided: *two_sided,
                 opacity: (*opacity, *opacity_cutoff),
             }),
-            Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
+            blend @ Material::Blend { by_side: true, a, .. } => {
+                let opacity = blend.cutout().map_or(Self::WHOLE, |cutout| (cutout.opacity, cutout.cutoff));
+                Self::of(materials, *a).map(|front| Self { opacity, two_sided: false, ..front })
+            }
+            blend @ Material::Blend { weight: ScalarInput::Constant(weight), a, b, .. } => {
                 let part = |id, share: f32| {
                     let emission = Self::of(materials, id)?;
-                    (share > 0.0).then_some(Self { scale: share * emission.scale, ..emission })
+                    let opacity = blend.cutout().map_or(Self::WHOLE, |cutout| (cutout.opacity, cutout.cutoff));
+                    (share > 0.0).then_some(Self { scale: share * emission.scale, opacity, ..emission })
                 };
                 part(*a, 1.0 - weight).or_else(|| part(*b, *weight))
             }

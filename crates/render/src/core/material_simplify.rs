@@ -42,7 +42,7 @@ impl Material {
         else {
             return self;
         };
-        if self.is_cutout() || normal_map.is_normal_map() {
+        if self.cutout().is_some() || normal_map.is_normal_map() {
             return self;
         }
         let alpha = match roughness {

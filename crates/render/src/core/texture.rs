@@ -58,6 +58,8 @@ pub struct Texture {
     pub invert: bool,
     /// Whether colours are multiplied by the vertex colours of a mesh.
     pub vertex_colors: bool,
+    /// As a normal map: how far white is above black, metres, if these are heights; `None` if they are normals.
+    pub relief: Option<f32>,
 }
 
 /// A pattern: colours over pattern coordinates.
@@ -121,6 +123,7 @@ impl Texture {
             tint: Vec3::ONE,
             invert: false,
             vertex_colors: false,
+            relief: None,
         }
     }
 
@@ -150,6 +153,21 @@ impl Texture {
             texel *= point.color;
         }
         texel
+    }
+
+    /// Derivatives of the height by the surface coordinates at a place, metres; `None` if these are no heights.
+    ///
+    /// They are those of the interpolated texels around it: constant along each axis between two.
+    pub(crate) fn slope(&self, point: &TexturePoint) -> Option<Vec2> {
+        let height = self.relief?;
+        let TexturePattern::Image { image, encoding, wrap, .. } = &self.pattern else { return Some(Vec2::ZERO) };
+        let uv = point.uv[usize::from(self.uv_set.min(1))];
+        let (places, [x, y]) = image.places(self.pattern_coordinates(uv.to_array()).into(), *wrap);
+        let [a, b, c, d] = image.texels.texels(places, *encoding).map(|texel| height * self.shown(texel).x);
+        // Rows count downwards, v upwards.
+        let by_u = ((b - a) * (1.0 - y) + (d - c) * y) * image.width as f32;
+        let by_v = ((a - c) * (1.0 - x) + (b - d) * x) * image.height as f32;
+        Some(self.uv_matrix.transpose() * Vec2::new(by_u, by_v))
     }
 
     /// Reads a part of each row of texels that [`Self::texel`] reads, so that they are in the cache afterwards. The
@@ -341,6 +359,32 @@ mod tests {
         let tinted = Texture { tint: Vec3::new(0.5, 1.0, 2.0), vertex_colors: true, ..texture };
         assert_eq!(tinted.eval(point), Vec3::new(0.25, 0.2, 0.0));
         assert_eq!(tinted.mean(), Vec3::new(0.5, 0.2, 0.0));
+    }
+
+    #[test]
+    fn slopes_are_differences_of_heights() {
+        let grey = |i: u32| Vec3::splat(((i * 37) % 11) as f32 / 11.0);
+        let image = Arc::new(ImageTexture::from_linear(5, 3, (0..15).map(grey).collect()));
+        let pattern =
+            TexturePattern::Image { image, encoding: Encoding::Linear, wrap: [Wrap::Repeat; 2], smooth: true };
+        let (uv_matrix, uv_offset) = (Mat2::from_cols_array(&[2.0, 0.5, -1.0, 1.5]), Vec2::new(0.2, 0.7));
+        let plain = Texture { uv_matrix, uv_offset, tint: Vec3::splat(0.7), ..Texture::new(pattern) };
+        assert_eq!(plain.slope(&Vec2::ZERO.into()), None);
+        let relief = Texture { relief: Some(0.02), invert: true, ..plain };
+        for i in 0..200 {
+            let uv = Vec2::new(0.013 * i as f32, 0.4 - 0.029 * i as f32);
+            let step = 1e-3;
+            let height = |uv: Vec2| 0.02 * relief.eval(uv).x;
+            let [by_u, by_v] =
+                [Vec2::X, Vec2::Y].map(|to| (height(uv + step * to) - height(uv - step * to)) / (2.0 * step));
+            let found = relief.slope(&uv.into()).unwrap();
+            // Between texels the difference quotient spans two slopes.
+            let p = relief.pattern_coordinates(uv.to_array());
+            let [x, y] = [p[0] * 5.0 - 0.5, (1.0 - p[1]) * 3.0 - 0.5].map(|x| (x - x.floor()).min(x.ceil() - x));
+            if x.min(y) > 0.02 {
+                assert!((found - Vec2::new(by_u, by_v)).length() < 2e-3, "{uv}: {found} for {by_u} {by_v}");
+            }
+        }
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub fn advance<'a>(
 /// Computes the tables of integrals that the materials of a scene need: up to half a second of one processor, divided
 /// among all, once per process. [`advance`] does it if nobody else has.
 pub fn compute_tables(scene: &Prepared) {
-    precomputed::compute_for(&scene.shading.materials);
+    precomputed::compute_for(scene);
 }
 
 /// Like [`advance`], for the tiles of a region only; all of its pixels get the same number of samples. Light paths are

@@ -1,5 +1,9 @@
 //! The transparent bodies of a scene, smallest last, and which of them contain a point.
 //!
+//! A surface that is closed bounds a body. One that is open, such as the surface of water that ends at the walls of its
+//! basin, is an interface: what is behind it is the medium, wherever the path has been before. Which it is follows from
+//! the sum of the area vectors of its faces, which is zero for every closed surface; see [`LARGEST_HOLE`].
+//!
 //! A sphere is a separate body, alone or in a group; so are all triangles of one mesh with the same material. Quads,
 //! triangles and planes of one material form one body together: a box may be made of them. Each body has as many rows
 //! as its material has transparent parts: a blend of two glasses is, for each path, a body of the glass through which
@@ -30,6 +34,8 @@ struct BodyRow {
     absorption: Vec3,
     /// Number of rows of the body.
     n_leaves: u32,
+    /// Whether its surface is open.
+    is_open: bool,
 }
 
 /// The bodies to which the surface of an object belongs, by their first rows.
@@ -59,17 +65,24 @@ struct BodyCandidate {
     material: MaterialId,
     /// Volume in cubic metres; infinite for a half-space.
     volume: f64,
+    /// Area of its faces, and the sum of their area vectors, square metres; zero for spheres and planes.
+    area: f64,
+    area_vector: DVec3,
     low: DVec3,
     high: DVec3,
     of: BodyPart,
 }
 
+/// Area of the holes of a surface, as far as they face one way, over that of its faces, above which it counts as open:
+/// a cracked mesh is still a body, and a bowl without thickness is not.
+const LARGEST_HOLE: f64 = 0.1;
+
 enum BodyPart {
     Object(u32),
     Primitive(u32, u32),
     Slot(u32),
-    /// All open surfaces of a material.
-    Open(Vec<u32>),
+    /// All quads, triangles and planes of a material.
+    Faces(Vec<u32>),
 }
 
 /// Number of largest bodies among which the deepest nesting is determined: nested bodies lie within large ones.
@@ -89,14 +102,15 @@ impl Bodies {
         // Of equally large bodies the later one counts, as if it had been entered last.
         candidates.sort_by(|a, b| b.volume.total_cmp(&a.volume));
         let mut rows = Vec::new();
-        for BodyCandidate { material, of, .. } in &candidates {
+        for candidate in &candidates {
+            let (BodyCandidate { material, of, .. }, is_open) = (candidate, candidate.is_open());
             let first = rows.len() as u32;
             let leaves = leaves_of(materials, *material);
             let n_leaves = leaves.len() as u32;
-            rows.extend(leaves.into_iter().map(|leaf| BodyRow { n_leaves, ..leaf }));
+            rows.extend(leaves.into_iter().map(|leaf| BodyRow { n_leaves, is_open, ..leaf }));
             match of {
                 BodyPart::Object(object) => of_object[*object as usize] = BodySurface::One(first),
-                BodyPart::Open(objects) => {
+                BodyPart::Faces(objects) => {
                     objects.iter().for_each(|&object| of_object[object as usize] = BodySurface::One(first));
                 }
                 BodyPart::Primitive(object, prim) => {
@@ -172,6 +186,12 @@ impl Bodies {
         rows.last().map_or(1.0, |&row| self.rows[row as usize].ior.powi(2))
     }
 
+    /// Whether the surface of a body is open, by any of its rows.
+    #[inline]
+    pub fn is_open(&self, row: u32) -> bool {
+        self.rows[row as usize].is_open
+    }
+
     pub fn n_leaves(&self, body: u32) -> u32 {
         self.rows[body as usize].n_leaves
     }
@@ -223,6 +243,9 @@ impl Bodies {
             rows.extend((0..winding).map(|_| body));
         }
         rows.sort_unstable();
+        // Open surfaces bound one medium at a time.
+        let mut has_open = false;
+        rows.retain(|&row| !self.is_open(row) || !std::mem::replace(&mut has_open, true));
         rows
     }
 }
@@ -256,7 +279,9 @@ fn winding(tree: &SceneTree, point: Vec3, counts: &dyn Fn(&Hit) -> bool) -> i32 
 /// The rows of a body of this material, in the order of shading.
 fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
     let material = &materials[id as usize];
-    let row = |ior: f32, dispersion: f32, absorption: Vec3| vec![BodyRow { ior, dispersion, absorption, n_leaves: 1 }];
+    let row = |ior: f32, dispersion: f32, absorption: Vec3| {
+        vec![BodyRow { ior, dispersion, absorption, n_leaves: 1, is_open: false }]
+    };
     match material {
         Material::Blend { a, b, .. } => [leaves_of(materials, *a), leaves_of(materials, *b)].concat(),
         material if !material.is_clear() => Vec::new(),
@@ -271,7 +296,7 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
 /// All bodies, in the order of objects and primitives.
 fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
     let mut bodies = Vec::new();
-    let mut open: Vec<BodyCandidate> = Vec::new();
+    let mut faces: Vec<BodyCandidate> = Vec::new();
     for (i, (object, shape)) in (0..).zip(geometry.objects.iter().zip(geometry.tree.shapes())) {
         let is_clear = |id: MaterialId| n_leaves[id as usize] > 0;
         if !object.materials.iter().any(|&id| is_clear(id)) {
@@ -280,6 +305,8 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
         let of_sphere = |material, center: DVec3, radius: f64, of| BodyCandidate {
             material,
             volume: 4.0 / 3.0 * PI * radius.powi(3),
+            area: 0.0,
+            area_vector: DVec3::ZERO,
             low: center - radius,
             high: center + radius,
             of,
@@ -313,12 +340,12 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
                 }
             }
             Shape::Plane { .. } | Shape::Quad { .. } | Shape::Triangle { .. } => {
-                let at = open.iter().position(|body| body.material == material).unwrap_or_else(|| {
-                    open.push(BodyCandidate::empty(material, BodyPart::Open(Vec::new())));
-                    open.len() - 1
+                let at = faces.iter().position(|body| body.material == material).unwrap_or_else(|| {
+                    faces.push(BodyCandidate::empty(material, BodyPart::Faces(Vec::new())));
+                    faces.len() - 1
                 });
-                let body = &mut open[at];
-                if let BodyPart::Open(objects) = &mut body.of {
+                let body = &mut faces[at];
+                if let BodyPart::Faces(objects) = &mut body.of {
                     objects.push(i);
                 }
                 match shape {
@@ -329,26 +356,35 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
                         body.add([a, a + u + v, a + v]);
                     }
                     _ => {
-                        body.volume = f64::INFINITY;
+                        (body.volume, body.area) = (f64::INFINITY, f64::INFINITY);
                         (body.low, body.high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
                     }
                 }
             }
         }
     }
-    bodies.extend(open);
-    bodies.iter_mut().for_each(|body| body.volume = body.volume.abs());
+    bodies.extend(faces);
+    // What has no volume contains everything else.
+    bodies.iter_mut().for_each(|body| body.volume = if body.is_open() { f64::INFINITY } else { body.volume.abs() });
     bodies
 }
 
 impl BodyCandidate {
     fn empty(material: MaterialId, of: BodyPart) -> Self {
-        Self { material, volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, of }
+        let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        Self { material, volume: 0.0, area: 0.0, area_vector: DVec3::ZERO, low, high, of }
+    }
+
+    fn is_open(&self) -> bool {
+        self.area_vector.length() > LARGEST_HOLE * self.area
     }
 
     /// Adds a triangle of the surface: by the divergence theorem they sum up to the enclosed volume.
     fn add(&mut self, [a, b, c]: [DVec3; 3]) {
         self.volume += a.dot(b.cross(c)) / 6.0;
+        let area_vector = 0.5 * (b - a).cross(c - a);
+        self.area += area_vector.length();
+        self.area_vector += area_vector;
         self.low = self.low.min(a).min(b).min(c);
         self.high = self.high.max(a).max(b).max(c);
     }

@@ -39,7 +39,7 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
             at_most_one(diffuse) && matches!(specular, ScalarInput::Constant(_)) && is_even(diffuse)
         }
         // Parts are sampled by luminance: without colour, each has the weight of the whole.
-        Material::Blend { weight, a, b } => {
+        Material::Blend { weight, a, b, .. } => {
             let part = |id: MaterialId| returns_at_most_all(materials, id) && is_even_part(materials, id);
             matches!(weight, ScalarInput::Constant(_)) && part(*a) && part(*b)
         }

@@ -158,7 +158,9 @@ impl ClassicRow {
                 }
                 Some(())
             }
-            Material::Blend { weight: ScalarInput::Constant(share), a, b } => {
+            blend @ Material::Blend { weight: ScalarInput::Constant(share), a, b, by_side: false, .. }
+                if blend.normal_map().is_none() =>
+            {
                 let share = share.clamp(0.0, 1.0);
                 self.add(materials, *a, weight * (1.0 - share))?;
                 self.add(materials, *b, weight * share)

@@ -68,7 +68,7 @@ mod tests {
             Texture { uv_offset: Vec2::X, ..large },
         ];
         let diffuse = |id| Material::Diffuse { albedo: ColorInput::Texture(id) };
-        let blend = |a, b| Material::Blend { weight: crate::core::material::ScalarInput::Texture(2), a, b };
+        let blend = |a, b| Material::blend(crate::core::material::ScalarInput::Texture(2), a, b);
         let materials = [diffuse(0), diffuse(1), diffuse(3), blend(0, 1), blend(3, 2)];
         let table = LargeTextures::build(&materials, &textures);
         let lists = [&[][..], &[1], &[3], &[2], &[2, 3]];

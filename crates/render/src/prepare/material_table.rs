@@ -59,7 +59,9 @@ impl MaterialTable {
             table.add(material, materials);
             let mut parts = [(0, 0.0); 2];
             match material {
-                Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
+                Material::Blend { weight: ScalarInput::Constant(weight), a, b, by_side: false, .. }
+                    if material.normal_map().is_none() =>
+                {
                     let kinds = [a, b].map(|&id| kind_of_part(&materials[id as usize]));
                     if let [Some(first), Some(second)] = kinds
                         && first != second

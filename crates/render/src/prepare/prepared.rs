@@ -3,7 +3,7 @@
 use crate::core::camera::Camera;
 use crate::core::environment::{Environment, EnvironmentSampler};
 use crate::core::material::Material;
-use crate::core::material_queries::Emission;
+use crate::core::material_queries::{Cutout, Emission};
 use crate::core::snapshot::{Geometry, Shading, Snapshot};
 use crate::prepare::ambient::AmbientLight;
 use crate::prepare::bodies::{Bodies, Boundary};
@@ -22,7 +22,7 @@ use glam::Vec3;
 use std::fmt;
 use std::ops::Deref;
 use std::panic::{RefUnwindSafe, UnwindSafe};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A scene ready for rendering: a [`Snapshot`], to which it dereferences, and its tables, which are shared like its
 /// parts.
@@ -80,10 +80,12 @@ pub(crate) struct Tables {
     /// Per material: whether it is textured, and so needs texture coordinates.
     pub(crate) textured: Vec<bool>,
     pub(crate) large_textures: LargeTextures,
-    /// Per material: whether its surfaces may be cut out, see [`Material::is_cutout`].
-    pub(crate) cutouts: Vec<bool>,
+    /// Per material, see [`Material::cutout`].
+    pub(crate) cutouts: Vec<Option<Cutout>>,
     /// Per material: whether it needs tangents.
     pub(crate) with_tangents: Vec<bool>,
+    /// Per material: what the coat of a plastic transmits, built when first needed; see `shading/coat.rs`.
+    pub(crate) coats: Vec<OnceLock<Vec<f32>>>,
     /// Emission per material.
     pub(crate) emission: Vec<Option<Emission>>,
     pub(crate) lights: LightTable,
@@ -243,13 +245,14 @@ impl Tables {
             environment: !matches!(environment, Environment::Black),
             textures: materials.iter().any(|material| material.is_textured(materials)),
             caustics: casters.is_some(),
-            cutouts: materials.iter().any(Material::is_cutout),
+            cutouts: materials.iter().any(|material| material.cutout().is_some()),
         };
         Self {
             radiance_unit: radiance_unit(&lights, &ambient, reach_of(geometry)),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             large_textures: LargeTextures::build(materials, textures),
-            cutouts: materials.iter().map(Material::is_cutout).collect(),
+            cutouts: materials.iter().map(Material::cutout).collect(),
+            coats: vec![OnceLock::new(); materials.len()],
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())
                 .then(|| radiance_bound(environment, &emission, materials))

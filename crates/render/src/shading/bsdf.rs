@@ -3,10 +3,13 @@
 use crate::core::color::luminance;
 use crate::core::material::{Fresnel, SMALLEST_ALPHA};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
+use crate::shading::conductor::conductor;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
-use crate::shading::metal::{Metal, schlick};
+use crate::shading::layer_albedo::cosine_mean;
+use crate::shading::metal::{Metal, schlick, with_further_bounces};
+use crate::shading::plastic::Plastic;
 use crate::shading::rough_glass::{RoughGlass, RoughGlassSample};
 use crate::shading::scatter::{BsdfSample, Scatter};
 use firstlight_kdtree::geometry::Frame;
@@ -15,7 +18,7 @@ use glam::{Vec2, Vec3};
 
 /// A lobe, with all of its parameters evaluated at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Lobe {
+pub(crate) enum Lobe<'a> {
     Diffuse {
         albedo: Vec3,
     },
@@ -28,6 +31,29 @@ pub(crate) enum Lobe {
         fresnel: Fresnel,
         compensate: bool,
     },
+    Conductor {
+        alpha: f32,
+        eta: Vec3,
+        k: Vec3,
+        reflectance: Vec3,
+        compensate: bool,
+    },
+    Plastic(Plastic<'a>),
+    /// Lambert on both sides; the sum of both shares is at most 1.
+    Translucent {
+        reflectance: Vec3,
+        transmittance: Vec3,
+        /// Media on both sides.
+        here: MediumId,
+    },
+    /// A pane without thickness.
+    ThinGlass {
+        ior: f32,
+        reflectance: Vec3,
+        transmittance: Vec3,
+        /// Media on both sides.
+        here: MediumId,
+    },
     Glass(Interface),
     /// Rough in the sense of [`crate::shading::rough_glass::is_smooth`].
     RoughGlass {
@@ -37,29 +63,75 @@ pub(crate) enum Lobe {
     },
 }
 
-impl Lobe {
+impl Lobe<'_> {
     /// A placeholder for a transmissive lobe that is distinguished from others but never sampled.
     pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, radiance_eta: 1.0, beyond: MediumId::OUTSIDE });
-}
 
-impl Lobe {
-    /// Approximate reflected or transmitted share of light, 0..1.
+    /// Approximate reflected or transmitted share of light, per channel, 0..1.
+    pub fn albedo(&self) -> Vec3 {
+        match *self {
+            Self::Diffuse { albedo } => albedo,
+            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => reflectance,
+            Self::Conductor { .. } => self.angular_tint(1.0),
+            Self::Plastic(plastic) => plastic.albedo(),
+            Self::Translucent { reflectance, transmittance, .. } => reflectance + transmittance,
+            Self::ThinGlass { transmittance, .. } => transmittance,
+            Self::Glass(_) | Self::RoughGlass { .. } => Vec3::ONE,
+        }
+    }
+
+    /// The same of all channels together.
     pub fn albedo_estimate(&self) -> f32 {
         match self {
-            Self::Diffuse { albedo } => luminance(*albedo),
-            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
             Self::Glass(_) | Self::RoughGlass { .. } => 1.0,
+            _ => luminance(self.albedo()),
+        }
+    }
+
+    /// Whether [`Scatter::through`] leads into the medium of the path itself, as it does for all such parts of a blend.
+    pub fn is_thin(&self) -> bool {
+        matches!(self, Self::Translucent { .. })
+    }
+
+    /// The microfacets of rough metal that faces the viewer; `None` for all others.
+    #[inline]
+    fn rough_metal(&self, wo: Vec3, normal: Vec3) -> Option<Metal<f32>> {
+        let metal = match *self {
+            Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
+                metal_at(normal, wo, alpha, reflectance, fresnel, compensate)
+            }
+            Self::Conductor { alpha, eta, k, compensate, .. } if alpha >= SMALLEST_ALPHA => {
+                let mut metal = metal_at(normal, wo, alpha, Vec3::ONE, Fresnel::Constant, false);
+                if compensate {
+                    let at = |k_of: usize| cosine_mean(|cos| conductor(cos, eta, k)[k_of]);
+                    let lost = ggx::lost_over_returned(normal.dot(wo), alpha);
+                    metal.gain = with_further_bounces(Vec3::new(at(0), at(1), at(2)).into(), lost, alpha);
+                }
+                metal
+            }
+            _ => return None,
+        };
+        metal.facing().then_some(metal)
+    }
+
+    /// Factor of the tint of metal that depends on the angle with its microfacets and is not in [`Metal`].
+    #[inline]
+    fn angular_tint(&self, cos: f32) -> Vec3 {
+        match *self {
+            Self::Conductor { eta, k, reflectance, .. } => reflectance * conductor(cos, eta, k),
+            _ => Vec3::ONE,
         }
     }
 }
 
-impl Scatter for Lobe {
+impl Scatter for Lobe<'_> {
     #[inline]
     fn has_non_specular(&self) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::RoughGlass { .. } => true,
-            Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,
-            Self::Mirror { .. } | Self::Glass(_) => false,
+            Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent { .. } => true,
+            Self::Metal { alpha, .. } | Self::Conductor { alpha, .. } => *alpha >= SMALLEST_ALPHA,
+            Self::Plastic(plastic) => plastic.has_non_specular(),
+            Self::Mirror { .. } | Self::Glass(_) | Self::ThinGlass { .. } => false,
         }
     }
 
@@ -72,6 +144,12 @@ impl Scatter for Lobe {
             return (Vec3::splat(value), pdf);
         }
         let cos = normal.dot(wi);
+        if let Self::Translucent { reflectance, transmittance, .. } = *self {
+            let passes = cos * normal.dot(wo) < 0.0;
+            let (color, pmf) = translucent_side(reflectance, transmittance, passes);
+            let cosine = cosine_hemisphere_pdf(cos.abs());
+            return (color * cosine, pmf * cosine);
+        }
         if cos <= 0.0 {
             return (Vec3::ZERO, 0.0);
         }
@@ -80,15 +158,14 @@ impl Scatter for Lobe {
                 let pdf = cosine_hemisphere_pdf(cos);
                 (albedo * pdf, pdf)
             }
-            Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
-                let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
-                if !metal.facing() {
-                    return (Vec3::ZERO, 0.0);
+            Self::Plastic(plastic) => plastic.eval(wo, wi, normal),
+            _ => match self.rough_metal(wo, normal) {
+                Some(metal) => {
+                    let found = metal.eval(metal.local(wi.into()));
+                    (Vec3::from(found.tint) * self.angular_tint(found.cos) * found.value, found.pdf)
                 }
-                let found = metal.eval(metal.local(wi.into()));
-                (Vec3::from(found.tint) * found.value, found.pdf)
-            }
-            _ => (Vec3::ZERO, 0.0),
+                None => (Vec3::ZERO, 0.0),
+            },
         }
     }
 
@@ -96,6 +173,7 @@ impl Scatter for Lobe {
     fn through(&self) -> Option<Interface> {
         match self {
             Self::RoughGlass { interface, .. } => Some(*interface),
+            Self::Translucent { here, .. } => Some(Interface::thin(*here)),
             _ => None,
         }
     }
@@ -121,18 +199,18 @@ impl Scatter for Lobe {
                 let tint = fresnel.reflectance(reflectance, normal.dot(wo));
                 Some(specular(1.0, mirrored(wo, normal), tint, None))
             }
-            Self::Metal { alpha, reflectance, fresnel, compensate } => {
-                let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
-                if !metal.facing() {
-                    return None;
-                }
+            Self::Conductor { alpha, .. } if alpha < SMALLEST_ALPHA => {
+                Some(specular(1.0, mirrored(wo, normal), self.angular_tint(normal.dot(wo)), None))
+            }
+            Self::Metal { .. } | Self::Conductor { .. } => {
+                let metal = self.rough_metal(wo, normal)?;
                 let [wi, local] = metal.sample(u.to_array());
                 // Below the surface: light that a second bounce would have returned.
                 if local.z <= 0.0 {
                     return None;
                 }
                 let found = metal.eval(local);
-                let weight = Vec3::from(found.tint) * found.weight;
+                let weight = Vec3::from(found.tint) * self.angular_tint(found.cos) * found.weight;
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
             }
             Self::RoughGlass { interface, alpha, compensate } => {
@@ -144,6 +222,34 @@ impl Scatter for Lobe {
                     probability: 1.0,
                     through: passes.then_some(interface),
                 })
+            }
+            Self::Plastic(plastic) => plastic.sample(wo, normal, u_choice(), u),
+            Self::Translucent { reflectance, transmittance, here } => {
+                let passes = u_choice() < translucent_side(reflectance, transmittance, true).1;
+                let (color, pmf) = translucent_side(reflectance, transmittance, passes);
+                let local = cosine_hemisphere(u);
+                let side = if passes { -normal } else { normal };
+                (local.z > 0.0 && pmf > 0.0).then(|| BsdfSample {
+                    wi: Frame::around(side).to_world(local),
+                    weight: color / pmf,
+                    pdf: pmf * cosine_hemisphere_pdf(local.z),
+                    probability: 1.0,
+                    through: passes.then(|| Interface::thin(here)),
+                })
+            }
+            Self::ThinGlass { ior, reflectance, transmittance, here } => {
+                let once = fresnel(normal.dot(wo).clamp(0.0, 1.0), 1.0 / ior).0;
+                // R + T² R + T² R³ + …, by light that goes to and fro inside.
+                let all = 2.0 * once / (1.0 + once);
+                let (back, on) = (all * reflectance, (1.0 - all) * transmittance);
+                let pmf = luminance(back) / luminance(back + on);
+                if u_choice() < pmf {
+                    Some(specular(pmf, mirrored(wo, normal), back / pmf, None))
+                } else if pmf < 1.0 {
+                    Some(specular(1.0 - pmf, -wo, on / (1.0 - pmf), Some(Interface::thin(here))))
+                } else {
+                    None
+                }
             }
             Self::Glass(interface) => {
                 let Interface { eta, radiance_eta, .. } = interface;
@@ -171,6 +277,14 @@ impl Fresnel {
     }
 }
 
+/// Colour and probability of one side of a translucent surface.
+#[inline]
+fn translucent_side(reflectance: Vec3, transmittance: Vec3, passes: bool) -> (Vec3, f32) {
+    let color = if passes { transmittance } else { reflectance };
+    let sum = luminance(reflectance + transmittance);
+    (color, if sum > 0.0 { luminance(color) / sum } else { 0.5 })
+}
+
 #[inline]
 fn metal_at(normal: Vec3, wo: Vec3, alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool) -> Metal<f32> {
     let axes = frame_around(normal.into());
@@ -190,8 +304,18 @@ mod tests {
     use crate::sampling::Sampler;
     use crate::shading::surface::blend::{Blend, Part};
 
-    fn metal(alpha: f32, compensate: bool) -> Lobe {
+    fn metal(alpha: f32, compensate: bool) -> Lobe<'static> {
         Lobe::Metal { alpha, reflectance: Vec3::ONE, fresnel: Fresnel::Constant, compensate }
+    }
+
+    /// Gold.
+    fn conductor_of(alpha: f32, compensate: bool) -> Lobe<'static> {
+        let (eta, k) = (Vec3::new(0.143, 0.375, 1.442), Vec3::new(3.983, 2.386, 1.603));
+        Lobe::Conductor { alpha, eta, k, reflectance: Vec3::new(1.0, 0.9, 0.8), compensate }
+    }
+
+    fn leaf(reflectance: Vec3, transmittance: Vec3) -> Lobe<'static> {
+        Lobe::Translucent { reflectance, transmittance, here: MediumId::OUTSIDE }
     }
 
     fn direction(cos: f32) -> Vec3 {
@@ -239,6 +363,12 @@ mod tests {
         let coat = [(Lobe::Diffuse { albedo: Vec3::new(0.8, 0.4, 0.1) }, 0.7), (metal(0.2, false), 0.3)];
         same_mean(0, &Lobe::Diffuse { albedo: Vec3::splat(0.6) });
         same_mean(1, &metal(0.4, false));
+        same_mean(4, &conductor_of(0.3, false));
+        same_mean(5, &conductor_of(0.7, true));
+        let leaf = leaf(Vec3::new(0.1, 0.4, 0.1), Vec3::new(0.3, 0.5, 0.05));
+        same_mean(6, &leaf);
+        let waxed = [(Part::Lobe(leaf), 0.8), (Part::Lobe(metal(0.3, false)), 0.2)];
+        same_mean(7, &Blend::new(&waxed, Vec::new()));
         let coat = coat.map(|(lobe, weight)| (Part::Lobe(lobe), weight));
         same_mean(2, &Blend::new(&coat, Vec::new()));
         same_mean(3, &Blend::new(&coat[..1], Vec::new()));
@@ -247,20 +377,23 @@ mod tests {
     fn same_mean(case: u32, bsdf: &impl Scatter) {
         for cos in [0.9, 0.4, 0.1] {
             let wo = direction(cos);
-            // ∫ f cos · L for a non-uniform L, by uniform directions and by sampling.
-            let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y;
+            // ∫ f cos · L for a non-uniform L over the sphere, by uniform directions and by sampling.
+            let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y + if w.z < 0.0 { 2.0 } else { 0.0 };
             let n = 1 << 16;
             let (mut even, mut sampled, mut pdf_integral) = (Vec3::ZERO, Vec3::ZERO, 0.0);
             for i in 0..n {
                 let sampler = Sampler::new(11, case, 0, i);
                 let u = sampler.pair(0);
                 let (r, phi) = ((1.0 - u.x * u.x).sqrt(), std::f32::consts::TAU * u.y);
-                let wi = Vec3::new(r * phi.cos(), r * phi.sin(), u.x);
-                let (value, pdf) = bsdf.eval(wo, wi, Vec3::Z);
-                even += value * light(wi) * std::f32::consts::TAU;
-                pdf_integral += pdf * std::f32::consts::TAU;
+                for z in [u.x, -u.x] {
+                    let wi = Vec3::new(r * phi.cos(), r * phi.sin(), z);
+                    let (value, pdf) = bsdf.eval(wo, wi, Vec3::Z);
+                    even += value * light(wi) * std::f32::consts::TAU;
+                    pdf_integral += pdf * std::f32::consts::TAU;
+                }
                 if let Some(s) = bsdf.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(1)) {
                     sampled += s.weight * light(s.wi);
+                    assert_eq!(s.through.is_some(), s.wi.z < 0.0, "case {case}, {cos}");
                     let (value, pdf) = bsdf.eval(wo, s.wi, Vec3::Z);
                     assert!((value / pdf - s.weight).length() < 2e-3 * s.weight.length());
                     assert!((pdf - s.pdf).abs() < 2e-3 * pdf);
@@ -275,10 +408,78 @@ mod tests {
     #[test]
     fn reflection_is_reciprocal() {
         let (a, b) = (direction(0.8), Vec3::new(-0.3, 0.5, 0.6).normalize());
-        for lobe in [Lobe::Diffuse { albedo: Vec3::splat(0.6) }, metal(0.3, false)] {
+        let lobes = [
+            Lobe::Diffuse { albedo: Vec3::splat(0.6) },
+            metal(0.3, false),
+            conductor_of(0.3, false),
+            leaf(Vec3::splat(0.3), Vec3::splat(0.6)),
+        ];
+        for lobe in lobes {
             let forth = lobe.eval(a, b, Vec3::Z).0 / b.z;
             let back = lobe.eval(b, a, Vec3::Z).0 / a.z;
             assert!((forth - back).length() < 1e-4 * forth.length());
+        }
+        // Through a leaf, seen from both sides.
+        let leaf = lobes[3];
+        let (forth, back) = (leaf.eval(a, -b, Vec3::Z).0 / b.z, leaf.eval(-b, a, Vec3::Z).0 / a.z);
+        assert!(forth.x > 0.1 && (forth - back).length() < 1e-6, "{forth} {back}");
+    }
+
+    #[test]
+    fn white_conductors_and_leaves_return_all_light() {
+        let white = |alpha, compensate| Lobe::Conductor {
+            alpha,
+            eta: Vec3::ZERO,
+            k: Vec3::ONE,
+            reflectance: Vec3::ONE,
+            compensate,
+        };
+        for cos in [1.0, 0.5, 0.1] {
+            for (lobe, tolerance) in [
+                (white(0.0, false), 1e-5),
+                (white(0.4, true), 1e-3),
+                (white(1.0, true), 1e-3),
+                (leaf(Vec3::splat(0.25), Vec3::splat(0.75)), 1e-4),
+            ] {
+                let found = furnace(&lobe, cos);
+                assert!((found - Vec3::ONE).abs().max_element() < tolerance, "{lobe:?}, cos {cos}: {found}");
+            }
+            assert!(furnace(&white(1.0, false), cos).x < 0.8);
+            assert!(furnace(&conductor_of(0.3, true), cos).max_element() <= 1.0);
+        }
+    }
+
+    #[test]
+    fn a_pane_reflects_twice_r_over_one_plus_r_and_passes_the_rest_straight() {
+        for ior in [1.0f32, 1.33, 1.5, 2.4] {
+            for cos in [1.0, 0.6, 0.2, 1e-3] {
+                let tint = Vec3::new(0.9, 0.5, 0.2);
+                let here = MediumId(4);
+                let pane = Lobe::ThinGlass { ior, reflectance: Vec3::ONE, transmittance: tint, here };
+                // Light between the two sides, summed bounce by bounce.
+                let once = f64::from(fresnel(cos, 1.0 / ior).0);
+                let (mut back, mut on, mut inside) = (once, 0.0, 1.0 - once);
+                for bounce in 0..100_000 {
+                    *(if bounce % 2 == 0 { &mut on } else { &mut back }) += inside * (1.0 - once);
+                    inside *= once;
+                }
+                let (mut reflected, mut passed) = (Vec3::ZERO, Vec3::ZERO);
+                let n = 1000;
+                for i in 0..n {
+                    let u = (i as f32 + 0.5) / n as f32;
+                    let Some(s) = pane.sample(direction(cos), Vec3::Z, || u, Vec2::ZERO) else { continue };
+                    match s.through {
+                        Some(interface) => {
+                            assert_eq!((s.wi, interface), (-direction(cos), Interface::thin(here)));
+                            passed += s.weight / n as f32;
+                        }
+                        None => reflected += s.weight / n as f32,
+                    }
+                }
+                let close = |found: f32, expected: f64| (f64::from(found) - expected).abs() < 3.0 / f64::from(n);
+                assert!(close(reflected.x, back) && close(reflected.z, back), "{ior}, {cos}: {reflected} for {back}");
+                assert!((passed / tint - Vec3::splat(on as f32)).abs().max_element() < 0.02, "{ior}, {cos}: {passed}");
+            }
         }
     }
 

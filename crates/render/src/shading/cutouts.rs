@@ -4,7 +4,8 @@
 //! fractional, the decision is random: it is a hash of the ray and the hit, so that a ray gets the same answer in every
 //! query, and on average the transmitted share of light continues. Scenes without such surfaces have no cost.
 
-use crate::core::material::{Material, MaterialId, ScalarInput};
+use crate::core::material::{MaterialId, ScalarInput};
+use crate::core::material_queries::Cutout;
 use crate::core::texture::TexturePoint;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{hash_combine, hash_u32};
@@ -88,25 +89,23 @@ impl Prepared {
     #[inline]
     fn onwards(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
         let id = material_of(self, hit);
-        if self.tables.cutouts[id as usize] { self.behind_cutout(id, ray, hit) } else { None }
+        self.behind_cutout(self.tables.cutouts[id as usize].as_ref()?, id, ray, hit)
     }
 
-    fn behind_cutout(&self, id: MaterialId, ray: &Ray, hit: &Hit) -> Option<Ray> {
-        let material = &self.shading.materials[id as usize];
-        let Material::Principled { two_sided, opacity, opacity_cutoff, .. } = material else { return None };
+    fn behind_cutout(&self, cutout: &Cutout, id: MaterialId, ray: &Ray, hit: &Hit) -> Option<Ray> {
         let length = ray.dir.length();
         let unit = Ray { dir: ray.dir / length, ..*ray };
         let of_unit = Hit { t: hit.t * length, ..*hit };
         // Most hits are decided by their side: a whole vertex, with its textures, costs several times as much.
         let point = self.geometry.tree.surface_point(&unit, &of_unit);
         let front = (-unit.dir).dot(point.geometric_normal) >= 0.0;
-        if *two_sided || front || material.is_clear() {
-            let opacity = match opacity {
-                ScalarInput::Constant(opacity) => *opacity,
-                ScalarInput::Texture(_) => opacity.eval(self, self.texture_point(id, &unit, &of_unit)),
+        if cutout.has_back || front {
+            let opacity = match cutout.opacity {
+                ScalarInput::Constant(opacity) => opacity,
+                map @ ScalarInput::Texture(_) => map.eval(self, self.texture_point(id, &unit, &of_unit)),
             };
-            let is_there = match opacity_cutoff {
-                Some(cutoff) => opacity >= *cutoff,
+            let is_there = match cutout.cutoff {
+                Some(cutoff) => opacity >= cutoff,
                 None => opacity >= 1.0 || probability(ray, hit) < opacity,
             };
             if is_there {

@@ -24,7 +24,7 @@ const BEND: f32 = 2.0;
 /// Losses by contrast of the indices, root of alpha, cosine.
 pub(crate) static LOSSES: IntegralTable = IntegralTable::new(N_ETA * N_ALPHA * N_COS, |i| {
     let (layer, row, column) = (i / N_COS / N_ALPHA, i / N_COS % N_ALPHA, i % N_COS);
-    integrate(cos_of(column, row), alpha_of(row), eta_of(layer), 24, 16)
+    lost_at(cos_of(column, row), alpha_of(row), eta_of(layer), [24, 16])
 });
 
 /// Cosine-weighted means by contrast of the indices and root of alpha.
@@ -84,12 +84,22 @@ fn eta_of(layer: usize) -> f32 {
     (1.0 + contrast) / (1.0 - contrast)
 }
 
+fn lost_at(cos: f32, alpha: f32, eta: f32, n: [u32; 2]) -> f32 {
+    (1.0 - scattered_once(cos, alpha, eta, n).0).max(0.0) as f32
+}
+
+/// Returns the share of light from one direction that single scattering returns on both sides, and on its own side
+/// alone.
+///
 /// Integrates over all visible normals by the midpoint rule, like [`ggx::single_scattering_albedo`].
-fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32 {
+///
+/// - `cos`, `alpha`, `eta`: as of [`lost`]; `alpha` at least [`SMALLEST_ALPHA`], `cos` above 0.
+/// - `n_radii`, `n_angles`: points along both axes.
+pub(crate) fn scattered_once(cos: f32, alpha: f32, eta: f32, [n_radii, n_angles]: [u32; 2]) -> (f64, f64) {
     let wo = Vector3 { x: (1.0 - cos * cos).max(0.0).sqrt(), y: 0.0, z: cos };
     let standard = Vector3 { x: wo.x * alpha, y: 0.0, z: wo.z }.normalize();
     let lambda_o = ggx::lambda(wo, alpha);
-    let mut kept = 0.0;
+    let (mut kept, mut reflected) = (0.0, 0.0);
     for i in 0..n_radii {
         // 1 − r², by its cube root: much of the loss is at the rim of the disc.
         let rest = 1.0 - (i as f32 + 0.5) / n_radii as f32;
@@ -108,6 +118,7 @@ fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32
             let mut back = 0.0;
             if above.z > 0.0 {
                 back += reflectance * seen / (seen + ggx::lambda(above, alpha));
+                reflected += f64::from(weight * back);
             }
             if below.z < 0.0 && reflectance < 1.0 {
                 let both = ggx::above_and_below(lambda_o, ggx::lambda(below, alpha));
@@ -116,7 +127,8 @@ fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32
             kept += f64::from(weight * back);
         }
     }
-    (1.0 - kept / f64::from(n_radii * n_angles)).max(0.0) as f32
+    let n = f64::from(n_radii * n_angles);
+    (kept / n, reflected / n)
 }
 
 #[cfg(test)]
@@ -128,7 +140,7 @@ mod tests {
         for alpha in [0.02, 0.1, 0.2, 0.33, 0.5, 0.7, 0.9, 1.0] {
             for eta in [1.0 / 2.4, 1.0 / 1.5, 1.0 / 1.33, 0.97, 1.1, 1.33, 1.5, 1.7, 2.4] {
                 for cos in [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0] {
-                    let (table, integral) = (lost(cos, alpha, eta), integrate(cos, alpha, eta, 120, 60));
+                    let (table, integral) = (lost(cos, alpha, eta), lost_at(cos, alpha, eta, [120, 60]));
                     assert!((table - integral).abs() < 0.016, "cos {cos}, α {alpha}, η {eta}: {table} for {integral}");
                 }
             }

@@ -40,6 +40,12 @@ pub(crate) struct Interface {
 }
 
 impl Interface {
+    /// The interface of a surface without thickness, in these media.
+    #[inline]
+    pub fn thin(here: MediumId) -> Self {
+        Self { eta: 1.0, radiance_eta: 1.0, beyond: here }
+    }
+
     /// Returns the interface as seen from the far side, except for `beyond`.
     #[inline]
     pub fn reversed(self) -> Self {

@@ -5,6 +5,9 @@
 //! absorption are functions of position alone, and paths from the camera and from the lights agree on them (nested
 //! dielectrics with priorities, Schmidt and Budge 2002).
 //!
+//! An open surface bounds no body: its side says what is before it and behind it, and a path in other media gets to the
+//! right ones there. A set has at most one open body, the largest; closed ones within it count.
+//!
 //! An interface scales radiance by (n before / n after)², and both indices come from the sets on its two sides, never
 //! from the surface. The factors of a path cancel except for the first and the last index, so no sequence of surfaces,
 //! however they are nested, open or hit in the wrong order, makes radiance / n² grow.
@@ -99,7 +102,13 @@ impl MediumSets {
         leaf: u32,
         others: &[Boundary],
     ) -> Interface {
-        let here = self.ior(from);
+        // What is before an open surface follows from its side alone.
+        let before = if scene.tables.bodies.is_open(boundary.body) {
+            self.crossed(scene, from, Boundary { front: !boundary.front, ..boundary }, leaf)
+        } else {
+            None
+        };
+        let (here, before) = (self.ior(from), self.ior(before.unwrap_or(from)));
         // Bodies are entered before others are left: intermediate media have no thickness.
         let all = || std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
         let mut in_order =
@@ -107,10 +116,10 @@ impl MediumSets {
         let beyond = in_order.try_fold(from, |at, (boundary, leaf)| self.crossed(scene, at, boundary, leaf));
         match beyond {
             Some(beyond) => {
-                let eta = here / self.ior(beyond);
-                Interface { eta, radiance_eta: eta, beyond }
+                let beyond_ior = self.ior(beyond);
+                Interface { eta: before / beyond_ior, radiance_eta: here / beyond_ior, beyond }
             }
-            // An open surface hit from behind, alone or with others: it refracts, but medium and radiance of the path
+            // A closed surface hit from behind, alone or with others: it refracts, but medium and radiance of the path
             // stay the same.
             None => {
                 let iors = scene.tables.bodies.iors(boundary.body + leaf);
@@ -120,7 +129,7 @@ impl MediumSets {
         }
     }
 
-    /// Returns the set after a crossing; `None` if the path leaves a body that it did not enter.
+    /// Returns the set after a crossing; `None` if the path leaves a closed body that it did not enter.
     fn crossed(&mut self, scene: &Prepared, from: MediumId, boundary: Boundary, leaf: u32) -> Option<MediumId> {
         let Boundary { body, front } = boundary;
         let row = if front { body + leaf } else { body };
@@ -128,8 +137,15 @@ impl MediumSets {
             return found;
         }
         let mut rows = self.sets[from.0 as usize / 4].to_vec();
+        let bodies = &scene.tables.bodies;
+        let is_open = bodies.is_open(body);
+        if is_open {
+            rows.retain(|&row| !bodies.is_open(row));
+        }
         let beyond = if front {
             rows.insert(rows.partition_point(|&other| other <= row), row);
+            Some(self.id_of(scene, rows.into()))
+        } else if is_open {
             Some(self.id_of(scene, rows.into()))
         } else {
             let own = row..row + scene.tables.bodies.n_leaves(body);
@@ -199,7 +215,7 @@ mod tests {
             .iter()
             .map(|&(_, ior)| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 })
             .collect();
-        materials.push(Material::Blend { weight: ScalarInput::Constant(0.5), a: 0, b: 1 });
+        materials.push(Material::blend(ScalarInput::Constant(0.5), 0, 1));
         let shapes: Vec<_> =
             radii_and_iors.iter().map(|&(radius, _)| Shape::Sphere { center: Vec3::ZERO, radius }).collect();
         let objects = (0..shapes.len() as u32).map(Object::plain).collect();
@@ -265,6 +281,53 @@ mod tests {
         let inside = pass(&mut sets, &scene, MediumId::OUTSIDE, 0, true).beyond;
         let interface = pass(&mut sets, &scene, inside, 1, false);
         assert_eq!(interface, Interface { eta: 1.3 / 1.5, radiance_eta: 1.0, beyond: inside });
+    }
+
+    #[test]
+    fn the_side_of_an_open_surface_says_what_is_before_and_behind_it() {
+        let sheet =
+            |y: f32| Shape::Quad { corner: Vec3::new(-5.0, y, -5.0), edge_u: 10.0 * Vec3::Z, edge_v: 10.0 * Vec3::X };
+        let glass = |ior| Material::Glass { ior, absorption: Vec3::ZERO, dispersion: 0.0 };
+        let ball = Shape::Sphere { center: Vec3::ZERO, radius: 1.0 };
+        let materials = vec![glass(1.5), glass(1.5), glass(1.2)];
+        let scene = of(vec![sheet(0.0), sheet(-3.0), ball], (0..3).map(Object::plain).collect(), materials);
+        let mut sets = MediumSets::default();
+        let outside = sets.start(&scene, &[]);
+        let entered = pass(&mut sets, &scene, outside, 0, true);
+        assert_eq!((entered.eta, entered.radiance_eta), (1.0 / 1.5, 1.0 / 1.5));
+        // Left by another sheet: water need not be of one piece.
+        let left = pass(&mut sets, &scene, entered.beyond, 1, false);
+        assert_eq!(left, Interface { eta: 1.5, radiance_eta: 1.5, beyond: outside });
+        // From behind without having entered it, and again from before: bent, but no brighter or darker than it is.
+        let behind = pass(&mut sets, &scene, outside, 0, false);
+        assert_eq!(behind, Interface { eta: 1.5, radiance_eta: 1.0, beyond: outside });
+        let again = pass(&mut sets, &scene, entered.beyond, 1, true);
+        assert_eq!((again.eta, again.radiance_eta, sets.ior(again.beyond)), (1.0 / 1.5, 1.0, 1.5));
+        assert_eq!(pass(&mut sets, &scene, again.beyond, 0, false).beyond, outside);
+        // A body in the water counts, and the surface of the water within it does not.
+        let ball = pass(&mut sets, &scene, entered.beyond, 2, true);
+        assert_eq!((ball.eta, sets.ior(ball.beyond)), (1.5 / 1.2, 1.2));
+        let out_of_water = pass(&mut sets, &scene, ball.beyond, 0, false);
+        assert_eq!((out_of_water.eta, sets.ior(out_of_water.beyond)), (1.0, 1.2));
+        assert_eq!(pass(&mut sets, &scene, out_of_water.beyond, 2, false).beyond, outside);
+    }
+
+    #[test]
+    fn cracks_leave_a_body_closed_and_large_holes_do_not() {
+        let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
+        let is_open = |keep: &dyn Fn(Vec3) -> bool| {
+            let mut mesh = firstlight_mesh::procedural::icosphere(6).flat();
+            let middle = |triangle: &[u32; 3]| triangle.iter().map(|&i| mesh.positions[i as usize]).sum::<Vec3>() / 3.0;
+            let kept: Vec<_> = mesh.triangles.iter().copied().filter(|triangle| keep(middle(triangle))).collect();
+            mesh.triangles = kept;
+            let build = firstlight_kdtree::BuildPreset::Quick;
+            let tree = firstlight_kdtree::MeshTree::build(&mesh.positions, &mesh.triangles, build).into();
+            let object = Object { mesh: Some(mesh.into()), ..Object::plain(0) };
+            let shape = Shape::Mesh { tree, world_from_object: glam::Affine3A::IDENTITY };
+            of(vec![shape], vec![object], vec![glass.clone()]).tables.bodies.is_open(0)
+        };
+        assert!(!is_open(&|_| true) && !is_open(&|p| p.y < 0.9) && !is_open(&|p| p.x.abs() > 0.05));
+        assert!(is_open(&|p| p.y < 0.3) && is_open(&|p| p.y > 0.5));
     }
 
     #[test]

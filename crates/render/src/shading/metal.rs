@@ -19,7 +19,7 @@ pub(crate) struct Metal<R: Real> {
     wo: Vector3<R>,
     lambda_o: R,
     /// Factor that adds further bounces between microfacets, see [`with_further_bounces`]; 1 without compensation.
-    gain: Vector3<R>,
+    pub gain: Vector3<R>,
 }
 
 /// BSDF value for one direction.
@@ -31,6 +31,8 @@ pub(crate) struct MetalValue<R> {
     pub pdf: R,
     /// f · cos / pdf divided by the tint.
     pub weight: R,
+    /// Cosine with the microfacets that reflect this way.
+    pub cos: R,
 }
 
 impl<R: Real> Metal<R> {
@@ -75,8 +77,9 @@ impl<R: Real> Metal<R> {
     #[inline(always)]
     pub fn eval(&self, wi: Vector3<R>) -> MetalValue<R> {
         let found = ggx::reflection(self.wo, self.lambda_o, wi, self.alpha);
-        let tint = tint(self.schlick, self.reflectance, self.wo.dot(found.half));
-        MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight }
+        let cos = self.wo.dot(found.half);
+        let tint = tint(self.schlick, self.reflectance, cos);
+        MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight, cos }
     }
 }
 

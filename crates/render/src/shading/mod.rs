@@ -2,6 +2,8 @@
 
 pub(crate) mod anisotropic_albedo;
 pub(crate) mod bsdf;
+pub(crate) mod coat;
+pub(crate) mod conductor;
 pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
@@ -17,6 +19,7 @@ pub(crate) mod medium;
 pub(crate) mod metal;
 pub(crate) mod mis_state;
 pub(crate) mod paths;
+pub(crate) mod plastic;
 pub(crate) mod precomputed;
 pub(crate) mod principled;
 pub(crate) mod rough_glass;

@@ -1,12 +1,14 @@
-//! Which tables of integrals materials need.
+//! Which tables of integrals the materials of a scene need.
 
 use crate::core::material::{ColorInput, Material, ScalarInput};
-use crate::shading::{anisotropic_albedo, ggx, glass_loss, layer_albedo};
+use crate::prepare::prepared::Prepared;
+use crate::shading::{anisotropic_albedo, coat, ggx, glass_loss, layer_albedo};
 use glam::Vec3;
 
-/// Computes the tables that materials need, on all threads.
-pub(crate) fn compute_for(materials: &[Material]) {
-    for material in materials {
+/// Computes the tables that its materials need, on all threads.
+pub(crate) fn compute_for(scene: &Prepared) {
+    coat::compute(scene);
+    for material in &scene.shading.materials {
         match material {
             Material::Principled { anisotropy, sheen_color, .. } => {
                 ggx::ALBEDOS.compute();
@@ -21,7 +23,9 @@ pub(crate) fn compute_for(materials: &[Material]) {
                     glass_loss::LOSSES.compute();
                 }
             }
-            Material::Metal { compensate: true, .. } => ggx::ALBEDOS.compute(),
+            Material::Metal { compensate: true, .. } | Material::Conductor { compensate: true, .. } => {
+                ggx::ALBEDOS.compute();
+            }
             Material::RoughGlass { compensate: true, .. } => glass_loss::LOSSES.compute(),
             _ => {}
         }

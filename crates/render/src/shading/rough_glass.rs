@@ -267,11 +267,11 @@ mod tests {
         Interface { eta, radiance_eta: eta, beyond: MediumId::OUTSIDE }
     }
 
-    fn lobe(alpha: f32, eta: f32) -> Lobe {
+    fn lobe(alpha: f32, eta: f32) -> Lobe<'static> {
         Lobe::RoughGlass { interface: interface(eta), alpha, compensate: false }
     }
 
-    fn whole_lobe(alpha: f32, eta: f32) -> Lobe {
+    fn whole_lobe(alpha: f32, eta: f32) -> Lobe<'static> {
         Lobe::RoughGlass { interface: interface(eta), alpha, compensate: true }
     }
 

@@ -19,7 +19,7 @@ pub(crate) trait Scatter {
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
 
     /// The interface that light from behind `normal` passes, if [`Self::eval`] includes such light. In blends only
-    /// sampling finds it, as if it were specular: each part leads into a different medium.
+    /// sampling finds light from other media, as if it were specular: each part leads into a different one.
     fn through(&self) -> Option<Interface>;
 
     /// Samples a direction; `None` if the sample carries no light.

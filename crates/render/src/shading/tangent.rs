@@ -14,34 +14,43 @@ pub(crate) struct Tangent {
     pub along_u: Vec3,
     /// 1 if `normal × along_u` is the direction of v for the normal of the front, otherwise -1.
     pub handedness: f32,
+    /// Gradients of u and of v over the surface, per metre; zero if not needed.
+    pub gradients: [Vec3; 2],
 }
 
 impl Tangent {
     pub fn new(along_u: Vec3, handedness: f32) -> Self {
-        Self { along_u, handedness }
+        Self { along_u, handedness, gradients: [Vec3::ZERO; 2] }
+    }
+
+    /// Tangent of a surface by the derivatives of its points by u and v.
+    pub fn of_derivatives(by_u: Vec3, by_v: Vec3) -> Self {
+        Self { gradients: gradients([by_u, by_v], [Vec2::X, Vec2::Y]), ..Self::new(by_u, 1.0) }
     }
 
     /// Tangent of a triangle of a mesh: that of its vertices, or derived from its texture coordinates.
     ///
     /// - `weights`: barycentric; `normal`: of the front, unit.
     pub fn of_mesh(mesh: &Mesh, triangle: [usize; 3], weights: Vec3, map: &Affine3A, normal: Vec3) -> Self {
+        let uv = |k: usize| mesh.uvs.get(triangle[k]).copied().unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y][k]);
+        let [p, q] = [1, 2].map(|k| map.transform_vector3(mesh.positions[triangle[k]] - mesh.positions[triangle[0]]));
+        let [a, b] = [1, 2].map(|k| uv(k) - uv(0));
+        let gradients = gradients([p, q], [a, b]);
         let mirrored = if map.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
         if !mesh.tangents.is_empty() {
             let [a, b, c] = triangle.map(|i| mesh.tangents[i]);
             let along = weights.x * a.truncate() + weights.y * b.truncate() + weights.z * c.truncate();
-            return Self::new(map.transform_vector3(along), mirrored * a.w);
+            return Self { gradients, ..Self::new(map.transform_vector3(along), mirrored * a.w) };
         }
-        let uv = |k: usize| mesh.uvs.get(triangle[k]).copied().unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y][k]);
-        let [p, q] = [1, 2].map(|k| map.transform_vector3(mesh.positions[triangle[k]] - mesh.positions[triangle[0]]));
-        let [a, b] = [1, 2].map(|k| uv(k) - uv(0));
         let area = a.perp_dot(b);
         if area == 0.0 || !area.is_finite() {
-            return Self::new(p, 1.0);
+            return Self { gradients, ..Self::new(p, 1.0) };
         }
         // Derivatives of the position by u and by v, up to a positive factor.
         let along_u = (b.y * p - a.y * q) * area.signum();
         let along_v = (a.x * q - b.x * p) * area.signum();
-        Self::new(along_u, if normal.cross(along_u).dot(along_v) < 0.0 { -1.0 } else { 1.0 })
+        let handedness = if normal.cross(along_u).dot(along_v) < 0.0 { -1.0 } else { 1.0 };
+        Self { gradients, ..Self::new(along_u, handedness) }
     }
 
     /// Returns a direction in the surface, unit.
@@ -69,6 +78,28 @@ pub(crate) fn normal_of_map(coded: Vec3, scale: f32, tangent: &Tangent, front: V
     (local.x * x + local.y * y + local.z * front).normalize_or(front)
 }
 
+/// Returns the normal of a surface with heights above it, unit: that of the points moved along their normals (Blinn
+/// 1978, "Simulation of Wrinkled Surfaces").
+///
+/// - `slope`: derivatives of the height by u and v, metres; `front`: normal of the front, unit.
+pub(crate) fn normal_of_relief(slope: Vec2, tangent: &Tangent, front: Vec3) -> Vec3 {
+    let gradient = slope.x * tangent.gradients[0] + slope.y * tangent.gradients[1];
+    (front - (gradient - front.dot(gradient) * front)).normalize_or(front)
+}
+
+/// Gradients of u and of v over a plane, per metre.
+///
+/// - `edges`: two vectors in the plane, metres; `changes`: of u and v along each.
+fn gradients([p, q]: [Vec3; 2], [a, b]: [Vec2; 2]) -> [Vec3; 2] {
+    let normal = p.cross(q);
+    let [across_p, across_q] = [p, q].map(|edge| edge.cross(normal) / normal.length_squared());
+    let of = |along_p: f32, along_q: f32| {
+        let gradient = along_p * across_q - along_q * across_p;
+        if gradient.is_finite() { gradient } else { Vec3::ZERO }
+    };
+    [of(a.x, b.x), of(a.y, b.y)]
+}
+
 /// Returns the normal closest to `normal`, in the plane of it and `wo`, for which the mirrored `wo` is not below
 /// `surface`.
 ///
@@ -90,6 +121,22 @@ pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::{Sampler, cosine_hemisphere};
+
+    /// The height u²/10 + v/5 over a skewed plane, against the normal of its points.
+    #[test]
+    fn a_relief_has_the_normal_of_its_points() {
+        let (by_u, by_v) = (Vec3::new(2.0, 0.3, 0.0), Vec3::new(-0.5, 0.7, 0.0));
+        let height = |u: f32, v: f32| 0.1 * u * u + 0.2 * v;
+        let point = |u: f32, v: f32| u * by_u + v * by_v + height(u, v) * Vec3::Z;
+        for (u, v) in [(0.0, 0.0), (1.0, 0.5), (-2.0, 3.0)] {
+            let step = 1e-2;
+            let across = point(u + step, v) - point(u - step, v);
+            let expected = across.cross(point(u, v + step) - point(u, v - step)).normalize();
+            let tangent = Tangent::of_derivatives(by_u, by_v);
+            let found = normal_of_relief(Vec2::new(0.2 * u, 0.2), &tangent, Vec3::Z);
+            assert!((found - expected).length() < 1e-4, "{u}, {v}: {found} for {expected}");
+        }
+    }
 
     /// For any normal and view direction, the mirrored ray leaves the surface, and normals that need no bending are
     /// unchanged.

@@ -1,6 +1,6 @@
 //! From a hit to a surface interaction.
 
-use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
+use crate::core::material::{ColorInput, MaterialId, ScalarInput};
 use crate::core::material_queries::Emission;
 use crate::core::texture::TexturePoint;
 use crate::prepare::light::shape::sphere_uv;
@@ -12,6 +12,7 @@ use firstlight_kdtree::{Hit, Shape};
 use firstlight_mesh::Mesh;
 use firstlight_simd::{Real, Vector3, three};
 use glam::{Vec2, Vec3, Vec4};
+use std::f32::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 
 /// A surface point seen along a ray.
@@ -28,7 +29,7 @@ pub(crate) struct Vertex {
     pub smooth_normal: Vec3,
     /// `smooth_normal` before normal mapping.
     pub interpolated: Vec3,
-    /// Set for materials that need it, see [`Material::asks_for_tangents`].
+    /// Set for materials that need it, see [`Material::asks_for_tangents`](crate::core::material::Material::asks_for_tangents).
     pub tangent: Tangent,
     /// Texture coordinates; on spheres only for textured materials.
     pub texture_point: TexturePoint,
@@ -87,27 +88,38 @@ impl Vertex {
                 let frame = Frame::around(*normal);
                 let local = point.position - *origin;
                 texture_point = Vec2::new(local.dot(frame.x), local.dot(frame.y)).into();
-                tangent = Tangent::new(frame.x, 1.0);
+                if asks_for_tangent {
+                    tangent = Tangent::of_derivatives(frame.x, frame.y);
+                }
             }
             // Longitude and latitude cost as much as everything else.
             Shape::Sphere { .. } | Shape::Spheres { .. }
                 if !scene.tables.textured[material as usize] && !asks_for_tangent => {}
-            Shape::Sphere { .. } => {
+            Shape::Sphere { radius, .. } => {
                 let turned = geometry.objects[hit.object as usize].turned;
                 let outwards = turned.map_or(point.geometric_normal, |map| map * point.geometric_normal);
                 texture_point = sphere_uv(outwards).into();
-                let east = tangent_of_sphere(outwards);
-                tangent = Tangent::new(turned.map_or(east, |map| map.transpose() * east), 1.0);
+                tangent = tangent_of_sphere(outwards, *radius, |v| turned.map_or(v, |map| map.transpose() * v));
             }
-            Shape::Spheres { world_from_object, .. } => {
+            Shape::Spheres { tree, world_from_object } => {
                 // Spheres are scaled uniformly, so the transpose is the inverse up to a factor.
                 let m = world_from_object.matrix3;
                 let outwards = (m.transpose() * point.geometric_normal).normalize();
                 texture_point = sphere_uv(outwards).into();
-                tangent = Tangent::new((m * tangent_of_sphere(outwards)).normalize(), 1.0);
+                let (_, radius) = tree.sphere(hit.prim);
+                tangent = tangent_of_sphere(outwards, radius, |v| m * v);
+                tangent.along_u = tangent.along_u.normalize();
             }
-            Shape::Quad { edge_u, .. } => tangent = Tangent::new(*edge_u, 1.0),
-            Shape::Triangle { vertices: [a, b, _] } => tangent = Tangent::new(*b - *a, 1.0),
+            Shape::Quad { edge_u, edge_v, .. } => {
+                if asks_for_tangent {
+                    tangent = Tangent::of_derivatives(*edge_u, *edge_v);
+                }
+            }
+            Shape::Triangle { vertices: [a, b, c] } => {
+                if asks_for_tangent {
+                    tangent = Tangent::of_derivatives(*b - *a, *c - *a);
+                }
+            }
         }
         let (position, error) = (point.position, point.error);
         let normal = geometric_normal;
@@ -124,11 +136,8 @@ impl Vertex {
             wo,
             lift,
         };
-        if asks_for_tangent
-            && let Material::Principled { normal_map, normal_scale, .. } = &scene.shading.materials[material as usize]
-            && normal_map.is_normal_map()
-        {
-            vertex.smooth_normal = vertex.turned(scene, *normal_map, *normal_scale);
+        if asks_for_tangent && let Some((map, scale)) = scene.shading.materials[material as usize].normal_map() {
+            vertex.smooth_normal = vertex.turned(scene, map, scale);
         }
         vertex.seen_along(wo)
     }
@@ -137,6 +146,12 @@ impl Vertex {
     #[inline]
     pub fn emitted(&self, scene: &Prepared, emission: &Emission) -> Vec3 {
         emission.scale * emission.radiance.eval(scene, TexturePoint { color: Vec4::ONE, ..self.texture_point })
+    }
+
+    /// Weight of the second part of a blend, 0..1.
+    #[inline]
+    pub fn share_of_second(&self, scene: &Prepared, weight: ScalarInput, by_side: bool) -> f32 {
+        if by_side { f32::from(!self.front) } else { weight.eval(scene, self.texture_point).clamp(0.0, 1.0) }
     }
 
     /// Returns the same point seen from another direction on the same side.
@@ -166,6 +181,11 @@ impl Vertex {
     /// Returns the normal of a map on the side of the viewer, not bent.
     fn turned(&self, scene: &Prepared, map: ColorInput, scale: f32) -> Vec3 {
         let side = if self.front { 1.0 } else { -1.0 };
+        if let ColorInput::Texture(id) = map
+            && let Some(slope) = scene.shading.textures[id as usize].slope(&self.texture_point)
+        {
+            return side * tangent::normal_of_relief(scale * slope, &self.tangent, side * self.interpolated);
+        }
         let coded = map.eval(scene, self.texture_point);
         side * tangent::normal_of_map(coded, scale, &self.tangent, side * self.interpolated)
     }
@@ -272,9 +292,14 @@ where
     weights.x * a + weights.y * b + weights.z * c
 }
 
-/// Direction along the circle of latitude, unit.
-fn tangent_of_sphere(outwards: Vec3) -> Vec3 {
-    Vec3::Y.cross(outwards).normalize_or(Vec3::X)
+/// Tangent of a sphere by longitude and latitude.
+///
+/// - `outwards`: unit, in its own space, from which `to_world` leads; `radius`: before that, metres.
+fn tangent_of_sphere(outwards: Vec3, radius: f32, to_world: impl Fn(Vec3) -> Vec3) -> Tangent {
+    let across = Vec3::Y.cross(outwards);
+    let east = across.normalize_or(Vec3::X);
+    let (by_u, by_v) = (TAU * radius * across, PI * radius * outwards.cross(east));
+    Tangent { along_u: to_world(east), ..Tangent::of_derivatives(to_world(by_u), to_world(by_v)) }
 }
 
 /// Returns the material of a hit.
@@ -307,6 +332,7 @@ impl ScalarInput {
 mod tests {
     use super::*;
     use crate::core::environment::Environment;
+    use crate::core::material::Material;
     use crate::core::snapshot::Object;
     use crate::test_scene::prepared;
     use firstlight_kdtree::{BuildPreset, MeshTree};

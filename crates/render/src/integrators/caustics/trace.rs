@@ -90,9 +90,9 @@ pub(crate) struct LightWave {
 }
 
 /// The BSDF of a surface: a lobe or a blend.
-enum LightPathSurface {
-    Lobe(Lobe),
-    Blend(Box<Blend>),
+enum LightPathSurface<'a> {
+    Lobe(Lobe<'a>),
+    Blend(Box<Blend<'a>>),
 }
 
 impl LightWave {
@@ -317,13 +317,13 @@ fn first_dimension(n_vertices: u32) -> u32 {
 }
 
 /// Returns `None` if the surface is black. Where light is dispersed, the path is limited to one channel.
-fn surface_at(
-    pass: &CausticPass,
+fn surface_at<'a>(
+    pass: &CausticPass<'a>,
     sets: &mut MediumSets,
     ray: &Ray,
     hit: &Hit,
     path: &mut LightPath,
-) -> Option<(Vertex, MaterialId, LightPathSurface)> {
+) -> Option<(Vertex, MaterialId, LightPathSurface<'a>)> {
     let scene = pass.scene;
     let material = material_of(scene, hit);
     let vertex = Vertex::new(scene, ray, hit, material);
@@ -500,7 +500,7 @@ impl LightPathStep<'_> {
     }
 }
 
-impl LightPathSurface {
+impl LightPathSurface<'_> {
     fn has_non_specular(&self) -> bool {
         match self {
             Self::Lobe(lobe) => lobe.has_non_specular(),

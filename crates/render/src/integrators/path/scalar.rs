@@ -110,15 +110,15 @@ impl PathWave {
     }
 
     /// Adds the emission of a hit; returns how it scatters, unless the path ends there.
-    fn surface_at(
+    fn surface_at<'a>(
         &mut self,
-        scene: &Prepared,
+        scene: &'a Prepared,
         depth: u32,
         settings: &RenderSettings,
         caustics: Option<&CausticPass>,
         i: usize,
         radiance: &mut [Vec3],
-    ) -> Option<PathSurface> {
+    ) -> Option<PathSurface<'a>> {
         let techniques = &settings.techniques;
         let mut path = self.paths.get(i);
         let ray = self.paths.rays.get(i);
@@ -352,22 +352,22 @@ impl PathStep<'_> {
 }
 
 /// A hit that scatters.
-struct PathSurface {
+struct PathSurface<'a> {
     path: Path,
     vertex: Vertex,
     hit: Hit,
     material: MaterialId,
-    bsdf: Bsdf,
+    bsdf: Bsdf<'a>,
 }
 
 /// How a surface scatters.
-enum Bsdf {
-    Lobe(Lobe),
-    Blend(Blend),
+enum Bsdf<'a> {
+    Lobe(Lobe<'a>),
+    Blend(Blend<'a>),
     Layers(Principled),
 }
 
-impl PathSurface {
+impl PathSurface<'_> {
     /// The side for light sampling, see [`lit_side`]; `None` where all scattering is specular.
     fn lit_side(&self) -> Option<Vec3> {
         fn side(vertex: &Vertex, bsdf: &impl Scatter) -> Option<Vec3> {

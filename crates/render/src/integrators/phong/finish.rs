@@ -3,8 +3,9 @@
 use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::integrators::phong::lobe::lobe_pdf;
 use crate::prepare::prepared::Prepared;
+use crate::shading::conductor::conductor;
 use crate::shading::dielectric::fresnel;
-use crate::shading::interface::Interface;
+use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lights::power_heuristic;
 use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
@@ -69,8 +70,8 @@ impl Finish {
             Shiny::Pane { share, interface: sides.interface(scene, leaf) }
         };
         match material {
-            Material::Blend { weight: share, a, b } => {
-                let share = share.eval(scene, uv).clamp(0.0, 1.0);
+            Material::Blend { weight: share, a, b, by_side, .. } => {
+                let share = vertex.share_of_second(scene, *share, *by_side);
                 self.add(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share));
                 self.add(scene, *b, vertex, sides, n_leaves, weight * share);
             }
@@ -81,14 +82,17 @@ impl Finish {
             }
             Material::Metal { alpha, reflectance, fresnel, .. } => {
                 let tint = weight * fresnel.reflectance(reflectance.eval(scene, uv), vertex.normal.dot(vertex.wo));
-                let alpha = alpha.eval(scene, uv).clamp(0.0, 1.0);
-                self.push(if alpha < SMALLEST_ALPHA {
-                    Shiny::Mirror { tint }
-                } else {
-                    // The lobe about the mirrored direction has four times the solid angle of that of the half vector,
-                    // whose exponent is 2 / α² − 2 (Walter et al. 2007, section 5).
-                    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
-                });
+                self.push(glossy(tint, alpha.eval(scene, uv).clamp(0.0, 1.0)));
+            }
+            Material::Conductor { alpha, eta, k, reflectance, .. } => {
+                let cos = vertex.normal.dot(vertex.wo);
+                let tint = weight * reflectance.eval(scene, uv) * conductor(cos.clamp(0.0, 1.0), *eta, *k);
+                self.push(glossy(tint, alpha.eval(scene, uv).clamp(0.0, 1.0)));
+            }
+            // The light between the two sides is left out.
+            Material::ThinGlass { .. } => {
+                let interface = Interface::thin(sides.as_ref().map_or(MediumId::OUTSIDE, |sides| sides.here));
+                self.push(Shiny::Pane { share: weight, interface });
             }
             Material::Glass { .. } | Material::RoughGlass { .. } => {
                 self.push(pane(weight));
@@ -128,11 +132,7 @@ impl Finish {
                 let tint: Vec3 = opaque * Fresnel::Schlick.reflectance(facing, cos)
                     + metallic * Fresnel::Schlick.reflectance(color, cos);
                 let tint = weight * tint;
-                self.push(if alpha < SMALLEST_ALPHA {
-                    Shiny::Mirror { tint }
-                } else {
-                    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
-                });
+                self.push(glossy(tint, alpha));
                 let diffuse = weight * opaque * (Vec3::ONE - facing) * color;
                 self.diffuse += diffuse;
                 self.ambient += diffuse;
@@ -187,6 +187,16 @@ impl Finish {
     }
 }
 
+/// The reflection of GGX microfacets.
+fn glossy(tint: Vec3, alpha: f32) -> Shiny {
+    if alpha < SMALLEST_ALPHA {
+        return Shiny::Mirror { tint };
+    }
+    // The lobe about the mirrored direction has four times the solid angle of that of the half vector, whose exponent is
+    // 2 / α² − 2 (Walter et al. 2007, section 5).
+    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
+}
+
 /// Returns the share of light that passes straight through a surface, for shadows without refraction, and the interface
 /// of its first transparent part; `None` if there is none.
 pub(crate) fn straight_through(
@@ -212,8 +222,8 @@ impl Passage {
         let leaf = self.n_leaves;
         self.n_leaves += u32::from(material.is_clear());
         let share = match material {
-            Material::Blend { weight: share, a, b } => {
-                let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
+            Material::Blend { weight: share, a, b, by_side, .. } => {
+                let share = vertex.share_of_second(scene, *share, *by_side);
                 self.add(scene, *a, vertex, sides, weight * (1.0 - share));
                 self.add(scene, *b, vertex, sides, weight * share);
                 return;

@@ -65,7 +65,7 @@ impl Transmission {
     pub fn interface(&self) -> Interface {
         match self.inside {
             Inside::Solid(interface) => interface,
-            Inside::Thin(here) => Interface { eta: 1.0, radiance_eta: 1.0, beyond: here },
+            Inside::Thin(here) => Interface::thin(here),
         }
     }
 }

@@ -6,6 +6,7 @@
 use crate::core::material::{Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::principled::at::principled_at;
+use crate::shading::surface::lobe_at;
 use crate::shading::vertex::Vertex;
 use glam::Vec3;
 
@@ -35,9 +36,9 @@ fn albedo_of_part(scene: &Prepared, vertex: &Vertex, id: MaterialId, depth: u32)
     match &scene.shading.materials[id as usize] {
         Material::Emissive { .. } => Vec3::ZERO,
         Material::Blend { .. } if depth > DEEPEST_BLEND => Vec3::ZERO,
-        Material::Blend { weight, a, b } => {
+        Material::Blend { weight, a, b, by_side, .. } => {
             let part = |id| albedo_of_part(scene, vertex, id, depth + 1);
-            part(*a).lerp(part(*b), weight.eval(scene, point).clamp(0.0, 1.0))
+            part(*a).lerp(part(*b), vertex.share_of_second(scene, *weight, *by_side))
         }
         Material::Phong { diffuse, specular, transparency, .. } => {
             let opaque = diffuse.eval(scene, point).lerp(Vec3::ONE, specular.eval(scene, point).clamp(0.0, 1.0));
@@ -52,6 +53,6 @@ fn albedo_of_part(scene: &Prepared, vertex: &Vertex, id: MaterialId, depth: u32)
                 + layers.metallic * layers.metal
                 + transmitted
         }
-        plain => plain.color().map_or(Vec3::ONE, |color| color.eval(scene, point)),
+        _ => lobe_at(scene, id, vertex, None).map_or(Vec3::ZERO, |lobe| lobe.albedo()),
     }
 }

@@ -9,33 +9,33 @@ use glam::{Vec2, Vec3};
 
 /// A blend; the weights of its parts sum to at most 1.
 #[derive(Clone, Debug)]
-pub(crate) struct Blend {
-    parts: [WeightedPart; MAX_LOBES],
+pub(crate) struct Blend<'a> {
+    parts: [WeightedPart<'a>; MAX_LOBES],
     n: usize,
     layers: Vec<Principled>,
 }
 
 /// A part of a blend.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Part {
-    Lobe(Lobe),
+pub(crate) enum Part<'a> {
+    Lobe(Lobe<'a>),
     /// A layered surface, by its index in the blend's `layers`.
     Layers(u8),
 }
 
 #[derive(Clone, Copy, Debug)]
-struct WeightedPart {
-    part: Part,
+struct WeightedPart<'a> {
+    part: Part<'a>,
     weight: f32,
     /// Probability of being sampled.
     pmf: f32,
 }
 
-impl Blend {
+impl<'a> Blend<'a> {
     /// Creates a blend from parts and their weights; at least one, at most [`MAX_LOBES`].
     ///
     /// - `layers`: the surfaces that [`Part::Layers`] refers to.
-    pub fn new(parts: &[(Part, f32)], layers: Vec<Principled>) -> Self {
+    pub fn new(parts: &[(Part<'a>, f32)], layers: Vec<Principled>) -> Self {
         let nothing = WeightedPart { part: parts[0].0, weight: 0.0, pmf: 0.0 };
         let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers };
         // Sampled in proportion to their reflected light; uniformly if all are black.
@@ -57,12 +57,17 @@ impl Blend {
         blend
     }
 
-    fn parts(&self) -> &[WeightedPart] {
+    fn parts(&self) -> &[WeightedPart<'a>] {
         &self.parts[..self.n]
     }
 }
 
-impl Part {
+impl Part<'_> {
+    /// See [`Lobe::is_thin`].
+    fn is_thin(self) -> bool {
+        matches!(self, Self::Lobe(lobe) if lobe.is_thin())
+    }
+
     fn has_non_specular(self, layers: &[Principled]) -> bool {
         match self {
             Self::Lobe(lobe) => lobe.has_non_specular(),
@@ -92,7 +97,7 @@ impl Part {
     }
 }
 
-impl Scatter for Blend {
+impl Scatter for Blend<'_> {
     fn has_non_specular(&self) -> bool {
         self.parts().iter().any(|p| p.part.has_non_specular(&self.layers))
     }
@@ -100,7 +105,8 @@ impl Scatter for Blend {
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let mut sum = (Vec3::ZERO, 0.0);
         for p in self.parts().iter().filter(|p| p.part.has_non_specular(&self.layers)) {
-            if p.part.through(&self.layers).is_some() && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
+            let leads_elsewhere = p.part.through(&self.layers).is_some() && !p.part.is_thin();
+            if leads_elsewhere && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
                 continue;
             }
             let (value, pdf) = p.part.eval(&self.layers, wo, wi, normal);
@@ -111,7 +117,7 @@ impl Scatter for Blend {
     }
 
     fn through(&self) -> Option<Interface> {
-        None
+        self.parts().iter().find(|p| p.part.is_thin()).and_then(|p| p.part.through(&self.layers))
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
@@ -130,7 +136,7 @@ impl Scatter for Blend {
         let p = &parts[chosen];
         let fresh = (rest / p.pmf).clamp(0.0, 1.0f32.next_down());
         let mut sample = p.part.sample(&self.layers, wo, normal, fresh, u)?;
-        if sample.pdf.is_finite() && sample.through.is_none() {
+        if sample.pdf.is_finite() && (sample.through.is_none() || p.part.is_thin()) {
             // All non-specular parts could have sampled this direction: one-sample estimate over their mixture.
             let (value, pdf) = self.eval(wo, sample.wi, normal);
             sample.weight = value / pdf;

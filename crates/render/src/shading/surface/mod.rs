@@ -6,6 +6,9 @@ pub(crate) mod blend;
 use crate::core::material::{MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
+use crate::shading::coat::Coat;
+use crate::shading::interface::MediumId;
+use crate::shading::plastic::Plastic;
 use crate::shading::principled::at::principled_at;
 use crate::shading::principled::layers::Principled;
 use crate::shading::rough_glass;
@@ -17,26 +20,26 @@ use glam::{Vec2, Vec3};
 /// Returns the lobes of a blend at a vertex; `None` if all of it is black.
 ///
 /// - `sides`: required by transparent parts; without it they may be distinguished from others, but not sampled.
-pub(crate) fn blend_at(
-    scene: &Prepared,
+pub(crate) fn blend_at<'a>(
+    scene: &'a Prepared,
     id: MaterialId,
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
-) -> Option<Blend> {
+) -> Option<Blend<'a>> {
     let mut parts = BlendParts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
     collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
     (parts.n > 0).then(|| Blend::new(&parts.parts[..parts.n], parts.layers))
 }
 
 /// The parts of a blend so far, with their weights.
-struct BlendParts {
-    parts: [(Part, f32); MAX_LOBES],
+struct BlendParts<'a> {
+    parts: [(Part<'a>, f32); MAX_LOBES],
     n: usize,
     layers: Vec<Principled>,
 }
 
-impl BlendParts {
-    fn push(&mut self, lobe: Lobe, weight: f32) {
+impl<'a> BlendParts<'a> {
+    fn push(&mut self, lobe: Lobe<'a>, weight: f32) {
         self.push_part(Part::Lobe(lobe), weight);
     }
 
@@ -45,28 +48,28 @@ impl BlendParts {
         self.layers.push(layers);
     }
 
-    fn push_part(&mut self, part: Part, weight: f32) {
+    fn push_part(&mut self, part: Part<'a>, weight: f32) {
         self.parts[self.n] = (part, weight);
         self.n += 1;
     }
 }
 
 /// - `n_leaves`: number of transparent parts so far, of any weight: counted like in [`crate::prepare::bodies::Bodies`].
-fn collect(
-    scene: &Prepared,
+fn collect<'a>(
+    scene: &'a Prepared,
     id: MaterialId,
     vertex: &Vertex,
     sides: &mut Option<&mut Sides>,
     n_leaves: &mut u32,
     weight: f32,
-    parts: &mut BlendParts,
+    parts: &mut BlendParts<'a>,
 ) {
     let material = &scene.shading.materials[id as usize];
     let leaf = *n_leaves;
     *n_leaves += u32::from(material.is_clear());
     match material {
-        Material::Blend { weight: share, a, b } => {
-            let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
+        Material::Blend { weight: share, a, b, by_side, .. } => {
+            let share = vertex.share_of_second(scene, *share, *by_side);
             collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), parts);
             collect(scene, *b, vertex, sides, n_leaves, weight * share, parts);
         }
@@ -100,7 +103,7 @@ fn collect(
             );
         }
         _ => {
-            if let Some(lobe) = lobe_at(scene, id, vertex, None) {
+            if let Some(lobe) = lobe_at(scene, id, vertex, sides.as_deref_mut()) {
                 parts.push(lobe, weight);
             }
         }
@@ -108,7 +111,7 @@ fn collect(
 }
 
 #[inline]
-fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lobe {
+fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lobe<'static> {
     match sides {
         Some(sides) => Lobe::Glass(sides.interface(scene, leaf)),
         None => Lobe::CLEAR,
@@ -117,7 +120,7 @@ fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lo
 
 /// Replaces smooth glass by rough glass, if microfacets of this width change directions.
 #[inline]
-fn rough_lobe(smooth: Lobe, alpha: f32, compensate: bool) -> Lobe {
+fn rough_lobe(smooth: Lobe<'static>, alpha: f32, compensate: bool) -> Lobe<'static> {
     match smooth {
         Lobe::Glass(interface) if !rough_glass::is_smooth(alpha, interface.eta) => {
             Lobe::RoughGlass { interface, alpha: alpha.min(1.0), compensate }
@@ -136,13 +139,14 @@ pub(crate) fn scalar_at(scene: &Prepared, id: MaterialId, uv: Vec2) -> f32 {
 
 /// Returns the lobe of a plain material; `None` if the surface is black. `sides` as in [`blend_at`].
 #[inline]
-pub(crate) fn lobe_at(
-    scene: &Prepared,
+pub(crate) fn lobe_at<'a>(
+    scene: &'a Prepared,
     id: MaterialId,
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
-) -> Option<Lobe> {
+) -> Option<Lobe<'a>> {
     let uv = vertex.texture_point;
+    let here = sides.as_ref().map_or(MediumId::OUTSIDE, |sides| sides.here);
     match &scene.shading.materials[id as usize] {
         Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),
         Material::Mirror { reflectance } => Some(Lobe::Mirror { reflectance: reflectance.eval(scene, uv) }),
@@ -151,6 +155,30 @@ pub(crate) fn lobe_at(
             reflectance: reflectance.eval(scene, uv),
             fresnel: *fresnel,
             compensate: *compensate,
+        }),
+        Material::Conductor { alpha, eta, k, reflectance, compensate } => Some(Lobe::Conductor {
+            alpha: alpha.eval(scene, uv).clamp(0.0, 1.0),
+            eta: *eta,
+            k: *k,
+            reflectance: reflectance.eval(scene, uv),
+            compensate: *compensate,
+        }),
+        Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
+            let coat = Coat::at(scene, id, *ior, alpha.eval(scene, uv).clamp(0.0, 1.0));
+            let albedo = diffuse.eval(scene, uv).clamp(Vec3::ZERO, Vec3::ONE);
+            let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
+            Some(Lobe::Plastic(Plastic::new(albedo, *nonlinear, specular, coat)))
+        }
+        Material::Translucent { reflectance, transmittance } => {
+            let [reflectance, transmittance] = [reflectance, transmittance].map(|color| color.eval(scene, uv));
+            let scale = (reflectance + transmittance).max(Vec3::ONE);
+            Some(Lobe::Translucent { reflectance: reflectance / scale, transmittance: transmittance / scale, here })
+        }
+        Material::ThinGlass { ior, reflectance, transmittance } => Some(Lobe::ThinGlass {
+            ior: *ior,
+            reflectance: reflectance.eval(scene, uv),
+            transmittance: transmittance.eval(scene, uv),
+            here,
         }),
         Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
         Material::RoughGlass { alpha, compensate, .. } => {
