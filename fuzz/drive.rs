@@ -87,6 +87,11 @@ pub fn pbrt(bytes: &[u8]) {
     open(SceneSource::Foreign(write("fuzz.pbrt", bytes)), None);
 }
 
+/// A scene of Mitsuba.
+pub fn mitsuba(bytes: &[u8]) {
+    open(SceneSource::Foreign(write("fuzz.xml", bytes)), None);
+}
+
 fn open_model(path: PathBuf, choice: Option<&ModelChoice>) {
     open(SceneSource::Model(path), choice);
 }

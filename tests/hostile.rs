@@ -189,6 +189,11 @@ fn pbrt_scenes() {
 }
 
 #[test]
+fn mitsuba_scenes() {
+    assault("mitsuba", drive::mitsuba, 2500, 64 * MIB, 512);
+}
+
+#[test]
 fn pictures() {
     assault("picture", drive::picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8);
 }

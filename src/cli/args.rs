@@ -2,7 +2,7 @@
 
 use crate::cli::console::{remark, tell};
 use crate::cli::failure::Failure;
-use crate::cli::number::{parse_seconds, parse_shutter};
+use crate::cli::number::{parse_define, parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
 use firstlight::cluster::unpack::{UnpackError, Unpacked, is_archive, unpack};
 use firstlight::frame::check_film_source;
@@ -77,6 +77,9 @@ pub struct OpenArgs {
     /// Allow models to read files outside of their own folders.
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
+    /// Value of a parameter of a Mitsuba scene, in place of its default.
+    #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = parse_define, help_heading = "Scene")]
+    pub defines: Vec<(String, String)>,
     /// Environment image (.hdr, .exr, .png, .jpg) that lights the scene instead of its own environment.
     #[arg(long, value_name = "FILE", visible_alias = "environment")]
     pub env: Option<PathBuf>,
@@ -91,6 +94,7 @@ impl OpenArgs {
             shutter: self.shutter,
             variant: self.variant.clone(),
             allow_outside: self.allow_outside,
+            defines: self.defines.clone(),
         }
     }
 }

@@ -56,6 +56,14 @@ pub fn parse_shutter(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a name and a value.
+pub fn parse_define(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("must be NAME=VALUE".to_owned()),
+    }
+}
+
 /// Parses a finite number of seconds.
 pub fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -136,6 +136,7 @@ fn open_options(how: &OpenArgs) -> impl Iterator<Item = JobOption> {
     ]
     .into_iter()
     .flatten()
+    .chain(how.defines.iter().map(|(name, value)| OptionName::Define.with(format!("{name}={value}"))))
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -46,6 +46,8 @@ pub enum OptionName {
     Exposure,
     /// `--fps`
     Fps,
+    /// `--define`
+    Define,
 }
 
 /// Why a text is no option of a job.
@@ -54,7 +56,7 @@ pub enum OptionName {
 pub struct NoOption(String);
 
 impl OptionName {
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 16] = [
         Self::Up,
         Self::Camera,
         Self::At,
@@ -70,6 +72,7 @@ impl OptionName {
         Self::MaxDepth,
         Self::Exposure,
         Self::Fps,
+        Self::Define,
     ];
 
     /// As on a command line.
@@ -90,6 +93,7 @@ impl OptionName {
             Self::MaxDepth => "--max-depth",
             Self::Exposure => "--exposure",
             Self::Fps => "--fps",
+            Self::Define => "--define",
         }
     }
 

@@ -62,7 +62,8 @@ pub struct LoadOptions<'a> {
 
 impl LoadOptions<'_> {
     fn choice(&self) -> &ModelChoice {
-        self.choice.unwrap_or(&ModelChoice::DEFAULT)
+        static NONE: ModelChoice = ModelChoice::DEFAULT;
+        self.choice.unwrap_or(&NONE)
     }
 
     fn aspect(&self) -> f64 {
@@ -86,7 +87,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     }
     options.say(&format!("loading {}", source.title()));
     let start = Instant::now();
-    let documents = Documents::new(options.choice().allow_outside);
+    let documents = Documents::new(options.choice());
     let mut model = None;
     let mut scene = match source {
         SceneSource::Builtin(name) => {
@@ -195,7 +196,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                 file => file.path().and_then(Path::parent).map(Path::to_path_buf).unwrap_or_default(),
             };
             let mut scene = {
-                let documents = Documents::new(options.choice().allow_outside);
+                let documents = Documents::new(options.choice());
                 let file = SceneFile::parse(text, path)?;
                 let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
                 match source {

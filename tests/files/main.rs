@@ -8,6 +8,7 @@ mod gltf;
 mod gltf_writer;
 mod input_files;
 mod layers;
+mod mitsuba;
 mod model_light;
 mod neutral;
 mod obj;

@@ -13,11 +13,14 @@ pub struct ModelChoice {
     pub variant: Option<String>,
     /// Whether the model may refer to files outside of its folder.
     pub allow_outside: bool,
+    /// Names and values of parameters that a scene of another renderer leaves open.
+    pub defines: Vec<(String, String)>,
 }
 
 impl ModelChoice {
     /// No selection.
-    pub const DEFAULT: Self = Self { camera: None, at: None, shutter: None, variant: None, allow_outside: false };
+    pub const DEFAULT: Self =
+        Self { camera: None, at: None, shutter: None, variant: None, allow_outside: false, defines: Vec::new() };
 }
 
 /// The up axis of a model.

@@ -16,7 +16,7 @@ pub(crate) mod expected;
 pub mod film_size;
 pub mod key;
 pub mod light;
-pub(crate) mod locate;
+pub mod locate;
 pub mod material_property;
 pub mod material_textures;
 pub mod model_format;

@@ -7,16 +7,19 @@ use std::path::Path;
 pub enum SceneFormat {
     /// pbrt, version 4: text with meshes, and PLY files beside it.
     Pbrt,
+    /// Mitsuba 3: XML with meshes in files of their own.
+    Mitsuba,
 }
 
 impl SceneFormat {
     /// All formats, in the order of listing.
-    pub const ALL: [Self; 1] = [Self::Pbrt];
+    pub const ALL: [Self; 2] = [Self::Pbrt, Self::Mitsuba];
 
     /// File extension, in lower case and without the dot.
     pub fn file_extension(self) -> &'static str {
         match self {
             Self::Pbrt => "pbrt",
+            Self::Mitsuba => "xml",
         }
     }
 
@@ -26,12 +29,12 @@ impl SceneFormat {
         Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.file_extension()))
     }
 
-    /// List of extensions for messages, with that of our own scenes: `.ron, .pbrt`.
+    /// List of extensions for messages, with that of our own scenes: `.ron, .pbrt, .xml`.
     pub fn extensions() -> String {
         Self::each(".").join(", ")
     }
 
-    /// List of shell patterns, likewise: `*.ron *.pbrt`.
+    /// List of shell patterns, likewise: `*.ron *.pbrt *.xml`.
     pub fn patterns() -> String {
         Self::each("*.").join(" ")
     }

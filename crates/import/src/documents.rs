@@ -13,6 +13,7 @@ use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_o
 use crate::read_scene::read_scene;
 use firstlight_files::limits::Limits;
 use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_format::choice::ModelChoice;
 use firstlight_format::error::SceneError;
 use firstlight_render::ImageTexture;
 use rayon::prelude::*;
@@ -28,6 +29,8 @@ type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 #[derive(Debug, Default)]
 pub struct Documents {
     options: ReadOptions,
+    /// Names and values of parameters of scenes of other renderers.
+    defines: Vec<(String, String)>,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
     /// Scenes of other renderers.
     scenes: Mutex<HashMap<PathBuf, Arc<ForeignScene>>>,
@@ -58,9 +61,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Documents {
-    /// No file yet; `allow_outside`: files outside of the folder of a model may be read.
-    pub fn new(allow_outside: bool) -> Self {
-        Self { options: ReadOptions { allow_outside, ..ReadOptions::default() }, ..Self::default() }
+    /// No file yet.
+    pub fn new(choice: &ModelChoice) -> Self {
+        let options = ReadOptions { allow_outside: choice.allow_outside, ..ReadOptions::default() };
+        Self { options, defines: choice.defines.clone(), ..Self::default() }
     }
 
     /// Whether models may refer to files outside of their folders.
@@ -96,7 +100,7 @@ impl Documents {
         if let Some(scene) = lock(&self.scenes).get(path) {
             return Ok(scene.clone());
         }
-        let options = ForeignOptions { allow_outside: self.options.allow_outside };
+        let options = ForeignOptions { allow_outside: self.options.allow_outside, defines: self.defines.clone() };
         let scene = Arc::new(read_scene(path, &options)?);
         Ok(lock(&self.scenes).entry(path.to_owned()).or_insert(scene).clone())
     }

@@ -1,4 +1,4 @@
-//! Models and scenes of other programs: OBJ, PLY, STL, glTF and pbrt, as meshes and as parts of a scene file.
+//! Models and scenes of other programs: OBJ, PLY, STL, glTF, pbrt and Mitsuba, as meshes and as parts of a scene file.
 //!
 //! A reader ([`obj`], [`ply`], [`stl`], [`gltf`]) returns an [`ImportedModel`] or an error with its location in the
 //! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`] and, for
@@ -16,6 +16,7 @@ pub mod gltf_scene;
 mod ktx2;
 mod load_model;
 pub mod meshes;
+pub(crate) mod mitsuba;
 pub(crate) mod model;
 pub(crate) mod mtl_material;
 pub mod obj;

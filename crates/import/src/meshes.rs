@@ -86,7 +86,8 @@ pub fn load_mesh(
         } else {
             Arc::new(finish(part_base(mesh, shading), source, shading, simplify, Some(CREASE))?)
         };
-        return Ok(LoadedMesh { mesh, ..LoadedMesh::empty(scene.files.clone()) });
+        let files = scene.files.iter().chain(scene.part_files.get(shape)).cloned().collect();
+        return Ok(LoadedMesh { mesh, ..LoadedMesh::empty(files) });
     }
     match (source.file(), source.model_format()) {
         (Some(file), Some(format)) => {

@@ -3,6 +3,7 @@
 //! What a format adds is a folder with a reader that returns a [`ForeignScene`], a line here and a line in
 //! [`SceneFormat`].
 
+use crate::mitsuba;
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::pbrt;
 use firstlight_format::error::SceneError;
@@ -20,6 +21,7 @@ pub(crate) fn read_scene(path: &Path, options: &ForeignOptions) -> Result<Foreig
     })?;
     let scene = match format {
         SceneFormat::Pbrt => pbrt::read(path, options)?,
+        SceneFormat::Mitsuba => mitsuba::read_scene(path, options)?,
     };
     scene.file.check().map_err(|error| SceneError::in_file(path, error.to_string()))?;
     Ok(scene)

@@ -9,10 +9,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Options for reading.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ForeignOptions {
     /// Whether files outside of the folder of the scene may be read.
     pub allow_outside: bool,
+    /// Names and values of parameters that the scene leaves open.
+    pub defines: Vec<(String, String)>,
 }
 
 /// A scene with everything that its text says.
@@ -23,6 +25,8 @@ pub struct ForeignScene {
     pub file: SceneFile,
     /// Meshes by the index of their shape in the text.
     pub parts: HashMap<u32, Arc<Mesh>>,
+    /// The file that a mesh was read from, if it is one, with its stamp from before it was read.
+    pub part_files: HashMap<u32, (PathBuf, Stamp)>,
     /// What is not shown as the file says, each kind once.
     pub warnings: Warnings,
     /// The scene, then the files that it includes, each with its stamp from before it was read.

@@ -31,6 +31,7 @@ use firstlight_format::error::SceneError;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::value::{Named, Rgb};
 use firstlight_render::Integrator;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Reads a scene with the files that it includes.
@@ -59,5 +60,5 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
         lights: builder.lights,
         animation: Default::default(),
     };
-    Ok(ForeignScene { file, parts: builder.parts, warnings: builder.warnings, files })
+    Ok(ForeignScene { file, parts: builder.parts, part_files: HashMap::new(), warnings: builder.warnings, files })
 }

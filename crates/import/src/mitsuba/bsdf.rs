@@ -1,0 +1,493 @@
+//! BSDFs as our materials: the one place that says which of ours stands for which of Mitsuba's, and what is told.
+//!
+//! Roughness is α in Mitsuba and its square root in `principled`. Start reading at [`Converter::material`].
+
+use crate::mitsuba::graph::Node;
+use crate::mitsuba::ior;
+use crate::mitsuba::scene::Converter;
+use crate::mitsuba::spectrum::Use;
+use crate::mitsuba::texture::Reads;
+use firstlight_files::printable;
+use firstlight_format::error::{SceneError, suggestion};
+use firstlight_format::parts::MaterialPart;
+use firstlight_format::sources::TextureSource;
+use firstlight_format::value::{ColorValue, ScalarValue};
+use firstlight_render::{MAX_LOBES, Material};
+use glam::Vec3;
+
+/// Depth of nested BSDFs.
+const MAX_DEPTH: u32 = 32;
+
+/// A BSDF in our words.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    pub part: MaterialPart,
+    /// Whether its back is like its front; in Mitsuba, the back of other reflecting surfaces is black.
+    pub two_sided: bool,
+}
+
+impl Surface {
+    fn one_sided(part: MaterialPart) -> Self {
+        Self { part, two_sided: false }
+    }
+
+    /// Of a surface that transmits, or is seen from both sides.
+    fn two_sided(part: MaterialPart) -> Self {
+        Self { part, two_sided: true }
+    }
+}
+
+impl Converter<'_> {
+    /// The material of a BSDF; `None` for `null`, through which light passes.
+    pub(crate) fn surface(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        if let Some(known) = self.surfaces.get(&node.index) {
+            return Ok(known.clone());
+        }
+        if depth > MAX_DEPTH {
+            return Err(node.error("BSDFs are nested too deep, or contain themselves"));
+        }
+        let surface = self.surface_of(node, depth)?;
+        self.surfaces.insert(node.index, surface.clone());
+        Ok(surface)
+    }
+
+    fn surface_of(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let surface = match node.plugin() {
+            "diffuse" => {
+                let albedo = self.color(node, "reflectance", 0.5, Use::Reflectance)?;
+                Surface::one_sided(Material::Diffuse { albedo })
+            }
+            "dielectric" | "roughdielectric" => self.dielectric(node)?,
+            "thindielectric" => self.thin_dielectric(node)?,
+            "conductor" | "roughconductor" => self.conductor(node)?,
+            "plastic" | "roughplastic" => self.plastic(node)?,
+            "pplastic" => {
+                self.tell(node, "polarisation is not modelled: the surface is a roughplastic");
+                self.plastic(node)?
+            }
+            "principled" => self.principled(node)?,
+            "principledthin" => self.principled_thin(node)?,
+            "twosided" => return self.both_sides(node, depth),
+            "mask" => return self.mask(node, depth),
+            "blendbsdf" => return self.blend(node, depth),
+            "normalmap" => return self.normal_map(node, depth),
+            "bumpmap" => return self.bump_map(node, depth),
+            "null" => return Ok(None),
+            plugin => {
+                let plugin = printable::name(plugin).into_owned();
+                self.tell(node, &format!("BSDFs of type {plugin} are not modelled: the surface is grey and diffuse"));
+                node.skip();
+                Surface::two_sided(grey())
+            }
+        };
+        Ok(Some(surface))
+    }
+
+    /// The index of refraction of one side, by name or number.
+    fn ior(&mut self, node: Node, name: &str, default: &str) -> Result<f64, SceneError> {
+        let by_name = |wanted: &str| {
+            ior::dielectric(wanted).ok_or_else(|| {
+                let hint = suggestion(wanted, ior::dielectric_names());
+                node.error(format!("there is no material `{}` for `{name}`{hint}", printable::name(wanted)))
+            })
+        };
+        let found = match node.value(name) {
+            Some(crate::mitsuba::graph::Value::Text(text)) => by_name(text)?,
+            Some(_) => node.float_or(name, 1.5)?,
+            None => by_name(default)?,
+        };
+        match found > 0.0 && found < 1e6 {
+            true => Ok(found),
+            false => Err(node.error(format!("`{name}` must be above 0"))),
+        }
+    }
+
+    fn relative_ior(&mut self, node: Node, default: &str) -> Result<f32, SceneError> {
+        let inside = self.ior(node, "int_ior", default)?;
+        Ok((inside / self.ior(node, "ext_ior", "air")?) as f32)
+    }
+
+    /// Tells of factors that are not 1: ours conserve energy.
+    fn factors(&mut self, node: Node, names: &[&str]) -> Result<(), SceneError> {
+        for name in names {
+            match self.given_color(node, name, Use::Factor)? {
+                None => {}
+                Some(ColorValue::Rgb(rgb)) if rgb == Vec3::ONE => {}
+                Some(_) => self.tell(node, &format!("{name} is not modelled: it is 1")),
+            }
+        }
+        Ok(())
+    }
+
+    /// α along u and v.
+    fn alphas(&mut self, node: Node) -> Result<(ScalarValue, ScalarValue), SceneError> {
+        match node.text("distribution")? {
+            Some("ggx") => {}
+            // Beckmann's is the default of Mitsuba.
+            _ => self.tell(node, "microfacets of Beckmann are not modelled: they are of GGX with the same width"),
+        }
+        node.ignore(&["sample_visible"]);
+        if node.has("alpha_u") || node.has("alpha_v") {
+            return Ok((self.scalar(node, "alpha_u", 0.1)?, self.scalar(node, "alpha_v", 0.1)?));
+        }
+        let alpha = self.scalar(node, "alpha", 0.1)?;
+        Ok((alpha.clone(), alpha))
+    }
+
+    /// One α, and whether that was one for both directions.
+    fn alpha(&mut self, node: Node) -> Result<ScalarValue, SceneError> {
+        let (u, v) = self.alphas(node)?;
+        if u != v {
+            self.tell(node, "anisotropy of this kind of surface is not modelled: its width along v is that along u");
+        }
+        Ok(within_share(u))
+    }
+
+    fn dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let ior = self.relative_ior(node, "bk7")?;
+        self.factors(node, &["specular_reflectance", "specular_transmittance"])?;
+        let (absorption, dispersion) = (Vec3::ZERO.into(), 0.0);
+        Ok(Surface::two_sided(match node.plugin() {
+            "dielectric" => Material::Glass { ior, absorption, dispersion },
+            _ => Material::RoughGlass { alpha: self.alpha(node)?, ior, absorption, dispersion, compensate: false },
+        }))
+    }
+
+    fn thin_dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let ior = self.relative_ior(node, "bk7")?;
+        let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
+        let transmittance = self.color(node, "specular_transmittance", 1.0, Use::Reflectance)?;
+        Ok(Surface::two_sided(Material::ThinGlass { ior, reflectance, transmittance }))
+    }
+
+    fn conductor(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
+        let material = node.text("material")?.unwrap_or(if node.plugin() == "conductor" { "none" } else { "Cu" });
+        let (eta, k) = if !node.has("eta") && !node.has("k") && material != "none" {
+            ior::conductor(material).ok_or_else(|| {
+                let hint = suggestion(material, ior::conductor_names());
+                node.error(format!("there is no conductor `{}`{hint}", printable::name(material)))
+            })?
+        } else {
+            (self.constant_color(node, "eta", 0.0, Use::Factor)?, self.constant_color(node, "k", 1.0, Use::Factor)?)
+        };
+        let (u, v) = match node.plugin() {
+            // Without a real part everything is reflected at every angle.
+            "conductor" if eta == Vec3::ZERO => return Ok(Surface::one_sided(Material::Mirror { reflectance })),
+            "conductor" => (0.0.into(), 0.0.into()),
+            _ => self.alphas(node)?,
+        };
+        match (&u, &v) {
+            (ScalarValue::Number(u), ScalarValue::Number(v)) if u != v => {
+                self.tell(node, "the reflectance of an anisotropic conductor is that of Schlick, not of its η and k");
+                let factor = match reflectance {
+                    ColorValue::Rgb(rgb) => rgb,
+                    ColorValue::Texture(_) => Vec3::ONE,
+                };
+                let normal: [f32; 3] = std::array::from_fn(|i| factor[i] * ior::normal_reflectance(eta[i], k[i]));
+                let normal = ColorValue::Rgb(Vec3::from_array(normal).clamp(Vec3::ZERO, Vec3::ONE));
+                return Ok(Surface::one_sided(anisotropic_metal(normal, *u, *v)));
+            }
+            _ if u != v => {
+                self.tell(node, "textures of two different widths are not modelled: the width along v is that along u");
+            }
+            _ => {}
+        }
+        let (eta, k) = (eta.into(), k.into());
+        Ok(Surface::one_sided(Material::Conductor { alpha: within_share(u), eta, k, reflectance, compensate: false }))
+    }
+
+    fn plastic(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let ior = self.relative_ior(node, "polypropylene")?;
+        let diffuse = self.color(node, "diffuse_reflectance", 0.5, Use::Reflectance)?;
+        let specular = within_share(self.scalar(node, "specular_reflectance", 1.0)?);
+        let nonlinear = node.boolean_or("nonlinear", false)?;
+        let alpha = match node.plugin() {
+            "plastic" => ScalarValue::Number(0.0),
+            _ => self.alpha(node)?,
+        };
+        Ok(Surface::one_sided(Material::Plastic { diffuse, alpha, ior, specular, nonlinear }))
+    }
+
+    /// Whether something of `principled` is there and not 0.
+    fn is_given(&mut self, node: Node, name: &str) -> Result<bool, SceneError> {
+        Ok(node.has(name) && self.scalar(node, name, 0.0)? != ScalarValue::Number(0.0))
+    }
+
+    fn principled(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let base = self.color(node, "base_color", 0.5, Use::Reflectance)?;
+        let transmits = self.is_given(node, "spec_trans")?;
+        let wanted_ior = match node.float("eta")? {
+            Some(eta) => eta,
+            None => {
+                let specular = node.float_or("specular", 0.5)?.clamp(if transmits { 1e-3 } else { 0.0 }, 12.0);
+                2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
+            }
+        };
+        node.ignore(&["diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate"]);
+        for (name, what) in [
+            ("sheen", "the sheen of Disney's model is not modelled: there is none"),
+            ("flatness", "flatness is not modelled: the base is diffuse"),
+            ("spec_tint", "tinted reflections of dielectrics are not modelled: they are white"),
+            ("clearcoat", "the clear coat of Disney's model is not that of ours, which is narrower at its foot"),
+        ] {
+            if self.is_given(node, name)? {
+                self.tell(node, what);
+            }
+        }
+        self.scalar(node, "sheen_tint", 0.0)?;
+        let rough = self.scalar(node, "roughness", 0.5)?;
+        let (metal, trans) = (self.scalar(node, "metallic", 0.0)?, self.scalar(node, "spec_trans", 0.0)?);
+        let (coat, gloss) = (self.scalar(node, "clearcoat", 0.0)?, self.constant_scalar(node, "clearcoat_gloss", 0.0)?);
+        let anisotropic = self.scalar(node, "anisotropic", 0.0)?;
+        let mut part = Material::principled(base);
+        let Material::Principled {
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            clearcoat,
+            clearcoat_roughness,
+            anisotropy,
+            ..
+        } = &mut part
+        else {
+            unreachable!("it is principled")
+        };
+        (*metallic, *transmission) = (within_share(metal), within_share(trans));
+        *ior = (wanted_ior as f32).clamp(1e-3, 1e3);
+        // A quarter of the strength, by definition.
+        *clearcoat = match coat {
+            ScalarValue::Number(coat) => ScalarValue::Number((0.25 * coat).clamp(0.0, 1.0)),
+            texture => texture,
+        };
+        *clearcoat_roughness = ScalarValue::Number((0.1 + (0.001 - 0.1) * gloss.clamp(0.0, 1.0)).sqrt() as f32);
+        *roughness = within_share(rough.clone());
+        match (&rough, &anisotropic) {
+            (_, ScalarValue::Number(0.0)) => {}
+            (ScalarValue::Number(rough), ScalarValue::Number(amount)) => {
+                let aspect = (1.0 - 0.9 * amount.clamp(0.0, 1.0)).sqrt();
+                let (along, across) = (rough * rough / aspect, rough * rough * aspect);
+                (*roughness, *anisotropy) = (across.clamp(0.0, 1.0).sqrt().into(), elongation(along, across).into());
+            }
+            _ => self.tell(node, "textured anisotropy is not modelled: the surface is isotropic"),
+        }
+        self.tell(node, "the diffuse base of Disney's model brightens at grazing angles; ours does not");
+        Ok(Surface { part, two_sided: transmits })
+    }
+
+    fn principled_thin(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let base = self.color(node, "base_color", 0.5, Use::Reflectance)?;
+        node.ignore(&[
+            "diffuse_reflectance_sampling_rate",
+            "diffuse_transmittance_sampling_rate",
+            "spec_reflectance_sampling_rate",
+            "specular_reflectance_sampling_rate",
+            "specular_transmittance_sampling_rate",
+        ]);
+        for (name, what) in [
+            ("sheen", "the sheen of Disney's model is not modelled: there is none"),
+            ("flatness", "flatness is not modelled: the base is diffuse"),
+            ("spec_tint", "tinted reflections of dielectrics are not modelled: they are white"),
+            ("diff_trans", "diffuse transmission is not modelled: all diffuse light is reflected"),
+            ("anisotropic", "the anisotropy of thin surfaces is not modelled: they are isotropic"),
+        ] {
+            if self.is_given(node, name)? {
+                self.tell(node, what);
+            }
+        }
+        self.scalar(node, "sheen_tint", 0.0)?;
+        let (rough, trans) = (self.scalar(node, "roughness", 0.5)?, self.scalar(node, "spec_trans", 0.0)?);
+        let eta = node.float_or("eta", 1.5)?;
+        let mut part = Material::principled(base);
+        if let Material::Principled { roughness, ior, transmission, thin_walled, .. } = &mut part {
+            (*roughness, *transmission, *thin_walled) = (within_share(rough), within_share(trans), true);
+            *ior = (eta as f32).clamp(1e-3, 1e3);
+        }
+        Ok(Surface::two_sided(part))
+    }
+
+    /// The nested BSDFs of an adapter, which has at least one.
+    fn nested<'a>(&mut self, node: Node<'a>, count: usize) -> Result<Vec<Node<'a>>, SceneError> {
+        let nested = node.children("bsdf")?;
+        match nested.len() {
+            0 => Err(node.error(format!("a {} contains no BSDF", node.plugin()))),
+            n if n > count => {
+                Err(node.error(format!("a {} contains {n} BSDFs, but may contain {count}", node.plugin())))
+            }
+            _ => Ok(nested),
+        }
+    }
+
+    fn only_nested(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let nested = self.nested(node, 1)?[0];
+        self.surface(nested, depth + 1)
+    }
+
+    fn both_sides(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let nested = self.nested(node, 2)?;
+        let front = self.surface(nested[0], depth + 1)?;
+        let Some(&back) = nested.get(1) else { return Ok(front.map(|front| Surface { two_sided: true, ..front })) };
+        let (Some(front), Some(other)) = (front, self.surface(back, depth + 1)?) else { return Ok(None) };
+        let [a, b] = [(nested[0], front), (back, other)].map(|(node, side)| self.add_material(node, side.part));
+        Ok(Some(Surface::two_sided(by_side(a, b))))
+    }
+
+    fn mask(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let wanted = within_share(self.scalar(node, "opacity", 0.5)?);
+        let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
+        let mut part = self.whole(node, surface.part);
+        if let Material::Principled { opacity, .. } | Material::Blend { opacity, .. } = &mut part {
+            *opacity = wanted;
+        }
+        Ok(Some(Surface { part, ..surface }))
+    }
+
+    /// A surface that can have holes and normals of its own.
+    fn whole(&mut self, node: Node, part: MaterialPart) -> MaterialPart {
+        match part {
+            Material::Principled { .. } | Material::Blend { .. } => part,
+            part => {
+                let name = self.add_material(node, part);
+                Material::blend(ScalarValue::Number(0.0), name.clone(), name)
+            }
+        }
+    }
+
+    fn blend(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let weight = within_share(self.scalar(node, "weight", 0.5)?);
+        let nested = self.nested(node, 2)?;
+        let [first, second] = nested[..] else { return Err(node.error("a blendbsdf contains two BSDFs")) };
+        let [a, b] = match (self.surface(first, depth + 1)?, self.surface(second, depth + 1)?) {
+            (Some(a), Some(b)) => [a, b],
+            (a, b) => {
+                self.tell(node, "a blend with a null BSDF is not modelled: it is the other part");
+                return Ok(a.or(b));
+            }
+        };
+        if self.n_lobes(&a.part) + self.n_lobes(&b.part) > MAX_LOBES {
+            self.tell(node, &format!("a blend of more than {MAX_LOBES} lobes is not modelled: it is the first part"));
+            return Ok(Some(a));
+        }
+        if [&a, &b].into_iter().any(|surface| has_own(&surface.part)) {
+            self.tell(node, "holes and normal maps of the parts of a blend are not modelled: they have none");
+        }
+        let two_sided = a.two_sided && b.two_sided;
+        let [a, b] = [(first, a), (second, b)].map(|(node, surface)| self.add_material(node, surface.part));
+        Ok(Some(Surface { part: Material::blend(weight, a, b), two_sided }))
+    }
+
+    fn bump_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        node.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
+        let scale = node.float_or("scale", 1.0)? as f32;
+        let heights = node.children("texture")?.first().copied();
+        let heights = heights.ok_or_else(|| node.error("a bumpmap contains a texture of heights"))?;
+        let heights = self.texture(heights, Use::Factor, Reads::Number)?;
+        let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
+        // A constant is of one height everywhere.
+        let ColorValue::Texture(heights) = heights else { return Ok(Some(surface)) };
+        let mut source = self.file.textures.get(&heights).cloned();
+        match &mut source {
+            Some(TextureSource::Image { relief, .. }) => *relief = Some(scale),
+            _ => {
+                self.tell(node, "only images are modelled as bump maps: the surface is smooth");
+                return Ok(Some(surface));
+            }
+        }
+        let name = self.names.free(&format!("{heights} as relief"));
+        self.file.textures.0.extend(source.map(|source| (name.clone(), source)));
+        let mut part = self.whole(node, surface.part);
+        if let Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } = &mut part {
+            *normal_map = ColorValue::Texture(name);
+        }
+        Ok(Some(Surface { part, ..surface }))
+    }
+
+    fn n_lobes(&self, part: &MaterialPart) -> usize {
+        match part {
+            Material::Blend { a, b, .. } => {
+                [a, b].into_iter().filter_map(|name| self.file.materials.get(name)).map(|part| self.n_lobes(part)).sum()
+            }
+            part => part.n_lobes(),
+        }
+    }
+
+    fn normal_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        node.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
+        let map = node.child("normalmap")?;
+        let map = map.ok_or_else(|| node.error("a normalmap contains a texture called `normalmap`"))?;
+        let map = self.texture(map, Use::Factor, Reads::Color)?;
+        let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
+        if map == ColorValue::Rgb(Vec3::new(0.5, 0.5, 1.0)) {
+            return Ok(Some(surface));
+        }
+        let mut part = self.whole(node, surface.part);
+        if let Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } = &mut part {
+            *normal_map = map;
+        }
+        Ok(Some(Surface { part, ..surface }))
+    }
+}
+
+/// What stands for a surface that is not modelled.
+pub(crate) fn grey() -> MaterialPart {
+    Material::Diffuse { albedo: ColorValue::grey(0.5) }
+}
+
+fn within_share(value: ScalarValue) -> ScalarValue {
+    match value {
+        ScalarValue::Number(number) => ScalarValue::Number(number.clamp(0.0, 1.0)),
+        texture @ ScalarValue::Texture(_) => texture,
+    }
+}
+
+/// The anisotropy of `principled` with these widths: α along is α across + (1 − α across) · anisotropy².
+fn elongation(along: f32, across: f32) -> f32 {
+    let (along, across) = (along.clamp(0.0, 1.0), across.clamp(0.0, 1.0));
+    if across >= 1.0 { 0.0 } else { ((along - across) / (1.0 - across)).clamp(0.0, 1.0).sqrt() }
+}
+
+/// A metal with widths α along u and v.
+fn anisotropic_metal(reflectance: ColorValue, u: f32, v: f32) -> MaterialPart {
+    let mut part = Material::principled(reflectance);
+    if let Material::Principled { metallic, roughness, anisotropy, anisotropy_rotation, .. } = &mut part {
+        let (along, across) = (u.max(v), u.min(v));
+        *metallic = 1.0.into();
+        *roughness = across.clamp(0.0, 1.0).sqrt().into();
+        (*anisotropy, *anisotropy_rotation) = (elongation(along, across).into(), if u >= v { 0.0 } else { 90.0 });
+    }
+    part
+}
+
+/// Whether a surface has holes or normals of its own, which parts of others have not.
+fn has_own(part: &MaterialPart) -> bool {
+    match part {
+        Material::Principled { opacity, normal_map, .. } | Material::Blend { opacity, normal_map, .. } => {
+            *opacity != ScalarValue::Number(1.0) || matches!(normal_map, ColorValue::Texture(_))
+        }
+        _ => false,
+    }
+}
+
+/// Exchanges holes and normals of two surfaces, if both can have them.
+pub(crate) fn exchange_own(one: &mut MaterialPart, other: &mut MaterialPart) {
+    use Material::{Blend, Principled};
+    let (
+        Blend { opacity: a, normal_map: b, .. } | Principled { opacity: a, normal_map: b, .. },
+        Blend { opacity: c, normal_map: d, .. } | Principled { opacity: c, normal_map: d, .. },
+    ) = (one, other)
+    else {
+        return;
+    };
+    std::mem::swap(a, c);
+    std::mem::swap(b, d);
+}
+
+/// A material of its own for each side.
+pub(crate) fn by_side(front: String, back: String) -> MaterialPart {
+    let mut part = Material::blend(ScalarValue::Number(0.0), front, back);
+    if let Material::Blend { by_side, .. } = &mut part {
+        *by_side = true;
+    }
+    part
+}

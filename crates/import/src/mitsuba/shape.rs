@@ -1,0 +1,376 @@
+//! Shapes as objects, with the lights that they are.
+
+use crate::mitsuba::bsdf::{Surface, by_side, exchange_own};
+use crate::mitsuba::graph::Node;
+use crate::mitsuba::meshes::{Geometry, MeshRequest};
+use crate::mitsuba::read::find_file;
+use crate::mitsuba::scene::Converter;
+use crate::mitsuba::spectrum::Use;
+use crate::mitsuba::transform::orthonormal;
+use crate::model::placing;
+use firstlight_files::printable;
+use firstlight_format::error::SceneError;
+use firstlight_format::material_textures::texture_names;
+use firstlight_format::model_format::ModelFormat;
+use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
+use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
+use firstlight_format::value::{ColorValue, ScalarValue};
+use firstlight_render::Material;
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
+
+/// Objects of a scene; instances of instances multiply.
+const MAX_OBJECTS: usize = 1 << 20;
+/// Depth of instances.
+const MAX_DEPTH: u32 = 8;
+
+/// From the axes of our sphere, whose texture has its poles at ±Y, to those of Mitsuba's, with poles at ±Z.
+const SPHERE_AXES: DMat3 = DMat3::from_cols(DVec3::NEG_X, DVec3::NEG_Z, DVec3::Y);
+
+impl Converter<'_> {
+    /// Adds a shape, or those of a group.
+    ///
+    /// - `outer`: from the space that the shape is placed in to our world.
+    pub(crate) fn shape(&mut self, node: Node, outer: DMat4, depth: u32) -> Result<(), SceneError> {
+        if depth > MAX_DEPTH {
+            return Err(node.error("instances are nested too deep, or contain themselves"));
+        }
+        self.n_shapes += 1;
+        if self.n_shapes > MAX_OBJECTS {
+            return Err(node.error(format!("the scene has more than {MAX_OBJECTS} shapes")));
+        }
+        let own = outer * node.transform("to_world")?;
+        match node.plugin() {
+            // Shown where it is instanced.
+            "shapegroup" => return Ok(()),
+            "instance" => {
+                for group in node.children("shape")? {
+                    for shape in group.children("shape")? {
+                        self.shape(shape, own, depth + 1)?;
+                    }
+                }
+                return Ok(());
+            }
+            "merge" => {
+                return node.children("shape")?.into_iter().try_for_each(|shape| self.shape(shape, own, depth + 1));
+            }
+            _ => {}
+        }
+        let Some(mut material) = self.material_of(node)? else {
+            node.skip();
+            return Ok(());
+        };
+        let is_flipped = node.boolean_or("flip_normals", false)?;
+        node.ignore(&["silhouette_sampling_weight"]);
+        let name = Some(self.names.free(node.called()));
+        // Nobody sees the back of a closed shape.
+        if !material.two_sided && matches!(node.plugin(), "rectangle" | "disk" | "cylinder") {
+            material.name = self.with_black_back(&material.name);
+        }
+        match node.plugin() {
+            "sphere" => self.sphere(node, own, is_flipped, name, material)?,
+            "rectangle" => self.rectangle(node, own, is_flipped, name, material)?,
+            plugin => {
+                let placed = match plugin {
+                    "obj" | "ply" | "serialized" => self.file_geometry(node)?.map(|geometry| (geometry, own)),
+                    "cube" => Some((Geometry::Cube, own)),
+                    "disk" => Some((Geometry::Disk, own)),
+                    "cylinder" => Some((Geometry::Cylinder, own * cylinder_placement(node)?)),
+                    other => {
+                        let other = printable::name(other).into_owned();
+                        self.tell(node, &format!("shapes of type {other} are not modelled: this one is left out"));
+                        node.skip();
+                        None
+                    }
+                };
+                if let Some((geometry, placed)) = placed {
+                    self.mesh(node, geometry, placed, is_flipped, name, material)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The material of this name on the front, and black on the back.
+    pub(crate) fn with_black_back(&mut self, name: &str) -> String {
+        if let Some(known) = self.backed.get(name) {
+            return known.clone();
+        }
+        let Some(front) = self.file.materials.get(name).cloned() else { return name.to_owned() };
+        // The back of these is black already.
+        if matches!(front, Material::Emissive { .. }) {
+            return name.to_owned();
+        }
+        let mut add = |wanted: &str, part: MaterialPart| {
+            let name = self.material_names.free(wanted);
+            self.file.materials.0.push((name.clone(), part));
+            name
+        };
+        let black = add("black", Material::Diffuse { albedo: ColorValue::grey(0.0) });
+        let mut inner = front;
+        let mut whole = by_side(String::new(), black);
+        exchange_own(&mut inner, &mut whole);
+        let inner = add(name, inner);
+        if let Material::Blend { a, .. } = &mut whole {
+            *a = inner;
+        }
+        let whole = add(&format!("{name}, one-sided"), whole);
+        self.backed.insert(name.to_owned(), whole.clone());
+        whole
+    }
+
+    fn file_geometry(&mut self, node: Node) -> Result<Option<Geometry>, SceneError> {
+        let name = node.text("filename")?.ok_or_else(|| node.error("a mesh needs a `filename`"))?;
+        node.ignore(&["load_materials", "max_smooth_angle", "collapse", "srgb", "vertex_count", "face_count"]);
+        let index = node.integer("shape_index")?.unwrap_or(0);
+        let path = match find_file(&self.references, &self.graph.folders, name) {
+            Ok(path) => path,
+            Err(why) => {
+                self.tell(node, &format!("{why}; the shape is left out"));
+                node.skip();
+                return Ok(None);
+            }
+        };
+        Ok(Some(match node.plugin() {
+            "obj" => Geometry::Model(ModelFormat::Obj, path),
+            "ply" => Geometry::Model(ModelFormat::Ply, path),
+            _ => Geometry::Serialized(path, u32::try_from(index).map_err(|_| node.error("`shape_index` is below 0"))?),
+        }))
+    }
+
+    fn mesh(
+        &mut self,
+        node: Node,
+        geometry: Geometry,
+        placed: DMat4,
+        flip_normals: bool,
+        name: Option<String>,
+        material: PlacedMaterial,
+    ) -> Result<(), SceneError> {
+        let is_obj = matches!(geometry, Geometry::Model(ModelFormat::Obj, _));
+        let request = MeshRequest {
+            flip_v: node.boolean_or("flip_tex_coords", is_obj)?,
+            face_normals: node.boolean_or("face_normals", false)?,
+            flip_normals,
+            tangents: material.needs_tangents,
+            geometry,
+        };
+        let Some(transform) = self.placement(node, placed) else { return Ok(()) };
+        let next = self.requests.len() as u32;
+        let is_file = request.geometry.file().is_some();
+        let shape = *self.requests.entry(request).or_insert(next);
+        if is_file && !material.two_sided {
+            self.one_sided.push(self.file.objects.len());
+        }
+        if material.needs_colors {
+            self.colored.entry(shape).or_insert(node.index);
+        }
+        let source = MeshSource::Part { file: self.file_name.clone(), shape };
+        let material = Some(material.name);
+        let (shading, simplify, materials) = (MeshShading::Auto, None, None);
+        self.file.objects.push(ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform });
+        Ok(())
+    }
+
+    fn sphere(
+        &mut self,
+        node: Node,
+        own: DMat4,
+        is_flipped: bool,
+        name: Option<String>,
+        material: PlacedMaterial,
+    ) -> Result<(), SceneError> {
+        let (center, radius) = (node.vector("center")?.unwrap_or(DVec3::ZERO), node.float_or("radius", 1.0)?);
+        if is_flipped {
+            self.tell(node, "a sphere whose normals point inwards is not modelled: they point outwards");
+        }
+        let placed = own * DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
+        // Mitsuba takes the radius along X for all.
+        let radius = placed.x_axis.truncate().length();
+        let is_even = |axis: DVec4| (axis.truncate().length() / radius - 1.0).abs() < 1e-5;
+        if !is_even(placed.y_axis) || !is_even(placed.z_axis) {
+            self.tell(node, "a sphere may not be stretched: its radius is that along X");
+        }
+        let center = placed.w_axis.truncate();
+        let turned = orthonormal(DMat3::from_mat4(placed)).unwrap_or(DMat3::ZERO) * radius * SPHERE_AXES;
+        let placed = DMat4::from_translation(center) * DMat4::from_mat3(turned);
+        let Some(transform) = self.placement(node, placed) else { return Ok(()) };
+        let material_name = material.name;
+        self.file.objects.push(match material.is_textured {
+            true => {
+                let (center, radius) = (DVec3::ZERO, 1.0);
+                ObjectPart::Sphere { name, center, radius, material: material_name, transform }
+            }
+            false => {
+                let transform = TransformPart::default();
+                ObjectPart::Sphere { name, center, radius, material: material_name, transform }
+            }
+        });
+        Ok(())
+    }
+
+    fn rectangle(
+        &mut self,
+        node: Node,
+        own: DMat4,
+        is_flipped: bool,
+        name: Option<String>,
+        material: PlacedMaterial,
+    ) -> Result<(), SceneError> {
+        if self.placement(node, own).is_none() {
+            return Ok(());
+        }
+        let at = |x: f64, y: f64| own.transform_point3(DVec3::new(x, y, 0.0));
+        let (edge_u, edge_v) = (2.0 * own.x_axis.truncate(), 2.0 * own.y_axis.truncate());
+        // The normal is that of the plane, also where the transform mirrors.
+        let normal = DMat3::from_mat4(own).inverse().transpose() * DVec3::Z;
+        let is_turned = (edge_u.cross(edge_v).dot(normal) < 0.0) != is_flipped;
+        let transform = TransformPart::default();
+        let (corner, edge_u, edge_v) = match is_turned {
+            false => (at(-1.0, -1.0), edge_u, edge_v),
+            // The same surface from the other side; its texture runs along u backwards.
+            true => {
+                if material.is_textured {
+                    self.tell(node, "a texture on a rectangle that faces backwards is not modelled: it is mirrored");
+                }
+                (at(1.0, -1.0), -edge_u, edge_v)
+            }
+        };
+        self.file.objects.push(ObjectPart::Quad { name, corner, edge_u, edge_v, material: material.name, transform });
+        Ok(())
+    }
+
+    /// The placement of an object; `None`, which is told, if it is flat or too far away.
+    fn placement(&mut self, node: Node, placed: DMat4) -> Option<TransformPart> {
+        let world = DAffine3::from_mat4(placed);
+        let is_affine = placed.row(3) == DVec4::W;
+        if !is_affine || !placing::is_placement(&world) {
+            self.tell(node, "its transform is flat, no affine one, or leads too far away: the shape is left out");
+            node.skip();
+            return None;
+        }
+        Some(placing::transform(&world))
+    }
+
+    /// The material of a shape; `None` for a surface that light passes.
+    fn material_of(&mut self, node: Node) -> Result<Option<PlacedMaterial>, SceneError> {
+        for medium in node.children("medium")? {
+            self.tell(node, "media are not modelled: the inside of the shape is empty");
+            medium.skip();
+        }
+        let bsdf = node.children("bsdf")?.first().copied();
+        let emitter = node.children("emitter")?.first().copied();
+        let key = (bsdf.map(|node| node.index), emitter.map(|node| node.index));
+        if let Some(known) = self.materials.get(&key) {
+            return Ok(known.clone());
+        }
+        let surface = match bsdf {
+            Some(bsdf) => self.surface(bsdf, 0)?,
+            None if emitter.is_some() => Some(black()),
+            None => Some(Surface { part: crate::mitsuba::bsdf::grey(), two_sided: false }),
+        };
+        let surface = match emitter {
+            Some(emitter) => Some(self.glowing(emitter, surface.unwrap_or_else(black))?),
+            None => surface,
+        };
+        let placed = surface.map(|surface| {
+            let is_textured = self.is_textured(&surface.part);
+            let needs_tangents = needs_tangents(&surface.part);
+            let is_color =
+                |name: &String| matches!(self.file.textures.get(name), Some(TextureSource::VertexColors { .. }));
+            let needs_colors = texture_names(&surface.part).iter().any(is_color);
+            let name = self.add_material(bsdf.or(emitter).unwrap_or(node), surface.part);
+            PlacedMaterial { name, is_textured, needs_tangents, needs_colors, two_sided: surface.two_sided }
+        });
+        self.materials.insert(key, placed.clone());
+        Ok(placed)
+    }
+
+    /// A surface that emits as well.
+    fn glowing(&mut self, emitter: Node, surface: Surface) -> Result<Surface, SceneError> {
+        emitter.ignore(&["sampling_weight"]);
+        if emitter.plugin() != "area" {
+            let plugin = printable::name(emitter.plugin()).into_owned();
+            self.tell(emitter, &format!("emitters of type {plugin} are not modelled: the shape does not emit"));
+            emitter.skip();
+            return Ok(surface);
+        }
+        let radiance = self.color(emitter, "radiance", 1.0, Use::Emission)?;
+        let emits = Material::Emissive { radiance: radiance.clone() };
+        let albedo = match &surface.part {
+            Material::Diffuse { albedo: ColorValue::Rgb(albedo) } => Some(*albedo),
+            _ => None,
+        };
+        Ok(match (albedo, radiance) {
+            (Some(albedo), _) if albedo.max_element() <= 0.0 => Surface { part: emits, two_sided: false },
+            (Some(albedo), ColorValue::Rgb(radiance)) => {
+                // Shares of a blend, undone by factors of its parts.
+                let weight = 1.0 - albedo.max_element().max(0.5);
+                let weight = if weight > 0.0 { weight } else { 1e-3 };
+                let reflects =
+                    Material::Diffuse { albedo: ColorValue::Rgb((albedo / (1.0 - weight)).min(glam::Vec3::ONE)) };
+                let emits = Material::Emissive { radiance: ColorValue::Rgb(radiance / weight) };
+                let [a, b] = [reflects, emits].map(|part| self.add_material(emitter, part));
+                Surface { part: Material::blend(ScalarValue::Number(weight), a, b), two_sided: false }
+            }
+            _ => {
+                self.tell(emitter, "what a light of this kind reflects is not modelled: it only emits");
+                Surface { part: emits, two_sided: false }
+            }
+        })
+    }
+
+    fn is_textured(&self, part: &MaterialPart) -> bool {
+        match part {
+            Material::Blend { weight, a, b, .. } => {
+                let mut parts = [a, b].into_iter().filter_map(|name| self.file.materials.get(name));
+                matches!(weight, ScalarValue::Texture(_)) || parts.any(|part| self.is_textured(part))
+            }
+            _ => !texture_names(part).is_empty(),
+        }
+    }
+}
+
+/// The material of a shape in the scene file.
+#[derive(Clone, Debug)]
+pub(crate) struct PlacedMaterial {
+    pub name: String,
+    /// Whether texture coordinates matter.
+    pub is_textured: bool,
+    pub needs_tangents: bool,
+    pub needs_colors: bool,
+    /// Whether the back is like the front.
+    pub two_sided: bool,
+}
+
+fn black() -> Surface {
+    Surface { part: Material::Diffuse { albedo: ColorValue::grey(0.0) }, two_sided: false }
+}
+
+fn needs_tangents(part: &MaterialPart) -> bool {
+    match part {
+        Material::Principled { normal_map, anisotropy, .. } => {
+            matches!(normal_map, ColorValue::Texture(_)) || *anisotropy != ScalarValue::Number(0.0)
+        }
+        _ => false,
+    }
+}
+
+/// From the cylinder of radius 1 between 0 and +Z to the one between two points.
+fn cylinder_placement(node: Node) -> Result<DMat4, SceneError> {
+    let (from, to) = (node.vector("p0")?.unwrap_or(DVec3::ZERO), node.vector("p1")?.unwrap_or(DVec3::Z));
+    let radius = node.float_or("radius", 1.0)?;
+    let axis = to - from;
+    let along = axis.try_normalize().ok_or_else(|| node.error("`p0` and `p1` of a cylinder are the same point"))?;
+    // Mitsuba's frame, so that textures start at the same angle.
+    let (x, y) = frame(along);
+    Ok(DMat4::from_cols((radius * x).extend(0.0), (radius * y).extend(0.0), axis.extend(0.0), from.extend(1.0)))
+}
+
+/// Two directions that are perpendicular to a unit vector and each other (Duff et al. 2017, "Building an Orthonormal
+/// Basis, Revisited").
+fn frame(n: DVec3) -> (DVec3, DVec3) {
+    let sign = 1_f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    (DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y))
+}

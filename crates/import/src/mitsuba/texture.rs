@@ -1,0 +1,321 @@
+//! Textures and colours of plugins: bitmaps, checkerboards, mesh attributes, spectra.
+//!
+//! Surface coordinates keep Mitsuba's: the top row of an image is at v = 0. Ours has it at v = 1, so that images are
+//! turned over after `to_uv`.
+
+use crate::mitsuba::graph::{Node, Spectrum, Value};
+use crate::mitsuba::read::find_file;
+use crate::mitsuba::scene::Converter;
+use crate::mitsuba::spectrum::Use;
+use firstlight_format::error::SceneError;
+use firstlight_format::sources::TextureSource;
+use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
+use firstlight_render::{Encoding, Wrap};
+use glam::{DMat2, DVec2, DVec3, Vec3};
+
+/// How a plugin reads a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Reads {
+    Color,
+    /// One number. A checkerboard then has its colours exchanged, in Mitsuba as here.
+    Number,
+}
+
+/// Depth of textures in textures.
+const MAX_DEPTH: u32 = 16;
+
+impl Converter<'_> {
+    /// A colour of a plugin, constant or textured.
+    pub(crate) fn color(&mut self, node: Node, name: &str, default: f64, of: Use) -> Result<ColorValue, SceneError> {
+        match self.given_color(node, name, of)? {
+            Some(color) => Ok(color),
+            None => Ok(ColorValue::grey(default as f32)),
+        }
+    }
+
+    /// `None` if the plugin has no such colour.
+    pub(crate) fn given_color(&mut self, node: Node, name: &str, of: Use) -> Result<Option<ColorValue>, SceneError> {
+        if let Some(value) = node.value(name) {
+            let rgb =
+                constant(value, of).ok_or_else(|| node.error(format!("`{name}` must be a colour or a texture")))?;
+            return Ok(Some(ColorValue::Rgb(limited(rgb, of))));
+        }
+        let Some(texture) = node.child(name)? else { return Ok(None) };
+        self.texture(texture, of, Reads::Color).map(Some)
+    }
+
+    /// A colour that ours cannot texture: the mean of a texture, which is told.
+    pub(crate) fn constant_color(&mut self, node: Node, name: &str, default: f64, of: Use) -> Result<Vec3, SceneError> {
+        Ok(match self.color(node, name, default, of)? {
+            ColorValue::Rgb(rgb) => rgb,
+            ColorValue::Texture(texture) => {
+                self.tell(node, &format!("a texture of {name} is not modelled: it is constant"));
+                match self.file.textures.get(&texture) {
+                    Some(TextureSource::Checker { a, b, .. }) => 0.5 * (a.0 + b.0),
+                    _ => Vec3::splat(default as f32),
+                }
+            }
+        })
+    }
+
+    /// A number of a plugin, constant or textured.
+    pub(crate) fn scalar(&mut self, node: Node, name: &str, default: f64) -> Result<ScalarValue, SceneError> {
+        let of = Use::Factor;
+        if let Some(value) = node.value(name) {
+            let rgb =
+                constant(value, of).ok_or_else(|| node.error(format!("`{name}` must be a number or a texture")))?;
+            return Ok(ScalarValue::Number(crate::mitsuba::texture::luminance(rgb) as f32));
+        }
+        let Some(texture) = node.child(name)? else { return Ok(ScalarValue::Number(default as f32)) };
+        Ok(match self.texture(texture, of, Reads::Number)? {
+            ColorValue::Rgb(rgb) => ScalarValue::Number(luminance(rgb.as_dvec3()) as f32),
+            ColorValue::Texture(name) => ScalarValue::Texture(name),
+        })
+    }
+
+    /// A number that ours cannot texture.
+    pub(crate) fn constant_scalar(&mut self, node: Node, name: &str, default: f64) -> Result<f64, SceneError> {
+        Ok(match self.scalar(node, name, default)? {
+            ScalarValue::Number(number) => f64::from(number),
+            ScalarValue::Texture(texture) => {
+                self.tell(node, &format!("a texture of {name} is not modelled: it is constant"));
+                match self.file.textures.get(&texture) {
+                    Some(TextureSource::Checker { a, b, .. }) => f64::from(0.5 * (a.0.x + b.0.x)),
+                    _ => default,
+                }
+            }
+        })
+    }
+
+    pub(crate) fn texture(&mut self, node: Node, of: Use, reads: Reads) -> Result<ColorValue, SceneError> {
+        if let Some(known) = self.textures.get(&(node.index, reads)) {
+            return Ok(ColorValue::Texture(known.clone()));
+        }
+        if self.texture_depth > MAX_DEPTH {
+            return Err(node.error("textures are nested too deep, or contain themselves"));
+        }
+        let source = match node.plugin() {
+            "bitmap" => self.bitmap(node)?,
+            "checkerboard" => self.checkerboard(node, of, reads)?,
+            "mesh_attribute" => match node.text("name")? {
+                Some(name) if name.starts_with("vertex_") => {
+                    let tint = Rgb(Vec3::splat(node.float_or("scale", 1.0)? as f32));
+                    TextureSource::VertexColors { channel: None, tint }
+                }
+                _ => {
+                    self.tell(node, "attributes of faces are not modelled: the texture is grey");
+                    return Ok(ColorValue::grey(0.5));
+                }
+            },
+            plugin => {
+                let Some(rgb) = self.spectrum_plugin(node, of)? else {
+                    self.tell(node, &format!("textures of type {plugin} are not modelled: it is grey"));
+                    return Ok(ColorValue::grey(0.5));
+                };
+                return Ok(ColorValue::Rgb(limited(rgb, of)));
+            }
+        };
+        let wanted = node.object().id.clone().unwrap_or_else(|| format!("{} {}", node.plugin(), node.index));
+        let name = self.names.free(&wanted);
+        self.file.textures.0.push((name.clone(), source));
+        self.textures.insert((node.index, reads), name.clone());
+        Ok(ColorValue::Texture(name))
+    }
+
+    /// A plugin that is a constant colour; `None` if it is another one.
+    fn spectrum_plugin(&mut self, node: Node, of: Use) -> Result<Option<DVec3>, SceneError> {
+        let scale = node.float_or("scale", 1.0)?;
+        Ok(match node.plugin() {
+            "srgb" | "rgb" | "uniform" | "spectrum" | "rawconstant" | "d65" => {
+                let given = ["color", "value"].into_iter().find_map(|name| node.value(name));
+                let daylight = node.plugin() == "d65";
+                let rgb = given.map_or(Some(DVec3::ONE), |value| match value {
+                    Value::Spectrum(spectrum @ Spectrum::Uniform(_)) if daylight => Some(spectrum.rgb(Use::Factor)),
+                    Value::Float(number) if node.plugin() == "uniform" && of == Use::Emission => {
+                        Some(Spectrum::Uniform(*number).rgb(of))
+                    }
+                    value => constant(value, of),
+                });
+                Some(rgb.ok_or_else(|| node.error("its colour must be one"))? * scale)
+            }
+            "blackbody" => {
+                let kelvin = node.float_or("temperature", 5000.0)?;
+                Some(crate::mitsuba::spectrum::blackbody(kelvin).rgb(of) * scale)
+            }
+            "irregular" | "regular" => {
+                let numbers = |name: &str| match node.value(name) {
+                    Some(Value::Text(text)) => crate::mitsuba::read::numbers(text),
+                    _ => None,
+                };
+                let spectrum = match (node.value("value"), numbers("wavelengths"), numbers("values")) {
+                    (Some(Value::Spectrum(spectrum)), ..) => Some(spectrum.clone()),
+                    (_, Some(wavelengths), Some(values)) if wavelengths.len() == values.len() => {
+                        crate::mitsuba::spectrum::sampled(wavelengths.into_iter().zip(values).collect()).ok()
+                    }
+                    (_, None, Some(values)) if values.len() >= 2 => {
+                        let from = node.float_or("wavelength_min", 360.0)?;
+                        let to = node.float_or("wavelength_max", 830.0)?;
+                        let step = (to - from) / (values.len() - 1) as f64;
+                        let samples = values.into_iter().enumerate().map(|(i, v)| (from + i as f64 * step, v));
+                        crate::mitsuba::spectrum::sampled(samples.collect()).ok()
+                    }
+                    _ => None,
+                };
+                let spectrum = spectrum.ok_or_else(|| node.error("its wavelengths and values do not match"))?;
+                Some(spectrum.rgb(of) * scale)
+            }
+            _ => None,
+        })
+    }
+
+    fn bitmap(&mut self, node: Node) -> Result<TextureSource, SceneError> {
+        let name = node.text("filename")?.ok_or_else(|| node.error("a bitmap needs a `filename`"))?;
+        node.ignore(&["format", "accel", "max_anisotropy", "gamma", "cache", "channel"]);
+        let file = match find_file(&self.references, &self.graph.folders, name) {
+            Ok(path) => self.file_path(&path),
+            // Told when it is looked for; or now, if it may not be.
+            Err(why) => {
+                self.tell(node, &why);
+                firstlight_files::printable::name(name).into_owned()
+            }
+        };
+        let wrap = match node.text("wrap_mode")? {
+            None | Some("repeat") => Wrap::Repeat,
+            Some("mirror") => Wrap::Mirror,
+            Some("clamp") => Wrap::Clamp,
+            Some(other) => return Err(node.error(format!("`wrap_mode` must be repeat, mirror or clamp, not {other}"))),
+        };
+        let smooth = node.text("filter_type")? != Some("nearest");
+        let encoding = if node.boolean_or("raw", false)? { Encoding::Linear } else { Encoding::Auto };
+        let (matrix, offset) = self.to_uv(node)?;
+        // Over the middle of the image: its top is at v = 1.
+        let flip = DMat2::from_diagonal(DVec2::new(1.0, -1.0));
+        let placed = Placed::of(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
+        let Placed { stretch, repeat, offset, rotate } = placed.unwrap_or_else(|| {
+            self.tell(node, "a sheared or flat texture transform is not modelled: it is left out");
+            Placed::of(flip, DVec2::Y).expect("it is no shear")
+        });
+        let mut image = TextureSource::image(file);
+        if let TextureSource::Image {
+            stretch: a,
+            repeat: b,
+            offset: c,
+            rotate: d,
+            wrap: e,
+            smooth: f,
+            encoding: g,
+            ..
+        } = &mut image
+        {
+            (*a, *b, *c, *d) = (stretch, repeat, offset, rotate);
+            (*e, *f, *g) = (wrap, smooth, encoding);
+        }
+        Ok(image)
+    }
+
+    fn checkerboard(&mut self, node: Node, of: Use, reads: Reads) -> Result<TextureSource, SceneError> {
+        self.texture_depth += 1;
+        let mut color = |name: &str, default: f64| self.constant_color(node, name, default, of).map(Rgb);
+        let (mut a, mut b) = (color("color0", 0.4)?, color("color1", 0.2)?);
+        self.texture_depth -= 1;
+        if reads == Reads::Number {
+            std::mem::swap(&mut a, &mut b);
+        }
+        let (matrix, offset) = self.to_uv(node)?;
+        // Its squares have sides of 1/2.
+        let placed = Placed::of(2.0 * matrix, 2.0 * offset).filter(|placed| placed.stretch == DVec2::ONE);
+        let Placed { repeat: squares, offset, rotate, .. } = placed.unwrap_or_else(|| {
+            self.tell(node, "a sheared or flat texture transform is not modelled: it is left out");
+            Placed::of(2.0 * DMat2::IDENTITY, DVec2::ZERO).expect("it is no shear")
+        });
+        Ok(TextureSource::Checker { a, b, squares, offset, rotate })
+    }
+
+    fn to_uv(&mut self, node: Node) -> Result<(DMat2, DVec2), SceneError> {
+        let m = node.transform("to_uv")?;
+        let matrix = DMat2::from_cols(m.x_axis.truncate().truncate(), m.y_axis.truncate().truncate());
+        Ok((matrix, m.w_axis.truncate().truncate()))
+    }
+}
+
+/// A texture transform as a scene file says it: stretch, then rotate, then repeat, then shift.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placed {
+    stretch: DVec2,
+    repeat: DVec2,
+    offset: DVec2,
+    /// Degrees.
+    rotate: f64,
+}
+
+impl Placed {
+    /// `None` if it is none: a shear, or a matrix without an inverse.
+    fn of(matrix: DMat2, offset: DVec2) -> Option<Self> {
+        let [[a, c], [b, d]] = matrix.to_cols_array_2d();
+        if b == 0.0 && c == 0.0 && a != 0.0 && d != 0.0 {
+            return Some(Self { stretch: DVec2::ONE, repeat: DVec2::new(a, d), offset, rotate: 0.0 });
+        }
+        // Rows diag(r) · R(θ) · diag(s): a = r₀ s₀ cos, b = −r₀ s₁ sin, c = r₁ s₀ sin, d = r₁ s₁ cos.
+        if a == 0.0 && d == 0.0 && b != 0.0 && c != 0.0 {
+            return Some(Self { stretch: DVec2::ONE, repeat: DVec2::new(-b, c), offset, rotate: 90.0 });
+        }
+        let tangent = (-(b * c) / (a * d)).sqrt();
+        if !tangent.is_normal() {
+            return None;
+        }
+        let (sin, cos) = tangent.atan().sin_cos();
+        let repeat = DVec2::new(a / cos, c / sin);
+        let stretch = DVec2::new(1.0, d / (repeat.y * cos));
+        // A rotation with factors of one size is said by repeats alone.
+        let stretch = if (stretch.y - 1.0).abs() < 1e-12 { DVec2::ONE } else { stretch };
+        Some(Self { stretch, repeat, offset, rotate: tangent.atan().to_degrees() })
+    }
+}
+
+/// The colour of a parameter that is one.
+pub(crate) fn constant(value: &Value, of: Use) -> Option<DVec3> {
+    match value {
+        Value::Float(number) => Some(DVec3::splat(*number)),
+        Value::Integer(number) => Some(DVec3::splat(*number as f64)),
+        Value::Rgb(rgb) | Value::Vector(rgb) => Some(*rgb),
+        Value::Spectrum(spectrum) => Some(spectrum.rgb(of)),
+        Value::Boolean(_) | Value::Text(_) | Value::Transform(_) => None,
+    }
+}
+
+/// Within what a scene file may have.
+fn limited(rgb: DVec3, of: Use) -> Vec3 {
+    let most = if of == Use::Reflectance { 1.0 } else { f64::from(f32::MAX) };
+    rgb.clamp(DVec3::ZERO, DVec3::splat(most)).as_vec3()
+}
+
+/// Rec. 709.
+pub(crate) fn luminance(rgb: DVec3) -> f64 {
+    if rgb.x == rgb.y && rgb.y == rgb.z { rgb.x } else { rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transforms_of_textures_are_taken_apart() {
+        for (matrix, is_placed) in [
+            (DMat2::from_diagonal(DVec2::new(2.0, -3.0)), true),
+            (DMat2::from_angle(0.3), true),
+            (DMat2::from_angle(2.8), true),
+            (DMat2::from_cols_array(&[0.0, 2.0, -1.0, 0.0]), true),
+            (DMat2::from_diagonal(DVec2::new(2.0, 5.0)) * DMat2::from_angle(-0.7), true),
+            (DMat2::from_angle(-0.7) * DMat2::from_diagonal(DVec2::new(2.0, 5.0)), true),
+            (DMat2::from_cols_array(&[1.0, 0.0, 1.0, 1.0]), false),
+            (DMat2::ZERO, false),
+        ] {
+            let placed = Placed::of(matrix, DVec2::ZERO);
+            assert_eq!(placed.is_some(), is_placed, "{matrix}");
+            let Some(Placed { stretch, repeat, rotate, .. }) = placed else { continue };
+            let rotation = DMat2::from_angle(rotate.to_radians());
+            let again = DMat2::from_diagonal(repeat) * rotation * DMat2::from_diagonal(stretch);
+            assert!(again.abs_diff_eq(matrix, 1e-12), "{matrix}: {placed:?}");
+        }
+    }
+}
