@@ -247,8 +247,8 @@ fn write_job(folder: &Path, job: &Job, options: &EngineOptions, package: Option<
         }
     }
     job.write(part).map_err(failed)?;
-    // This file marks the folder as a job.
-    Ok(new.finish(OsStr::new("job.json"))?)
+    // This file marks the folder as a job. Another job may have come first.
+    new.finish(OsStr::new("job.json")).or_else(|error| check_is_free(folder).and(Err(error.into())))
 }
 
 /// Refuses a folder that has a job, or anything that a job would replace.

@@ -6,6 +6,7 @@ use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path
 use crate::files::stamp::{Stamp, stamp};
 use crate::files::warnings::Warnings;
 use crate::format::animation::TrackPart;
+use crate::format::bounds;
 use crate::format::bounds::{check_moment, check_shutter_share};
 use crate::format::choice::ModelChoice;
 use crate::format::choice::UpAxis;
@@ -26,7 +27,8 @@ use crate::scene::animation::edited::show_time;
 use crate::scene::builtin::{BUILTIN_SCENES, builtin_text};
 use crate::scene::default_scene;
 use crate::scene::image_metadata::{ImageMetadata, MetadataError};
-use crate::scene::load_meshes::{LoadedMeshKey, LostMesh, ObjectMeshes, load_meshes, mesh_key};
+use crate::scene::known_meshes::KnownMeshes;
+use crate::scene::load_meshes::{LostMesh, ObjectMeshes, load_meshes};
 use crate::scene::loaded::LoadedScene;
 use crate::scene::model_light::{Model, light_as_in, light_model};
 use crate::scene::source::SceneSource;
@@ -35,7 +37,7 @@ use crate::scene::world::extent::{Extent, ExtentCache};
 use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::world::World;
 use glam::DVec3;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -280,8 +282,9 @@ fn resolve(
     let is_anything_left = meshes.iter().any(is_left);
     for LostMesh { object, error } in lost {
         let path = format!("objects/{object}/source");
-        // Without any object there is nothing to open.
-        if is_anything_left {
+        // Without any object there is nothing to open; and a scene that is shown stays while a file of it is broken.
+        let was_there = before.as_ref().is_some_and(|before| before.has_mesh(&scene.file.objects[object]));
+        if is_anything_left && !was_there {
             let name = scene.file.objects[object].name().map_or_else(|| "the object".to_owned(), quoted);
             scene.warnings.push(format!("{}{error}; {name} is left out", at(text, &title, &path)));
         } else {
@@ -326,15 +329,18 @@ fn resolve(
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
         // A scene is still useful if an image is missing.
-        let at = at(text, &title, &place);
+        let at = || at(text, &title, &place);
         let is_environment = place == ENVIRONMENT;
         match scene.add_picture(&file, &path, options, documents) {
+            Err(error) if text.is_some() && options.known.is_some_and(|known| known.pictures.contains_key(&file)) => {
+                note(place.clone(), &error);
+            }
             Err(error) if is_environment => {
-                scene.warnings.push(format!("{at}{error}; an environment of one colour is shown"));
+                scene.warnings.push(format!("{}{error}; an environment of one colour is shown", at()));
                 lost.insert(file);
             }
             Err(error) if !lost.contains(&file) => {
-                scene.warnings.push(format!("{at}{error}; the texture is omitted"));
+                scene.warnings.push(format!("{}{error}; the texture is omitted", at()));
                 lost.insert(file);
             }
             _ => {}
@@ -545,9 +551,8 @@ impl LoadedScene {
         let camera = &mut self.file.camera;
         if let (None, Some(forward)) = (camera.pivot_distance, camera.forward) {
             let depth = (center - camera.eye).dot(forward);
-            camera.pivot_distance = Some(depth).filter(|depth| {
-                (crate::format::bounds::MIN_SIZE..crate::format::bounds::MAX_COORDINATE).contains(depth)
-            });
+            camera.pivot_distance =
+                Some(depth).filter(|depth| (bounds::MIN_SIZE..bounds::MAX_COORDINATE).contains(depth));
         }
         (center - DVec3::splat(radius), center + DVec3::splat(radius))
     }
@@ -649,66 +654,6 @@ fn known_picture<'a>(
         return None;
     }
     known.pictures.get(name)
-}
-
-/// The data that was read before, by the objects that it was read for.
-struct KnownMeshes<'a> {
-    scene: &'a LoadedScene,
-    meshes: HashMap<LoadedMeshKey, usize>,
-    balls: HashMap<BallsKey, usize>,
-}
-
-/// First centre, steps, radii and other centres, as bits.
-#[derive(PartialEq, Eq, Hash)]
-enum BallsKey {
-    Grid([u64; 4], Vec<(u32, [u64; 3])>),
-    Spheres(Vec<[u64; 3]>, Vec<u64>, bool),
-}
-
-impl<'a> KnownMeshes<'a> {
-    fn new(scene: &'a LoadedScene) -> Self {
-        let mut known = Self { scene, meshes: HashMap::new(), balls: HashMap::new() };
-        for (i, object) in scene.file.objects.iter().enumerate() {
-            if let Some(key) = mesh_key(object) {
-                known.meshes.entry(key).or_insert(i);
-            } else if let Some(key) = Self::balls_key(object) {
-                known.balls.entry(key).or_insert(i);
-            }
-        }
-        known
-    }
-
-    fn balls_key(object: &ObjectPart) -> Option<BallsKey> {
-        let bits = |v: &DVec3| v.to_array().map(f64::to_bits);
-        match object {
-            ObjectPart::BallGrid { first, steps, radius, .. } => {
-                let [x, y, z] = bits(first);
-                let steps = steps.iter().map(|(count, step)| (*count, bits(step))).collect();
-                Some(BallsKey::Grid([x, y, z, radius.to_bits()], steps))
-            }
-            ObjectPart::Spheres { centers, radii, .. } => {
-                let (radii, each) = match radii {
-                    RadiiPart::All(radius) => (vec![radius.to_bits()], false),
-                    RadiiPart::Each(radii) => (radii.iter().map(|radius| radius.to_bits()).collect(), true),
-                };
-                Some(BallsKey::Spheres(centers.iter().map(bits).collect(), radii, each))
-            }
-            _ => None,
-        }
-    }
-
-    /// The mesh of an equal object, if its files have not changed.
-    fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
-        let key = mesh_key(wanted)?;
-        let is_builtin = matches!(key.0, MeshSource::Builtin(_));
-        let mesh = self.scene.meshes[*self.meshes.get(&key)?].as_ref()?;
-        ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
-    }
-
-    /// The spheres of an equal object.
-    fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
-        self.scene.balls[*self.balls.get(&Self::balls_key(wanted)?)?].clone()
-    }
 }
 
 /// The text of a scene file, within its length limit.

@@ -12,6 +12,7 @@ mod extract;
 mod fingerprint;
 pub mod image_metadata;
 mod inner_light;
+mod known_meshes;
 mod load;
 mod load_meshes;
 mod loaded;

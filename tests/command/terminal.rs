@@ -77,13 +77,19 @@ fn names_of_scene_files() {
         format!("materials: {{ \"a\": diffuse(albedo: \"{name}\") }}"),
         format!("objects: [mesh(source: obj(\"{name}\"))]"),
         format!("objects: [mesh(source: builtin(\"{name}\"))]"),
-        format!("textures: {{ \"{name}\": image(file: \"{name}\") }}"),
-        format!("environment: image(file: \"{name}\")"),
         format!("{ACTING}: 3"),
         format!("film: (width: \"{name}\")"),
     ] {
         write(&fields);
         assert!(says(path, "info a.ron", 1).err.contains("error: a.ron:"));
+    }
+    // What is told of a scene that lacks an image.
+    for fields in [
+        format!("textures: {{ \"{name}\": image(file: \"{name}\") }}"),
+        format!("environment: image(file: \"{name}\")"),
+    ] {
+        write(&fields);
+        assert!(says(path, "info a.ron", 0).err.contains("warning: a.ron:"));
     }
     // What is told of a scene that is good.
     write(&format!(

@@ -30,14 +30,15 @@ pub fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
         "" => Some(1),
         rest => rest.strip_prefix(' ').filter(|digits| digits.starts_with(|c| matches!(c, '1'..='9')))?.parse().ok(),
     };
-    let taken: std::collections::HashSet<u64> = (named.iter(world))
+    let mut taken: Vec<u64> = (named.iter(world))
         .filter(|(_, is_material)| *is_material == of_materials)
         // `name 1` is another name.
         .filter_map(|(taken, _)| number_of(taken).filter(|&number| number > 1 || taken.as_str() == name))
         .collect();
-    match (1..).find(|number| !taken.contains(number)) {
-        Some(1) => name.to_owned(),
-        number => format!("{name} {}", number.expect("more numbers than names")),
+    taken.sort_unstable();
+    match taken.into_iter().fold(1, |free, number| if number == free { free + 1 } else { free }) {
+        1 => name.to_owned(),
+        free => format!("{name} {free}"),
     }
 }
 

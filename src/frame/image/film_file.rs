@@ -486,6 +486,7 @@ fn change_names() -> impl Iterator<Item = String> {
 mod tests {
     use super::*;
     use crate::frame::core::offline::{Target, render_offline};
+    use crate::frame::image::picture_file::Print;
     use crate::render::RenderSettings;
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
@@ -572,6 +573,24 @@ mod tests {
             bytes.splice(at..at + 4 + length, [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat());
             std::fs::write(&path, bytes).unwrap();
             assert!(read_film_summary(&path).unwrap_err().is_damaged(), "{text}");
+        }
+    }
+
+    #[test]
+    fn metadata_beyond_the_limit_is_refused_in_every_format() {
+        let folder = tempfile::tempdir().unwrap();
+        let (film, note) = tiny(1);
+        write_film_file(&film, &note, &folder.path().join("film.exr")).unwrap();
+        for name in ["film.exr", "a.exr", "a.png"] {
+            let path = folder.path().join(name);
+            let (size, display) = ((film.width(), film.height()), crate::render::Display::default());
+            let print = Print { film: &film, display: &display, size, note: Some(&note), denoised: None };
+            if name != "film.exr" {
+                print.write(&path, Replace::AllButFilms).unwrap();
+            }
+            let read = |note_bytes| ImageMetadata::read_within(&path, &Limits { note_bytes, ..Limits::USUAL });
+            assert_eq!(read(1 << 20).unwrap().to_note(), note, "{name}");
+            assert!(read(note.len() as u64 - 1).is_err(), "{name}");
         }
     }
 

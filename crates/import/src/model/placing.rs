@@ -1,5 +1,6 @@
 //! Matrices as placements of a scene file.
 
+use firstlight_format::bounds;
 use firstlight_format::parts::TransformPart;
 use glam::{DAffine3, DVec3};
 
@@ -7,8 +8,8 @@ use glam::{DAffine3, DVec3};
 pub(crate) fn is_placement(world: &DAffine3) -> bool {
     let determinant = world.matrix3.determinant().abs();
     world.is_finite()
-        && world.translation.abs().max_element() <= firstlight_format::bounds::MAX_COORDINATE
-        && (firstlight_format::bounds::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
+        && world.translation.abs().max_element() <= bounds::MAX_COORDINATE
+        && (bounds::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
 }
 
 /// A matrix as a scene file says it.

@@ -24,6 +24,7 @@ use glam::{DAffine3, DMat3, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
@@ -76,7 +77,7 @@ pub(crate) struct Builder<'a> {
     pub parts: HashMap<u32, Arc<Mesh>>,
     /// Meshes in files of their own that became parts.
     pub files: Vec<(PathBuf, Stamp)>,
-    pub(super) named: HashMap<String, Arc<Described>>,
+    pub(super) named: HashMap<String, Rc<Described>>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
     definitions: HashMap<String, Vec<Item>>,

@@ -15,7 +15,7 @@ use firstlight_format::error::{SceneError, suggestion};
 use glam::DAffine3;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// Files inside of one another.
 const MAX_INCLUDES_DEEP: usize = 32;
@@ -264,7 +264,7 @@ impl<'a> Reader<'a> {
                 if self.state.defaults.len() == MAX_ATTRIBUTES {
                     return Err(cursor.wrong(at, format!("there are more than {MAX_ATTRIBUTES} `Attribute`s")));
                 }
-                Arc::make_mut(&mut self.state.defaults).push((of, params.into_list()));
+                Rc::make_mut(&mut self.state.defaults).push((of, params.into_list()));
             }
             "Include" | "Import" => {
                 let file = cursor.string()?;
@@ -342,7 +342,7 @@ impl<'a> Reader<'a> {
                     let kind = printable::name(&kind).into_owned();
                     self.builder.tell(format!("area lights of the kind `{kind}` are taken for diffuse ones"));
                 }
-                self.state.area_light = Some(Arc::new(params));
+                self.state.area_light = Some(Rc::new(params));
             }
             "LightSource" => {
                 let kind = cursor.string()?;

@@ -3,22 +3,24 @@
 //! | pbrt | ours |
 //! |---|---|
 //! | `diffuse` | `diffuse` |
-//! | `coateddiffuse` | `principled`: a dielectric layer over a diffuse one |
-//! | `conductor` | `metal` with the reflectance at normal incidence |
+//! | `coateddiffuse` | `plastic` |
+//! | `conductor` | `conductor`; `metal` where its reflectance is a texture |
 //! | `coatedconductor` | `principled`: metal under a clear coat |
 //! | `dielectric` | `glass`, `rough_glass` |
-//! | `thindielectric` | `principled`, thin walled |
-//! | `diffusetransmission`, `subsurface` | `diffuse`, told |
+//! | `thindielectric` | `thin_glass` |
+//! | `diffusetransmission` | `translucent` |
+//! | `subsurface` | `diffuse`, told |
 //! | `mix` | `blend` |
 //! | `interface` | nothing: the surface is left out |
 
 use crate::pbrt::params::Params;
-use crate::pbrt::spectrum::{Spectrum, UnknownSpectrum, conductor_reflectance};
+use crate::pbrt::spectrum::{Spectrum, UnknownSpectrum, conductor_index, normal_reflectance};
 use crate::pbrt::textures::Texture;
 use firstlight_files::printable;
 use firstlight_format::parts::{InFile, MaterialPart};
+use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::Fresnel;
+use firstlight_render::{Encoding, Fresnel};
 use glam::{DVec3, Vec3};
 
 /// Where the values of a material come from: textures become names, and what is not shown is told.
@@ -35,6 +37,8 @@ pub(crate) trait MaterialScope {
     fn image(&mut self, name: &str) -> Option<ColorValue>;
     /// The name of a material of the scene, for a mixture.
     fn material(&mut self, name: &str) -> Option<String>;
+    /// Adds a material that another one refers to; returns its name.
+    fn add(&mut self, part: MaterialPart) -> String;
     /// Something about this material that is not shown.
     fn tell(&mut self, what: &str);
 }
@@ -109,21 +113,50 @@ fn ior(scope: &mut impl MaterialScope, params: &Params, name: &str) -> (f32, f32
     (if ior > 0.0 && ior.is_finite() { ior } else { 1.0 }, dispersion as f32)
 }
 
-/// Reflectance of a conductor at normal incidence.
-fn conductor(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> ColorValue {
+/// What makes a conductor.
+enum Conductor {
+    /// Index of refraction and extinction coefficient, per channel.
+    Index { eta: DVec3, k: DVec3 },
+    /// A texture of its reflectance at normal incidence.
+    Reflectance(ColorValue),
+}
+
+impl Conductor {
+    /// Its colour at normal incidence.
+    fn color(self) -> ColorValue {
+        match self {
+            Self::Index { eta, k } => {
+                let channel = |i: usize| normal_reflectance(eta[i], k[i]) as f32;
+                ColorValue::Rgb(Vec3::new(channel(0), channel(1), channel(2)))
+            }
+            Self::Reflectance(value) => value,
+        }
+    }
+}
+
+fn conductor(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> Conductor {
     if params.has("reflectance") {
-        return color(scope, params, "reflectance", 1.0);
+        return match color(scope, params, "reflectance", 1.0) {
+            // An index of 1, as in pbrt.
+            ColorValue::Rgb(reflectance) => {
+                let r = reflectance.as_dvec3().min(DVec3::splat(0.9999));
+                Conductor::Index { eta: DVec3::ONE, k: 2.0 * (r / (1.0 - r)).map(f64::sqrt) }
+            }
+            texture => Conductor::Reflectance(texture),
+        };
     }
     let name = |end: &str| format!("{prefix}{end}");
     if params.texture(&name("eta")).is_some() || params.texture(&name("k")).is_some() {
         scope.tell("textures of `eta` and `k` are not modelled: copper is used");
     }
     let part = |end: &str| params.spectrum(&name(end)).unwrap_or_else(|| Spectrum::Named(format!("metal-Cu-{end}")));
-    let reflectance = conductor_reflectance(&part("eta"), &part("k")).unwrap_or_else(|UnknownSpectrum(name)| {
-        scope.tell(&format!("the spectrum `{}` is not known: a grey metal is used", printable::name(&name)));
-        DVec3::splat(0.7)
-    });
-    ColorValue::Rgb(reflectance.as_vec3())
+    match conductor_index(&part("eta"), &part("k")) {
+        Ok((eta, k)) => Conductor::Index { eta, k },
+        Err(UnknownSpectrum(name)) => {
+            scope.tell(&format!("the spectrum `{}` is not known: a grey metal is used", printable::name(&name)));
+            Conductor::Reflectance(ColorValue::grey(0.7))
+        }
+    }
 }
 
 fn principled(base_color: ColorValue) -> MaterialPart {
@@ -143,22 +176,32 @@ pub(crate) fn material(
         "" | "none" | "interface" => return None,
         "diffuse" => MaterialPart::Diffuse { albedo: color(scope, params, "reflectance", 0.5) },
         "coateddiffuse" => {
-            let mut part = principled(color(scope, params, "reflectance", 0.5));
+            let diffuse = color(scope, params, "reflectance", 0.5);
             let width = alpha(scope, params, "");
-            let (index, _) = ior(scope, params, "eta");
-            if let MaterialPart::Principled { roughness: r, ior: i, .. } = &mut part {
-                (*r, *i) = (roughness(scope, width), index);
+            let (ior, _) = ior(scope, params, "eta");
+            MaterialPart::Plastic {
+                diffuse,
+                alpha: scope.scalar_value(width),
+                ior,
+                specular: 1.0.into(),
+                nonlinear: true,
             }
-            part
         }
         "conductor" => {
             let width = alpha(scope, params, "");
             let alpha = scope.scalar_value(width);
-            let reflectance = conductor(scope, params, "");
-            MaterialPart::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, compensate: false }
+            match conductor(scope, params, "") {
+                Conductor::Index { eta, k } => {
+                    let (eta, k, reflectance) = (Rgb(eta.as_vec3()), Rgb(k.as_vec3()), ColorValue::grey(1.0));
+                    MaterialPart::Conductor { alpha, eta, k, reflectance, compensate: false }
+                }
+                Conductor::Reflectance(reflectance) => {
+                    MaterialPart::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, compensate: false }
+                }
+            }
         }
         "coatedconductor" => {
-            let mut part = principled(conductor(scope, params, "conductor."));
+            let mut part = principled(conductor(scope, params, "conductor.").color());
             let (base, coat) = (alpha(scope, params, "conductor."), alpha(scope, params, "interface."));
             if let MaterialPart::Principled { metallic, roughness: r, clearcoat, clearcoat_roughness, .. } = &mut part {
                 (*metallic, *clearcoat) = (1.0.into(), 1.0.into());
@@ -179,17 +222,13 @@ pub(crate) fn material(
             }
         }
         "thindielectric" => {
-            let mut part = principled(ColorValue::grey(1.0));
-            let (index, _) = ior(scope, params, "eta");
-            if let MaterialPart::Principled { transmission, thin_walled, roughness, ior, .. } = &mut part {
-                (*transmission, *thin_walled, *roughness, *ior) = (1.0.into(), true, 0.0.into(), index);
-            }
-            part
+            let (ior, _) = ior(scope, params, "eta");
+            MaterialPart::ThinGlass { ior, reflectance: ColorValue::grey(1.0), transmittance: ColorValue::grey(1.0) }
         }
-        "diffusetransmission" => {
-            scope.tell("light does not pass through it: diffuse transmission is not modelled");
-            MaterialPart::Diffuse { albedo: color(scope, params, "reflectance", 0.25) }
-        }
+        "diffusetransmission" => MaterialPart::Translucent {
+            reflectance: color(scope, params, "reflectance", 0.25),
+            transmittance: color(scope, params, "transmittance", 0.25),
+        },
         "subsurface" => {
             scope.tell("subsurface scattering is not modelled: a diffuse surface is shown");
             MaterialPart::Diffuse { albedo: color(scope, params, "reflectance", 0.5) }
@@ -211,21 +250,58 @@ pub(crate) fn material(
             MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
         }
     };
-    if params.has("displacement") {
-        scope.tell("bump maps are not modelled: the surface is smooth");
-    }
-    if let Some(normals) = params.string("normalmap").and_then(|name| scope.image(name)) {
-        match with_layers(&part) {
-            Some(mut layered) => {
-                if let MaterialPart::Principled { normal_map, .. } = &mut layered {
-                    *normal_map = normals;
-                }
-                part = layered;
+    if let Some(normals) = normals(scope, params) {
+        part = match part {
+            MaterialPart::Principled { .. } | MaterialPart::Blend { .. } => part,
+            plain => {
+                let name = scope.add(plain);
+                MaterialPart::blend(0.0.into(), name.clone(), name)
             }
-            None => scope.tell("its normal map is not modelled"),
+        };
+        if let MaterialPart::Principled { normal_map, .. } | MaterialPart::Blend { normal_map, .. } = &mut part {
+            *normal_map = normals;
         }
     }
     Some(part)
+}
+
+/// The normal map of a material, or the image of its displacement as a relief.
+fn normals(scope: &mut impl MaterialScope, params: &Params) -> Option<ColorValue> {
+    if let Some(name) = params.string("normalmap") {
+        return scope.image(name);
+    }
+    match scope.number(params, "displacement")? {
+        Texture::Varying(TextureSource::Image {
+            file,
+            stretch,
+            repeat,
+            offset,
+            rotate,
+            wrap,
+            wrap_v,
+            tint,
+            invert,
+            ..
+        }) => {
+            let mut source = TextureSource::image(file);
+            if let TextureSource::Image { relief, encoding, .. } = &mut source {
+                (*relief, *encoding) = (Some(1.0), Encoding::Linear);
+            }
+            if let TextureSource::Image { stretch: s, repeat: r, offset: o, rotate: a, .. } = &mut source {
+                (*s, *r, *o, *a) = (stretch, repeat, offset, rotate);
+            }
+            if let TextureSource::Image { wrap: u, wrap_v: v, tint: t, invert: i, .. } = &mut source {
+                (*u, *v, *t, *i) = (wrap, wrap_v, tint, invert);
+            }
+            Some(scope.color_value(Texture::Varying(source)))
+        }
+        Texture::Varying(_) => {
+            scope.tell("only images are modelled as bump maps: the surface is smooth");
+            None
+        }
+        // The same height everywhere.
+        Texture::Constant(_) => None,
+    }
 }
 
 /// The same surface as `principled`, which has what other kinds lack; `None` if it is not the same.

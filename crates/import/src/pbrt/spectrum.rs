@@ -79,15 +79,26 @@ impl Spectrum {
     }
 }
 
-/// Reflectance of a conductor at normal incidence.
+/// Index of refraction and extinction coefficient of a conductor, per channel.
 ///
-/// Colours are used channel by channel; spectra wavelength by wavelength.
-pub(crate) fn conductor_reflectance(eta: &Spectrum, k: &Spectrum) -> Result<DVec3, UnknownSpectrum> {
+/// Colours are used channel by channel. Of spectra, the reflectance at normal incidence is integrated wavelength by
+/// wavelength; the index is that of a wavelength of the channel, and the coefficient gives that reflectance.
+pub(crate) fn conductor_index(eta: &Spectrum, k: &Spectrum) -> Result<(DVec3, DVec3), UnknownSpectrum> {
     if let (Spectrum::Rgb(eta), Spectrum::Rgb(k)) = (eta, k) {
-        let channel = |i: usize| normal_reflectance(eta[i], k[i]);
-        return Ok(DVec3::new(channel(0), channel(1), channel(2)));
+        return Ok((*eta, *k));
     }
-    let at = |spectrum: &Spectrum, is_eta: bool, nm: f64| match spectrum {
+    // Every name is tried before the integral.
+    let index = DVec3::new(at(eta, true, 610.0)?, at(eta, true, 550.0)?, at(eta, true, 460.0)?);
+    at(k, false, 550.0)?;
+    let reflectance = |nm: f64| normal_reflectance(at(eta, true, nm).unwrap_or(1.0), at(k, false, nm).unwrap_or(0.0));
+    let r = albedo_of(reflectance).clamp(DVec3::ZERO, DVec3::splat(0.9999));
+    let (plus, minus) = ((index + 1.0) * (index + 1.0), (index - 1.0) * (index - 1.0));
+    Ok((index, ((r * plus - minus) / (1.0 - r)).max(DVec3::ZERO).map(f64::sqrt)))
+}
+
+/// A spectrum of a conductor at a wavelength in nm: its index of refraction or its extinction coefficient.
+fn at(spectrum: &Spectrum, is_eta: bool, nm: f64) -> Result<f64, UnknownSpectrum> {
+    match spectrum {
         // Any smooth spectrum of this colour is as good as another.
         Spectrum::Rgb(rgb) => Ok(match nm {
             ..490.0 => rgb.z,
@@ -105,18 +116,11 @@ pub(crate) fn conductor_reflectance(eta: &Spectrum, k: &Spectrum) -> Result<DVec
             let column = |&(nm, eta, k): &(f64, f64, f64)| (nm, if is_eta { eta } else { k });
             Ok(interpolated(&data.iter().map(column).collect::<Vec<_>>(), nm))
         }
-    };
-    // Every name is tried before the integral.
-    (at(eta, true, 550.0)?, at(k, false, 550.0)?);
-    let reflectance = |nm: f64| {
-        let (eta, k) = (at(eta, true, nm).unwrap_or(1.0), at(k, false, nm).unwrap_or(0.0));
-        normal_reflectance(eta, k)
-    };
-    Ok(albedo_of(reflectance).clamp(DVec3::ZERO, DVec3::ONE))
+    }
 }
 
 /// Fresnel reflectance of an interface from air at normal incidence.
-fn normal_reflectance(eta: f64, k: f64) -> f64 {
+pub(crate) fn normal_reflectance(eta: f64, k: f64) -> f64 {
     let k2 = k * k;
     let reflectance = ((eta - 1.0).powi(2) + k2) / ((eta + 1.0).powi(2) + k2);
     if reflectance.is_finite() { reflectance.clamp(0.0, 1.0) } else { 0.0 }
@@ -156,6 +160,12 @@ fn interpolated(samples: &[(f64, f64)], nm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn conductor_reflectance(eta: &Spectrum, k: &Spectrum) -> Result<DVec3, UnknownSpectrum> {
+        let (eta, k) = conductor_index(eta, k)?;
+        let channel = |i: usize| normal_reflectance(eta[i], k[i]);
+        Ok(DVec3::new(channel(0), channel(1), channel(2)))
+    }
 
     fn near(found: DVec3, expected: DVec3, tolerance: f64) {
         assert!((found - expected).abs().max_element() < tolerance, "{found} for {expected}");

@@ -2,7 +2,7 @@
 
 use crate::pbrt::params::{Param, Params};
 use glam::DAffine3;
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// A material as it was described.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub(crate) struct Described {
 #[derive(Clone, Debug)]
 pub(crate) enum MaterialRef {
     /// Described where it is set.
-    Own(Arc<Described>),
+    Own(Rc<Described>),
     /// By its name, which may be described later.
     Named(String),
 }
@@ -33,11 +33,11 @@ pub(crate) struct State {
     pub is_reversed: bool,
     pub material: MaterialRef,
     /// Parameters of the light that the shapes emit.
-    pub area_light: Option<Arc<Params>>,
+    pub area_light: Option<Rc<Params>>,
     /// Name of the medium inside of the shapes; empty for none.
     pub inside: String,
     /// Parameters for what is described from here on, by `shape`, `light`, `material`, `medium` or `texture`.
-    pub defaults: Arc<Vec<(String, Vec<Param>)>>,
+    pub defaults: Rc<Vec<(String, Vec<Param>)>>,
 }
 
 impl Default for State {
@@ -47,10 +47,10 @@ impl Default for State {
             ctm: DAffine3::IDENTITY,
             sets_start: true,
             is_reversed: false,
-            material: MaterialRef::Own(Arc::new(plain)),
+            material: MaterialRef::Own(Rc::new(plain)),
             area_light: None,
             inside: String::new(),
-            defaults: Arc::default(),
+            defaults: Rc::default(),
         }
     }
 }
@@ -59,7 +59,7 @@ impl State {
     /// Multiplies the transform.
     pub(crate) fn apply(&mut self, transform: DAffine3) {
         if self.sets_start {
-            self.ctm = self.ctm * transform;
+            self.ctm *= transform;
         }
     }
 

@@ -9,8 +9,9 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Triangles that a surface may have after subdivision.
-const MAX_TRIANGLES: usize = 1 << 20;
+/// Triangles that a surface may have after subdivision; three levels are always made.
+const MAX_TRIANGLES: usize = 1 << 18;
+const MAX_FACTOR: usize = 1 << (2 * 3);
 
 /// Vertices and triangles between two steps.
 struct Surface {
@@ -39,9 +40,10 @@ pub(crate) fn subdivided(params: &Params) -> Result<Indexed, String> {
     }
     let is_triangle = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
     let mut surface = Surface { positions, triangles: triangles.iter().copied().filter(is_triangle).collect() };
+    let most = MAX_TRIANGLES.max(surface.triangles.len().saturating_mul(MAX_FACTOR));
     for _ in 0..params.count("levels").unwrap_or(3) {
         // What is finer than this looks the same.
-        if surface.triangles.len() > MAX_TRIANGLES / 4 {
+        if surface.triangles.len() > most / 4 {
             break;
         }
         surface = surface.refined()?;

@@ -13,7 +13,7 @@ use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::{Encoding, MAX_LOBES};
 use glam::{DVec3, Vec3};
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// Materials inside of one another.
 const MAX_DEPTH: u32 = 8;
@@ -41,9 +41,9 @@ impl Builder<'_> {
     }
 
     /// A material with a number of its own.
-    pub(crate) fn described(&mut self, name: &str, kind: String, params: Params) -> Arc<Described> {
+    pub(crate) fn described(&mut self, name: &str, kind: String, params: Params) -> Rc<Described> {
         self.n_described += 1;
-        Arc::new(Described { number: self.n_described, name: name.to_owned(), kind, params })
+        Rc::new(Described { number: self.n_described, name: name.to_owned(), kind, params })
     }
 
     /// A medium: only one that absorbs and does not scatter is modelled, inside of glass.
@@ -96,7 +96,7 @@ impl Builder<'_> {
         let base_name = base.clone().unwrap_or_else(|| "light".to_owned());
         let mut part = base.and_then(|name| self.part(&name));
         let mut others = Vec::new();
-        if let Some((radiance, is_two_sided)) = light {
+        if let Some((radiance, is_two_sided)) = light.clone() {
             let names = ["surface", "emitter"].map(|end| self.material_names.free(&format!("{base_name}: {end}")));
             let surface = emissive(part.as_ref(), radiance, is_two_sided, names.clone());
             others.extend(names.into_iter().zip(surface.others));
@@ -104,17 +104,15 @@ impl Builder<'_> {
         }
         let mut part = part?;
         if let Some(value) = opacity {
-            match with_layers(&part) {
-                Some(mut layered) => {
-                    if let MaterialPart::Principled { opacity, .. } = &mut layered {
-                        *opacity = value;
-                    }
-                    part = layered;
-                }
-                None => {
-                    let what = format!("`alpha` of `{}` is not modelled with its material", printable::name(shape));
-                    self.tell(what);
-                }
+            part = match with_layers(&part) {
+                Some(layered) => layered,
+                None if light.is_none() => MaterialPart::blend(0.0.into(), base_name.clone(), base_name.clone()),
+                None => part,
+            };
+            if let MaterialPart::Principled { opacity, .. } | MaterialPart::Blend { opacity, .. } = &mut part {
+                *opacity = value;
+            } else {
+                self.tell(format!("`alpha` of `{}` is not modelled with its material", printable::name(shape)));
             }
         }
         let name = self.material_names.free(&base_name);
@@ -148,7 +146,7 @@ impl Builder<'_> {
     }
 
     /// The name of a material as one of ours; `None` if nothing can be seen of it.
-    fn converted(&mut self, described: &Arc<Described>, absorption: Vec3) -> Option<String> {
+    fn converted(&mut self, described: &Rc<Described>, absorption: Vec3) -> Option<String> {
         let key = format!("{} {absorption}", described.number);
         if let Some(known) = self.material_of.get(&key) {
             return known.clone();
@@ -253,6 +251,12 @@ impl MaterialScope for Scope<'_, '_> {
     fn material(&mut self, name: &str) -> Option<String> {
         let described = self.builder.named.get(cut(name)).cloned()?;
         self.builder.converted(&described, Vec3::ZERO)
+    }
+
+    fn add(&mut self, part: MaterialPart) -> String {
+        let name = self.builder.material_names.free(&self.name);
+        self.builder.add_material(name.clone(), part);
+        name
     }
 
     fn tell(&mut self, what: &str) {

@@ -3,6 +3,7 @@
 use crate::pbrt::params::Params;
 use crate::pbrt::transforms::world_for;
 use firstlight_files::printable;
+use firstlight_format::bounds;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::parts::{DisplayPart, FilmPart};
 use firstlight_render::PixelFilter;
@@ -75,9 +76,7 @@ impl ViewOptions {
         let mut camera =
             CameraPart { look_at: None, forward: Some(forward), up, ..CameraPart::looking_at(eye, eye + forward) };
         if kind == "orthographic" {
-            camera.orthographic_height = Some(
-                (height * size).clamp(firstlight_format::bounds::MIN_SIZE, firstlight_format::bounds::MAX_COORDINATE),
-            );
+            camera.orthographic_height = Some((height * size).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE));
         } else {
             if kind != "perspective" {
                 tell(format!(
@@ -93,8 +92,7 @@ impl ViewOptions {
         if lens > 0.0 {
             camera.lens_radius = Some(lens.min(1e6));
             let focus = params.number("focaldistance").unwrap_or(1e6) * size;
-            camera.focus_distance =
-                Some(focus.clamp(firstlight_format::bounds::MIN_SIZE, firstlight_format::bounds::MAX_COORDINATE));
+            camera.focus_distance = Some(focus.clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE));
         }
         camera
     }
