@@ -36,7 +36,9 @@ fn told(scene: &LoadedScene) -> Vec<String> {
 
 /// A sphere with this BSDF, and a light, so that nothing is added.
 fn material(bsdf: &str) -> (MaterialPart, Vec<String>) {
-    let scene = opened(&format!("<emitter type=\"constant\"/><shape type=\"sphere\" id=\"ball\">{bsdf}</shape>"));
+    let scene = opened(&format!(
+        "<sensor type=\"perspective\"/><emitter type=\"constant\"/><shape type=\"sphere\" id=\"ball\">{bsdf}</shape>"
+    ));
     let ObjectPart::Sphere { material, .. } = &scene.file.objects[0] else { panic!("it is a sphere") };
     (scene.file.materials.get(material).unwrap().clone(), told(&scene))
 }
@@ -196,14 +198,14 @@ fn errors_have_a_line_and_a_column() {
             "a.xml:2:22: there is no object with the id `gras` (did you mean `grass`?)",
         ),
         ("<thing type=\"a\"/>", "a.xml:2:1: `<thing>` is not known"),
-        ("<shape type=\"sphere\">", "a.xml:3:3: not valid XML: "),
+        ("<shape type=\"sphere\">", "a.xml:3:1: not valid XML: "),
         ("<shape type=\"$kind\"/>", "a.xml:2:1: `$kind` has no value"),
         ("<bsdf type=\"diffuse\" id=\"a\"/>\n<bsdf type=\"diffuse\" id=\"a\"/>", "a.xml:3:1: the id `a` is used twice"),
         ("<include filename=\"none.xml\"/>", "a.xml:2:1: `none.xml`: no such file"),
         ("<include filename=\"../b.xml\"/>", "a.xml:2:1: `../b.xml` is a path out of the folder"),
         (
             "<shape type=\"sphere\"><transform name=\"to_world\"><matrix value=\"1 2\"/></transform></shape>",
-            "a.xml:2:50: a matrix has 16 numbers",
+            "a.xml:2:49: a matrix has 16 numbers",
         ),
         (
             "<shape type=\"sphere\"><bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"watr\"/></bsdf></shape>",

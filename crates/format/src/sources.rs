@@ -67,6 +67,9 @@ pub enum EnvironmentLayout {
     Equirectangular,
     /// A square of equal areas, as pbrt has it: the middle is +Z, the corners are −Z.
     EqualArea,
+    /// Longitude and latitude as in Mitsuba 3: colours are interpolated between texels, and the first and last row lie
+    /// at the poles.
+    Interpolated,
 }
 
 /// A texture as a scene file describes it.

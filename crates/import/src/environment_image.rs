@@ -8,6 +8,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Height of images beyond which the result is no larger.
 const MAX_HEIGHT: u32 = 4096;
+/// Height to which images with interpolated colours are enlarged at most.
+const MAX_INTERPOLATED: u32 = 2048;
 
 /// The image as an equirectangular one about +Y whose middle column is in direction −Z, as [`firstlight_render::Environment`]
 /// has it.
@@ -15,11 +17,13 @@ const MAX_HEIGHT: u32 = 4096;
 /// - `axes`: rows of the matrix from directions of the world to those of the image. The pole of an image is +Y of its
 ///   directions in the equirectangular layout, and +Z in the one of equal areas.
 pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Option<[[f64; 3]; 3]>) -> ImageTexture {
-    /// Samples of a texel along each side, so that no light between two of them is lost.
-    const SAMPLES: u32 = 4;
+    // Samples of a texel along each side, so that no light between two of them is lost.
+    let samples = if layout == EnvironmentLayout::Interpolated { 1 } else { 4 };
     let height = match layout {
         EnvironmentLayout::Equirectangular => image.height,
         EnvironmentLayout::EqualArea => image.height.max(image.width),
+        // Texels of one colour each stand for the slopes between those of the image.
+        EnvironmentLayout::Interpolated => image.height.saturating_mul(8).min(MAX_INTERPOLATED).max(image.height),
     };
     let height = height.clamp(1, MAX_HEIGHT);
     let width = 2 * height;
@@ -37,22 +41,30 @@ pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Op
                 DVec2::new(u.rem_euclid(1.0), direction.y.clamp(-1.0, 1.0).acos() / PI)
             }
             EnvironmentLayout::EqualArea => equal_area(direction),
+            EnvironmentLayout::Interpolated => {
+                let u = (0.5 + direction.x.atan2(-direction.z) / TAU) * size.x - 0.5;
+                let v = direction.y.clamp(-1.0, 1.0).acos() / PI * (size.y - 1.0);
+                let (x, y) = (u.floor() as i64, v.floor() as i64);
+                let around = |x: i64| x.rem_euclid(i64::from(image.width).max(1));
+                let row = |y: i64| texel(around(x), y).lerp(texel(around(x + 1), y), (u - u.floor()) as f32);
+                return row(y).lerp(row(y + 1), (v - v.floor()) as f32);
+            }
         } * size;
         texel(point.x.floor() as i64, point.y.floor() as i64)
     };
     let row = |y: u32| -> Vec<Vec3> {
         let at = |x: u32| {
-            let samples = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));
-            let sum: Vec3 = samples
+            let cells = (0..samples).flat_map(|j| (0..samples).map(move |i| (i, j)));
+            let sum: Vec3 = cells
                 .map(|(i, j)| {
                     let sub = |cell: u32, k: u32, n: u32| {
-                        (f64::from(cell) + (f64::from(k) + 0.5) / f64::from(SAMPLES)) / f64::from(n)
+                        (f64::from(cell) + (f64::from(k) + 0.5) / f64::from(samples)) / f64::from(n)
                     };
                     let (azimuth, polar) = ((sub(x, i, width) - 0.5) * TAU, sub(y, j, height) * PI);
                     radiance(DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()))
                 })
                 .sum();
-            sum / (SAMPLES * SAMPLES) as f32
+            sum / (samples * samples) as f32
         };
         (0..width).map(at).collect()
     };
@@ -130,6 +142,23 @@ mod tests {
         let own = direction_of(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / f64::from(n));
         let expected = DVec3::new(own.x, own.z, -own.y);
         assert!((moment.normalize() - expected).length() < 0.03, "{} for {expected}", moment.normalize());
+    }
+
+    #[test]
+    fn colours_between_texels_are_interpolated_and_rows_reach_the_poles() {
+        // Red is the column, green the row.
+        let source = image(8, 5, |i, j| Vec3::new(i as f32, j as f32, 0.0));
+        let found = equirectangular(&source, EnvironmentLayout::Interpolated, None);
+        assert_eq!((found.width, found.height), (80, 40));
+        let at = |i: u32, j: u32| found.linear((i + j * found.width) as usize);
+        for (i, j) in [(10, 3), (41, 20), (60, 39)] {
+            let column = (f64::from(i) + 0.5) / 10.0 - 0.5;
+            let row = (f64::from(j) + 0.5) / 40.0 * 4.0;
+            let expected = DVec3::new(column, row, 0.0).as_vec3();
+            assert!((at(i, j) - expected).abs().max_element() < 1e-5, "{} for {expected}", at(i, j));
+        }
+        // Across the seam, half of each side.
+        assert!((at(0, 0).x - (0.45 * 7.0)).abs() < 1e-5, "{}", at(0, 0));
     }
 
     #[test]

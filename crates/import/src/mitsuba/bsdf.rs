@@ -2,7 +2,7 @@
 //!
 //! Roughness is α in Mitsuba and its square root in `principled`. Start reading at [`Converter::material`].
 
-use crate::mitsuba::graph::Node;
+use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::ior;
 use crate::mitsuba::scene::Converter;
 use crate::mitsuba::spectrum::Use;
@@ -92,7 +92,7 @@ impl Converter<'_> {
             })
         };
         let found = match node.value(name) {
-            Some(crate::mitsuba::graph::Value::Text(text)) => by_name(text)?,
+            Some(Value::Text(text)) => by_name(text)?,
             Some(_) => node.float_or(name, 1.5)?,
             None => by_name(default)?,
         };
@@ -377,8 +377,16 @@ impl Converter<'_> {
         Ok(Some(Surface { part: Material::blend(weight, a, b), two_sided }))
     }
 
+    /// Mitsuba darkens light that grazes the normal of a map.
+    fn tell_of_shadowing(&mut self, node: Node) -> Result<(), SceneError> {
+        if node.boolean_or("use_shadowing_function", true)? {
+            self.tell(node, "the shadowing function of normal and bump maps is not modelled: it is 1");
+        }
+        Ok(())
+    }
+
     fn bump_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        node.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
+        node.ignore(&["flip_invalid_normals"]);
         let scale = node.float_or("scale", 1.0)? as f32;
         let heights = node.children("texture")?.first().copied();
         let heights = heights.ok_or_else(|| node.error("a bumpmap contains a texture of heights"))?;
@@ -394,6 +402,7 @@ impl Converter<'_> {
                 return Ok(Some(surface));
             }
         }
+        self.tell_of_shadowing(node)?;
         let name = self.names.free(&format!("{heights} as relief"));
         self.file.textures.0.extend(source.map(|source| (name.clone(), source)));
         let mut part = self.whole(node, surface.part);
@@ -413,7 +422,7 @@ impl Converter<'_> {
     }
 
     fn normal_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        node.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
+        node.ignore(&["flip_invalid_normals"]);
         let map = node.child("normalmap")?;
         let map = map.ok_or_else(|| node.error("a normalmap contains a texture called `normalmap`"))?;
         let map = self.texture(map, Use::Factor, Reads::Color)?;
@@ -421,6 +430,7 @@ impl Converter<'_> {
         if map == ColorValue::Rgb(Vec3::new(0.5, 0.5, 1.0)) {
             return Ok(Some(surface));
         }
+        self.tell_of_shadowing(node)?;
         let mut part = self.whole(node, surface.part);
         if let Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } = &mut part {
             *normal_map = map;

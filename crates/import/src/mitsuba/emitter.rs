@@ -7,7 +7,7 @@ use crate::mitsuba::spectrum::Use;
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use firstlight_format::parts::{LightPart, TransformPart};
-use firstlight_format::sources::EnvironmentSource;
+use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_format::value::Rgb;
 use glam::{DVec3, Vec3};
 
@@ -87,8 +87,8 @@ impl Converter<'_> {
             Ok(path) => {
                 // Its centre is at +Z; ours at −Z.
                 let mut image = EnvironmentSource::image(self.file_path(&path));
-                if let EnvironmentSource::Image { scale: factor, rotate, .. } = &mut image {
-                    (*factor, *rotate) = (Rgb(Vec3::splat(scale)), 180.0);
+                if let EnvironmentSource::Image { scale: factor, rotate, layout, .. } = &mut image {
+                    (*factor, *rotate, *layout) = (Rgb(Vec3::splat(scale)), 180.0, EnvironmentLayout::Interpolated);
                 }
                 self.file.environment = image;
             }

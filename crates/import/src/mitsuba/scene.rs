@@ -16,15 +16,17 @@ use firstlight_files::reference::References;
 use firstlight_files::relative::{path_to_text, relative_path};
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_files::warnings::{Warning, Warnings};
+use firstlight_format::animation::AnimationPart;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::error::SceneError;
 use firstlight_format::names::Names;
-use firstlight_format::parts::{MaterialPart, ObjectPart};
+use firstlight_format::parts::{DisplayPart, FilmPart, MaterialPart, ObjectPart};
 use firstlight_format::placement::Placement;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{EnvironmentSource, MeshSource};
-use firstlight_format::value::Named;
+use firstlight_format::value::{Named, Rgb};
 use firstlight_mesh::Mesh;
+use firstlight_render::{Integrator, PixelFilter};
 use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -78,17 +80,17 @@ impl<'a> Converter<'a> {
         let file = SceneFile {
             camera: CameraPart::looking_at(DVec3::ZERO, DVec3::Z),
             cameras: Named::default(),
-            film: firstlight_format::parts::FilmPart::default(),
-            integrator: firstlight_render::Integrator::default(),
+            film: FilmPart::default(),
+            integrator: Integrator::default(),
             max_depth: None,
-            display: firstlight_format::parts::DisplayPart::default(),
+            display: DisplayPart::default(),
             environment: EnvironmentSource::Black,
-            air: firstlight_format::value::Rgb::default(),
+            air: Rgb::default(),
             textures: Named::default(),
             materials: Named::default(),
             objects: Vec::new(),
             lights: Vec::new(),
-            animation: firstlight_format::animation::AnimationPart::default(),
+            animation: AnimationPart::default(),
         };
         Self {
             graph,
@@ -146,7 +148,7 @@ impl<'a> Converter<'a> {
         if !has_camera {
             let (min, max) = self.bounds(&parts);
             self.file.camera = default_camera(min, max);
-            (self.file.film.width, self.file.film.height) = (768, 576);
+            self.file.film = FilmPart { width: 768, height: 576, filter: PixelFilter::Gaussian };
             self.warnings.push(Warning::notice(format!(
                 "{}: has no sensor that is modelled: the camera sees the whole scene from the front",
                 self.graph.files[0].path.display()

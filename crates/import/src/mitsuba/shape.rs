@@ -1,6 +1,6 @@
 //! Shapes as objects, with the lights that they are.
 
-use crate::mitsuba::bsdf::{Surface, by_side, exchange_own};
+use crate::mitsuba::bsdf::{Surface, by_side, exchange_own, grey};
 use crate::mitsuba::graph::Node;
 use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
@@ -16,7 +16,7 @@ use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Material;
-use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
 
 /// Objects of a scene; instances of instances multiply.
 const MAX_OBJECTS: usize = 1 << 20;
@@ -266,7 +266,7 @@ impl Converter<'_> {
         let surface = match bsdf {
             Some(bsdf) => self.surface(bsdf, 0)?,
             None if emitter.is_some() => Some(black()),
-            None => Some(Surface { part: crate::mitsuba::bsdf::grey(), two_sided: false }),
+            None => Some(Surface { part: grey(), two_sided: false }),
         };
         let surface = match emitter {
             Some(emitter) => Some(self.glowing(emitter, surface.unwrap_or_else(black))?),
@@ -306,8 +306,7 @@ impl Converter<'_> {
                 // Shares of a blend, undone by factors of its parts.
                 let weight = 1.0 - albedo.max_element().max(0.5);
                 let weight = if weight > 0.0 { weight } else { 1e-3 };
-                let reflects =
-                    Material::Diffuse { albedo: ColorValue::Rgb((albedo / (1.0 - weight)).min(glam::Vec3::ONE)) };
+                let reflects = Material::Diffuse { albedo: ColorValue::Rgb((albedo / (1.0 - weight)).min(Vec3::ONE)) };
                 let emits = Material::Emissive { radiance: ColorValue::Rgb(radiance / weight) };
                 let [a, b] = [reflects, emits].map(|part| self.add_material(emitter, part));
                 Surface { part: Material::blend(ScalarValue::Number(weight), a, b), two_sided: false }

@@ -4,9 +4,10 @@
 //! turned over after `to_uv`.
 
 use crate::mitsuba::graph::{Node, Spectrum, Value};
-use crate::mitsuba::read::find_file;
+use crate::mitsuba::read::{find_file, numbers};
 use crate::mitsuba::scene::Converter;
-use crate::mitsuba::spectrum::Use;
+use crate::mitsuba::spectrum::{Use, blackbody, sampled};
+use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
@@ -64,7 +65,7 @@ impl Converter<'_> {
         if let Some(value) = node.value(name) {
             let rgb =
                 constant(value, of).ok_or_else(|| node.error(format!("`{name}` must be a number or a texture")))?;
-            return Ok(ScalarValue::Number(crate::mitsuba::texture::luminance(rgb) as f32));
+            return Ok(ScalarValue::Number(luminance(rgb) as f32));
         }
         let Some(texture) = node.child(name)? else { return Ok(ScalarValue::Number(default as f32)) };
         Ok(match self.texture(texture, of, Reads::Number)? {
@@ -140,24 +141,24 @@ impl Converter<'_> {
             }
             "blackbody" => {
                 let kelvin = node.float_or("temperature", 5000.0)?;
-                Some(crate::mitsuba::spectrum::blackbody(kelvin).rgb(of) * scale)
+                Some(blackbody(kelvin).rgb(of) * scale)
             }
             "irregular" | "regular" => {
-                let numbers = |name: &str| match node.value(name) {
-                    Some(Value::Text(text)) => crate::mitsuba::read::numbers(text),
+                let list = |name: &str| match node.value(name) {
+                    Some(Value::Text(text)) => numbers(text),
                     _ => None,
                 };
-                let spectrum = match (node.value("value"), numbers("wavelengths"), numbers("values")) {
+                let spectrum = match (node.value("value"), list("wavelengths"), list("values")) {
                     (Some(Value::Spectrum(spectrum)), ..) => Some(spectrum.clone()),
                     (_, Some(wavelengths), Some(values)) if wavelengths.len() == values.len() => {
-                        crate::mitsuba::spectrum::sampled(wavelengths.into_iter().zip(values).collect()).ok()
+                        sampled(wavelengths.into_iter().zip(values).collect()).ok()
                     }
                     (_, None, Some(values)) if values.len() >= 2 => {
                         let from = node.float_or("wavelength_min", 360.0)?;
                         let to = node.float_or("wavelength_max", 830.0)?;
                         let step = (to - from) / (values.len() - 1) as f64;
                         let samples = values.into_iter().enumerate().map(|(i, v)| (from + i as f64 * step, v));
-                        crate::mitsuba::spectrum::sampled(samples.collect()).ok()
+                        sampled(samples.collect()).ok()
                     }
                     _ => None,
                 };
@@ -176,7 +177,7 @@ impl Converter<'_> {
             // Told when it is looked for; or now, if it may not be.
             Err(why) => {
                 self.tell(node, &why);
-                firstlight_files::printable::name(name).into_owned()
+                printable::name(name).into_owned()
             }
         };
         let wrap = match node.text("wrap_mode")? {
@@ -187,7 +188,7 @@ impl Converter<'_> {
         };
         let smooth = node.text("filter_type")? != Some("nearest");
         let encoding = if node.boolean_or("raw", false)? { Encoding::Linear } else { Encoding::Auto };
-        let (matrix, offset) = self.to_uv(node)?;
+        let (matrix, offset) = self.uv_transform(node)?;
         // Over the middle of the image: its top is at v = 1.
         let flip = DMat2::from_diagonal(DVec2::new(1.0, -1.0));
         let placed = Placed::of(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
@@ -221,7 +222,7 @@ impl Converter<'_> {
         if reads == Reads::Number {
             std::mem::swap(&mut a, &mut b);
         }
-        let (matrix, offset) = self.to_uv(node)?;
+        let (matrix, offset) = self.uv_transform(node)?;
         // Its squares have sides of 1/2.
         let placed = Placed::of(2.0 * matrix, 2.0 * offset).filter(|placed| placed.stretch == DVec2::ONE);
         let Placed { repeat: squares, offset, rotate, .. } = placed.unwrap_or_else(|| {
@@ -231,7 +232,7 @@ impl Converter<'_> {
         Ok(TextureSource::Checker { a, b, squares, offset, rotate })
     }
 
-    fn to_uv(&mut self, node: Node) -> Result<(DMat2, DVec2), SceneError> {
+    fn uv_transform(&self, node: Node) -> Result<(DMat2, DVec2), SceneError> {
         let m = node.transform("to_uv")?;
         let matrix = DMat2::from_cols(m.x_axis.truncate().truncate(), m.y_axis.truncate().truncate());
         Ok((matrix, m.w_axis.truncate().truncate()))

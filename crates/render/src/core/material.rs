@@ -39,7 +39,7 @@ materials! {
         ior: f32, Number(Ior) = 1.5, "IOR";
         /// strength of the reflection of the coat
         specular: P::Scalar, Scalar(Share) = 1.0, "specular";
-        /// the base colours light at every bounce below the coat: saturated, and exact
+        /// the base colours light at every bounce below the coat
         nonlinear: bool, Flag(Choice) = true, "nonlinear";
     }
 

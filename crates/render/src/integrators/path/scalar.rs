@@ -361,6 +361,7 @@ struct PathSurface<'a> {
 }
 
 /// How a surface scatters.
+#[expect(clippy::large_enum_variant, reason = "nothing is allocated per sample")]
 enum Bsdf<'a> {
     Lobe(Lobe<'a>),
     Blend(Blend<'a>),
