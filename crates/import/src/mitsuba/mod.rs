@@ -8,7 +8,6 @@
 
 pub(crate) mod bsdf;
 pub(crate) mod camera;
-pub(crate) mod cie;
 pub(crate) mod emitter;
 pub(crate) mod graph;
 pub(crate) mod ior;

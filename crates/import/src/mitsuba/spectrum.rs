@@ -2,8 +2,8 @@
 //!
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/generated/plugins_spectra.html>
 
-use crate::mitsuba::cie::{Light, linear_rgb, xyz_to_rgb};
 use crate::mitsuba::graph::Spectrum;
+use crate::model::cie::{daylight, rgb_of_xyz, xyz_of};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_format::error::SceneError;
 use glam::DVec3;
@@ -77,7 +77,9 @@ impl Spectrum {
     pub(crate) fn rgb(&self, of: Use) -> DVec3 {
         match self {
             // Equal energy is no white of Rec. 709.
-            Self::Uniform(value) if of == Use::Emission => *value * DVec3::from_array(xyz_to_rgb([1.0; 3])),
+            Self::Uniform(value) if of == Use::Emission => {
+                *value * DVec3::from_array(rgb_of_xyz(DVec3::ONE).to_array())
+            }
             Self::Uniform(value) => DVec3::splat(*value),
             Self::Sampled(samples) => {
                 let light = if of == Use::Emission { Light::Equal } else { Light::D65 };
@@ -85,6 +87,34 @@ impl Spectrum {
                 if of == Use::Reflectance { rgb.min(DVec3::ONE) } else { rgb }
             }
         }
+    }
+}
+
+/// The light that a spectrum is seen under.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Light {
+    /// Equal energy at all wavelengths: of emission.
+    Equal,
+    /// Daylight, the white of Rec. 709: of reflectance.
+    D65,
+}
+
+/// The colour of a spectrum that is linear between samples and 0 outside, negative channels as 0. A spectrum of 1 has
+/// the luminance 1.
+///
+/// - `samples`: wavelengths in nm, increasing, with values.
+pub(crate) fn linear_rgb(samples: &[(f64, f64)], light: Light) -> [f64; 3] {
+    let power = |nm: f64| if light == Light::D65 { daylight(nm) } else { 1.0 };
+    let color = xyz_of(|nm| value_at(samples, nm) * power(nm)) / xyz_of(power).y;
+    rgb_of_xyz(color).max(DVec3::ZERO).to_array()
+}
+
+fn value_at(samples: &[(f64, f64)], wavelength: f64) -> f64 {
+    let after = samples.partition_point(|(at, _)| *at <= wavelength);
+    match (after.checked_sub(1).map(|i| samples[i]), samples.get(after)) {
+        (Some((a, va)), Some(&(b, vb))) => va + (vb - va) * (wavelength - a) / (b - a),
+        (Some((a, va)), None) if a == wavelength => va,
+        _ => 0.0,
     }
 }
 
@@ -108,5 +138,25 @@ mod tests {
         assert!(grey.abs_diff_eq(DVec3::new(0.77637, 0.77981, 0.77603), 2e-3), "{grey}");
         let light = parse("400:0, 500:8, 600:15.6, 700:18.4").unwrap().rgb(Use::Emission);
         assert!(light.abs_diff_eq(DVec3::new(20.711, 10.855, 2.771), 1e-2), "{light}");
+    }
+
+    #[test]
+    fn a_grey_surface_in_daylight_is_grey_and_equal_energy_is_not() {
+        let flat = [(300.0, 0.5), (900.0, 0.5)];
+        for channel in linear_rgb(&flat, Light::D65) {
+            assert!((channel - 0.5).abs() < 1e-3, "{channel}");
+        }
+        // The white of equal energy, (1, 1, 1) in XYZ, is reddish in Rec. 709.
+        let equal = linear_rgb(&flat, Light::Equal).map(|channel| 2.0 * channel);
+        for (channel, expected) in equal.into_iter().zip([1.2048, 0.9483, 0.9087]) {
+            assert!((channel - expected).abs() < 2e-3, "{equal:?}");
+        }
+    }
+
+    #[test]
+    fn outside_of_its_samples_a_spectrum_is_dark() {
+        assert_eq!(value_at(&[(400.0, 1.0), (500.0, 3.0)], 450.0), 2.0);
+        assert_eq!([399.0, 501.0].map(|at| value_at(&[(400.0, 1.0), (500.0, 3.0)], at)), [0.0; 2]);
+        assert_eq!(value_at(&[(400.0, 1.0), (500.0, 3.0)], 500.0), 3.0);
     }
 }

@@ -2,6 +2,7 @@
 //! mesh, and placements.
 
 pub(crate) mod assemble;
+pub(crate) mod cie;
 pub(crate) mod foreign;
 pub(crate) mod imported;
 pub(crate) mod material;

@@ -8,7 +8,6 @@
 //! Humphreys 2023, "Physically Based Rendering", fourth edition.
 
 mod build;
-mod cie;
 mod cursor;
 mod directives;
 mod lights;

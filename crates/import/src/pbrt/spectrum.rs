@@ -5,7 +5,7 @@
 //! `blackbody L 6500` and `spectrum L "stdillum-D65"` all have luminance 1; and its film (`sensor "cie1931"`) shows
 //! luminance 1 as 1.
 
-use crate::pbrt::cie::{daylight, rgb_of_xyz, xyz_of};
+use crate::model::cie::{daylight, rgb_of_xyz, xyz_of};
 use crate::pbrt::named_spectra::{conductor_data, glass_data};
 use glam::DVec3;
 

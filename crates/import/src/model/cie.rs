@@ -1,59 +1,43 @@
-//! The CIE 1931 colour-matching functions (2°) and illuminant D65, and spectra as linear Rec. 709.
+//! Colorimetry: the CIE 1931 2° observer and daylight D65, from spectra to linear Rec. 709.
 //!
 //! Source of the tables: CIE 015:2018, every 5 nm.
+
+use glam::DVec3;
 
 /// First wavelength, nm.
 const FIRST: f64 = 360.0;
 /// Between two rows, nm.
 const STEP: f64 = 5.0;
 
-/// The light that a spectrum is seen under.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Light {
-    /// Equal energy at all wavelengths: of emission.
-    Equal,
-    /// Daylight, the white of Rec. 709: of reflectance.
-    D65,
+/// A row at a wavelength in nm, interpolated between those of the table.
+fn row(nm: f64) -> [f64; 4] {
+    let row = ((nm - FIRST) / STEP).clamp(0.0, (TABLE.len() - 1) as f64);
+    let (low, high) = (TABLE[row.floor() as usize], TABLE[row.ceil() as usize]);
+    std::array::from_fn(|k| low[k] + (high[k] - low[k]) * row.fract())
 }
 
-/// The colour of a spectrum that is linear between samples and 0 outside, negative channels as 0. A spectrum of 1 has
-/// the luminance 1.
-///
-/// - `samples`: wavelengths in nm, increasing, with values.
-pub(crate) fn linear_rgb(samples: &[(f64, f64)], light: Light) -> [f64; 3] {
-    let mut xyz = [0.0; 3];
-    let mut luminance = 0.0;
-    // In steps of 1 nm, the rows are interpolated.
-    for i in 0..=(TABLE.len() - 1) * STEP as usize {
-        let row = (i as f64 / STEP).min((TABLE.len() - 1) as f64);
-        let (at, part) = ((row as usize).min(TABLE.len() - 2), row - (row as usize).min(TABLE.len() - 2) as f64);
-        let [x, y, z, d65] = std::array::from_fn(|k| TABLE[at][k] * (1.0 - part) + TABLE[at + 1][k] * part);
-        let power = if light == Light::D65 { d65 } else { 1.0 };
-        luminance += y * power;
-        let value = value_at(samples, FIRST + i as f64) * power;
-        for (sum, matching) in xyz.iter_mut().zip([x, y, z]) {
-            *sum += matching * value;
-        }
-    }
-    xyz_to_rgb(xyz.map(|sum| sum / luminance)).map(|channel| channel.max(0.0))
+/// Relative power of D65 at a wavelength in nm.
+pub(crate) fn daylight(nm: f64) -> f64 {
+    row(nm)[3]
 }
 
-/// IEC 61966-2-1.
-pub(crate) fn xyz_to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
-    [
-        3.240_479 * x - 1.537_15 * y - 0.498_535 * z,
-        -0.969_256 * x + 1.875_991 * y + 0.041_556 * z,
-        0.055_648 * x - 0.204_043 * y + 1.057_311 * z,
-    ]
+/// Tristimulus values of a spectrum, which is called with wavelengths in nm, in steps of 1 nm.
+pub(crate) fn xyz_of(spectrum: impl Fn(f64) -> f64) -> DVec3 {
+    let last = (TABLE.len() - 1) * STEP as usize;
+    let at = |nm: f64| {
+        let [x, y, z, _] = row(nm);
+        spectrum(nm) * DVec3::new(x, y, z)
+    };
+    (0..=last).map(|i| at(FIRST + i as f64)).sum()
 }
 
-fn value_at(samples: &[(f64, f64)], wavelength: f64) -> f64 {
-    let after = samples.partition_point(|(at, _)| *at <= wavelength);
-    match (after.checked_sub(1).map(|i| samples[i]), samples.get(after)) {
-        (Some((a, va)), Some(&(b, vb))) => va + (vb - va) * (wavelength - a) / (b - a),
-        (Some((a, va)), None) if a == wavelength => va,
-        _ => 0.0,
-    }
+/// Linear Rec. 709 from tristimulus values (IEC 61966-2-1); D65 with Y = 1 is (1, 1, 1).
+pub(crate) fn rgb_of_xyz(DVec3 { x, y, z }: DVec3) -> DVec3 {
+    DVec3::new(
+        3.240_970 * x - 1.537_383 * y - 0.498_611 * z,
+        -0.969_244 * x + 1.875_968 * y + 0.041_555 * z,
+        0.055_630 * x - 0.203_977 * y + 1.056_972 * z,
+    )
 }
 
 /// x̄, ȳ, z̄, D65.
@@ -114,22 +98,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grey_surface_in_daylight_is_grey_and_equal_energy_is_not() {
-        let flat = [(300.0, 0.5), (900.0, 0.5)];
-        for channel in linear_rgb(&flat, Light::D65) {
-            assert!((channel - 0.5).abs() < 1e-3, "{channel}");
-        }
-        // The white of equal energy, (1, 1, 1) in XYZ, is reddish in Rec. 709.
-        let equal = linear_rgb(&flat, Light::Equal).map(|channel| 2.0 * channel);
-        for (channel, expected) in equal.into_iter().zip([1.2048, 0.9483, 0.9087]) {
-            assert!((channel - expected).abs() < 2e-3, "{equal:?}");
-        }
-    }
-
-    #[test]
-    fn outside_of_its_samples_a_spectrum_is_dark() {
-        assert_eq!(value_at(&[(400.0, 1.0), (500.0, 3.0)], 450.0), 2.0);
-        assert_eq!([399.0, 501.0].map(|at| value_at(&[(400.0, 1.0), (500.0, 3.0)], at)), [0.0; 2]);
-        assert_eq!(value_at(&[(400.0, 1.0), (500.0, 3.0)], 500.0), 3.0);
+    fn the_tables_add_up_to_known_sums() {
+        // The integral of each matching function is that of ȳ, 106.857 nm; the white point of D65 is
+        // (0.95047, 1, 1.08883).
+        let equal = xyz_of(|_| 1.0);
+        assert!((equal / 106.857 - DVec3::ONE).abs().max_element() < 1e-3, "{equal}");
+        let white = xyz_of(daylight);
+        let white = white / white.y;
+        assert!((white - DVec3::new(0.95047, 1.0, 1.08883)).abs().max_element() < 1e-3, "{white}");
+        assert!((rgb_of_xyz(white) - DVec3::ONE).abs().max_element() < 2e-3);
+        assert!((daylight(565.0) - 98.1671).abs() < 1e-9);
     }
 }
