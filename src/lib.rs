@@ -26,7 +26,7 @@
 //! | `report`, `stability` (feature `cli`) | error against time; counts of hard cases |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | the world: components, loading, saving, animation, extraction of the snapshot |
-//! | [`import`] | OBJ, PLY, STL and glTF as meshes and parts of a scene file |
+//! | [`import`] | OBJ, PLY, STL, glTF, and scenes of pbrt and Mitsuba, as meshes and parts of a scene file |
 //! | [`format`](mod@format) | the scene file: values, checks and their limits, placements, lights, keys |
 //! | [`files`], `console` (feature `cli`) | bounded reading, whole-file writing, escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |

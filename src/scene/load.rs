@@ -280,16 +280,24 @@ fn resolve(
     }
     let is_left = |mesh: &Option<LoadedMesh>| mesh.as_ref().is_none_or(|mesh| !mesh.mesh.triangles.is_empty());
     let is_anything_left = meshes.iter().any(is_left);
+    let mut n_left_out = 0;
     for LostMesh { object, error } in lost {
         let path = format!("objects/{object}/source");
         // Without any object there is nothing to open; and a scene that is shown stays while a file of it is broken.
         let was_there = before.as_ref().is_some_and(|before| before.has_mesh(&scene.file.objects[object]));
         if is_anything_left && !was_there {
-            let name = scene.file.objects[object].name().map_or_else(|| "the object".to_owned(), quoted);
-            scene.warnings.push(format!("{}{error}; {name} is left out", at(text, &title, &path)));
+            n_left_out += 1;
+            if n_left_out <= SceneError::MAX_TOLD {
+                let name = scene.file.objects[object].name().map_or_else(|| "the object".to_owned(), quoted);
+                scene.warnings.push(format!("{}{error}; {name} is left out", at(text, &title, &path)));
+            }
         } else {
             note(path, &error);
         }
+    }
+    if n_left_out > SceneError::MAX_TOLD {
+        let more = n_left_out - SceneError::MAX_TOLD;
+        scene.warnings.push(format!("{}: meshes of {more} more objects are left out", title.display()));
     }
     for object in &scene.file.objects {
         let mut balls = None;

@@ -33,12 +33,6 @@ pub struct Framing {
     triangles: usize,
 }
 
-/// Corners of the box of a mesh, in its own coordinates, metres.
-pub fn corners_of(mesh: &Mesh) -> (DVec3, DVec3) {
-    let around = mesh.bounds();
-    (around.min.as_dvec3() + mesh.center, around.max.as_dvec3() + mesh.center)
-}
-
 impl Framing {
     /// - `side`: signs of the direction of the front; `aspect`: width over height of the image.
     pub fn new(side: DVec3, aspect: f64) -> Self {
@@ -64,7 +58,7 @@ impl Framing {
 
     /// Adds a mesh that is placed in the world.
     ///
-    /// - `corners`: those of [`corners_of`] the mesh, which many instances may share.
+    /// - `corners`: those of the box of the mesh, which many instances may share.
     pub fn add(&mut self, mesh: &Mesh, (min, max): (DVec3, DVec3), world: &DAffine3) {
         self.triangles += mesh.triangles.len();
         if self.triangles <= MOST_TRIANGLES {
@@ -127,6 +121,7 @@ impl Framing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::placing::corners_of;
     use firstlight_mesh::procedural;
     use glam::{DQuat, DVec2};
 

@@ -1,16 +1,17 @@
 //! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file.
 //!
-//! A camera that the file lacks is added as for other models ([`crate::framing`]); light and ground are added later
-//! ([`crate::scene::model_light`]).
+//! A camera that the file lacks is added as for other models ([`crate::framing`]); light and ground are added by the
+//! world (`scene/model_light.rs`).
 
 use crate::documents::{Documents, Opened};
 use crate::error::gltf::{GltfProblem, Located};
-use crate::framing::{Framing, corners_of};
+use crate::framing::Framing;
 use crate::gltf::assembly::PlacedLight;
 use crate::gltf::facts::GltfFacts;
 use crate::gltf::mesh::BuiltMesh;
 use crate::gltf_motion::GltfMotion;
 use crate::gltf_parts::{camera_of, light_of};
+use crate::model::placing::corners_of;
 use crate::model::placing::{is_placement, transform};
 use firstlight_files::warnings::Warnings;
 use firstlight_format::camera::CameraPart;

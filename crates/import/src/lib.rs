@@ -2,7 +2,7 @@
 //!
 //! A reader ([`obj`], [`ply`], [`stl`], [`gltf`]) returns an [`ImportedModel`] or an error with its location in the
 //! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`] and, for
-//! scenes of other renderers, at [`read_scene`].
+//! scenes of other renderers, at `read_scene`.
 
 pub mod documents;
 pub mod environment_image;
@@ -17,7 +17,7 @@ mod ktx2;
 mod load_model;
 pub mod meshes;
 pub(crate) mod mitsuba;
-pub(crate) mod model;
+pub mod model;
 pub(crate) mod mtl_material;
 pub mod obj;
 pub mod orientation;

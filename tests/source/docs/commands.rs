@@ -18,11 +18,14 @@ impl TempFolder {
         Self(path)
     }
 
-    /// With the files that pages speak of: `model.obj`, `scene.ron`, `scene.pbrt`, `wood.png` and `environment.hdr`.
+    /// With the files that pages speak of: `model.obj`, `scene.ron`, `scene.pbrt`, `scene.xml`, `wood.png` and `environment.hdr`.
     pub fn with_files(name: &str) -> Self {
         let folder = Self::new(name);
         fs::write(folder.0.join("model.obj"), octahedron()).unwrap();
         fs::write(folder.0.join("scene.pbrt"), "WorldBegin\nLightSource \"infinite\"\nShape \"sphere\"").unwrap();
+        let mitsuba = "<scene version=\"3.0.0\"><default name=\"spp\" value=\"4\"/><emitter type=\"constant\"/>\
+                       <shape type=\"sphere\"/></scene>";
+        fs::write(folder.0.join("scene.xml"), mitsuba).unwrap();
         fs::copy(root().join("assets/scenes/cornell.ron"), folder.0.join("scene.ron")).unwrap();
         let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
         hdr.extend([128, 120, 110, 129].repeat(8));

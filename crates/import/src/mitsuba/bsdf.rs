@@ -2,11 +2,11 @@
 //!
 //! Roughness is α in Mitsuba and its square root in `principled`. Start reading at [`Converter::material`].
 
+use crate::mitsuba::converter::Reads;
+use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::ior;
-use crate::mitsuba::scene::Converter;
 use crate::mitsuba::spectrum::Use;
-use crate::mitsuba::texture::Reads;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::parts::MaterialPart;
@@ -17,25 +17,6 @@ use glam::Vec3;
 
 /// Depth of nested BSDFs.
 const MAX_DEPTH: u32 = 32;
-
-/// A BSDF in our words.
-#[derive(Clone, Debug)]
-pub(crate) struct Surface {
-    pub part: MaterialPart,
-    /// Whether its back is like its front; in Mitsuba, the back of other reflecting surfaces is black.
-    pub two_sided: bool,
-}
-
-impl Surface {
-    fn one_sided(part: MaterialPart) -> Self {
-        Self { part, two_sided: false }
-    }
-
-    /// Of a surface that transmits, or is seen from both sides.
-    fn two_sided(part: MaterialPart) -> Self {
-        Self { part, two_sided: true }
-    }
-}
 
 impl Converter<'_> {
     /// The material of a BSDF; `None` for `null`, through which light passes.

@@ -1,7 +1,7 @@
 //! Sensors, films and integrators.
 
+use crate::mitsuba::converter::Converter;
 use crate::mitsuba::graph::Node;
-use crate::mitsuba::scene::Converter;
 use firstlight_files::printable;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::error::SceneError;

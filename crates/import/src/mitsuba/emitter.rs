@@ -1,8 +1,8 @@
 //! Emitters that are no shapes: environment, points, spots, directions.
 
+use crate::mitsuba::converter::Converter;
 use crate::mitsuba::graph::Node;
 use crate::mitsuba::read::find_file;
-use crate::mitsuba::scene::Converter;
 use crate::mitsuba::spectrum::Use;
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;

@@ -1,9 +1,10 @@
 //! Shapes as meshes: files of other programs with Mitsuba's rules for normals and texture coordinates, and the shapes
 //! that ours lack.
 
-use crate::load_model::load_model;
 use crate::mitsuba::serialized::read_serialized;
 use crate::model::imported::{ModelNormals, ModelOptions};
+use crate::obj::load_obj_with;
+use crate::ply::load_ply_with;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_mesh::{Mesh, NormalWeight};
 use glam::{DVec3, Vec2, Vec3};
@@ -60,7 +61,10 @@ impl MeshRequest {
                     false => ModelNormals::FileOrComputed { crease_angle: std::f32::consts::PI },
                 };
                 let options = ModelOptions { normals, ..ModelOptions::default() };
-                let model = load_model(path, *format, &options).map_err(|error| error.to_string())?;
+                let model = match format {
+                    ModelFormat::Obj => load_obj_with(path, &options).map_err(|error| error.to_string())?,
+                    _ => load_ply_with(path, &options).map_err(|error| error.to_string())?,
+                };
                 Mesh { slots: Vec::new(), ..model.mesh }
             }
             Geometry::Serialized(path, index) => {

@@ -8,6 +8,7 @@
 
 pub(crate) mod bsdf;
 pub(crate) mod camera;
+mod converter;
 pub(crate) mod emitter;
 pub(crate) mod graph;
 pub(crate) mod ior;
@@ -20,7 +21,8 @@ pub(crate) mod spectrum;
 pub(crate) mod texture;
 pub(crate) mod transform;
 
-use crate::mitsuba::scene::{Converted, Converter};
+use crate::mitsuba::converter::Converter;
+use crate::mitsuba::scene::Converted;
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use firstlight_files::reference::References;
 use firstlight_files::relative::path_to_text;

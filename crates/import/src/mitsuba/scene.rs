@@ -3,14 +3,12 @@
 //! Coordinates stay as they are, unless an environment image has its poles elsewhere than at ±Y or the camera mirrors:
 //! then the whole scene is turned, which shows the same image. Start reading at [`Converter::convert`].
 
-use crate::framing::corners_of;
-use crate::mitsuba::bsdf::Surface;
 use crate::mitsuba::camera::default_camera;
+use crate::mitsuba::converter::Converter;
 use crate::mitsuba::graph::{Graph, Node};
 use crate::mitsuba::meshes::MeshRequest;
-use crate::mitsuba::shape::PlacedMaterial;
-use crate::mitsuba::texture::Reads;
 use crate::mitsuba::transform::orthonormal;
+use crate::model::placing::corners_of;
 use firstlight_files::printable;
 use firstlight_files::reference::References;
 use firstlight_files::relative::{path_to_text, relative_path};
@@ -32,39 +30,6 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// A scene while it is converted.
-pub(crate) struct Converter<'a> {
-    pub graph: &'a Graph,
-    /// From Mitsuba's world to ours.
-    pub world: DMat4,
-    pub file: SceneFile,
-    pub warnings: Warnings,
-    pub references: References<'a>,
-    /// Of the scene: paths are relative to it.
-    pub folder: &'a Path,
-    /// Of the scene in its folder.
-    pub file_name: String,
-    pub textures: HashMap<(usize, Reads), String>,
-    /// Of the textures that are being converted.
-    pub texture_depth: u32,
-    /// By the index of their BSDF.
-    pub surfaces: HashMap<usize, Option<Surface>>,
-    /// Number of shapes so far, with those of instances.
-    pub n_shapes: usize,
-    /// By BSDF and emitter.
-    pub materials: HashMap<(Option<usize>, Option<usize>), Option<PlacedMaterial>>,
-    /// Meshes to be made, by their number in the scene.
-    pub requests: HashMap<MeshRequest, u32>,
-    /// Objects of meshes from files whose back is black in Mitsuba.
-    pub one_sided: Vec<usize>,
-    /// By the name of a material: the one that has a black back as well.
-    pub backed: HashMap<String, String>,
-    /// Meshes that need vertex colours, and the shape of each.
-    pub colored: HashMap<u32, usize>,
-    pub names: Names,
-    pub material_names: Names,
-}
 
 /// A converted scene.
 pub(crate) struct Converted {

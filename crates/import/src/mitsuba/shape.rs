@@ -1,10 +1,11 @@
 //! Shapes as objects, with the lights that they are.
 
-use crate::mitsuba::bsdf::{Surface, by_side, exchange_own, grey};
+use crate::mitsuba::bsdf::{by_side, exchange_own, grey};
+use crate::mitsuba::converter::Surface;
+use crate::mitsuba::converter::{Converter, PlacedMaterial};
 use crate::mitsuba::graph::Node;
 use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
-use crate::mitsuba::scene::Converter;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
 use crate::model::placing;
@@ -327,18 +328,6 @@ impl Converter<'_> {
             _ => !texture_names(part).is_empty(),
         }
     }
-}
-
-/// The material of a shape in the scene file.
-#[derive(Clone, Debug)]
-pub(crate) struct PlacedMaterial {
-    pub name: String,
-    /// Whether texture coordinates matter.
-    pub is_textured: bool,
-    pub needs_tangents: bool,
-    pub needs_colors: bool,
-    /// Whether the back is like the front.
-    pub two_sided: bool,
 }
 
 fn black() -> Surface {

@@ -3,9 +3,9 @@
 //! Surface coordinates keep Mitsuba's: the top row of an image is at v = 0. Ours has it at v = 1, so that images are
 //! turned over after `to_uv`.
 
+use crate::mitsuba::converter::{Converter, Reads};
 use crate::mitsuba::graph::{Node, Spectrum, Value};
 use crate::mitsuba::read::{find_file, numbers};
-use crate::mitsuba::scene::Converter;
 use crate::mitsuba::spectrum::{Use, blackbody, sampled};
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
@@ -13,14 +13,6 @@ use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
 use firstlight_render::{Encoding, Wrap};
 use glam::{DMat2, DVec2, DVec3, Vec3};
-
-/// How a plugin reads a texture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Reads {
-    Color,
-    /// One number. A checkerboard then has its colours exchanged, in Mitsuba as here.
-    Number,
-}
 
 /// Depth of textures in textures.
 const MAX_DEPTH: u32 = 16;

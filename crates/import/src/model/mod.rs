@@ -7,6 +7,6 @@ pub(crate) mod foreign;
 pub(crate) mod imported;
 pub(crate) mod material;
 pub(crate) mod number;
-pub(crate) mod placing;
+pub mod placing;
 pub(crate) mod polygon;
 pub(crate) mod texture_map;

@@ -2,6 +2,7 @@
 
 use firstlight_format::bounds;
 use firstlight_format::parts::TransformPart;
+use firstlight_mesh::Mesh;
 use glam::{DAffine3, DVec3};
 
 /// Whether an object may have this transform.
@@ -21,4 +22,10 @@ pub(crate) fn transform(world: &DAffine3) -> TransformPart {
     let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
     let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
     TransformPart { matrix, ..TransformPart::default() }
+}
+
+/// Corners of the box of a mesh, in its own coordinates, metres.
+pub fn corners_of(mesh: &Mesh) -> (DVec3, DVec3) {
+    let around = mesh.bounds();
+    (around.min.as_dvec3() + mesh.center, around.max.as_dvec3() + mesh.center)
 }

@@ -102,15 +102,21 @@ impl MediumSets {
         leaf: u32,
         others: &[Boundary],
     ) -> Interface {
+        let is_open = |boundary: Boundary| scene.tables.bodies.is_open(boundary.body);
+        // A sheet that lies on a body says nothing: the body knows what is on both sides.
+        let has_body = !others.is_empty() && (!is_open(boundary) || others.iter().any(|&other| !is_open(other)));
         // What is before an open surface follows from its side alone.
-        let before = if scene.tables.bodies.is_open(boundary.body) {
+        let before = if is_open(boundary) && !has_body {
             self.crossed(scene, from, Boundary { front: !boundary.front, ..boundary }, leaf)
         } else {
             None
         };
         let (here, before) = (self.ior(from), self.ior(before.unwrap_or(from)));
         // Bodies are entered before others are left: intermediate media have no thickness.
-        let all = || std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
+        let all = || {
+            let all = std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
+            all.filter(|&(boundary, _)| !(has_body && is_open(boundary)))
+        };
         let mut in_order =
             all().filter(|(boundary, _)| boundary.front).chain(all().filter(|(boundary, _)| !boundary.front));
         let beyond = in_order.try_fold(from, |at, (boundary, leaf)| self.crossed(scene, at, boundary, leaf));

@@ -1,0 +1,84 @@
+//! A scene while it is converted: what its parts have in common.
+
+use crate::mitsuba::graph::Graph;
+use crate::mitsuba::meshes::MeshRequest;
+use firstlight_files::reference::References;
+use firstlight_files::warnings::Warnings;
+use firstlight_format::names::Names;
+use firstlight_format::parts::MaterialPart;
+use firstlight_format::scene_file::SceneFile;
+use glam::DMat4;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// How a plugin reads a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Reads {
+    Color,
+    /// One number. A checkerboard then has its colours exchanged, in Mitsuba as here.
+    Number,
+}
+
+/// A BSDF in our words.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    pub part: MaterialPart,
+    /// Whether its back is like its front; in Mitsuba, the back of other reflecting surfaces is black.
+    pub two_sided: bool,
+}
+
+impl Surface {
+    pub(crate) fn one_sided(part: MaterialPart) -> Self {
+        Self { part, two_sided: false }
+    }
+
+    /// Of a surface that transmits, or is seen from both sides.
+    pub(crate) fn two_sided(part: MaterialPart) -> Self {
+        Self { part, two_sided: true }
+    }
+}
+
+/// The material of a shape in the scene file.
+#[derive(Clone, Debug)]
+pub(crate) struct PlacedMaterial {
+    pub name: String,
+    /// Whether texture coordinates matter.
+    pub is_textured: bool,
+    pub needs_tangents: bool,
+    pub needs_colors: bool,
+    /// Whether the back is like the front.
+    pub two_sided: bool,
+}
+
+/// A scene while it is converted.
+pub(crate) struct Converter<'a> {
+    pub graph: &'a Graph,
+    /// From Mitsuba's world to ours.
+    pub world: DMat4,
+    pub file: SceneFile,
+    pub warnings: Warnings,
+    pub references: References<'a>,
+    /// Of the scene: paths are relative to it.
+    pub folder: &'a Path,
+    /// Of the scene in its folder.
+    pub file_name: String,
+    pub textures: HashMap<(usize, Reads), String>,
+    /// Of the textures that are being converted.
+    pub texture_depth: u32,
+    /// By the index of their BSDF.
+    pub surfaces: HashMap<usize, Option<Surface>>,
+    /// Number of shapes so far, with those of instances.
+    pub n_shapes: usize,
+    /// By BSDF and emitter.
+    pub materials: HashMap<(Option<usize>, Option<usize>), Option<PlacedMaterial>>,
+    /// Meshes to be made, by their number in the scene.
+    pub requests: HashMap<MeshRequest, u32>,
+    /// Objects of meshes from files whose back is black in Mitsuba.
+    pub one_sided: Vec<usize>,
+    /// By the name of a material: the one that has a black back as well.
+    pub backed: HashMap<String, String>,
+    /// Meshes that need vertex colours, and the shape of each.
+    pub colored: HashMap<u32, usize>,
+    pub names: Names,
+    pub material_names: Names,
+}
