@@ -5,6 +5,7 @@ use crate::pbrt::tokens::{Token, TokenKind, Tokens, Unterminated, line_and_colum
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use glam::{DAffine3, DMat4, DVec3};
+use std::cell::Cell;
 use std::path::PathBuf;
 
 /// Parameters that a directive may have.
@@ -21,11 +22,13 @@ pub(crate) struct SourceText {
 pub(crate) struct Cursor<'a> {
     source: &'a SourceText,
     tokens: Tokens<'a>,
+    /// A position in bytes and the number of line ends before it: places are asked for in the order of the text.
+    counted: Cell<(usize, usize)>,
 }
 
 impl<'a> Cursor<'a> {
     pub(crate) fn new(source: &'a SourceText) -> Self {
-        Self { source, tokens: Tokens::new(&source.text) }
+        Self { source, tokens: Tokens::new(&source.text), counted: Cell::default() }
     }
 
     /// An error at a position in bytes.
@@ -35,8 +38,12 @@ impl<'a> Cursor<'a> {
 
     /// `file:line`, for remarks.
     pub(crate) fn place(&self, at: usize) -> String {
-        let (line, _) = line_and_column(&self.source.text, at);
-        format!("{}:{line}", self.source.path.display())
+        let text = self.source.text.as_bytes();
+        let at = at.min(text.len());
+        let (from, before) = if self.counted.get().0 <= at { self.counted.get() } else { (0, 0) };
+        let lines = before + text[from..at].iter().filter(|byte| **byte == b'\n').count();
+        self.counted.set((at, lines));
+        format!("{}:{}", self.source.path.display(), lines + 1)
     }
 
     fn unterminated(&self, Unterminated { at }: Unterminated) -> SceneError {
@@ -211,5 +218,21 @@ impl<'a> Cursor<'a> {
             _ => return Err(wrong()),
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pbrt::tokens::line_and_column;
+
+    #[test]
+    fn places_are_those_of_the_text_in_any_order() {
+        let source = SourceText { path: "a.pbrt".into(), text: "a\n\nbc\nd".to_owned() };
+        let cursor = Cursor::new(&source);
+        for at in [0, 3, 4, 6, 6, 2, 100, 1] {
+            let line = line_and_column(&source.text, at).0;
+            assert_eq!(cursor.place(at), format!("a.pbrt:{line}"));
+        }
     }
 }
