@@ -2,7 +2,7 @@
 
 use crate::format::bounds;
 use crate::format::choice::UpAxis;
-use crate::format::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart, TransformPart};
+use crate::format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
 use crate::format::value::Named;
@@ -12,7 +12,6 @@ use crate::import::meshes::LoadedMesh;
 use crate::import::model::placing::corners_of;
 use crate::import::orientation::faces_away;
 use crate::import::up_axis::{guess_up, guess_up_of_obj};
-use crate::render::Integrator;
 use crate::scene::inner_light::RoomInside;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
@@ -155,19 +154,9 @@ pub fn around(
         transform,
     };
     let file = SceneFile {
-        camera: framing.camera(),
-        cameras: Named::default(),
-        film: FilmPart::default(),
-        integrator: Integrator::default(),
-        max_depth: None,
-        display: DisplayPart::default(),
-        environment: EnvironmentSource::Black,
-        air: Rgb::default(),
-        textures: Named::default(),
         materials: Named(if has_materials { Vec::new() } else { vec![(CLAY.to_owned(), clay)] }),
         objects: vec![model],
-        lights: Vec::new(),
-        animation: Default::default(),
+        ..SceneFile::new(framing.camera())
     };
     (file, framing, side)
 }

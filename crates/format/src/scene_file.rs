@@ -53,6 +53,27 @@ pub struct SceneFile {
     pub animation: AnimationPart,
 }
 
+impl SceneFile {
+    /// A scene without anything but a camera.
+    pub fn new(camera: CameraPart) -> Self {
+        Self {
+            camera,
+            cameras: Named::default(),
+            film: FilmPart::default(),
+            integrator: Integrator::default(),
+            max_depth: None,
+            display: DisplayPart::default(),
+            environment: EnvironmentSource::default(),
+            air: Rgb::default(),
+            textures: Named::default(),
+            materials: Named::default(),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            animation: AnimationPart::default(),
+        }
+    }
+}
+
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }

@@ -18,11 +18,10 @@ use firstlight_format::camera::CameraPart;
 use firstlight_format::choice::ModelChoice;
 use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::material_textures::texture_names;
-use firstlight_format::parts::{FilmPart, LightPart, ObjectPart};
+use firstlight_format::parts::{LightPart, ObjectPart};
 use firstlight_format::scene_file::SceneFile;
-use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
+use firstlight_format::sources::{MeshShading, MeshSource, Seconds, TextureSource};
 use firstlight_format::value::Named;
-use firstlight_format::value::Rgb;
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -166,19 +165,12 @@ impl Maker<'_> {
         let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), camera_of(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;
         let file = SceneFile {
-            camera: chosen.cloned().unwrap_or_else(|| framing.camera()),
             cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
-            film: FilmPart::default(),
-            integrator: firstlight_render::Integrator::default(),
-            max_depth: None,
-            display: firstlight_format::parts::DisplayPart::default(),
-            environment: EnvironmentSource::Black,
-            air: Rgb::default(),
             textures,
             materials: named,
             objects,
             lights: self.lights(&assembly.lights, &mut warnings),
-            animation: Default::default(),
+            ..SceneFile::new(chosen.cloned().unwrap_or_else(|| framing.camera()))
         };
         let mut all: Warnings = document.omissions.sentences().iter().map(|sentence| self.told(sentence)).collect();
         all.append(&warnings);

@@ -14,17 +14,15 @@ use firstlight_files::reference::References;
 use firstlight_files::relative::{path_to_text, relative_path};
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_files::warnings::{Warning, Warnings};
-use firstlight_format::animation::AnimationPart;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::error::SceneError;
 use firstlight_format::names::Names;
-use firstlight_format::parts::{DisplayPart, FilmPart, MaterialPart, ObjectPart};
+use firstlight_format::parts::{FilmPart, MaterialPart, ObjectPart};
 use firstlight_format::placement::Placement;
 use firstlight_format::scene_file::SceneFile;
-use firstlight_format::sources::{EnvironmentSource, MeshSource};
-use firstlight_format::value::{Named, Rgb};
+use firstlight_format::sources::MeshSource;
 use firstlight_mesh::Mesh;
-use firstlight_render::{Integrator, PixelFilter};
+use firstlight_render::PixelFilter;
 use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -42,21 +40,7 @@ pub(crate) struct Converted {
 
 impl<'a> Converter<'a> {
     pub(crate) fn new(graph: &'a Graph, references: References<'a>, folder: &'a Path, file_name: String) -> Self {
-        let file = SceneFile {
-            camera: CameraPart::looking_at(DVec3::ZERO, DVec3::Z),
-            cameras: Named::default(),
-            film: FilmPart::default(),
-            integrator: Integrator::default(),
-            max_depth: None,
-            display: DisplayPart::default(),
-            environment: EnvironmentSource::Black,
-            air: Rgb::default(),
-            textures: Named::default(),
-            materials: Named::default(),
-            objects: Vec::new(),
-            lights: Vec::new(),
-            animation: AnimationPart::default(),
-        };
+        let file = SceneFile::new(CameraPart::looking_at(DVec3::ZERO, DVec3::Z));
         Self {
             graph,
             world: DMat4::IDENTITY,

@@ -28,8 +28,7 @@ use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::pbrt::directives::Reader;
 use firstlight_format::error::SceneError;
 use firstlight_format::scene_file::SceneFile;
-use firstlight_format::value::{Named, Rgb};
-use firstlight_render::Integrator;
+use firstlight_format::value::Named;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -45,19 +44,15 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
     builder.keep_used_materials();
     files.extend(builder.files);
     let file = SceneFile {
-        camera: view.camera,
-        cameras: Named::default(),
         film: view.film,
-        integrator: Integrator::default(),
         max_depth: Some(view.max_depth),
         display: view.display,
         environment: builder.environment,
-        air: Rgb::default(),
         textures: Named(builder.used_textures),
         materials: Named(builder.materials),
         objects: builder.objects,
         lights: builder.lights,
-        animation: Default::default(),
+        ..SceneFile::new(view.camera)
     };
     Ok(ForeignScene { file, parts: builder.parts, part_files: HashMap::new(), warnings: builder.warnings, files })
 }
