@@ -7,7 +7,7 @@
 mod common;
 
 use common::{scenes, world_of};
-use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
     Camera, ColorInput, Environment, Exposed, Film, Geometry, Material, Object, Prepared, RenderSettings,
@@ -48,7 +48,11 @@ fn preparation(n: u32) -> f64 {
         let shape = |i: u32| {
             let place = Vec3::new((i % 100) as f32, 0.3 * open * (i % 7) as f32, (i / 100) as f32) * 2.0;
             let turn = Quat::from_rotation_y(open + i as f32);
-            Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::from_rotation_translation(turn, place) }
+            Shape::Mesh {
+                tree: tree.clone(),
+                world_from_object: Affine3A::from_rotation_translation(turn, place),
+                space: HitSpace::Object,
+            }
         };
         let geometry = Geometry::build((0..n).map(shape).collect(), vec![object.clone(); n as usize]);
         let snapshot = Snapshot { geometry: Arc::new(geometry), shading: shading.clone(), camera: eye() };

@@ -8,7 +8,7 @@
 //! Everything runs on one thread; the forms take turns, and each figure is the median over the rounds.
 
 use firstlight::geometry::{Ray, Shear, intersect_triangle, robust::offset_ray_origin};
-use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitBatch, HitSpace, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use glam::{Affine3A, Vec3};
 use std::hint::black_box;
@@ -72,7 +72,11 @@ fn main() {
     let mesh = serpent_knot(&SerpentKnot::default());
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
     let bounds = tree.bounds();
-    let scene = SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]);
+    let scene = SceneTree::build(vec![Shape::Mesh {
+        tree: tree.clone(),
+        world_from_object: Affine3A::IDENTITY,
+        space: HitSpace::Object,
+    }]);
     let rays: Vec<Ray> = (0..1 << 16)
         .map(|_| {
             let (from, to) = (random.point() * 3.0, random.point() * 0.5);

@@ -4,7 +4,7 @@ use crate::WAVE;
 use crate::clock::{cpu_seconds, median};
 use crate::rays::Random;
 use firstlight::geometry::Ray;
-use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree};
+use firstlight::kdtree::{BuildPreset, HitBatch, HitSpace, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree};
 use firstlight::mesh::procedural;
 use glam::{Affine3A, Vec3};
 use std::sync::Arc;
@@ -42,6 +42,7 @@ fn crowds() -> Vec<(String, Vec<Shape>)> {
         let mesh = |(center, radius)| Shape::Mesh {
             tree: tree.clone(),
             world_from_object: Affine3A::from_translation(center) * Affine3A::from_scale(Vec3::splat(radius)),
+            space: HitSpace::Object,
         };
         crowds.push((format!("{n} meshes"), balls(&mut random, n).into_iter().map(mesh).collect()));
     }

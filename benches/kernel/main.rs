@@ -24,7 +24,7 @@ mod rays;
 mod small;
 
 use clock::{cpu_seconds, median};
-use firstlight::kdtree::{BuildPreset, HitBatch, InstructionSet, MeshTree, RayBatch, SceneTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitBatch, HitSpace, InstructionSet, MeshTree, RayBatch, SceneTree, Shape};
 use glam::Affine3A;
 use rays::RaySet;
 use std::sync::Arc;
@@ -125,7 +125,11 @@ fn main() {
             scene
         });
         println!();
-        let scene = SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]);
+        let scene = SceneTree::build(vec![Shape::Mesh {
+            tree: tree.clone(),
+            world_from_object: Affine3A::IDENTITY,
+            space: HitSpace::Object,
+        }]);
         for set in rays::classes(&scene, &mesh, options.size) {
             if !options.class.is_empty() && options.class != set.name {
                 continue;

@@ -144,7 +144,7 @@ impl Session {
         world.init_resource::<Paused>();
         world.init_resource::<DisplaySettings>();
         world.init_resource::<CommandQueue>();
-        world.init_resource::<RenderState>();
+        world.insert_resource(RenderState::for_session());
         world.init_resource::<FrameChanges>();
         world.init_resource::<Picture>();
         world.init_resource::<Status>();

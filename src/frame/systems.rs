@@ -10,12 +10,17 @@ use crate::frame::state::resources::{
     Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
 };
 use crate::frame::worker::{Job, Orders};
+use crate::kdtree::HitSpace;
 use crate::render::RenderSettings;
+use crate::scene::hit_spaces::{StaticJob, hit_spaces};
 use crate::scene::world::entity_state::SceneChanges;
 use crate::scene::{
     Animation, CameraInput, DisplaySettings, Extraction, Moment, Rendering, SceneInputs, SceneQueries, Shape, Trees,
+    origin_of,
 };
 use bevy_ecs::prelude::{DetectChanges, Res, ResMut, World};
+use glam::DVec3;
+use std::time::Duration;
 
 /// Applies finished background work to the world, for example replaces the scene by one that was loaded.
 ///
@@ -32,6 +37,12 @@ pub fn edit(world: &mut World) {
                 shown.trees.extend(trees);
                 shown.better_trees |= shown.trees.preview().len() < preview;
                 shown.waiting = true;
+            }
+            Finished::Statics(built) => {
+                let mut shown = world.resource_mut::<RenderState>();
+                shown.trees.take_statics(built);
+                shown.builds_statics = false;
+                shown.better_trees = true;
             }
             Finished::Scene { again: true, result: Ok(scene), .. } => adopt_moment(world, *scene, now),
             Finished::Scene { result: Ok(scene), .. } => adopt(world, *scene, now),
@@ -101,10 +112,13 @@ pub fn rebuild(
             status.say(clock.0, MessageKind::Error, format!("the camera was not changed: {bad}"));
             inputs.camera = shown.inputs.camera;
         }
-        let missing = missing_trees(&inputs, &mut shown.trees);
+        let origin = origin_of(&inputs);
+        let same_objects = inputs.objects == shown.inputs.objects
+            && shown.extraction.as_ref().is_some_and(|extraction| extraction.origin == origin);
+        let missing = if same_objects { Vec::new() } else { missing_trees(&inputs, &mut shown.trees, origin) };
         if !missing.is_empty() {
             // The old image stays until the trees are built; the camera keeps moving.
-            beside.build(missing, true, renderer.0.pool());
+            beside.build(missing, shown.trees.clone(), true, renderer.0.pool());
             inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
         }
         let differences = compare(&shown.inputs, &inputs);
@@ -115,7 +129,7 @@ pub fn rebuild(
             shown.revision += 1;
         }
         shown.inputs = inputs;
-        let RenderState { inputs, extraction, trees, extents, .. } = &mut *shown;
+        let RenderState { inputs, extraction, trees, extents, unsettled_since, .. } = &mut *shown;
         let rebuilt = match (extraction.as_mut(), part) {
             (None, _) => {
                 *extraction = Some(Extraction::new(inputs, trees));
@@ -134,6 +148,7 @@ pub fn rebuild(
         }
         if rebuilt {
             trees.keep_used(inputs);
+            *unsettled_since = Some(clock.0);
             around.extent = extents.extent(inputs);
             around.corners = extents.corners(inputs);
             for problem in extraction.iter().flat_map(|extraction| &extraction.problems) {
@@ -153,15 +168,18 @@ pub fn rebuild(
     if std::mem::take(&mut shown.better_trees)
         && let RenderState { inputs, extraction: Some(extraction), trees, generation, .. } = &mut *shown
     {
-        // The same hits, found faster: no sample is lost, and no restart is reported. After a restart it comes with the
-        // job.
-        extraction.take_trees(trees);
+        // The same hits, found faster: no sample is lost, and no restart is reported, unless a large mesh has come to rest.
+        // After a restart it comes with the job.
+        if !extraction.take_trees(inputs, trees) {
+            changes.add(Level::Restart, "meshes came to rest");
+        }
         extraction.expose(animation, seconds, inputs, trees);
         if !changes.restarts() {
             renderer.0.set_prepared(*generation, extraction.prepared.clone());
         }
     }
     improve_trees(&mut shown, &beside, &renderer);
+    share_trees(&mut shown, &beside, &renderer, clock.0);
     found.0 = changes;
 }
 
@@ -179,12 +197,28 @@ fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &R
     let new: Vec<Shape> = preview.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
     if !new.is_empty() {
         shown.improving.extend(new.iter().cloned());
-        beside.build(new, false, renderer.0.pool());
+        beside.build(new, shown.trees.clone(), false, renderer.0.pool());
+    }
+}
+
+/// Starts building trees that meshes share, once nothing has moved for a while.
+fn share_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer, now: Duration) {
+    const REST: Duration = Duration::from_millis(250);
+    let rests = shown.trees.has_preview_statics || shown.unsettled_since.is_some_and(|since| now >= since + REST);
+    if shown.builds_statics || !rests {
+        return;
+    }
+    let RenderState { inputs, extraction: Some(extraction), trees, .. } = &*shown else { return };
+    let job = StaticJob::next(inputs, trees, extraction.origin);
+    shown.unsettled_since = None;
+    if let Some(job) = job {
+        shown.builds_statics = true;
+        beside.build_statics(job, renderer.0.pool());
     }
 }
 
 /// Returns shapes whose trees have yet to be built. Small trees are built immediately, within the frame.
-fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
+fn missing_trees(inputs: &SceneInputs, trees: &mut Trees, origin: DVec3) -> Vec<Shape> {
     const AT_ONCE: usize = 2_000;
     let mut missing: Vec<Shape> = Vec::new();
     for object in &inputs.objects {
@@ -200,6 +234,13 @@ fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
             missing.push(object.shape.clone());
         } else if let Err(reason) = trees.add(&object.shape) {
             trees.mark_unfit(&object.shape, reason);
+        }
+    }
+    // Meshes that share no tree need one of their own.
+    for (object, space) in inputs.objects.iter().zip(hit_spaces(inputs, trees, origin, None)) {
+        let is_new = space == HitSpace::Object && !missing.contains(&object.shape);
+        if is_new && trees.has(&object.shape) && !trees.is_built(&object.shape) {
+            missing.push(object.shape.clone());
         }
     }
     missing

@@ -10,7 +10,7 @@
 //! Start reading at [`TreeTable::measure`].
 
 use crate::geometry::{Ray, robust::offset_ray_origin};
-use crate::kdtree::{BuildPreset, KdTreeStats, MeshTree, SceneTree, Shape, Visits};
+use crate::kdtree::{BuildPreset, HitSpace, KdTreeStats, MeshTree, SceneTree, Shape, Visits};
 use crate::mesh::Mesh;
 use crate::render::{
     Camera, ColorInput, Environment, Film, Geometry, Integrator, Material, Object, Prepared, RayCounts, RenderSettings,
@@ -256,7 +256,7 @@ impl ModelScene {
 }
 
 fn placed(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
-    Shape::Mesh { tree: tree.clone(), world_from_object }
+    Shape::Mesh { tree: tree.clone(), world_from_object, space: HitSpace::Object }
 }
 
 fn phong(diffuse: ColorInput, specular: f32) -> Material {

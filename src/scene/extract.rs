@@ -7,18 +7,19 @@ use crate::format::camera::render_camera;
 use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
-use crate::kdtree::{self};
+use crate::kdtree::{self, HitSpace};
 use crate::mesh::Mesh;
 use crate::render::{
     self, Camera, ColorInput, Cone, DeltaLight, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object,
     Prepared, ScalarInput, Shading, Snapshot, TextureId,
 };
 use crate::scene::animation::Animation;
+use crate::scene::hit_spaces::{about, hit_spaces, sound_affine};
 use crate::scene::world::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
 use crate::scene::world::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
 use crate::scene::world::trees::{Trees, address};
 use bevy_ecs::prelude::Entity;
-use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -64,11 +65,11 @@ enum MaterialKey {
 impl Extraction {
     /// Builds everything. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
-        Self::about(origin_for(&camera_of(inputs).view), inputs, trees, None)
+        Self::about(origin_of(inputs), inputs, trees, None)
     }
 
     /// - `before`: the same scene at another time, whose tables are shared as far as they are equal.
-    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees, before: Option<&Prepared>) -> Self {
+    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees, before: Option<(&SceneInputs, &Prepared)>) -> Self {
         let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
@@ -76,8 +77,9 @@ impl Extraction {
         }
         let mut geometry = (Vec::new(), Vec::new());
         let mut entities = Vec::new();
-        for object in &inputs.objects {
-            match shape_of(object, trees, origin) {
+        let spaces = hit_spaces(inputs, trees, origin, before.map(|(base, _)| base));
+        for (object, space) in inputs.objects.iter().zip(spaces) {
+            match shape_of(object, trees, origin, space) {
                 Ok((shape, mesh)) => {
                     let mut keys: Vec<_> = object.slots.iter().map(|&slot| MaterialKey::Material(slot)).collect();
                     if keys.is_empty() {
@@ -118,13 +120,13 @@ impl Extraction {
             geometry.1.push(Object { is_point_light: true, ..Object::plain(glow) });
             entities.push(light.entity);
         }
-        let geometry = Geometry::build(geometry.0, geometry.1);
+        let geometry = Geometry::build_with(geometry.0, geometry.1, &trees.statics);
         let shading = shading_of(inputs, &mut materials, origin);
         let camera = camera_in(&camera_of(inputs), origin);
         let snapshot = Snapshot::new(geometry, shading, camera);
         let prepared = match before {
             None => Prepared::new(snapshot),
-            Some(before) => before.with_snapshot(snapshot),
+            Some((_, before)) => before.with_snapshot(snapshot),
         };
         Self { origin, prepared, problems, entities, delta_lights, ids: materials.ids, order: materials.order }
     }
@@ -138,21 +140,34 @@ impl Extraction {
         })
     }
 
-    /// Replaces the trees of meshes by those in `trees`. All trees of a mesh give the same hits, so the samples do not
-    /// change.
-    pub fn take_trees(&mut self, trees: &Trees) {
+    /// Replaces the trees of meshes by those in `trees`. Returns whether samples so far are those of the new ones: all
+    /// trees of a mesh give the same hits, unless they are decided in another space.
+    ///
+    /// - `inputs`: the inputs that this was made of.
+    pub fn take_trees(&mut self, inputs: &SceneInputs, trees: &Trees) -> bool {
+        let spaces: HashMap<Entity, HitSpace> = inputs
+            .objects
+            .iter()
+            .map(|object| object.entity)
+            .zip(hit_spaces(inputs, trees, self.origin, None))
+            .collect();
         let old = &self.prepared.geometry;
-        let shapes = old.tree.shapes().iter().zip(&old.objects).map(|(shape, object)| {
+        let mut same_hits = true;
+        let objects = old.tree.shapes().iter().zip(&old.objects).zip(&self.entities);
+        let shapes = objects.map(|((shape, object), entity)| {
             let newer = object.mesh.as_ref().and_then(|mesh| trees.meshes.get(&address(mesh)));
             match (shape, newer) {
-                (&kdtree::Shape::Mesh { world_from_object, .. }, Some((_, tree))) => {
-                    kdtree::Shape::Mesh { tree: tree.clone(), world_from_object }
+                (&kdtree::Shape::Mesh { world_from_object, space: old, .. }, Some((_, tree))) => {
+                    let space = spaces.get(entity).copied().unwrap_or(old);
+                    same_hits &= space == old;
+                    kdtree::Shape::Mesh { tree: tree.clone(), world_from_object, space }
                 }
                 _ => shape.clone(),
             }
         });
-        let geometry = Geometry::build(shapes.collect(), old.objects.clone());
+        let geometry = Geometry::build_with(shapes.collect(), old.objects.clone(), &trees.statics);
         self.prepared = self.prepared.with_trees(Arc::new(geometry));
+        same_hits
     }
 
     /// Rebuilds one part and keeps the rest. If the camera has moved so far that the origin changes, everything is
@@ -185,7 +200,7 @@ impl Extraction {
     pub fn at(&self, animation: &Animation, inputs: &SceneInputs, trees: &Trees, seconds: f64) -> Prepared {
         let then = animation.inputs_at(inputs, seconds);
         if then.objects != inputs.objects || !same_shapes(&then.lights, &inputs.lights) {
-            return Self::about(self.origin, &then, trees, Some(&self.prepared)).prepared;
+            return Self::about(self.origin, &then, trees, Some((inputs, &self.prepared))).prepared;
         }
         let mut prepared = self.prepared.clone();
         if then.lights != inputs.lights || then.materials != inputs.materials {
@@ -220,6 +235,11 @@ pub fn origin_for(view: &View) -> DVec3 {
     if origin.is_finite() { origin } else { DVec3::ZERO }
 }
 
+/// The origin for the camera of a scene.
+pub(crate) fn origin_of(inputs: &SceneInputs) -> DVec3 {
+    origin_for(&camera_of(inputs).view)
+}
+
 fn camera_of(inputs: &SceneInputs) -> CameraInput {
     inputs.camera.filter(|camera| camera.check().is_ok()).unwrap_or(CameraInput {
         entity: Entity::PLACEHOLDER,
@@ -234,13 +254,14 @@ fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: D
 }
 
 /// The shape for the kd-tree, relative to `origin`, or why it is invalid.
-fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
+fn shape_of(
+    object: &ObjectInput,
+    trees: &Trees,
+    origin: DVec3,
+    space: HitSpace,
+) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
     let placement = &object.placement;
-    let world = placement.affine();
-    let determinant = world.matrix3.determinant();
-    if !world.is_finite() || !determinant.is_finite() || determinant == 0.0 {
-        return Err("its transform is not finite or flattens it".to_owned());
-    }
+    let world = sound_affine(placement).ok_or("its transform is not finite or flattens it")?;
     let point = |p: DVec3| (world.transform_point3(p) - origin).as_vec3();
     let vector = |v: DVec3| world.transform_vector3(v).as_vec3();
     let even = |placement: &Placement| placement.even_scale().ok_or("spheres need a uniform scale".to_owned());
@@ -277,7 +298,7 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
         Shape::Mesh(mesh) => {
             let (_, tree) = trees.meshes.get(&address(mesh)).ok_or_else(|| trees.reason(&object.shape))?;
             let world_from_object = about(world, mesh.center, origin);
-            return Ok((kdtree::Shape::Mesh { tree: tree.clone(), world_from_object }, Some(mesh.clone())));
+            return Ok((kdtree::Shape::Mesh { tree: tree.clone(), world_from_object, space }, Some(mesh.clone())));
         }
         Shape::Spheres(balls) => {
             even(placement)?;
@@ -299,12 +320,6 @@ fn turned(object: &ObjectInput) -> Option<Mat3> {
 fn has_area(u: Vec3, v: Vec3) -> bool {
     let area = u.as_dvec3().cross(v.as_dvec3()).length();
     area.is_finite() && area > 0.0
-}
-
-/// The transform from coordinates relative to `center` to ones relative to `origin`.
-fn about(world: DAffine3, center: DVec3, origin: DVec3) -> Affine3A {
-    let translation = world.transform_point3(center) - origin;
-    Affine3A::from_mat3_translation(world.matrix3.as_mat3(), translation.as_vec3())
 }
 
 /// The materials that a snapshot needs, numbered in the order of first use.

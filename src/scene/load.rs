@@ -26,6 +26,8 @@ use crate::render::ImageTexture;
 use crate::scene::animation::edited::show_time;
 use crate::scene::builtin::{BUILTIN_SCENES, builtin_text};
 use crate::scene::default_scene;
+use crate::scene::extract::origin_of;
+use crate::scene::hit_spaces::{StaticJob, own_trees};
 use crate::scene::image_metadata::{ImageMetadata, MetadataError};
 use crate::scene::known_meshes::KnownMeshes;
 use crate::scene::load_meshes::{LostMesh, ObjectMeshes, load_meshes};
@@ -599,15 +601,27 @@ impl LoadedScene {
                 self.trees.mark_unfit(&shape, String::new());
                 continue;
             }
-            if !self.trees.has(&shape) {
-                options.say(&match &shape {
-                    Shape::Mesh(mesh) => format!("building a kd-tree over {} triangles", mesh.triangles.len()),
-                    Shape::Spheres(balls) => format!("building a kd-tree over {} spheres", balls.centers.len()),
-                    _ => String::new(),
-                });
+            if let Shape::Spheres(balls) = &shape
+                && !self.trees.has(&shape)
+            {
+                options.say(&format!("building a kd-tree over {} spheres", balls.centers.len()));
             }
             let added = if options.preview { self.trees.add_preview(&shape) } else { self.trees.add(&shape) };
             added.map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
+        }
+        let mut world = World::new();
+        self.spawn(&mut world);
+        let inputs = SceneInputs::of(&mut world);
+        if let Some(job) = StaticJob::next(&inputs, &self.trees, origin_of(&inputs)) {
+            let (triangles, meshes) = (job.n_triangles(), job.n_meshes());
+            let of = if meshes == 1 { String::new() } else { format!(" of {meshes} meshes") };
+            options.say(&format!("building a kd-tree over {triangles} triangles{of}"));
+            self.trees.take_statics(job.build(options.preview));
+        }
+        // The others have trees of their own, which many objects may share.
+        for tree in own_trees(&inputs, &self.trees).into_iter().filter(|tree| !tree.is_built()) {
+            options.say(&format!("building a kd-tree over {} triangles", tree.n_triangles()));
+            tree.ensure_built();
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Long paths of diffuse bounces in closed boxes: none may escape, not even in a corner.
 
 use crate::geometry::{Ray, robust::offset_ray_origin};
-use crate::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
+use crate::kdtree::{BuildPreset, HitBatch, HitSpace, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use crate::mesh::procedural;
 use crate::stability::random::Random;
 use crate::stability::tally::Tally;
@@ -23,18 +23,16 @@ fn boxes() -> Vec<(&'static str, SceneTree)> {
     let ball = Shape::Sphere { center: Vec3::ZERO, radius: 1.0 };
     let hull = procedural::icosphere(4);
     let hull = Arc::new(MeshTree::build(&hull.positions, &hull.triangles, BuildPreset::Best));
+    let placed = |tree: &Arc<MeshTree>, world_from_object, space| {
+        SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object, space }])
+    };
     vec![
         ("box of quads", SceneTree::build(walls)),
-        (
-            "box of triangles",
-            SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]),
-        ),
-        ("turned box of triangles", SceneTree::build(vec![Shape::Mesh { tree, world_from_object: turned }])),
+        ("box of triangles", placed(&tree, Affine3A::IDENTITY, HitSpace::World)),
+        ("turned box of triangles", placed(&tree, turned, HitSpace::World)),
+        ("turned box with its own tree", placed(&tree, turned, HitSpace::Object)),
         ("ball", SceneTree::build(vec![ball])),
-        (
-            "sphere of triangles",
-            SceneTree::build(vec![Shape::Mesh { tree: hull, world_from_object: Affine3A::IDENTITY }]),
-        ),
+        ("sphere of triangles", placed(&hull, Affine3A::IDENTITY, HitSpace::World)),
     ]
 }
 

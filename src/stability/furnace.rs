@@ -4,7 +4,7 @@
 //! fails: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at
 //! every level, both integrators, with and without SIMD. [`random`] has randomly generated scenes.
 
-use crate::kdtree::{BuildPreset, MeshTree, Shape, SphereTree};
+use crate::kdtree::{BuildPreset, HitSpace, MeshTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
 use crate::render::{Camera, Environment, Fresnel, Integrator, Material, Object, RenderSettings, ScalarInput};
 use crate::stability::light::{LightCase, camera, diffuse, grey, prepared};
@@ -49,7 +49,7 @@ fn ball(center: Vec3, radius: f32, material: u32) -> PlacedShape {
 
 fn mesh(mesh: Mesh, world_from_object: Affine3A, material: u32) -> PlacedShape {
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
-    (Shape::Mesh { tree, world_from_object }, material, Some(Arc::new(mesh)))
+    (Shape::Mesh { tree, world_from_object, space: HitSpace::Object }, material, Some(Arc::new(mesh)))
 }
 
 /// A box of six outward-facing quads.

@@ -74,7 +74,7 @@ impl ReferenceIntersector {
                 Shape::Plane { point, normal } => {
                     push(Solid::Plane { point: point.as_dvec3(), normal: normal.as_dvec3().normalize() }, None);
                 }
-                Shape::Mesh { tree, world_from_object: map } => {
+                Shape::Mesh { tree, world_from_object: map, .. } => {
                     let wide = widened(map);
                     for prim in 0..tree.n_triangles() as u32 {
                         let corners = tree.vertices(prim).map(|v| wide.transform_point3(v.as_dvec3()));

@@ -1,7 +1,7 @@
 //! Cases for intersection: rays against closed meshes, needles, flat objects, and the surfaces that rays leave.
 
 use crate::geometry::Ray;
-use crate::kdtree::{BuildPreset, MeshTree, SceneTree, Shape, SphereTree};
+use crate::kdtree::{BuildPreset, HitSpace, MeshTree, SceneTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
 use crate::stability::random::Random;
 use crate::stability::reference::ReferenceIntersector;
@@ -87,7 +87,11 @@ fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: RaySet) -> Te
 }
 
 fn mesh_shape(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
-    Shape::Mesh { tree: tree.clone(), world_from_object }
+    Shape::Mesh { tree: tree.clone(), world_from_object, space: HitSpace::Object }
+}
+
+fn static_shape(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
+    Shape::Mesh { tree: tree.clone(), world_from_object, space: HitSpace::World }
 }
 
 /// Closed meshes of one to two metres.
@@ -165,7 +169,7 @@ pub fn closed() -> Vec<Plan> {
                         let turn = Affine3A::from_scale(Vec3::splat(place.scale));
                         mesh_shape(&soup.tree(), Affine3A::from_translation(place.shift()) * turn)
                     } else {
-                        mesh_shape(&world.tree(), Affine3A::IDENTITY)
+                        static_shape(&world.tree(), Affine3A::IDENTITY)
                     };
                     let reference = ReferenceIntersector::of(&SceneTree::build(vec![shape.clone()]));
                     let origins = insides(&reference, &world, index as u64);
@@ -318,6 +322,8 @@ fn shapes_at(place: SurfaceCase) -> Vec<(&'static str, Shape)> {
         ("mesh", mesh_shape(&placed.tree(), Affine3A::IDENTITY)),
         ("instance", mesh_shape(&stone.tree(), turned)),
         ("mirrored instance", mesh_shape(&stone.tree(), mirrored)),
+        ("static mesh", static_shape(&stone.tree(), turned)),
+        ("mirrored static mesh", static_shape(&stone.tree(), mirrored)),
         ("balls", Shape::Spheres { tree: Arc::new(balls), world_from_object: even }),
     ]
 }

@@ -3,7 +3,8 @@
 use crate::random::Random;
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
 use firstlight::kdtree::{
-    BuildPreset, Hit, HitBatch, InstructionSet, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree,
+    BuildPreset, Hit, HitBatch, HitSpace, InstructionSet, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree,
+    StaticTree,
 };
 use glam::{Affine3A, EulerRot, Quat, Vec3, vec3};
 use std::sync::Arc;
@@ -176,7 +177,7 @@ fn assert_agrees(scene: &SceneTree, rays: &[Ray], what: &str) {
 }
 
 fn mesh(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
-    Shape::Mesh { tree: tree.clone(), world_from_object }
+    Shape::Mesh { tree: tree.clone(), world_from_object, space: HitSpace::Object }
 }
 
 #[test]
@@ -333,6 +334,11 @@ fn placements(random: &mut Random, n: usize, spread: f32, even: bool) -> Vec<Aff
         .collect()
 }
 
+/// Both spaces in turn.
+fn space_of(i: usize) -> HitSpace {
+    if i.is_multiple_of(2) { HitSpace::World } else { HitSpace::Object }
+}
+
 /// Every kind of shape, several of each, with ties: repeated objects and quads that share a plane.
 fn mixed_scene(seed: u64, n: usize, preset: BuildPreset) -> (SceneTree, Soup) {
     let mut random = Random(seed);
@@ -354,12 +360,12 @@ fn mixed_scene(seed: u64, n: usize, preset: BuildPreset) -> (SceneTree, Soup) {
             0 => Shape::Quad { corner: p, edge_u: q, edge_v: r },
             1 => Shape::Sphere { center: p, radius: 0.05 + 0.3 * random.signed().abs() },
             2 => Shape::Triangle { vertices: [p, p + q, p + r] },
-            3 => Shape::Mesh { tree: tree.clone(), world_from_object: placed[i] },
+            3 => Shape::Mesh { tree: tree.clone(), world_from_object: placed[i], space: space_of(i / 7) },
             4 => {
                 let tree = if i / 7 % 2 == 0 { &balls } else { &few_balls };
                 Shape::Spheres { tree: tree.clone(), world_from_object: placed_balls[i] }
             }
-            5 => Shape::Mesh { tree: soup_tree.clone(), world_from_object: placed[i] },
+            5 => Shape::Mesh { tree: soup_tree.clone(), world_from_object: placed[i], space: space_of(i / 14) },
             _ => shapes[random.below(shapes.len())].clone(),
         });
     }
@@ -375,6 +381,64 @@ fn scenes_of_all_shapes_agree() {
             assert_agrees(&scene, &awkward_rays(seed, &sheet, 1500), &format!("scene {seed} of {n}, {preset:?}"));
         }
     }
+}
+
+/// Shapes of the world that share trees, as they are found after edits: some moved, removed, added or in another order.
+#[test]
+fn trees_that_outlive_edits_give_the_hits_of_new_ones() {
+    let static_mesh = |tree: &Arc<MeshTree>, world_from_object| Shape::Mesh {
+        tree: tree.clone(),
+        world_from_object,
+        space: HitSpace::World,
+    };
+    for (seed, n) in [(1, 2), (2, 5), (3, 30), (4, 80)] {
+        let mut random = Random(seed);
+        let (sheet, soup) = (sheet(10), triangle_soup(seed, 60));
+        let mut placed = placements(&mut random, n, 0.5, false);
+        // Copies in one place tie everywhere.
+        placed.extend_from_within(..n / 2);
+        let trees: Vec<Arc<MeshTree>> =
+            (0..placed.len()).map(|i| [&sheet, &soup][i % 2].tree(PRESETS[i % PRESETS.len()])).collect();
+        let old: Vec<Shape> = placed.iter().zip(&trees).map(|(map, tree)| static_mesh(tree, *map)).collect();
+        let statics: Vec<_> = StaticTree::build(&old, BuildPreset::Quick).into_iter().map(Arc::new).collect();
+        let rays = awkward_rays(seed, &sheet, 600);
+        let moved = Affine3A::from_translation(vec3(0.3, -0.1, 0.2));
+        let mut fewer = old.clone();
+        fewer.remove(n / 2);
+        fewer.remove(0);
+        let mut edited = fewer.clone();
+        edited[n / 4] = static_mesh(&trees[n / 4], moved * placed[n / 4]);
+        edited.insert(1, Shape::Sphere { center: Vec3::ZERO, radius: 0.2 });
+        edited.push(mesh(&sheet.tree(BuildPreset::Best), moved));
+        edited.push(static_mesh(&sheet.tree(BuildPreset::Best), placed[0]));
+        let mut turned = old.clone();
+        turned.reverse();
+        for (what, shapes) in [("same", old), ("fewer", fewer), ("edited", edited), ("turned", turned)] {
+            let what = format!("{what} {seed}");
+            let scene = SceneTree::build_with(shapes.clone(), &statics);
+            assert_agrees(&scene, &rays, &what);
+            let new = SceneTree::build(shapes);
+            for ray in &rays {
+                assert_eq!(bits(scene.closest_hit(ray)), bits(new.closest_hit(ray)), "{what} {ray:?}");
+            }
+        }
+    }
+}
+
+/// Meshes of very different sizes do not share a tree, and hits do not tell.
+#[test]
+fn a_ground_of_kilometres_leaves_the_tree_of_a_small_mesh_alone() {
+    let small = sheet(10).tree(BuildPreset::Best);
+    let ground = sheet(2).tree(BuildPreset::Best);
+    let place = |tree: &Arc<MeshTree>, size: f32| Shape::Mesh {
+        tree: tree.clone(),
+        world_from_object: Affine3A::from_scale(Vec3::splat(size)),
+        space: HitSpace::World,
+    };
+    let shapes = vec![place(&ground, 1e4), place(&small, 1.0), place(&small, 1.5), place(&small, 0.1)];
+    let statics = StaticTree::build(&shapes, BuildPreset::Best);
+    assert_eq!(statics.iter().map(StaticTree::n_members).collect::<Vec<_>>(), [3, 1]);
+    assert_agrees(&SceneTree::build(shapes), &awkward_rays(4, &sheet(10), 1500), "sizes");
 }
 
 #[test]
@@ -453,6 +517,7 @@ fn surfaces(scale: f32, offset: Vec3) -> Vec<(&'static str, Shape)> {
         ("triangle", Shape::Triangle { vertices: [at(a), at(b), at(c)] }),
         ("mesh", mesh(&placed, Affine3A::IDENTITY)),
         ("instance", mesh(&centered, turned)),
+        ("static", Shape::Mesh { tree: centered, world_from_object: turned, space: HitSpace::World }),
         ("balls", Shape::Spheres { tree: Arc::new(balls), world_from_object: even }),
     ]
 }
@@ -519,7 +584,7 @@ fn error_of_a_surface_point_is_a_bound() {
                     Shape::Plane { point, normal } => (p - point.as_dvec3()).dot(normal.as_dvec3()),
                     Shape::Quad { corner, .. } => (p - corner.as_dvec3()).dot(n),
                     Shape::Triangle { vertices } => (p - vertices[0].as_dvec3()).dot(n),
-                    Shape::Mesh { tree, world_from_object } => {
+                    Shape::Mesh { tree, world_from_object, .. } => {
                         let corner = tree.vertices(hit.prim)[0].as_dvec3();
                         let map = world_from_object;
                         (p - (map.matrix3.as_dmat3() * corner + map.translation.as_dvec3())).dot(n)

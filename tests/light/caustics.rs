@@ -1,7 +1,7 @@
 //! Light that smooth surfaces gather, found by light paths and from the camera together.
 
 use crate::common::*;
-use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
     Camera, CausticPlan, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, Prepared,
@@ -212,7 +212,10 @@ fn block(center: Vec3, size: Vec3, material: u32) -> (Shape, Object) {
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
     let extent = tree.bounds().max - tree.bounds().min;
     let world_from_object = Affine3A::from_scale_rotation_translation(size / extent, Quat::IDENTITY, center);
-    (Shape::Mesh { tree, world_from_object }, Object { mesh: Some(mesh), ..Object::plain(material) })
+    (
+        Shape::Mesh { tree, world_from_object, space: HitSpace::Object },
+        Object { mesh: Some(mesh), ..Object::plain(material) },
+    )
 }
 
 /// A light above a floor, and bodies between them.
@@ -282,7 +285,10 @@ fn smooth_body(material: u32) -> (Shape, Object) {
     let mesh = Arc::new(procedural::icosphere(2).with_vertex_normals());
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
     let world_from_object = Affine3A::from_scale(Vec3::splat(0.8));
-    (Shape::Mesh { tree, world_from_object }, Object { mesh: Some(mesh), ..Object::plain(material) })
+    (
+        Shape::Mesh { tree, world_from_object, space: HitSpace::Object },
+        Object { mesh: Some(mesh), ..Object::plain(material) },
+    )
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Shading of sixteen paths at a time, held against one path at a time, sample by sample.
 
 use crate::common::*;
-use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
+use firstlight::kdtree::{BuildPreset, HitSpace, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
     BadSample, CausticPlan, ColorInput, Cone, DeltaLight, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture,
@@ -19,7 +19,15 @@ fn metal(alpha: f32, fresnel: Fresnel, compensate: bool) -> Material {
 /// A mesh in its place, with its normals and surface coordinates.
 fn placed(mesh: Mesh, world_from_object: Affine3A) -> (Shape, Option<Arc<Mesh>>) {
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
-    (Shape::Mesh { tree, world_from_object }, Some(Arc::new(mesh)))
+    (Shape::Mesh { tree, world_from_object, space: HitSpace::Object }, Some(Arc::new(mesh)))
+}
+
+/// The same, tested in the space of the snapshot.
+fn standing((mut shape, mesh): (Shape, Option<Arc<Mesh>>)) -> (Shape, Option<Arc<Mesh>>) {
+    if let Shape::Mesh { space, .. } = &mut shape {
+        *space = HitSpace::World;
+    }
+    (shape, mesh)
 }
 
 /// Moved by `to` after it was scaled.
@@ -65,7 +73,8 @@ fn room_with(
         plain(sphere(Vec3::new(1.7, 0.35, 1.4), 0.35), 11),
         (placed(smooth.clone(), scaled(Vec3::new(-0.4, 0.3, 0.5), Vec3::new(-1.9, 0.8, -0.8))), 11),
         (placed(unwrapped, scaled(Vec3::new(0.3, 0.4, 0.3), Vec3::new(0.5, 1.4, -0.6))), 12),
-        (placed(smooth, scaled(Vec3::splat(0.3), Vec3::new(-0.5, 1.6, 0.0))), 13),
+        (standing(placed(smooth.clone(), scaled(Vec3::splat(0.3), Vec3::new(-0.5, 1.6, 0.0)))), 13),
+        (standing(placed(smooth, scaled(Vec3::new(-0.2, 0.3, 0.2), Vec3::new(-1.3, 1.5, 0.3)))), 4),
         plain(cloud(Vec3::new(-1.6, 0.1, 1.6)), 13),
         plain(cloud(Vec3::new(0.6, 0.1, 2.0)), 1),
     ];

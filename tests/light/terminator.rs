@@ -7,7 +7,7 @@
 
 use crate::common::{camera, emissive, render};
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
-use firstlight::kdtree::{BuildPreset, MeshTree, SceneTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, SceneTree, Shape};
 use firstlight::mesh::Mesh;
 use firstlight::mesh::procedural::icosphere;
 use firstlight::render::{Environment, Geometry, Integrator, Object, Prepared, RenderSettings, Shading, Snapshot};
@@ -64,7 +64,11 @@ fn intensity() -> f32 {
 
 /// The same without any care for the terminator: the shadow ray starts where the camera ray met the triangle.
 fn plain(mesh: &Mesh) -> Vec<f32> {
-    let scene = SceneTree::build(vec![Shape::Mesh { tree: tree(mesh), world_from_object: Affine3A::IDENTITY }]);
+    let scene = SceneTree::build(vec![Shape::Mesh {
+        tree: tree(mesh),
+        world_from_object: Affine3A::IDENTITY,
+        space: HitSpace::Object,
+    }]);
     let shade = |i: u32| {
         let film = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
         let ray = eye().ray(film, Vec2::splat(SIDE as f32), Vec2::ZERO);
@@ -121,7 +125,7 @@ fn coarse_balls_are_shaded_like_true_ones() {
     println!("| triangles | RMS, plain | largest, plain | RMS | largest |\n|---:|---:|---:|---:|---:|");
     for frequency in [3, 4, 8, 16, 32] {
         let mesh = ball(frequency);
-        let shape = Shape::Mesh { tree: tree(&mesh), world_from_object: Affine3A::IDENTITY };
+        let shape = Shape::Mesh { tree: tree(&mesh), world_from_object: Affine3A::IDENTITY, space: HitSpace::Object };
         let (rms, largest) = difference(&rendered(shape, Some(mesh.clone())), &truth);
         let (plain_rms, plain_largest) = difference(&plain(&mesh), &true_at_centers());
         println!(

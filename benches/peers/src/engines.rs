@@ -4,7 +4,7 @@ use crate::clock::cpu_seconds;
 use crate::{RayBatch, RayClass, each};
 use bvh::aabb::{Aabb, Bounded, IntersectsAabb};
 use bvh::bounding_hierarchy::BHShape;
-use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, SceneTree, Shape};
+use firstlight::kdtree::{HitSpace, BuildPreset, HitBatch, MeshTree, SceneTree, Shape};
 use glam::{Affine3A, Vec3};
 use nalgebra::{Point3, Vector3};
 use obvhs::BvhBuildParams;
@@ -41,7 +41,7 @@ pub struct Firstlight {
 impl Firstlight {
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let (tree, seconds) = timed(|| MeshTree::build(positions, triangles, BuildPreset::Best));
-        let shape = Shape::Mesh { tree: Arc::new(tree), world_from_object: Affine3A::IDENTITY };
+        let shape = Shape::Mesh { tree: Arc::new(tree), world_from_object: Affine3A::IDENTITY, space: HitSpace::Object };
         Self { scene: SceneTree::build(vec![shape]), seconds }
     }
 }

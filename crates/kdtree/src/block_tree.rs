@@ -8,6 +8,7 @@ use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
 use super::reference::{BuildConfig, Primitives};
 use super::simd::KernelSimd;
+use super::static_tree::PresentMembers;
 
 #[derive(Debug, PartialEq)]
 pub(super) struct BlockTree<B: LeafBlock> {
@@ -75,14 +76,21 @@ impl<B: LeafBlock> BlockTree<B> {
         }
     }
 
-    /// Offers the hits of a leaf, which is a child of a [`Node8`].
+    /// Offers the hits of a leaf, which is a child of a [`Node8`], among the primitives that `present` keeps.
     #[inline(always)]
-    pub fn test_leaf<S: KernelSimd>(&self, s: S, child: u32, ray: &B::Ray, nearest: &mut Nearest) {
+    pub fn test_leaf<S: KernelSimd>(
+        &self,
+        s: S,
+        child: u32,
+        ray: &B::Ray,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
         let first = (child & !(LEAF | COMPACT)) as usize;
         if child & COMPACT == 0 {
-            test_blocks(s, &self.blocks, first, ray, nearest);
+            test_blocks(s, &self.blocks, first, ray, nearest, present);
         } else {
-            test_blocks(s, &self.compact, first, ray, nearest);
+            test_blocks(s, &self.compact, first, ray, nearest, present);
         }
     }
 
@@ -167,9 +175,16 @@ fn check_count(n_blocks: usize) {
 }
 
 #[inline(always)]
-fn test_blocks<S: KernelSimd, B: LeafBlock>(s: S, blocks: &[B], mut block: usize, ray: &B::Ray, nearest: &mut Nearest) {
+fn test_blocks<S: KernelSimd, B: LeafBlock>(
+    s: S,
+    blocks: &[B],
+    mut block: usize,
+    ray: &B::Ray,
+    nearest: &mut Nearest,
+    present: Option<&PresentMembers>,
+) {
     loop {
-        B::test(s, &blocks[block], ray, nearest);
+        B::test(s, &blocks[block], ray, nearest, present);
         if !blocks[block].prims().is_followed() {
             return;
         }

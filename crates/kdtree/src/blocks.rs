@@ -6,6 +6,7 @@ use super::leaf::{BLOCK, LeafBlock, LeafRay, NoBlock, Prims, ShearedRay, offer};
 use super::ray::Nearest;
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, Mask};
+use super::static_tree::PresentMembers;
 use crate::geometry::{Ray, Shear, intersect_sphere};
 use firstlight_simd::three;
 use glam::{DVec3, Vec3};
@@ -210,12 +211,18 @@ impl LeafBlock for SphereBlock {
     }
 
     #[inline(always)]
-    fn test<S: KernelSimd>(s: S, block: &Self, ray: &PreciseRay, nearest: &mut Nearest) {
+    fn test<S: KernelSimd>(
+        s: S,
+        block: &Self,
+        ray: &PreciseRay,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
         /// More spheres are tested together.
         const FEW: u32 = 3;
         let mut near = block.near(s, &ray.rounded, nearest.t);
         if near.count_ones() > FEW {
-            return offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
+            return offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims.get(lane));
         }
         let (origin, dir) = (DVec3::from_array(ray.origin), DVec3::from_array(ray.dir));
         while near != 0 {
@@ -231,11 +238,17 @@ impl LeafBlock for SphereBlock {
 
     /// The rounded ray takes as long as the test, unless sixteen lanes take two registers.
     #[inline(always)]
-    fn test_once<S: KernelSimd>(s: S, block: &Self, ray: &PreciseRay, nearest: &mut Nearest) {
+    fn test_once<S: KernelSimd>(
+        s: S,
+        block: &Self,
+        ray: &PreciseRay,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
         if S::IS_NARROW {
-            return Self::test(s, block, ray, nearest);
+            return Self::test(s, block, ray, nearest, present);
         }
-        offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
+        offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims.get(lane));
     }
 }
 

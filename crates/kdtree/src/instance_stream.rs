@@ -206,7 +206,7 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             let placement = tree.placement(slot.walk.child & !PLACEMENT);
             let own_tree = tree.own_tree(placement);
             let entered = match own_tree {
-                OwnTree::Mesh(tree) => enter::<_, ANY>(slot, &tree.tree, placement),
+                OwnTree::Mesh(tree) => enter::<_, ANY>(slot, &tree.blocks, placement),
                 OwnTree::Spheres(tree) => enter::<_, ANY>(slot, &tree.tree, placement),
             };
             if let Some(own_nodes) = entered {
@@ -222,9 +222,11 @@ pub(super) fn run<S: KernelSimd, const ANY: bool>(
             let at = i as usize % SLOTS;
             let slot = &mut slots[at];
             match trees[at] {
-                Some(OwnTree::Mesh(tree)) => tree.tree.test_leaf(s, slot.walk.child, &slot.sheared, &mut slot.nearest),
+                Some(OwnTree::Mesh(tree)) => {
+                    tree.blocks.test_leaf(s, slot.walk.child, &slot.sheared, &mut slot.nearest, None);
+                }
                 Some(OwnTree::Spheres(tree)) => {
-                    tree.tree.test_leaf(s, slot.walk.child, &slot.precise, &mut slot.nearest)
+                    tree.tree.test_leaf(s, slot.walk.child, &slot.precise, &mut slot.nearest, None);
                 }
                 None => {}
             }

@@ -1,8 +1,10 @@
 //! Kd-tree over the bounds of objects that have their own tree, used when there are many of them.
 
+use super::block_tree::BlockTree;
+use super::blocks::TriangleBlock;
 use super::build::{LeafMaker, build};
 use super::leaf::{BLOCK, Prims};
-use super::mesh_tree::{BuildPreset, MeshTree};
+use super::mesh_tree::{BuildPreset, Triangles};
 use super::node8::{DescentRay, LEAF, Node8, STACK, collapse};
 use super::nodes::KdNodes;
 use super::reference::{BuildConfig, Primitives};
@@ -54,15 +56,24 @@ impl Placement {
 /// The tree of an object.
 #[derive(Clone, Debug)]
 pub(super) enum OwnTree {
-    Mesh(Arc<MeshTree>),
+    Mesh(OwnMesh),
     Spheres(Arc<SphereTree>),
+}
+
+/// The triangles of a mesh and the tree over them.
+#[derive(Clone, Debug)]
+pub(super) struct OwnMesh {
+    mesh: Arc<Triangles>,
+    pub blocks: Arc<BlockTree<TriangleBlock>>,
 }
 
 impl OwnTree {
     /// Returns the tree of a shape; `None` for a shape without one.
     pub fn of(shape: &Shape) -> Option<Self> {
         match shape {
-            Shape::Mesh { tree, .. } => Some(Self::Mesh(tree.clone())),
+            Shape::Mesh { tree, .. } => {
+                Some(Self::Mesh(OwnMesh { mesh: tree.mesh.clone(), blocks: tree.blocks().clone() }))
+            }
             Shape::Spheres { tree, .. } => Some(Self::Spheres(tree.clone())),
             _ => None,
         }
@@ -71,21 +82,21 @@ impl OwnTree {
     /// The same for the same tree.
     fn support(&self) -> Support {
         match self {
-            Self::Mesh(tree) => Support::of(tree.positions.iter().map(|&position| (position, 0.0))),
+            Self::Mesh(own) => Support::of(own.mesh.positions.iter().map(|&position| (position, 0.0))),
             Self::Spheres(tree) => Support::of((0..tree.len() as u32).map(|prim| tree.sphere(prim))),
         }
     }
 
     fn bounds(&self) -> Aabb {
         match self {
-            Self::Mesh(tree) => tree.bounds(),
+            Self::Mesh(own) => own.mesh.bounds,
             Self::Spheres(tree) => tree.bounds(),
         }
     }
 
     fn address(&self) -> usize {
         match self {
-            Self::Mesh(tree) => Arc::as_ptr(tree).addr(),
+            Self::Mesh(own) => Arc::as_ptr(&own.blocks).addr(),
             Self::Spheres(tree) => Arc::as_ptr(tree).addr(),
         }
     }

@@ -3,6 +3,7 @@
 use super::lanes::{LaneHits, shear};
 use super::ray::Nearest;
 use super::simd::{KernelSimd, LANES, Mask};
+use super::static_tree::PresentMembers;
 use crate::geometry::{Ray, Shear};
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -31,26 +32,52 @@ pub(super) trait LeafBlock: Sized + Send {
     /// Returns all lanes that the ray hits, with any sign of `t`.
     fn hits<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
 
-    /// Offers the nearest hit of the block.
+    /// Offers the nearest hit of the block among the primitives that `present` keeps; `None` keeps all.
     #[inline(always)]
-    fn test<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
-        offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims().get(lane));
+    fn test<S: KernelSimd>(
+        s: S,
+        block: &Self,
+        ray: &Self::Ray,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
+        offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims().get(lane));
     }
 
     /// Does [`Self::test`] for a ray that is prepared for this block alone.
     #[inline(always)]
-    fn test_once<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
-        Self::test(s, block, ray, nearest);
+    fn test_once<S: KernelSimd>(
+        s: S,
+        block: &Self,
+        ray: &Self::Ray,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
+        Self::test(s, block, ray, nearest, present);
     }
 }
 
-/// Offers the nearest of the hits, which belong to ascending primitives.
+/// Offers the nearest of the hits that `present` keeps; they belong to ascending primitives.
 #[inline(always)]
-pub(super) fn offer<S: KernelSimd>(s: S, hits: LaneHits<S>, nearest: &mut Nearest, prim: impl FnOnce(usize) -> u32) {
+pub(super) fn offer<S: KernelSimd>(
+    s: S,
+    hits: LaneHits<S>,
+    nearest: &mut Nearest,
+    present: Option<&PresentMembers>,
+    prim: impl Fn(usize) -> u32,
+) {
     if hits.mask == 0 {
         return;
     }
-    let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
+    let mut valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
+    if let Some(present) = present {
+        let mut left = valid;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize % BLOCK;
+            left &= left - 1;
+            valid &= !(Mask::from(!present.has(prim(lane))) << lane);
+        }
+    }
     if valid == 0 {
         return;
     }

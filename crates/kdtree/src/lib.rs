@@ -1,8 +1,8 @@
 //! Closest-hit and any-hit queries over scenes, meshes and sphere clouds, answered in batches.
 //!
-//! [`SceneTree`] is the top level over the objects of a scene. A mesh has a [`MeshTree`] and a cloud of spheres a
-//! [`SphereTree`], each built once in its own space and shared by all objects that use it. Knows nothing of materials
-//! or entities: positions go in, hits come out.
+//! [`SceneTree`] is the top level over the objects of a scene. Meshes that stand still share a [`StaticTree`]. A mesh that
+//! is used several times or moves has a [`MeshTree`] and a cloud of spheres a [`SphereTree`], each built once in its own
+//! space and shared by all objects that use it. Knows nothing of materials or entities: positions go in, hits come out.
 
 mod batch;
 mod block_tree;
@@ -30,6 +30,7 @@ mod simd;
 mod sphere_tree;
 mod split;
 mod split_simd;
+mod static_tree;
 mod stats;
 mod stream;
 mod support;
@@ -42,8 +43,9 @@ pub use batch::{append, append_bits};
 pub use firstlight_simd::InstructionSet;
 pub use mesh_tree::{BuildPreset, MeshTree};
 pub use scene_tree::SceneTree;
-pub use shape::{Hit, RayClass, Shape};
+pub use shape::{Hit, HitSpace, RayClass, Shape};
 pub use sphere_tree::SphereTree;
+pub use static_tree::StaticTree;
 pub use stats::KdTreeStats;
 pub use surface::SurfacePoint;
 pub use surface::{F64_ERROR, INSET, quad_rim, sphere_error};

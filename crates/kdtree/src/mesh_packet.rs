@@ -13,15 +13,18 @@ use super::objects::FrameF64;
 use super::ray::{Nearest, RELATIVE_PADDING};
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, LANES, Mask};
+use super::static_tree::PresentMembers;
 use firstlight_simd::three;
 
 /// Sixteen rays in the mesh's own space, and their nearest hits so far.
-pub(super) struct MeshPacket<S: KernelSimd> {
+pub(super) struct MeshPacket<'a, S: KernelSimd> {
     pub origin: [S::F; 3],
     pub dir: [S::F; 3],
     /// Lanes that hold a ray.
     pub lanes: Mask,
     pub nearest: NearestLanes,
+    /// The primitives that take part; `None` for all.
+    pub present: Option<&'a PresentMembers>,
 }
 
 /// [`Nearest`] of sixteen rays; in memory, because single lanes are read and written too.
@@ -44,12 +47,12 @@ pub(super) trait PacketBlock: LeafBlock {
     /// Whether the test uses the [`Footprint`].
     const HAS_FOOTPRINT: bool;
 
-    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
+    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<'_, S>) -> Self::Frame<S>;
 
     /// Tests the rays of `mask` against the whole leaf.
     fn test_rays<S: KernelSimd>(
         s: S,
-        packet: &mut MeshPacket<S>,
+        packet: &mut MeshPacket<'_, S>,
         common: (&PacketGroup<S>, &Self::Frame<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
@@ -104,12 +107,12 @@ impl PacketBlock for TriangleBlock {
     const HAS_FOOTPRINT: bool = true;
 
     #[inline(always)]
-    fn frame<S: KernelSimd>(_: S, _: &MeshPacket<S>) {}
+    fn frame<S: KernelSimd>(_: S, _: &MeshPacket<'_, S>) {}
 
     #[inline(always)]
     fn test_rays<S: KernelSimd>(
         s: S,
-        packet: &mut MeshPacket<S>,
+        packet: &mut MeshPacket<'_, S>,
         (group, ()): (&PacketGroup<S>, &()),
         leaf: &Leaf<Self>,
         mask: Mask,
@@ -129,7 +132,7 @@ impl PacketBlock for SphereBlock {
     const HAS_FOOTPRINT: bool = false;
 
     #[inline(always)]
-    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> SphereFrame<S> {
+    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<'_, S>) -> SphereFrame<S> {
         let precise = FrameF64::new(s, &packet.origin, &packet.dir);
         let length = s.sqrt_d(dot(s, &precise.dir, &precise.dir));
         let inv_length = s.mul_d(length, precise.inv_dir_squared);
@@ -140,7 +143,7 @@ impl PacketBlock for SphereBlock {
     #[inline(always)]
     fn test_rays<S: KernelSimd>(
         s: S,
-        packet: &mut MeshPacket<S>,
+        packet: &mut MeshPacket<'_, S>,
         (_, frame): (&PacketGroup<S>, &SphereFrame<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
@@ -238,7 +241,7 @@ fn interval<S: KernelSimd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
     [s.least(mask, a), -s.least(mask, s.sub(s.splat(0.0), a))]
 }
 
-impl<S: KernelSimd> MeshPacket<S> {
+impl<S: KernelSimd> MeshPacket<'_, S> {
     /// Finds the nearest hits; with `ANY` a ray ends at its first hit and traversal starts from its far end, as in
     /// streams.
     #[inline(always)]
@@ -391,7 +394,7 @@ impl<S: KernelSimd> MeshPacket<S> {
                 sy: sy[lane],
                 sz: sz[lane],
             };
-            self.nearest.offer_one(s, block, &ray, lane);
+            self.nearest.offer_one(s, block, &ray, lane, self.present);
         }
     }
 
@@ -411,7 +414,7 @@ impl<S: KernelSimd> MeshPacket<S> {
             let lane = mask.trailing_zeros() as usize % LANES;
             mask &= mask - 1;
             let at = |v: &[[f32; LANES]; 3]| [f64::from(v[0][lane]), f64::from(v[1][lane]), f64::from(v[2][lane])];
-            self.nearest.offer_one(s, block, &PreciseRay::of(at(&origin), at(&dir)), lane);
+            self.nearest.offer_one(s, block, &PreciseRay::of(at(&origin), at(&dir)), lane, self.present);
         }
     }
 
@@ -444,6 +447,9 @@ impl<S: KernelSimd> MeshPacket<S> {
     #[inline(always)]
     fn test_triangle(&mut self, s: S, group: &PacketGroup<S>, block: &impl PacketTriangles, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
+        if self.present.is_some_and(|present| !present.has(block.prims().get(lane))) {
+            return;
+        }
         let [kx, ky, kz] = group.axes;
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
         let (a, b, c) = (block.corner(lane, 0), block.corner(lane, 1), block.corner(lane, 2));
@@ -484,10 +490,17 @@ impl<S: KernelSimd> MeshPacket<S> {
 impl NearestLanes {
     /// Tests one ray against a whole block.
     #[inline(always)]
-    fn offer_one<S: KernelSimd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
+    fn offer_one<S: KernelSimd, B: LeafBlock>(
+        &mut self,
+        s: S,
+        block: &B,
+        ray: &B::Ray,
+        lane: usize,
+        present: Option<&PresentMembers>,
+    ) {
         let (t, prim) = (self.t[lane], self.prim[lane]);
         let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
-        B::test_once(s, block, ray, &mut nearest);
+        B::test_once(s, block, ray, &mut nearest, present);
         if nearest.found {
             (self.t[lane], self.u[lane], self.v[lane]) = (nearest.t, nearest.u, nearest.v);
             self.prim[lane] = nearest.prim;

@@ -10,6 +10,7 @@ use super::shared_block::SharedBlock;
 use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
+use std::sync::{Arc, OnceLock};
 
 /// Trade-off between build time and traversal speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,12 +49,38 @@ impl BuildPreset {
 /// Cost of testing a leaf block of a mesh, relative to visiting an inner node.
 pub(super) const BLOCK_COST: f32 = 3.0;
 
-/// A kd-tree over a mesh, built once and never edited; a changed mesh gets a new tree.
-#[derive(Debug, PartialEq)]
+/// A mesh and its kd-tree, which is built once and never edited; a changed mesh gets a new one.
+///
+/// The tree may be [deferred](Self::deferred) until something asks for it: a mesh that stands still is in a
+/// [`StaticTree`](super::StaticTree) and needs none of its own.
+#[derive(Debug)]
 pub struct MeshTree {
-    pub(super) positions: Vec<Vec3>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) tree: BlockTree<TriangleBlock>,
+    pub(super) mesh: Arc<Triangles>,
+    config: BuildConfig,
+    blocks: OnceLock<Arc<BlockTree<TriangleBlock>>>,
+}
+
+/// Compares meshes and trees.
+impl PartialEq for MeshTree {
+    fn eq(&self, other: &Self) -> bool {
+        self.mesh == other.mesh && self.blocks() == other.blocks()
+    }
+}
+
+/// The triangles of a mesh, in its own space.
+#[derive(Debug, PartialEq)]
+pub(super) struct Triangles {
+    pub positions: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// The box around all triangles with an area.
+    pub bounds: Aabb,
+}
+
+impl Triangles {
+    #[inline]
+    pub fn vertices(&self, prim: u32) -> [Vec3; 3] {
+        self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
+    }
 }
 
 /// The builder's view of a mesh.
@@ -74,63 +101,116 @@ impl Primitives for LeafTriangles<'_> {
     }
 
     fn bounds(&self, prim: u32) -> Aabb {
-        let [a, b, c] = self.vertices(prim);
-        // With two equal vertices the edge functions cancel exactly, so no ray can hit.
-        if a == b || b == c || c == a { Aabb::EMPTY } else { Aabb::from_points([a, b, c]) }
+        triangle_bounds(self.vertices(prim))
     }
 
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
         clip_triangle(&self.vertices(prim), axis, limit, below, padding)
     }
 
-    fn shape(&self, prim: u32) -> Option<[u32; 9]> {
-        let [a, b, c] = self.vertices(prim).map(|vertex| vertex.to_array().map(f32::to_bits));
-        Some([a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]])
+    fn shape(&self, prim: u32) -> Option<[u32; 10]> {
+        Some(triangle_bits(self.vertices(prim), 0))
     }
+}
+
+/// Bounds of a triangle; empty if no ray can hit it.
+pub(super) fn triangle_bounds([a, b, c]: [Vec3; 3]) -> Aabb {
+    // With two equal vertices the edge functions cancel exactly, so no ray can hit.
+    if a == b || b == c || c == a { Aabb::EMPTY } else { Aabb::from_points([a, b, c]) }
+}
+
+/// The bits of a triangle for [`Primitives::shape`], among triangles of the same group.
+pub(super) fn triangle_bits(vertices: [Vec3; 3], group: u32) -> [u32; 10] {
+    let [a, b, c] = vertices.map(|vertex| vertex.to_array().map(f32::to_bits));
+    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], group]
 }
 
 impl MeshTree {
     /// Builds the tree. Indices must lie within `positions`, and positions must be finite.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
-        Self::build_by(positions, triangles, &preset.config(BLOCK))
+        Self::build_by(positions, triangles, preset.config(BLOCK))
     }
 
     /// Like [`build`](Self::build), but leaves of at most `leaf_limit` triangles, at least 1, are never split further,
     /// whatever the cost; for comparison. [`Self::build`] decides by the cost, or in a median tree by the block size.
     pub fn build_limited(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset, leaf_limit: usize) -> Self {
-        Self::build_by(positions, triangles, &BuildConfig { leaf_limit: leaf_limit.max(1), ..preset.config(BLOCK) })
+        Self::build_by(positions, triangles, BuildConfig { leaf_limit: leaf_limit.max(1), ..preset.config(BLOCK) })
     }
 
-    fn build_by(positions: &[Vec3], triangles: &[[u32; 3]], config: &BuildConfig) -> Self {
+    /// Like [`build`](Self::build), but the tree is built when something asks for it first.
+    pub fn deferred(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
         assert!(triangles.len() < MAX_PRIMS, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
         let view = LeafTriangles { positions: &positions, triangles: &triangles };
+        let boxes = (0..triangles.len() as u32).map(|prim| view.bounds(prim));
+        let bounds = boxes.fold(Aabb::EMPTY, |all, one| if one.is_empty() { all } else { all.union(one) });
+        let mesh = Arc::new(Triangles { positions, triangles, bounds });
+        Self { mesh, config: preset.config(BLOCK), blocks: OnceLock::new() }
+    }
+
+    fn build_by(positions: &[Vec3], triangles: &[[u32; 3]], config: BuildConfig) -> Self {
+        let tree = Self { config, ..Self::deferred(positions, triangles, BuildPreset::Best) };
+        tree.blocks();
+        tree
+    }
+
+    /// The same mesh with a tree of this preset, built now.
+    pub fn rebuilt(&self, preset: BuildPreset) -> Self {
+        let tree = Self { mesh: self.mesh.clone(), config: preset.config(BLOCK), blocks: OnceLock::new() };
+        tree.blocks();
+        tree
+    }
+
+    /// Memory of nodes and blocks, bytes; 0 if they are not built.
+    pub fn bytes(&self) -> usize {
+        self.blocks.get().map_or(0, |blocks| blocks.bytes())
+    }
+
+    /// Whether the tree is built.
+    pub fn is_built(&self) -> bool {
+        self.blocks.get().is_some()
+    }
+
+    /// Builds the tree if it is not built yet.
+    pub fn ensure_built(&self) {
+        self.blocks();
+    }
+
+    /// The tree, built now if it is not yet.
+    pub(super) fn blocks(&self) -> &Arc<BlockTree<TriangleBlock>> {
+        if let Some(blocks) = self.blocks.get() {
+            return blocks;
+        }
+        // Not by `get_or_init`: while this thread waits for its helpers, it may take over work that asks for this tree.
+        let Triangles { positions, triangles, .. } = &*self.mesh;
+        let view = LeafTriangles { positions, triangles };
         let vertices = |prim| view.vertices(prim);
         let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
-        let tree = BlockTree::build(&view, config, make_block, |prims| SharedBlock::pack_if_small(prims, vertices));
-        Self { positions, triangles, tree }
+        let make_compact = |prims: &[u32]| SharedBlock::pack_if_small(prims, vertices);
+        let built = Arc::new(BlockTree::build(&view, &self.config, make_block, make_compact));
+        self.blocks.get_or_init(|| built)
     }
 
     /// The box around all triangles with an area; empty if there are none.
     pub fn bounds(&self) -> Aabb {
-        self.tree.nodes.bounds
+        self.mesh.bounds
     }
 
     /// Number of triangles of the mesh, including those without area.
     pub fn n_triangles(&self) -> usize {
-        self.triangles.len()
+        self.mesh.triangles.len()
     }
 
     /// The three corners of a triangle, in the mesh's own space.
     #[inline]
     pub fn vertices(&self, prim: u32) -> [Vec3; 3] {
-        self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
+        self.mesh.vertices(prim)
     }
 
     /// Offers the triangles along the ray until no nearer hit is possible; `nearest` limits the ray, not `ray.t_max`.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
-        self.tree.nodes.walk(&tree_ray, nearest.t, |first, count| {
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.blocks().extent);
+        self.blocks().nodes.walk(&tree_ray, nearest.t, |first, count| {
             self.offer_leaf(ray, shear, nearest, first, count);
             if any && nearest.found { f32::NEG_INFINITY } else { nearest.t }
         });
@@ -140,7 +220,7 @@ impl MeshTree {
     /// used.
     pub fn count_visits(&self, ray: &Ray) -> Visits {
         let shear = Shear::new(ray.dir);
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, self.tree.extent);
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, self.blocks().extent);
         let mut nearest = Nearest::before(ray.t_max);
         let (mut leaves, mut blocks, mut inner) = (0, 0, 0);
         let visit = |first, count, _| {
@@ -148,7 +228,7 @@ impl MeshTree {
             self.offer_leaf(ray, &shear, &mut nearest, first, count);
             nearest.t
         };
-        self.tree.nodes.walk_cells(&tree_ray, 0.0, ray.t_max, visit, || inner += 1);
+        self.blocks().nodes.walk_cells(&tree_ray, 0.0, ray.t_max, visit, || inner += 1);
         Visits { inner, leaves, blocks }
     }
 
@@ -157,19 +237,19 @@ impl MeshTree {
     ///
     /// [`KdTreeStats`]: super::KdTreeStats
     pub fn count_visits_through(&self, ray: &Ray) -> Visits {
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, &Shear::new(ray.dir), self.tree.extent);
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &Shear::new(ray.dir), self.blocks().extent);
         let (mut leaves, mut blocks, mut inner) = (0, 0, 0);
         let visit = |_, count, _| {
             (leaves, blocks) = (leaves + 1, blocks + count as usize);
             ray.t_max
         };
-        self.tree.nodes.walk_cells(&tree_ray, 0.0, ray.t_max, visit, || inner += 1);
+        self.blocks().nodes.walk_cells(&tree_ray, 0.0, ray.t_max, visit, || inner += 1);
         Visits { inner, leaves, blocks }
     }
 
     #[inline]
     fn offer_leaf(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, first: u32, count: u32) {
-        for prim in self.tree.leaf(first, count).prims() {
+        for prim in self.blocks().leaf(first, count).prims() {
             if let Some(hit) = intersect_triangle(ray.origin, shear, &self.vertices(prim)) {
                 nearest.offer(hit.t, hit.u, hit.v, prim);
             }
@@ -178,7 +258,7 @@ impl MeshTree {
 
     /// Like [`offer_hits`](Self::offer_hits), by brute force: the reference for all trees.
     pub(super) fn offer_hits_naive(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest) {
-        for prim in 0..self.triangles.len() as u32 {
+        for prim in 0..self.mesh.triangles.len() as u32 {
             if let Some(hit) = intersect_triangle(ray.origin, shear, &self.vertices(prim)) {
                 nearest.offer(hit.t, hit.u, hit.v, prim);
             }

@@ -36,7 +36,7 @@ pub(super) trait Primitives: Sync {
     /// Bounds of the part of the primitive with `axis <= limit` (`below`) or `axis >= limit`, padded by `padding`.
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb>;
     /// Bits that determine every hit of a primitive: of primitives with equal bits only the first can be hit.
-    fn shape(&self, _prim: u32) -> Option<[u32; 9]> {
+    fn shape(&self, _prim: u32) -> Option<[u32; 10]> {
         None
     }
 }

@@ -5,14 +5,17 @@ use super::block_tree::BlockTree;
 use super::instance_tree::Recent;
 use super::leaf::LeafBlock;
 use super::ray::{Nearest, TreeRay};
-use super::shape::{Hit, RayClass, Shape, object_bounds};
+use super::shape::{Hit, HitSpace, RayClass, Shape, object_bounds};
 use super::simd::InstructionSet;
 use super::sphere_tree::RayF64;
+use super::static_tree::{StaticTree, placed_vertices};
 use super::surface::{Instance, PlacedShapes, SurfacePoint};
 use super::trace::{Instances, TopLevel};
 use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
+use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Answers closest-hit and any-hit queries over the objects of a scene.
 ///
@@ -38,11 +41,17 @@ fn map_shapes<T: Send>(shapes: &[Shape], compute: impl Fn(&Shape) -> T + Send + 
 impl SceneTree {
     /// Builds the tree. Object `i` of all later hits is `shapes[i]`.
     pub fn build(shapes: Vec<Shape>) -> Self {
+        Self::build_with(shapes, &[])
+    }
+
+    /// Like [`build`](Self::build), with trees for shapes of [`HitSpace::World`]. Shapes that are in none get one now;
+    /// hits do not depend on which trees are given.
+    pub fn build_with(shapes: Vec<Shape>, statics: &[Arc<StaticTree>]) -> Self {
         let instances = map_shapes(&shapes, Instance::new);
         let boxes = map_shapes(&shapes, object_bounds);
         let bounds = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
         let objects = PlacedShapes { shapes, instances };
-        let top = TopLevel::new(&objects, &boxes);
+        let top = TopLevel::new(&objects, &boxes, statics);
         Self { objects, bounds, top }
     }
 
@@ -121,7 +130,7 @@ impl SceneTree {
     /// traversal used.
     pub fn count_visits(&self, ray: &Ray) -> Visits {
         let scene_ray = SceneRay::new(ray);
-        let (mut best, mut visits) = (None, Visits::default());
+        let mut best = None;
         for &object in &self.top.simple_objects {
             self.offer_object(object, &scene_ray, &mut best, Effort::Closest);
         }
@@ -129,6 +138,7 @@ impl SceneTree {
         self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, Effort::Closest);
         self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, Effort::Closest);
         self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        let mut visits = self.walk_statics(&scene_ray, &mut best, Effort::Closest);
         let mut offer = |object: u32, best: &mut Option<Hit>| {
             if let Shape::Mesh { tree, .. } = &self.objects.shapes[object as usize] {
                 let t_max = best.map_or(ray.t_max, |hit| hit.t);
@@ -172,6 +182,7 @@ impl SceneTree {
         self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, effort);
         self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, effort);
         self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, effort);
+        self.walk_statics(&scene_ray, &mut best, effort);
         match &self.top.instances {
             Instances::Few(instances) => {
                 instances.iter().for_each(|&object| self.offer_object(object, &scene_ray, &mut best, effort));
@@ -207,6 +218,31 @@ impl SceneTree {
         });
     }
 
+    fn walk_statics(&self, ray: &SceneRay, best: &mut Option<Hit>, effort: Effort) -> Visits {
+        let mut visits = Visits::default();
+        for placed in &self.top.statics {
+            let blocks = &placed.tree.blocks;
+            let tree_ray = TreeRay::new(ray.ray.origin, ray.ray.dir, &ray.shear, blocks.extent);
+            let (mut leaves, mut n_blocks, mut inner) = (0, 0, 0);
+            let t_max = best.map_or(ray.ray.t_max, |hit| hit.t);
+            let visit = |first, count, _| {
+                (leaves, n_blocks) = (leaves + 1, n_blocks + count as usize);
+                for prim in blocks.leaf(first, count).prims() {
+                    if placed.present().is_none_or(|present| present.has(prim)) {
+                        let (object, own) = placed.object_of(prim);
+                        offer_triangle(&placed.vertices(prim), ray, best, object, own);
+                    }
+                }
+                limit(best, &ray.ray, effort)
+            };
+            blocks.nodes.walk_cells(&tree_ray, 0.0, t_max, visit, || inner += 1);
+            visits.inner += inner;
+            visits.leaves += leaves;
+            visits.blocks += n_blocks;
+        }
+        visits
+    }
+
     fn offer_object(&self, object: u32, ray: &SceneRay, best: &mut Option<Hit>, effort: Effort) {
         let mut nearest = Nearest::before(best.map_or(ray.ray.t_max, |hit| hit.t));
         // At equal distance the lower object wins, whatever its primitive.
@@ -229,6 +265,14 @@ impl SceneTree {
                     nearest.offer(hit.t, hit.u, hit.v, 0);
                 }
             }
+            // In a static tree.
+            Shape::Mesh { space: HitSpace::World, .. } if effort != Effort::Naive => {}
+            Shape::Mesh { tree, world_from_object, space: HitSpace::World } => {
+                for prim in 0..tree.n_triangles() as u32 {
+                    let vertices = placed_vertices(tree.vertices(prim), world_from_object);
+                    offer_triangle(&vertices, ray, best, object, prim);
+                }
+            }
             Shape::Mesh { tree, .. } => {
                 let ray = self.objects.instances[object as usize].ray(&ray.ray);
                 let shear = Shear::new(ray.dir);
@@ -248,6 +292,16 @@ impl SceneTree {
         if nearest.found {
             *best = Some(Hit { t: nearest.t, u: nearest.u, v: nearest.v, prim: nearest.prim, object });
         }
+    }
+}
+
+/// Offers a triangle of a static tree; ties go to the lower object, then to the lower primitive.
+fn offer_triangle(vertices: &[Vec3; 3], ray: &SceneRay, best: &mut Option<Hit>, object: u32, prim: u32) {
+    let Some(hit) = intersect_triangle(ray.ray.origin, &ray.shear, vertices) else { return };
+    let limit = best.map_or(ray.ray.t_max, |best| best.t);
+    let wins_tie = best.is_some_and(|best| (object, prim) < (best.object, best.prim));
+    if hit.t > 0.0 && (hit.t < limit || hit.t == limit && wins_tie) {
+        *best = Some(Hit { t: hit.t, u: hit.u, v: hit.v, prim, object });
     }
 }
 

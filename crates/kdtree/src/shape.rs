@@ -39,12 +39,14 @@ pub enum Shape {
         /// The corners, metres.
         vertices: [Vec3; 3],
     },
-    /// A mesh with its own tree, placed by an invertible map.
+    /// A mesh, placed by an invertible map.
     Mesh {
-        /// The tree over the triangles, in the mesh's own space.
+        /// The triangles and the tree over them, in the mesh's own space.
         tree: Arc<MeshTree>,
         /// Map from the mesh's own space to that of the snapshot.
         world_from_object: Affine3A,
+        /// Where its hits are decided.
+        space: HitSpace,
     },
     /// A cloud of spheres with its own tree; `world_from_object` rotates, translates and scales uniformly.
     Spheres {
@@ -56,13 +58,25 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Map from the object's own space to that of the snapshot.
+    /// Map from the space in which hits are decided to that of the snapshot.
     pub(super) fn world_from_object(&self) -> Affine3A {
         match self {
+            Self::Mesh { space: HitSpace::World, .. } => Affine3A::IDENTITY,
             Self::Mesh { world_from_object, .. } | Self::Spheres { world_from_object, .. } => *world_from_object,
             _ => Affine3A::IDENTITY,
         }
     }
+}
+
+/// The space in which rays and the triangles of a mesh are tested, which decides how coordinates are rounded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HitSpace {
+    /// That of the mesh, in its own tree: rays are transformed. For meshes that are used several times or move.
+    #[default]
+    Object,
+    /// That of the snapshot, in a tree that the mesh shares with others: vertices are transformed, once. For meshes that
+    /// are used once and stand still.
+    World,
 }
 
 /// A hint about the rays of a batch: it selects the traversal, never the result.
@@ -115,7 +129,7 @@ pub(super) fn object_bounds(shape: &Shape) -> Aabb {
         Shape::Sphere { center, radius } => sphere_bounds(*center, *radius),
         Shape::Quad { corner, edge_u, edge_v } => Aabb::from_points(quad_corners(*corner, *edge_u, *edge_v)),
         Shape::Triangle { vertices } => Aabb::from_points(*vertices),
-        Shape::Mesh { tree, world_from_object } => placed_bounds(tree.bounds(), world_from_object, None),
+        Shape::Mesh { tree, world_from_object, .. } => placed_bounds(tree.bounds(), world_from_object, None),
         Shape::Spheres { tree, world_from_object } => placed_bounds(tree.bounds(), world_from_object, None),
     }
 }

@@ -9,6 +9,7 @@ use super::lanes::{LaneHits, Sheared, may_hit, resolve};
 use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay, offer};
 use super::ray::Nearest;
 use super::simd::{Corners, Eight, KernelSimd, Mask};
+use super::static_tree::PresentMembers;
 use firstlight_simd::three;
 use glam::Vec3;
 
@@ -146,9 +147,15 @@ impl LeafBlock for SharedBlock {
     }
 
     #[inline(always)]
-    fn test<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay, nearest: &mut Nearest) {
+    fn test<S: KernelSimd>(
+        s: S,
+        block: &Self,
+        ray: &ShearedRay,
+        nearest: &mut Nearest,
+        present: Option<&PresentMembers>,
+    ) {
         if !S::IS_NARROW {
-            return offer(s, Self::hits(s, block, ray), nearest, |lane| block.prims.get(lane));
+            return offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims.get(lane));
         }
         let vertices = ray.shear(s, &block.vertices);
         let [x, y, _] = vertices;
@@ -159,7 +166,7 @@ impl LeafBlock for SharedBlock {
             let Eight { corners, places } = s.first_eight(some, &block.corners);
             let mut hits = hits_of(s, &vertices, &corners, ray.sz);
             hits.mask &= (1 << some.count_ones()) - 1;
-            offer(s, hits, nearest, |lane| block.prims.get((places >> (8 * lane)) as usize % BLOCK));
+            offer(s, hits, nearest, present, |lane| block.prims.get((places >> (8 * lane)) as usize % BLOCK));
         }
     }
 }
@@ -218,7 +225,7 @@ mod tests {
         let sheared = ShearedRay::new(ray, &Shear::new(ray.dir));
         let mut nearest = Nearest::before(f32::INFINITY);
         for block in blocks {
-            B::test(s, block, &sheared, &mut nearest);
+            B::test(s, block, &sheared, &mut nearest, None);
         }
         nearest.found.then(|| (nearest.prim, [nearest.t, nearest.u, nearest.v].map(f32::to_bits)))
     }

@@ -67,10 +67,10 @@ impl Primitives for SpherePrimitives<'_> {
         Some(clip_sphere(center, radius, axis, limit, below, padding))
     }
 
-    fn shape(&self, prim: u32) -> Option<[u32; 9]> {
+    fn shape(&self, prim: u32) -> Option<[u32; 10]> {
         let (center, radius) = self.sphere(prim);
         let [x, y, z] = center.to_array().map(f32::to_bits);
-        Some([x, y, z, radius.to_bits(), 0, 0, 0, 0, 0])
+        Some([x, y, z, radius.to_bits(), 0, 0, 0, 0, 0, 0])
     }
 }
 

@@ -52,12 +52,12 @@ impl MeshTree {
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),
-            blocks: self.tree.n_blocks(),
-            bytes: self.tree.bytes(),
+            blocks: self.blocks().n_blocks(),
+            bytes: self.blocks().bytes(),
             ..KdTreeStats::default()
         };
-        let root_area = f64::from(self.tree.nodes.bounds.area());
-        self.tree.nodes.visit_cells(&mut |node, cell, depth| {
+        let root_area = f64::from(self.blocks().nodes.bounds.area());
+        self.blocks().nodes.visit_cells(&mut |node, cell, depth| {
             let share = if root_area > 0.0 { f64::from(cell.area()) / root_area } else { 1.0 };
             stats.depth = stats.depth.max(depth);
             match node {
@@ -68,7 +68,7 @@ impl MeshTree {
                 Node::Leaf { count: 0, .. } => stats.empty_leaves += 1,
                 Node::Leaf { first, count } => {
                     stats.leaves += 1;
-                    stats.references += self.tree.leaf(first, count).prims().count();
+                    stats.references += self.blocks().leaf(first, count).prims().count();
                     stats.expected_leaf_visits += share;
                     stats.expected_block_tests += share * f64::from(count);
                 }
@@ -84,10 +84,10 @@ impl MeshTree {
     /// If one is not.
     pub fn check_invariants(&self) {
         let mut seen = vec![false; self.n_triangles()];
-        self.tree.nodes.visit_cells(&mut |node, cell, _| {
+        self.blocks().nodes.visit_cells(&mut |node, cell, _| {
             assert!(!cell.is_empty(), "a cell inside out: {cell:?}");
             if let Node::Leaf { first, count } = node {
-                let leaf = self.tree.leaf(first, count);
+                let leaf = self.blocks().leaf(first, count);
                 let prims: Vec<u32> = leaf.prims().collect();
                 assert!(prims.is_sorted_by(|a, b| a < b), "not ascending: {prims:?}");
                 assert_eq!(prims.len().div_ceil(BLOCK), leaf.n_blocks(), "blocks that could be saved");
@@ -115,8 +115,8 @@ impl MeshTree {
             assert!(seen, "triangle {prim} is in no leaf");
             for point in points {
                 assert!(
-                    self.tree.nodes.some_leaf_at(point.to_array(), |first, count| {
-                        self.tree.leaf(first, count).prims().any(|other| other == prim || is_copy(prim, other))
+                    self.blocks().nodes.some_leaf_at(point.to_array(), |first, count| {
+                        self.blocks().leaf(first, count).prims().any(|other| other == prim || is_copy(prim, other))
                     }),
                     "triangle {prim} is missing at {point}"
                 );

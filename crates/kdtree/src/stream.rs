@@ -13,6 +13,7 @@ use super::node8::{DONE, Stack, Walk};
 use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
+use super::static_tree::PresentMembers;
 
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
 pub(super) const SLOTS: usize = 64;
@@ -112,12 +113,15 @@ impl StreamRay for PreciseRay {
 
 /// Traces all rays of the source; with `ANY` a ray ends at its first hit and traversal starts from its far end.
 ///
+/// - `present`: the primitives that take part; `None` for all.
+///
 /// A ray that leaves a surface first passes nearby geometry, most of which does not block it. An occluder, such as a
 /// wall of a room, is as likely to be found from the other end.
 #[inline(always)]
 pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
+    present: Option<&PresentMembers>,
     source: &mut impl Source,
     state: &mut StreamState,
 ) where
@@ -185,7 +189,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
-            tree.test_leaf(s, slot.walk.child, &slot.leaf, &mut slot.nearest);
+            tree.test_leaf(s, slot.walk.child, &slot.leaf, &mut slot.nearest, present);
             slot.walk.descent.end = slot.nearest.t;
         }
         for &i in &list[..len] {
@@ -286,7 +290,7 @@ mod tests {
 
     fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, state: &mut StreamState) -> Vec<(u32, bool, u32)> {
         let mut source = Listed { rays, next: 0, poisoned, finished: Vec::new() };
-        run::<Portable, _, false>(Portable, &tree.tree, &mut source, state);
+        run::<Portable, _, false>(Portable, tree.blocks(), None, &mut source, state);
         source.finished.sort_unstable();
         source.finished
     }

@@ -15,7 +15,8 @@
 //!
 //! Start reading at [`PlacedShapes::surface_point`].
 
-use super::shape::{Hit, Shape, inverse, transform_point, transform_vector};
+use super::shape::{Hit, HitSpace, Shape, inverse, transform_point, transform_vector};
+use super::static_tree::placed_vertices;
 use crate::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use crate::geometry::{Aabb, Ray, quad_corners};
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
@@ -50,6 +51,8 @@ pub struct Instance {
     pub condition: f32,
     /// Addition to the error of points by the round trip, in the object's own metres.
     pub rim: f32,
+    /// −1 for a mesh whose triangles are mirrored in the space of their test, otherwise 1.
+    pub side: f32,
 }
 
 impl Instance {
@@ -62,11 +65,17 @@ impl Instance {
         let offset = there * object_from_world.translation.abs() + world_from_object.translation.abs();
         let round_trip = there * back;
         let reach = match shape {
-            Shape::Mesh { tree, .. } if !tree.bounds().is_empty() => {
+            Shape::Mesh { tree, space: HitSpace::Object, .. } if !tree.bounds().is_empty() => {
                 let Aabb { min, max } = tree.bounds();
                 there * min.abs().max(max.abs()) + Vec3::from(world_from_object.translation.abs())
             }
             _ => Vec3::ZERO,
+        };
+        let side = match shape {
+            Shape::Mesh { world_from_object: map, space: HitSpace::World, .. } if map.matrix3.determinant() < 0.0 => {
+                -1.0
+            }
+            _ => 1.0,
         };
         let rim = gamma(8) * (round_trip * reach + Vec3::from(offset)).max_element() * row_sum(back);
         Self {
@@ -77,6 +86,7 @@ impl Instance {
             round_trip_offset: offset.into(),
             condition: row_sum(there) * row_sum(back),
             rim,
+            side,
         }
     }
 
@@ -140,7 +150,13 @@ impl PlacedShapes {
                     uv,
                 }
             }
-            Shape::Mesh { tree, world_from_object } => {
+            Shape::Mesh { tree, world_from_object, space: HitSpace::World } => {
+                let vertices = placed_vertices(tree.vertices(hit.prim), world_from_object);
+                let LocalPoint { position, error, normal } = triangle_point(&vertices, hit.u, hit.v, 1.0, 0.0);
+                let side = self.instances[hit.object as usize].side;
+                SurfacePoint { position, error, geometric_normal: side * normal.normalize(), uv }
+            }
+            Shape::Mesh { tree, world_from_object, .. } => {
                 let instance = &self.instances[hit.object as usize];
                 let local = triangle_point(&tree.vertices(hit.prim), hit.u, hit.v, instance.condition, instance.rim);
                 instance.carry_to_world(world_from_object, local, uv)

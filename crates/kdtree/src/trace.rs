@@ -1,8 +1,8 @@
 //! Batch queries over a scene: selects the traversal for each kind of object.
 //!
 //! A handful of simple objects, or of spheres in a cloud, is tested by packets of sixteen rays; larger numbers have
-//! trees that are traversed by streams. Rays that enter the bounds of an instance traverse its own tree, as a packet if
-//! the batch is coherent, otherwise in a stream. Many instances have a tree over them, and one stream through both
+//! trees that are traversed by streams. Meshes that stand still share static trees; other rays that enter the bounds of
+//! an instance traverse its own tree: as a packet if the batch is coherent, otherwise in a stream. Many instances have a tree over them, and one stream through both
 //! levels. None of this changes the results.
 
 use super::batch::{HitBatch, RayBatch};
@@ -16,13 +16,15 @@ use super::objects::{Packet, SimpleObjects, load_some, load_some_u};
 use super::primitive_trees::PrimitiveTrees;
 use super::ray::Nearest;
 use super::ray_setup::{FetchedRays, Source};
-use super::shape::{RayClass, Shape};
+use super::shape::{HitSpace, RayClass, Shape};
 use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
+use super::static_tree::{self, PlacedStatic, PresentMembers, StaticTree};
 use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
 use crate::geometry::Aabb;
 use glam::Affine3A;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 /// Rays that pass through all objects before the next ones start.
 const CHUNK: usize = 2048;
@@ -35,6 +37,8 @@ pub(super) struct TopLevel {
     /// Object indices of `simple`.
     pub simple_objects: Vec<u32>,
     pub loose: PrimitiveTrees,
+    /// Meshes whose hits are decided in the space of the snapshot.
+    pub statics: Vec<PlacedStatic>,
     pub instances: Instances,
 }
 
@@ -62,10 +66,13 @@ impl TopLevel {
     /// Groups the objects.
     ///
     /// - `boxes`: bounds of all shapes.
-    pub fn new(scene: &PlacedShapes, boxes: &[Aabb]) -> Self {
+    /// - `statics`: trees of an earlier state of the scene.
+    pub fn new(scene: &PlacedShapes, boxes: &[Aabb], statics: &[Arc<StaticTree>]) -> Self {
         let shapes = &scene.shapes[..];
         let (loose, simple_objects) = PrimitiveTrees::build(shapes, boxes);
-        let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
+        let is_instance = |object: &u32| {
+            matches!(shapes[*object as usize], Shape::Mesh { space: HitSpace::Object, .. } | Shape::Spheres { .. })
+        };
         let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
         let instances = if instances.len() > MAX_INSTANCES {
             Instances::Many(InstanceTree::build(scene, &instances))
@@ -73,7 +80,7 @@ impl TopLevel {
             Instances::Few(instances)
         };
         let simple = SimpleObjects::new(shapes, simple_objects.iter().copied());
-        Self { simple, simple_objects, loose, instances }
+        Self { simple, simple_objects, loose, statics: static_tree::place(shapes, statics), instances }
     }
 
     pub fn closest_hits(
@@ -102,7 +109,8 @@ impl TopLevel {
 /// Any tree that streams traverse.
 #[derive(Clone, Copy)]
 enum StreamTree<'a> {
-    Triangles(&'a BlockTree<TriangleBlock>),
+    /// And the primitives that take part.
+    Triangles(&'a BlockTree<TriangleBlock>, Option<&'a PresentMembers>),
     Quads(&'a BlockTree<QuadBlock>),
     Spheres(&'a BlockTree<SphereBlock>),
     Instances(&'a InstanceTree),
@@ -229,29 +237,33 @@ fn trace_in<A: Answers + ?Sized>(
     let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
     for first in (0..rays.len()).step_by(CHUNK) {
         let end = (first + CHUNK).min(rays.len());
-        answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, first, end });
-        let own = |instance: Option<u32>| QueuedRays {
-            rays,
-            first,
-            end,
-            instance: instance.map(|i| (i, &scene.instances[i as usize])),
-        };
+        let statics = if class == RayClass::Coherent { &top.statics[..] } else { &[] };
+        let (simple, instances) = (&top.simple, &in_packets[..]);
+        answers.packets(set, &Packets { simple, statics, instances, scene, rays, first, end });
+        let own = |owner| QueuedRays { rays, first, end, owner };
         if let Some(tree) = &top.loose.spheres {
-            answers.stream(set, StreamTree::Spheres(tree), own(None), state);
+            answers.stream(set, StreamTree::Spheres(tree), own(Owner::Primitives), state);
         }
         if let Some(tree) = &top.loose.quads {
-            answers.stream(set, StreamTree::Quads(tree), own(None), state);
+            answers.stream(set, StreamTree::Quads(tree), own(Owner::Primitives), state);
         }
         if let Some(tree) = &top.loose.triangles {
-            answers.stream(set, StreamTree::Triangles(tree), own(None), state);
+            answers.stream(set, StreamTree::Triangles(tree, None), own(Owner::Primitives), state);
+        }
+        if class == RayClass::Incoherent {
+            for placed in &top.statics {
+                let tree = StreamTree::Triangles(&placed.tree.blocks, placed.present());
+                answers.stream(set, tree, own(Owner::Members(placed)), state);
+            }
         }
         for &object in &streamed {
             if let Some(tree) = tree_of(scene, object) {
-                answers.stream(set, tree, own(Some(object)), state);
+                let instance = &scene.instances[object as usize];
+                answers.stream(set, tree, own(Owner::Instance(object, instance)), state);
             }
         }
         if let Instances::Many(tree) = &top.instances {
-            answers.stream(set, StreamTree::Instances(tree), own(None), state);
+            answers.stream(set, StreamTree::Instances(tree), own(Owner::Primitives), state);
         }
     }
 }
@@ -259,7 +271,7 @@ fn trace_in<A: Answers + ?Sized>(
 /// Returns the tree of an object; `None` for an object without one.
 fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
     match &scene.shapes[object as usize] {
-        Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(&tree.tree)),
+        Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(tree.blocks(), None)),
         Shape::Spheres { tree, .. } => Some(StreamTree::Spheres(&tree.tree)),
         _ => None,
     }
@@ -268,6 +280,7 @@ fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
 /// Input of packet traversal.
 struct Packets<'a> {
     simple: &'a SimpleObjects,
+    statics: &'a [PlacedStatic],
     /// Meshes and small clouds of spheres.
     instances: &'a [u32],
     scene: &'a PlacedShapes,
@@ -293,11 +306,14 @@ fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, pack
     for first in (packets.first..packets.end).step_by(LANES) {
         let mut packet = Packet::load(s, packets.rays, first);
         packet.test_objects::<ANY>(s, packets.simple);
+        for placed in packets.statics {
+            trace_static::<S, ANY>(s, placed, &mut packet, &mut stack);
+        }
         for &object in packets.instances {
             let instance = &packets.scene.instances[object as usize];
             match &packets.scene.shapes[object as usize] {
                 Shape::Mesh { tree, .. } => {
-                    trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
+                    trace_packet::<S, _, ANY>(s, tree.blocks(), instance, object, &mut packet, &mut stack);
                 }
                 Shape::Spheres { tree, .. } if tree.len() > MAX_PACKET_SPHERES => {
                     trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
@@ -333,15 +349,49 @@ fn trace_packet<S: KernelSimd, B: PacketBlock, const ANY: bool>(
     // At equal distance the lower object wins, whatever its primitive.
     let wins_ties: Mask = packet.found & s.lt_u(s.splat_u(object), packet.object);
     s.store_u(s.select_u(wins_ties, s.splat_u(u32::MAX), s.splat_u(0)), &mut nearest.prim);
-    let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest };
+    let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest, present: None };
     mesh_packet.trace::<B, ANY>(s, tree, stack);
-    let nearest = mesh_packet.nearest;
+    take_hits(s, packet, &mesh_packet.nearest, &[object; LANES]);
+}
+
+/// Traces a packet through a static tree.
+#[inline(always)]
+fn trace_static<S: KernelSimd, const ANY: bool>(
+    s: S,
+    placed: &PlacedStatic,
+    packet: &mut Packet<S>,
+    stack: &mut PacketStack<S>,
+) {
+    let lanes = if ANY { packet.lanes & !packet.found } else { packet.lanes };
+    if lanes == 0 {
+        return;
+    }
+    let mut nearest = NearestLanes { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], prim: [0; LANES], found: 0 };
+    s.store(packet.t, &mut nearest.t);
+    let mut objects = [0; LANES];
+    s.store_u(packet.object, &mut objects);
+    for lane in (0..LANES).filter(|lane| packet.found >> lane & 1 != 0) {
+        nearest.prim[lane] = placed.wins_ties_below(objects[lane]);
+    }
+    let [origin, dir] = [packet.origin, packet.dir];
+    let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest, present: placed.present() };
+    mesh_packet.trace::<TriangleBlock, ANY>(s, &placed.tree.blocks, stack);
+    let mut nearest = mesh_packet.nearest;
+    for lane in (0..LANES).filter(|lane| nearest.found >> lane & 1 != 0) {
+        (objects[lane], nearest.prim[lane]) = placed.object_of(nearest.prim[lane]);
+    }
+    take_hits(s, packet, &nearest, &objects);
+}
+
+/// Moves the hits that were found in a tree to the packet.
+#[inline(always)]
+fn take_hits<S: KernelSimd>(s: S, packet: &mut Packet<S>, nearest: &NearestLanes, objects: &[u32; LANES]) {
     let take = nearest.found;
     packet.t = s.select(take, s.load(&nearest.t), packet.t);
     packet.u = s.select(take, s.load(&nearest.u), packet.u);
     packet.v = s.select(take, s.load(&nearest.v), packet.v);
     packet.prim = s.select_u(take, s.load_u(&nearest.prim), packet.prim);
-    packet.object = s.select_u(take, s.splat_u(object), packet.object);
+    packet.object = s.select_u(take, s.load_u(objects), packet.object);
     packet.found |= take;
 }
 
@@ -371,9 +421,11 @@ fn run_stream<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(
 ) {
     let mut source = Queue { rays, answers };
     match tree {
-        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
-        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
-        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, &mut state.one),
+        StreamTree::Triangles(tree, present) => {
+            stream::run::<S, _, ANY>(s, tree, present, &mut source, &mut state.one);
+        }
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, None, &mut source, &mut state.one),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, None, &mut source, &mut state.one),
         StreamTree::Instances(tree) => {
             let state = state.two.get_or_insert_with(InstanceState::new);
             instance_stream::run::<S, ANY>(s, tree, &mut source, state);
@@ -388,8 +440,18 @@ struct QueuedRays<'a> {
     /// The next ray, and the one after the last.
     first: usize,
     end: usize,
-    /// The instance of the tree; `None` if the tree's primitives are themselves the objects.
-    instance: Option<(u32, &'a Instance)>,
+    owner: Owner<'a>,
+}
+
+/// The objects that the primitives of a tree belong to.
+#[derive(Clone, Copy)]
+enum Owner<'a> {
+    /// They are the objects.
+    Primitives,
+    /// All belong to this object.
+    Instance(u32, &'a Instance),
+    /// To the members of a static tree.
+    Members(&'a PlacedStatic),
 }
 
 struct Queue<'a, A: ?Sized> {
@@ -405,7 +467,7 @@ impl<A: Answers + ?Sized> Source for Queue<'_, A> {
 
     #[inline(always)]
     fn fetch<S: KernelSimd>(&mut self, s: S, to: &mut FetchedRays) -> Option<Mask> {
-        let QueuedRays { rays, first, end, instance } = self.rays;
+        let QueuedRays { rays, first, end, owner } = self.rays;
         if first == end {
             return None;
         }
@@ -423,24 +485,41 @@ impl<A: Answers + ?Sized> Source for Queue<'_, A> {
         let known = s.lt_u(object, s.splat_u(HitBatch::MISS));
         let zero = s.splat_u(0);
         // At equal distance the lower object wins, whatever its primitive.
-        let prim = match instance {
-            None => s.select_u(known, object, zero),
-            Some((own, _)) => s.select_u(known & s.lt_u(s.splat_u(own), object), s.splat_u(u32::MAX), zero),
+        let prim = match owner {
+            Owner::Primitives => s.select_u(known, object, zero),
+            Owner::Instance(own, _) => s.select_u(known & s.lt_u(s.splat_u(own), object), s.splat_u(u32::MAX), zero),
+            Owner::Members(_) => zero,
         };
         s.store_u(prim, &mut to.prim);
+        if let Owner::Members(placed) = owner
+            && known != 0
+        {
+            let mut objects = [0; LANES];
+            s.store_u(object, &mut objects);
+            for lane in (0..LANES).filter(|lane| known >> lane & 1 != 0) {
+                to.prim[lane] = placed.wins_ties_below(objects[lane]);
+            }
+        }
         to.id = std::array::from_fn(|lane| (first + lane) as u32);
         Some(lanes & Mask::MAX >> (LANES - n))
     }
 
     #[inline(always)]
     fn own_from_world(&self) -> Option<&Affine3A> {
-        self.rays.instance.map(|(_, instance)| &instance.object_from_world)
+        match self.rays.owner {
+            Owner::Instance(_, instance) => Some(&instance.object_from_world),
+            Owner::Primitives | Owner::Members(_) => None,
+        }
     }
 
     #[inline(always)]
     fn finish(&mut self, ray: u32, nearest: &Nearest) {
         if nearest.found {
-            let (object, prim) = self.rays.instance.map_or((nearest.prim, 0), |(object, _)| (object, nearest.prim));
+            let (object, prim) = match self.rays.owner {
+                Owner::Primitives => (nearest.prim, 0),
+                Owner::Instance(object, _) => (object, nearest.prim),
+                Owner::Members(placed) => placed.object_of(nearest.prim),
+            };
             self.answers.set(ray as usize, object, prim, nearest);
         }
     }

@@ -4,6 +4,7 @@ use crate::frame::Waker;
 use crate::frame::image::film_file::check_film_source;
 use crate::frame::state::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
+use crate::scene::hit_spaces::{BuiltStatics, StaticJob};
 use crate::scene::{
     LoadOptions, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis,
     load, read_picture,
@@ -21,6 +22,8 @@ pub enum Finished {
         result: Result<Box<LoadedScene>, SceneError>,
     },
     Trees(Trees),
+    /// Trees that meshes share.
+    Statics(BuiltStatics),
     Mesh(Box<Remade>),
     /// An image for a material.
     Picture {
@@ -141,16 +144,17 @@ impl BackgroundTasks {
     }
 
     /// Builds the missing trees of shapes; with `preview`, preview trees for large meshes.
-    pub fn build(&self, shapes: Vec<Shape>, preview: bool, pool: Arc<rayon::ThreadPool>) {
+    ///
+    /// - `known`: trees of the scene, some of which may be deferred.
+    pub fn build(&self, shapes: Vec<Shape>, known: Trees, preview: bool, pool: Arc<rayon::ThreadPool>) {
         self.with(|board| board.building += 1);
         let this = self.clone();
         let work = move || {
             let mut trees = Trees::default();
             for shape in &shapes {
-                let build = || if preview { trees.add_preview(shape) } else { trees.add(shape) };
-                let built = guarded(|| pool.install(build));
-                if let Err(reason) | Ok(Err(reason)) = built {
-                    trees.mark_unfit(shape, reason);
+                match guarded(|| pool.install(|| known.built(shape, preview))) {
+                    Ok(Ok(built)) => trees.extend(built),
+                    Err(reason) | Ok(Err(reason)) => trees.mark_unfit(shape, reason),
                 }
             }
             this.with(|board| {
@@ -160,6 +164,21 @@ impl BackgroundTasks {
             this.wake();
         };
         self.spawn("firstlight trees", work, |board, _| board.building -= 1);
+    }
+
+    /// Builds trees that meshes share.
+    pub fn build_statics(&self, job: StaticJob, pool: Arc<rayon::ThreadPool>) {
+        self.with(|board| board.building += 1);
+        let this = self.clone();
+        let work = move || {
+            let built = guarded(|| pool.install(|| job.build(false)));
+            this.with(|board| {
+                board.building -= 1;
+                board.finished.extend(built.ok().map(Finished::Statics));
+            });
+            this.wake();
+        };
+        self.spawn("firstlight static trees", work, |board, _| board.building -= 1);
     }
 
     /// Makes a mesh again; an earlier request for the same object is dropped.

@@ -103,6 +103,10 @@ pub struct RenderState {
     pub(crate) region: Option<[f64; 4]>,
     /// Whether the world has changes that wait for a tree.
     pub(crate) waiting: bool,
+    /// When the objects last changed, if that may be a reason to build trees that meshes share.
+    pub(crate) unsettled_since: Option<Duration>,
+    /// Whether such trees are being built.
+    pub(crate) builds_statics: bool,
     /// Whether final trees of the rendered scene are available.
     pub(crate) better_trees: bool,
     /// Shapes whose final trees are being built.
@@ -117,6 +121,11 @@ pub struct RenderState {
 }
 
 impl RenderState {
+    /// Empty, for a session, which does not wait for trees of large meshes.
+    pub(crate) fn for_session() -> Self {
+        Self { trees: Trees { defers: true, ..Trees::default() }, ..Self::default() }
+    }
+
     /// Generation of the image that is being rendered.
     pub(crate) fn generation(&self) -> u64 {
         self.generation

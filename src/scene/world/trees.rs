@@ -1,6 +1,6 @@
-//! Cache of the kd-trees of meshes and of the trees of groups of spheres.
+//! Cache of the kd-trees of meshes and of groups of spheres, and of the trees that meshes share.
 
-use crate::kdtree::{BuildPreset, MeshTree, SphereTree};
+use crate::kdtree::{BuildPreset, MeshTree, SphereTree, StaticTree};
 use crate::mesh::Mesh;
 use crate::scene::world::components::{Balls, Shape};
 use crate::scene::world::inputs::SceneInputs;
@@ -13,13 +13,23 @@ pub struct Trees {
     pub(crate) meshes: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
     pub(crate) balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
     /// Shapes without a tree because they are invalid, and why.
-    unfit: HashMap<usize, (Shape, String)>,
-    /// Meshes with a tree of the quick preset: equal hits, slower traversal.
-    preview: HashSet<usize>,
+    pub(crate) unfit: HashMap<usize, (Shape, String)>,
+    /// Meshes whose tree has the quick preset: equal hits, slower traversal.
+    pub(crate) preview: HashSet<usize>,
+    /// Trees that meshes share which stand still, for this or an earlier state of the scene.
+    pub(crate) statics: Vec<Arc<StaticTree>>,
+    /// Whether they have the quick preset.
+    pub(crate) has_preview_statics: bool,
+    /// Whether large meshes that are in no shared tree are drawn by their own until somebody builds one, rather than at
+    /// once: for sessions, which do not wait.
+    pub(crate) defers: bool,
 }
 
+/// Below this number of triangles, the best tree is built within a frame or two.
+pub(crate) const LARGE: usize = 10_000;
+
 impl Trees {
-    /// Whether nothing has to be built for this shape.
+    /// Whether this shape is known: it has a tree, or one that is built when it is needed, or none for a reason.
     pub fn has(&self, shape: &Shape) -> bool {
         if shared(shape).is_some_and(|key| self.unfit.contains_key(&key)) {
             return true;
@@ -31,7 +41,13 @@ impl Trees {
         }
     }
 
-    /// Builds the tree of a mesh or a group of spheres, unless it has one.
+    /// Whether a mesh has a tree of its own that is built.
+    pub(crate) fn is_built(&self, shape: &Shape) -> bool {
+        let own = |mesh: &Arc<Mesh>| self.meshes.get(&address(mesh)).is_some_and(|(_, tree)| tree.is_built());
+        if let Shape::Mesh(mesh) = shape { own(mesh) } else { true }
+    }
+
+    /// Adds a mesh or a group of spheres, unless it is known. The tree of a mesh is built when something needs it.
     ///
     /// # Errors
     /// If the mesh has no triangles, an index out of range or a coordinate that is not finite.
@@ -45,8 +61,6 @@ impl Trees {
     /// # Errors
     /// Like [`Self::add`].
     pub fn add_preview(&mut self, shape: &Shape) -> Result<(), String> {
-        /// Below this, the best tree is built within a frame or two.
-        const LARGE: usize = 10_000;
         let is_large = matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() >= LARGE);
         self.add_by(shape, if is_large { BuildPreset::Quick } else { BuildPreset::Best })
     }
@@ -58,7 +72,7 @@ impl Trees {
         match shape {
             Shape::Mesh(mesh) => {
                 check_mesh(mesh)?;
-                let tree = MeshTree::build(&mesh.positions, &mesh.triangles, preset);
+                let tree = MeshTree::deferred(&mesh.positions, &mesh.triangles, preset);
                 self.meshes.insert(address(mesh), (mesh.clone(), Arc::new(tree)));
                 if preset == BuildPreset::Quick {
                     self.preview.insert(address(mesh));
@@ -74,9 +88,32 @@ impl Trees {
         Ok(())
     }
 
-    /// The meshes with a tree of the quick preset, in ascending order of size.
+    /// Builds the tree of a shape of these trees now, with the best preset or, if `preview`, as
+    /// [`Self::add_preview`]; returns it alone.
+    ///
+    /// # Errors
+    /// Like [`Self::add`].
+    pub(crate) fn built(&self, shape: &Shape, preview: bool) -> Result<Self, String> {
+        let mut built = Self::default();
+        match shape {
+            Shape::Mesh(mesh) if self.meshes.contains_key(&address(mesh)) => {
+                let (mesh, known) = &self.meshes[&address(mesh)];
+                let is_quick = preview && mesh.triangles.len() >= LARGE;
+                let preset = if is_quick { BuildPreset::Quick } else { BuildPreset::Best };
+                built.meshes.insert(address(mesh), (mesh.clone(), Arc::new(known.rebuilt(preset))));
+                if is_quick {
+                    built.preview.insert(address(mesh));
+                }
+            }
+            _ if preview => built.add_preview(shape)?,
+            _ => built.add(shape)?,
+        }
+        Ok(built)
+    }
+
+    /// The meshes with a built tree of the quick preset, in ascending order of size.
     pub fn preview(&self) -> Vec<Shape> {
-        let meshes = self.meshes.iter().filter(|(key, _)| self.preview.contains(key));
+        let meshes = self.meshes.iter().filter(|(key, (_, tree))| self.preview.contains(key) && tree.is_built());
         let mut meshes: Vec<Arc<Mesh>> = meshes.map(|(_, (mesh, _))| mesh.clone()).collect();
         // The largest takes the longest to rebuild.
         meshes.sort_by_key(|mesh| mesh.triangles.len());
@@ -98,7 +135,8 @@ impl Trees {
 
     /// Memory of all trees, bytes; for groups of spheres, of the spheres only.
     pub fn bytes(&self) -> usize {
-        self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
+        self.meshes.values().map(|(_, tree)| tree.bytes()).sum::<usize>()
+            + self.statics.iter().map(|tree| tree.bytes()).sum::<usize>()
             + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
     }
 
@@ -116,6 +154,9 @@ impl Trees {
             self.meshes.insert(key, tree);
         }
         self.balls.extend(other.balls);
+        if !other.statics.is_empty() {
+            (self.statics, self.has_preview_statics) = (other.statics, other.has_preview_statics);
+        }
     }
 
     /// Removes the trees of shapes that no object uses.
@@ -125,6 +166,9 @@ impl Trees {
         self.balls.retain(|key, _| used.contains(key));
         self.unfit.retain(|key, _| used.contains(key));
         self.preview.retain(|key| used.contains(key));
+        let meshes = &self.meshes;
+        self.statics.retain(|statics| meshes.values().any(|(_, tree)| statics.has_mesh(tree)));
+        self.has_preview_statics &= !self.statics.is_empty();
     }
 }
 

@@ -9,7 +9,7 @@ use crate::core::delta_light::DeltaLight;
 use crate::core::environment::Environment;
 use crate::core::material::{Material, MaterialId};
 use crate::core::texture::Texture;
-use firstlight_kdtree::{Hit, SceneTree, Shape};
+use firstlight_kdtree::{Hit, SceneTree, Shape, StaticTree};
 use firstlight_mesh::Mesh;
 use glam::{Mat3, Vec3};
 use std::sync::Arc;
@@ -97,8 +97,16 @@ impl Geometry {
     /// # Panics
     /// If the lists differ in length.
     pub fn build(shapes: Vec<Shape>, objects: Vec<Object>) -> Self {
+        Self::build_with(shapes, objects, &[])
+    }
+
+    /// Like [`Self::build`], with trees for meshes that stand still; see [`SceneTree::build_with`].
+    ///
+    /// # Panics
+    /// Like [`Self::build`].
+    pub fn build_with(shapes: Vec<Shape>, objects: Vec<Object>, statics: &[Arc<StaticTree>]) -> Self {
         assert_eq!(shapes.len(), objects.len(), "each shape needs its object");
-        Self { objects, tree: SceneTree::build(shapes) }
+        Self { objects, tree: SceneTree::build_with(shapes, statics) }
     }
 
     /// Returns the material of a hit.

@@ -218,7 +218,7 @@ impl Bodies {
                         is_inside(local, center.as_dvec3(), f64::from(radius)).then_some(bodies[prim as usize])
                     }));
                 }
-                (BodySurface::Parts(parts), Shape::Mesh { tree, world_from_object }) => {
+                (BodySurface::Parts(parts), Shape::Mesh { tree, world_from_object, .. }) => {
                     let local = world_from_object.inverse().transform_point3(point);
                     let bounds = tree.bounds();
                     if local.cmplt(bounds.min).any() || local.cmpgt(bounds.max).any() {
@@ -325,7 +325,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
                     of_sphere(material, center, f64::from(radius) * scale, BodyPart::Primitive(i, prim))
                 }));
             }
-            Shape::Mesh { tree, world_from_object } => {
+            Shape::Mesh { tree, world_from_object, .. } => {
                 let map = world_from_object.matrix3.as_dmat3();
                 let offset = Vec3::from(world_from_object.translation).as_dvec3();
                 let mut distinct = object.materials.clone();

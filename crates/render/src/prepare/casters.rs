@@ -249,7 +249,7 @@ impl Caster {
             Shape::Triangle { vertices } => {
                 of_points((vertices[0] + vertices[1] + vertices[2]) / 3.0, &mut vertices.iter().copied())
             }
-            Shape::Mesh { tree, world_from_object } => {
+            Shape::Mesh { tree, world_from_object, .. } => {
                 let bounds = tree.bounds();
                 let center = world_from_object.transform_point3(0.5 * (bounds.min + bounds.max));
                 let mesh = object.mesh.as_ref().expect("a mesh shape brings its mesh");

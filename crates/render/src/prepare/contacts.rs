@@ -156,7 +156,7 @@ fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
 /// the others too. It does not depend on the side from which a path comes.
 fn size_rank(touched: &ContactScene, object: u32) -> u32 {
     match &touched.geometry.tree.shapes()[object as usize] {
-        Shape::Mesh { tree, world_from_object } => {
+        Shape::Mesh { tree, world_from_object, .. } => {
             let bounds = tree.bounds();
             let offset = Vec3::from(world_from_object.translation).abs().max_element();
             let scale = world_from_object.matrix3.to_cols_array().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
@@ -325,7 +325,7 @@ fn faces_of(object: u32, shape: &Shape) -> Vec<Face> {
             let [a, b, c, d] = quad_corners(*corner, *edge_u, *edge_v);
             [[a, b, c], [b, c, d], [a, c, d], [a, b, d]].into_iter().filter_map(face).collect()
         }
-        Shape::Mesh { tree, world_from_object } => {
+        Shape::Mesh { tree, world_from_object, .. } => {
             let map = world_from_object.matrix3.as_dmat3();
             let offset = Vec3::from(world_from_object.translation).as_dvec3();
             let corners = |prim| tree.vertices(prim).map(|p| map * p.as_dvec3() + offset);
@@ -347,7 +347,7 @@ fn box_of(shape: &Shape) -> [Vec3; 2] {
         Shape::Plane { .. } => [Vec3::NEG_INFINITY, Vec3::INFINITY],
         Shape::Triangle { vertices } => around(vertices),
         Shape::Quad { corner, edge_u, edge_v } => around(&quad_corners(*corner, *edge_u, *edge_v)),
-        Shape::Mesh { tree, world_from_object } if !tree.bounds().is_empty() => {
+        Shape::Mesh { tree, world_from_object, .. } if !tree.bounds().is_empty() => {
             let bounds = tree.bounds();
             let pick = |i: usize, axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
             let corner = |i| world_from_object.transform_point3(Vec3::new(pick(i, 0), pick(i, 1), pick(i, 2)));
@@ -398,14 +398,17 @@ fn equal_spheres(shapes: &[Shape], clear: &[bool]) -> Vec<(u32, u32)> {
 mod tests {
     use super::*;
     use crate::core::snapshot::Object;
-    use firstlight_kdtree::{BuildPreset, MeshTree};
+    use firstlight_kdtree::{BuildPreset, HitSpace, MeshTree};
     use firstlight_mesh::{Mesh, procedural};
     use glam::{Affine3A, Quat};
     use std::f32::consts::FRAC_PI_4;
 
     fn placed(mesh: Mesh, map: Affine3A) -> (Shape, Object) {
         let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
-        (Shape::Mesh { tree, world_from_object: map }, Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) })
+        (
+            Shape::Mesh { tree, world_from_object: map, space: HitSpace::Object },
+            Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) },
+        )
     }
 
     /// Pairs of objects that are all transparent except those of material 1.

@@ -1,7 +1,7 @@
 //! Data of objects with their own space, as arrays for SIMD.
 
 use crate::prepare::arrays::push;
-use firstlight_kdtree::{SceneTree, Shape};
+use firstlight_kdtree::{HitSpace, SceneTree, Shape};
 use firstlight_simd::padded;
 use glam::{Mat3A, Vec3};
 
@@ -23,6 +23,8 @@ pub(crate) struct InstanceTable {
     pub round_trip_offset: [Vec<f32>; 3],
     pub condition: Vec<f32>,
     pub rim: Vec<f32>,
+    /// For meshes of [`HitSpace::World`] −1 if they are mirrored, otherwise 1; 0 for all others.
+    pub side: Vec<f32>,
 }
 
 impl InstanceTable {
@@ -47,6 +49,8 @@ impl InstanceTable {
         push(&mut self.round_trip_offset, instance.round_trip_offset);
         self.condition.push(instance.condition);
         self.rim.push(instance.rim);
+        let is_placed = matches!(tree.shapes()[object], Shape::Mesh { space: HitSpace::World, .. });
+        self.side.push(if is_placed { instance.side } else { 0.0 });
     }
 
     /// Pads the arrays for gather operations.
@@ -63,6 +67,7 @@ impl InstanceTable {
             round_trip_offset: vectors(self.round_trip_offset),
             condition: padded(self.condition),
             rim: padded(self.rim),
+            side: padded(self.side),
         }
     }
 }

@@ -329,7 +329,8 @@ mod tests {
             let build = firstlight_kdtree::BuildPreset::Quick;
             let tree = firstlight_kdtree::MeshTree::build(&mesh.positions, &mesh.triangles, build).into();
             let object = Object { mesh: Some(mesh.into()), ..Object::plain(0) };
-            let shape = Shape::Mesh { tree, world_from_object: glam::Affine3A::IDENTITY };
+            let (world_from_object, space) = (glam::Affine3A::IDENTITY, Default::default());
+            let shape = Shape::Mesh { tree, world_from_object, space };
             of(vec![shape], vec![object], vec![glass.clone()]).tables.bodies.is_open(0)
         };
         assert!(!is_open(&|_| true) && !is_open(&|p| p.y < 0.9) && !is_open(&|p| p.x.abs() > 0.05));

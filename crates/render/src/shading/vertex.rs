@@ -344,7 +344,8 @@ mod tests {
         let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
         let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
         let grey = Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) };
-        prepared(vec![Shape::Mesh { tree, world_from_object }], vec![object], vec![grey], Environment::Black)
+        let shape = Shape::Mesh { tree, world_from_object, space: Default::default() };
+        prepared(vec![shape], vec![object], vec![grey], Environment::Black)
     }
 
     /// Rays from outside towards a unit sphere, on a grid.

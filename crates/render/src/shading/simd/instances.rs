@@ -27,7 +27,7 @@ fn times_abs<S: Simd>(columns: &Columns, row: Bits<S>, v: Vector<S>) -> Vector<S
     x * v.x + y * v.y + z * v.z
 }
 
-/// Points in the spaces of their objects.
+/// Points in the spaces in which their objects are tested.
 struct LocalPoints<S: Simd> {
     position: Vector<S>,
     error: Vector<S>,
@@ -85,7 +85,15 @@ impl<S: Simd> SurfaceLanes<S> {
             }
         }
         let positions = three!(|k| Vector::from_arrays(s, &corners[k]));
-        let [a, b, c] = positions;
+        let side = Float::gather(&table.side, row);
+        let placed = mask & !side.is_zero();
+        let mut tested = positions;
+        if placed != 0 {
+            let offset = Vector::gather(&table.world_offset, row);
+            let in_world = three!(|k| times(&table.world_from_object, row, positions[k]) + offset);
+            tested = three!(|k| select_vector(placed, in_world[k], positions[k]));
+        }
+        let [a, b, c] = tested;
         let (u, v) = (Float::gather(&at.hits.u, at.index), Float::gather(&at.hits.v, at.index));
         let w = u.all(1.0) - u - v;
         let condition = Float::gather(&table.condition, row);
@@ -98,7 +106,15 @@ impl<S: Simd> SurfaceLanes<S> {
         let longest = (b - a).abs().max((c - a).abs()).max_element() * 4.0;
         let inset = (error.max_element() + Float::gather(&table.rim, row)) * INSET;
         let near_rim = mask & (u.min(v).min(w) * doubled_area).lt(inset * longest);
-        self.carry_to_world(table, row, mask, LocalPoints { position, error, normal: cross });
+        if placed != mask {
+            self.carry_to_world(table, row, mask & !placed, LocalPoints { position, error, normal: cross });
+        }
+        if placed != 0 {
+            let normal = cross.normalize() * side;
+            self.position = select_vector(placed, position, self.position);
+            self.geometric_normal = select_vector(placed, normal, self.geometric_normal);
+            self.offset = select(placed, normal.abs().dot(error), self.offset);
+        }
         let mut uv = [u, v];
         if with_uvs != 0 {
             uv = two!(|k| {
