@@ -234,9 +234,10 @@ pub(super) struct PresentMembers {
 }
 
 impl PresentMembers {
+    /// Whether a primitive takes part; the index of an empty lane of a block takes none.
     #[inline]
     pub fn has(&self, prim: u32) -> bool {
-        self.bits[prim as usize / 64] >> (prim % 64) & 1 != 0
+        self.bits.get(prim as usize / 64).is_some_and(|bits| bits >> (prim % 64) & 1 != 0)
     }
 }
 
