@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! cargo bench -p firstlight-benches --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--isa avx2] [--quick]
-//!     [--small] [--crowd]
+//!     [--small] [--crowd] [--rooms]
 //! ```
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
 //! - `FIRSTLIGHT_EMBREE`: a libembree4 shared object to compare with (see `scripts/compare_embree.sh`).
+//! - `--rooms`: rooms of many meshes, in separate trees and in one; `FIRSTLIGHT_ROOMS` adds scene files.
 //! - `--isa avx2`: uses AVX2 where there is AVX-512, and Embree does too.
 //! - `FIRSTLIGHT_EMBREE_ROBUST`: if set, Embree builds its scenes with the robust flag.
 //!
@@ -21,6 +22,7 @@ mod crowd;
 mod embree;
 mod meshes;
 mod rays;
+mod rooms;
 mod small;
 
 use clock::{cpu_seconds, median};
@@ -46,7 +48,7 @@ struct Options {
 fn main() {
     let mut options =
         Options { filter: String::new(), class: String::new(), size: 384, rounds: 7, preset: BuildPreset::Best };
-    let (mut only_small, mut only_crowd) = (false, false);
+    let (mut only_small, mut only_crowd, mut only_rooms) = (false, false, false);
     // A part of Embree's device configuration.
     let mut isa = "";
     // Builds too run on this thread alone, whose clock is read.
@@ -59,6 +61,7 @@ fn main() {
             "--median" => options.preset = BuildPreset::Median,
             "--small" => only_small = true,
             "--crowd" => only_crowd = true,
+            "--rooms" => only_rooms = true,
             "--class" => options.class = args.next().expect("--class wants a name"),
             "--size" => {
                 let size: u32 = args.next().and_then(|n| n.parse().ok()).expect("--size wants a number of pixels");
@@ -75,6 +78,10 @@ fn main() {
     }
     if only_crowd {
         crowd::run(options.rounds);
+        return;
+    }
+    if only_rooms {
+        rooms::run(&options.filter, options.rounds, options.size);
         return;
     }
     if only_small || options.filter.is_empty() {

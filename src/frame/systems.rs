@@ -9,16 +9,17 @@ use crate::frame::state::background::{BackgroundTasks, Finished};
 use crate::frame::state::resources::{
     Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
 };
+use crate::frame::state::selection::Selection;
 use crate::frame::worker::{Job, Orders};
 use crate::kdtree::HitSpace;
 use crate::render::RenderSettings;
 use crate::scene::hit_spaces::{StaticJob, hit_spaces};
 use crate::scene::world::entity_state::SceneChanges;
 use crate::scene::{
-    Animation, CameraInput, DisplaySettings, Extraction, Moment, Rendering, SceneInputs, SceneQueries, Shape, Trees,
-    origin_of,
+    Animation, CameraInput, DisplaySettings, Extraction, Moment, Rendering, SceneInputs, SceneQueries, Shape,
+    SnapshotPart, Trees, origin_of,
 };
-use bevy_ecs::prelude::{DetectChanges, Res, ResMut, World};
+use bevy_ecs::prelude::{DetectChanges, Entity, Res, ResMut, World};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -43,6 +44,7 @@ pub fn edit(world: &mut World) {
                 shown.trees.take_statics(built);
                 shown.builds_statics = false;
                 shown.better_trees = true;
+                shown.waiting = true;
             }
             Finished::Scene { again: true, result: Ok(scene), .. } => adopt_moment(world, *scene, now),
             Finished::Scene { result: Ok(scene), .. } => adopt(world, *scene, now),
@@ -68,6 +70,7 @@ pub fn rebuild(
     time: (Option<Res<Animation>>, Option<Res<Moment>>),
     beside: Res<BackgroundTasks>,
     renderer: Res<Renderer>,
+    selection: Option<Res<Selection>>,
     clock: Res<Clock>,
     mut shown: ResMut<RenderState>,
     mut found: ResMut<FrameChanges>,
@@ -115,10 +118,9 @@ pub fn rebuild(
         let origin = origin_of(&inputs);
         let same_objects = inputs.objects == shown.inputs.objects
             && shown.extraction.as_ref().is_some_and(|extraction| extraction.origin == origin);
-        let missing = if same_objects { Vec::new() } else { missing_trees(&inputs, &mut shown.trees, origin) };
-        if !missing.is_empty() {
+        let waits = !same_objects && builds_missing_trees(&inputs, &mut shown, origin, (&beside, &renderer));
+        if waits {
             // The old image stays until the trees are built; the camera keeps moving.
-            beside.build(missing, shown.trees.clone(), true, renderer.0.pool());
             inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
         }
         let differences = compare(&shown.inputs, &inputs);
@@ -130,7 +132,12 @@ pub fn rebuild(
         }
         shown.inputs = inputs;
         let RenderState { inputs, extraction, trees, extents, unsettled_since, .. } = &mut *shown;
-        let rebuilt = match (extraction.as_mut(), part) {
+        let is_elsewhere = extraction.as_ref().is_some_and(|extraction| extraction.origin != origin);
+        let rebuilt = match (extraction.as_mut(), part.or(is_elsewhere.then_some(SnapshotPart::Camera))) {
+            (Some(extraction), Some(_)) if waits => {
+                extraction.follow_camera(inputs);
+                structure
+            }
             (None, _) => {
                 *extraction = Some(Extraction::new(inputs, trees));
                 true
@@ -178,6 +185,8 @@ pub fn rebuild(
             renderer.0.set_prepared(*generation, extraction.prepared.clone());
         }
     }
+    let selected = selection.as_ref().map_or(&[][..], |selection| &selection.0);
+    prepare_moves(&mut shown, selected, &beside, &renderer);
     improve_trees(&mut shown, &beside, &renderer);
     share_trees(&mut shown, &beside, &renderer, clock.0);
     found.0 = changes;
@@ -201,6 +210,19 @@ fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &R
     }
 }
 
+/// Starts building the own trees of selected meshes, which they need once they are moved.
+fn prepare_moves(shown: &mut RenderState, selected: &[Entity], beside: &BackgroundTasks, renderer: &Renderer) {
+    let RenderState { inputs, trees, prepared_moves, .. } = shown;
+    prepared_moves.retain(|shape| !trees.is_built(shape));
+    let chosen = inputs.objects.iter().filter(|object| selected.contains(&object.entity)).map(|object| &object.shape);
+    let is_new = |shape: &&Shape| trees.has(shape) && !trees.is_built(shape) && !prepared_moves.contains(shape);
+    let new: Vec<Shape> = chosen.filter(is_new).cloned().collect();
+    if !new.is_empty() {
+        prepared_moves.extend(new.iter().cloned());
+        beside.build(new, trees.clone(), true, renderer.0.pool());
+    }
+}
+
 /// Starts building trees that meshes share, once nothing has moved for a while.
 fn share_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer, now: Duration) {
     const REST: Duration = Duration::from_millis(250);
@@ -213,8 +235,34 @@ fn share_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Ren
     shown.unsettled_since = None;
     if let Some(job) = job {
         shown.builds_statics = true;
-        beside.build_statics(job, renderer.0.pool());
+        beside.build_statics(job, false, renderer.0.pool());
     }
+}
+
+/// Starts building the trees without which a scene cannot be shown; false if there are none.
+fn builds_missing_trees(
+    inputs: &SceneInputs,
+    shown: &mut RenderState,
+    origin: DVec3,
+    (beside, renderer): (&BackgroundTasks, &Renderer),
+) -> bool {
+    let missing = missing_trees(inputs, &mut shown.trees, origin);
+    if !missing.is_empty() {
+        beside.build(missing, shown.trees.clone(), true, renderer.0.pool());
+        return true;
+    }
+    let Some(job) = StaticJob::missing(inputs, &shown.trees, origin) else { return false };
+    if !shown.builds_statics {
+        shown.builds_statics = true;
+        // What moves on has a tree of its own by then.
+        let moved = shown.inputs.objects.iter().map(|object| object.shape.clone());
+        let moved: Vec<Shape> = moved.filter(|shape| job.has(shape, &shown.trees)).collect();
+        if !moved.is_empty() {
+            beside.build(moved, shown.trees.clone(), true, renderer.0.pool());
+        }
+        beside.build_statics(job, true, renderer.0.pool());
+    }
+    true
 }
 
 /// Returns shapes whose trees have yet to be built. Small trees are built immediately, within the frame.

@@ -170,6 +170,11 @@ impl Extraction {
         same_hits
     }
 
+    /// Moves the camera and keeps the rest, the origin too.
+    pub(crate) fn follow_camera(&mut self, inputs: &SceneInputs) {
+        self.prepared = self.prepared.with_camera(camera_in(&camera_of(inputs), self.origin));
+    }
+
     /// Rebuilds one part and keeps the rest. If the camera has moved so far that the origin changes, everything is
     /// rebuilt; returns true then.
     pub fn update(&mut self, part: SnapshotPart, inputs: &SceneInputs, trees: &Trees) -> bool {

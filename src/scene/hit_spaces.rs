@@ -3,7 +3,7 @@
 //! A mesh that one object uses is tested in the space of the snapshot ([`HitSpace::World`]), in a tree that it shares
 //! with all others that stand still; a mesh that several objects use is tested in its own. That depends on the scene
 //! alone, so an image does not tell how the scene came about. Two things that move are tested in their own space: an
-//! object during the exposure, and in a session a large mesh until it has rested and is in a shared tree again.
+//! object during the exposure, and in a session a large mesh while it is being moved.
 
 use crate::format::placement::Placement;
 use crate::kdtree::{BuildPreset, HitSpace, MeshTree, Shape as PlacedShape, StaticTree};
@@ -40,11 +40,12 @@ pub(crate) fn hit_spaces(
         if !trees.defers || trees.shares(&shape) {
             return HitSpace::World;
         }
-        let n = n_triangles(&shape);
-        if n > AT_ONCE[0] || n > left {
+        if let PlacedShape::Mesh { tree, .. } = &shape
+            && !is_at_once(&shape, &mut left)
+            && tree.is_built()
+        {
             return HitSpace::Object;
         }
-        left -= n;
         HitSpace::World
     };
     shapes.into_iter().enumerate().map(choose).collect()
@@ -83,6 +84,16 @@ fn mesh_map(object: &ObjectInput, mesh: &Mesh, origin: DVec3) -> Option<Affine3A
 pub(super) fn about(world: DAffine3, center: DVec3, origin: DVec3) -> Affine3A {
     let translation = world.transform_point3(center) - origin;
     Affine3A::from_mat3_translation(world.matrix3.as_mat3(), translation.as_vec3())
+}
+
+/// Whether a mesh can be put into a tree within the frame.
+///
+/// - `left`: triangles that still can, in all.
+fn is_at_once(shape: &PlacedShape, left: &mut usize) -> bool {
+    let n = n_triangles(shape);
+    let fits = n <= AT_ONCE[0] && n <= *left;
+    *left -= if fits { n } else { 0 };
+    fits
 }
 
 fn n_triangles(shape: &PlacedShape) -> usize {
@@ -134,6 +145,26 @@ impl StaticJob {
         Some(if is_worn || trees.has_preview_statics { all } else { Self { shapes: rest, replaces: false } })
     }
 
+    /// Large meshes that are in no shared tree, and have no tree of their own to be drawn by until they are. `None` if
+    /// there are none.
+    pub fn missing(inputs: &SceneInputs, trees: &Trees, origin: DVec3) -> Option<Self> {
+        let mut left = AT_ONCE[1];
+        let is_missing = |shape: &PlacedShape| match shape {
+            PlacedShape::Mesh { tree, .. } => !trees.shares(shape) && !is_at_once(shape, &mut left) && !tree.is_built(),
+            _ => false,
+        };
+        let shapes: Vec<PlacedShape> =
+            placed_meshes(inputs, trees, origin).into_iter().flatten().filter(is_missing).collect();
+        (!shapes.is_empty()).then_some(Self { shapes, replaces: false })
+    }
+
+    /// Whether a mesh of the scene is among them.
+    pub fn has(&self, shape: &Shape, trees: &Trees) -> bool {
+        let Shape::Mesh(mesh) = shape else { return false };
+        let Some((_, wanted)) = trees.meshes.get(&address(mesh)) else { return false };
+        self.shapes.iter().any(|it| matches!(it, PlacedShape::Mesh { tree, .. } if Arc::ptr_eq(tree, wanted)))
+    }
+
     /// Number of meshes.
     pub fn n_meshes(&self) -> usize {
         self.shapes.len()
@@ -176,6 +207,7 @@ impl Trees {
             self.has_preview_statics = built.is_preview;
         } else {
             self.statics.extend(built.trees);
+            self.has_preview_statics |= built.is_preview;
         }
     }
 }

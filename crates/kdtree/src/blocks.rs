@@ -307,7 +307,7 @@ mod tests {
         for (ray, end) in rays {
             let ray = PreciseRay::of(ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array());
             let mut nearest = Nearest::before(*end);
-            SphereBlock::test(s, block, &ray, &mut nearest);
+            SphereBlock::test(s, block, &ray, &mut nearest, None);
             out.push((nearest.found, nearest.t.to_bits(), nearest.prim));
         }
     }

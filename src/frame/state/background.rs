@@ -167,11 +167,13 @@ impl BackgroundTasks {
     }
 
     /// Builds trees that meshes share.
-    pub fn build_statics(&self, job: StaticJob, pool: Arc<rayon::ThreadPool>) {
+    ///
+    /// - `preview`: see [`StaticJob::build`].
+    pub fn build_statics(&self, job: StaticJob, preview: bool, pool: Arc<rayon::ThreadPool>) {
         self.with(|board| board.building += 1);
         let this = self.clone();
         let work = move || {
-            let built = guarded(|| pool.install(|| job.build(false)));
+            let built = guarded(|| pool.install(|| job.build(preview)));
             this.with(|board| {
                 board.building -= 1;
                 board.finished.extend(built.ok().map(Finished::Statics));

@@ -109,6 +109,8 @@ pub struct RenderState {
     pub(crate) builds_statics: bool,
     /// Whether final trees of the rendered scene are available.
     pub(crate) better_trees: bool,
+    /// Selected meshes whose own trees are being built.
+    pub(crate) prepared_moves: Vec<Shape>,
     /// Shapes whose final trees are being built.
     pub(crate) improving: Vec<Shape>,
     /// Discard all samples at the next frame, for this reason.

@@ -41,9 +41,9 @@ impl Trees {
         }
     }
 
-    /// Whether a mesh has a tree of its own that is built.
+    /// Whether nothing is left to build of a shape of its own: false for a known mesh whose tree is deferred.
     pub(crate) fn is_built(&self, shape: &Shape) -> bool {
-        let own = |mesh: &Arc<Mesh>| self.meshes.get(&address(mesh)).is_some_and(|(_, tree)| tree.is_built());
+        let own = |mesh: &Arc<Mesh>| self.meshes.get(&address(mesh)).is_none_or(|(_, tree)| tree.is_built());
         if let Shape::Mesh(mesh) = shape { own(mesh) } else { true }
     }
 
@@ -120,6 +120,11 @@ impl Trees {
         meshes.into_iter().map(Shape::Mesh).collect()
     }
 
+    /// Whether some trees are quick ones, to be replaced by better ones.
+    pub fn is_preview(&self) -> bool {
+        self.has_preview_statics || !self.preview().is_empty()
+    }
+
     /// Records that no tree can be built, so that it is not tried again; without a reason if it was told already.
     pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
         if let Some(key) = shared(shape) {
@@ -140,13 +145,13 @@ impl Trees {
             + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
     }
 
-    /// Adds all trees of `other`, except quick ones for which there already is a tree.
+    /// Adds all trees of `other`, except quick ones for which one is built already.
     pub fn extend(&mut self, other: Self) {
         self.unfit.extend(other.unfit);
         for (key, tree) in other.meshes {
             if !other.preview.contains(&key) {
                 self.preview.remove(&key);
-            } else if self.meshes.contains_key(&key) {
+            } else if self.meshes.get(&key).is_some_and(|(_, known)| known.is_built()) {
                 continue;
             } else {
                 self.preview.insert(key);
