@@ -5,10 +5,10 @@ use super::build::{LeafMaker, build};
 use super::leaf::{BLOCK, LeafBlock, Prims};
 use super::node8::{LEAF, Node8, collapse};
 use super::nodes::{KdNode, KdNodes};
+use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::reference::{BuildConfig, Primitives};
 use super::simd::KernelSimd;
-use super::static_tree::PresentMembers;
 
 #[derive(Debug, PartialEq)]
 pub(super) struct BlockTree<B: LeafBlock> {
@@ -84,7 +84,7 @@ impl<B: LeafBlock> BlockTree<B> {
         child: u32,
         ray: &B::Ray,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         let first = (child & !(LEAF | COMPACT)) as usize;
         if child & COMPACT == 0 {
@@ -181,7 +181,7 @@ fn test_blocks<S: KernelSimd, B: LeafBlock>(
     mut block: usize,
     ray: &B::Ray,
     nearest: &mut Nearest,
-    present: Option<&PresentMembers>,
+    present: Option<&PresentPrimitives>,
 ) {
     loop {
         B::test(s, &blocks[block], ray, nearest, present);

@@ -3,10 +3,10 @@
 
 use super::lanes::{LaneHits, may_hit, quad_hits, resolve, sphere_hits};
 use super::leaf::{BLOCK, LeafBlock, LeafRay, NoBlock, Prims, ShearedRay, offer};
+use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, Mask};
-use super::static_tree::PresentMembers;
 use crate::geometry::{Ray, Shear, intersect_sphere};
 use firstlight_simd::three;
 use glam::{DVec3, Vec3};
@@ -216,7 +216,7 @@ impl LeafBlock for SphereBlock {
         block: &Self,
         ray: &PreciseRay,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         /// More spheres are tested together.
         const FEW: u32 = 3;
@@ -243,7 +243,7 @@ impl LeafBlock for SphereBlock {
         block: &Self,
         ray: &PreciseRay,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         if S::IS_NARROW {
             return Self::test(s, block, ray, nearest, present);

@@ -1,9 +1,9 @@
 //! The interface of leaf blocks, sixteen primitives each, and of rays prepared for them.
 
 use super::lanes::{LaneHits, shear};
+use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::simd::{KernelSimd, LANES, Mask};
-use super::static_tree::PresentMembers;
 use crate::geometry::{Ray, Shear};
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -39,7 +39,7 @@ pub(super) trait LeafBlock: Sized + Send {
         block: &Self,
         ray: &Self::Ray,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims().get(lane));
     }
@@ -51,7 +51,7 @@ pub(super) trait LeafBlock: Sized + Send {
         block: &Self,
         ray: &Self::Ray,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         Self::test(s, block, ray, nearest, present);
     }
@@ -63,7 +63,7 @@ pub(super) fn offer<S: KernelSimd>(
     s: S,
     hits: LaneHits<S>,
     nearest: &mut Nearest,
-    present: Option<&PresentMembers>,
+    present: Option<&PresentPrimitives>,
     prim: impl Fn(usize) -> u32,
 ) {
     if hits.mask == 0 {

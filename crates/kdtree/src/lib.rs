@@ -18,6 +18,7 @@ mod mesh_tree;
 mod node8;
 mod nodes;
 mod objects;
+mod present;
 mod primitive_trees;
 mod quad_filter;
 mod ray;

@@ -10,10 +10,10 @@ use super::lanes::{LaneHits, dot, longest_axis, may_hit, resolve, shear, sphere_
 use super::leaf::{BLOCK, LeafBlock, ShearedRay};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::FrameF64;
+use super::present::PresentPrimitives;
 use super::ray::{Nearest, RELATIVE_PADDING};
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, LANES, Mask};
-use super::static_tree::PresentMembers;
 use firstlight_simd::three;
 
 /// Sixteen rays in the mesh's own space, and their nearest hits so far.
@@ -24,7 +24,7 @@ pub(super) struct MeshPacket<'a, S: KernelSimd> {
     pub lanes: Mask,
     pub nearest: NearestLanes,
     /// The primitives that take part; `None` for all.
-    pub present: Option<&'a PresentMembers>,
+    pub present: Option<&'a PresentPrimitives>,
 }
 
 /// [`Nearest`] of sixteen rays; in memory, because single lanes are read and written too.
@@ -496,7 +496,7 @@ impl NearestLanes {
         block: &B,
         ray: &B::Ray,
         lane: usize,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         let (t, prim) = (self.t[lane], self.prim[lane]);
         let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };

@@ -7,9 +7,9 @@
 
 use super::lanes::{LaneHits, Sheared, may_hit, resolve};
 use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay, offer};
+use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::simd::{Corners, Eight, KernelSimd, Mask};
-use super::static_tree::PresentMembers;
 use firstlight_simd::three;
 use glam::Vec3;
 
@@ -152,7 +152,7 @@ impl LeafBlock for SharedBlock {
         block: &Self,
         ray: &ShearedRay,
         nearest: &mut Nearest,
-        present: Option<&PresentMembers>,
+        present: Option<&PresentPrimitives>,
     ) {
         if !S::IS_NARROW {
             return offer(s, Self::hits(s, block, ray), nearest, present, |lane| block.prims.get(lane));

@@ -3,7 +3,7 @@
 //! A room of three hundred meshes is traversed as one mesh. The triangles are tested in the space of the snapshot, with
 //! vertices rounded to it once ([`placed_vertices`]), so the hits of a mesh do not depend on which others are in its
 //! tree. A tree outlives edits: members that the scene no longer has, or has elsewhere, are passed over
-//! ([`PresentMembers`]).
+//! ([`PresentPrimitives`]).
 //!
 //! Start reading at [`StaticTree::build`].
 
@@ -13,6 +13,7 @@ use super::blocks::TriangleBlock;
 use super::build::clip_triangle;
 use super::leaf::{BLOCK, MAX_PRIMS};
 use super::mesh_tree::{BuildPreset, Triangles, triangle_bits, triangle_bounds};
+use super::present::PresentPrimitives;
 use super::reference::Primitives;
 use super::shape::{HitSpace, Shape, transform_point};
 use super::shared_block::SharedBlock;
@@ -219,26 +220,11 @@ impl Primitives for PlacedTriangles<'_> {
 pub(super) struct PlacedStatic {
     pub tree: Arc<StaticTree>,
     /// The members that objects of the scene are, if some are none.
-    present: Option<PresentMembers>,
+    present: Option<PresentPrimitives>,
     /// By member; [`PlacedStatic::GONE`] for one that is no object of the scene.
     objects: Vec<u32>,
     /// Object and first primitive of the members that the scene has, in ascending order of both.
     order: Vec<(u32, u32)>,
-}
-
-/// The primitives of a tree that belong to objects of the scene.
-#[derive(Debug)]
-pub(super) struct PresentMembers {
-    /// One bit per primitive.
-    bits: Vec<u64>,
-}
-
-impl PresentMembers {
-    /// Whether a primitive takes part; the index of an empty lane of a block takes none.
-    #[inline]
-    pub fn has(&self, prim: u32) -> bool {
-        self.bits.get(prim as usize / 64).is_some_and(|bits| bits >> (prim % 64) & 1 != 0)
-    }
 }
 
 impl PlacedStatic {
@@ -264,12 +250,15 @@ impl PlacedStatic {
             return None;
         }
         order.iter().for_each(|(object, _)| placed[*object as usize] = true);
-        let present = (order.len() < objects.len()).then(|| PresentMembers::new(tree, &objects));
+        let here = objects.iter().zip(&tree.members).filter(|(object, _)| **object != Self::GONE);
+        let ranges = here.map(|(_, member)| (member.first as usize, member.mesh.triangles.len()));
+        let is_whole = order.len() == objects.len();
+        let present = (!is_whole).then(|| PresentPrimitives::new(tree.n_triangles(), ranges));
         Some(Self { tree: tree.clone(), present, objects, order })
     }
 
     /// The primitives that take part; `None` for all.
-    pub fn present(&self) -> Option<&PresentMembers> {
+    pub fn present(&self) -> Option<&PresentPrimitives> {
         self.present.as_ref()
     }
 
@@ -294,21 +283,6 @@ impl PlacedStatic {
     pub fn wins_ties_below(&self, object: u32) -> u32 {
         let lower = self.order.partition_point(|(own, _)| *own < object);
         self.order.get(lower).map_or(u32::MAX, |(_, first)| *first)
-    }
-}
-
-impl PresentMembers {
-    fn new(tree: &StaticTree, objects: &[u32]) -> Self {
-        let mut bits = vec![0u64; tree.n_triangles().div_ceil(64)];
-        for (member, _) in tree.members.iter().zip(objects).filter(|(_, object)| **object != PlacedStatic::GONE) {
-            let (mut prim, end) = (member.first as usize, member.first as usize + member.mesh.triangles.len());
-            while prim < end {
-                let n = (64 - prim % 64).min(end - prim);
-                bits[prim / 64] |= (u64::MAX >> (64 - n)) << (prim % 64);
-                prim += n;
-            }
-        }
-        Self { bits }
     }
 }
 

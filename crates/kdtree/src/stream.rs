@@ -10,10 +10,10 @@ use super::block_tree::BlockTree;
 use super::blocks::PreciseRay;
 use super::leaf::{LeafBlock, LeafRay, ShearedRay};
 use super::node8::{DONE, Stack, Walk};
+use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
-use super::static_tree::PresentMembers;
 
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
 pub(super) const SLOTS: usize = 64;
@@ -121,7 +121,7 @@ impl StreamRay for PreciseRay {
 pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
-    present: Option<&PresentMembers>,
+    present: Option<&PresentPrimitives>,
     source: &mut impl Source,
     state: &mut StreamState,
 ) where

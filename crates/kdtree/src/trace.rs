@@ -13,12 +13,13 @@ use super::instance_tree::InstanceTree;
 use super::lanes::to_own_space;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects, load_some, load_some_u};
+use super::present::PresentPrimitives;
 use super::primitive_trees::PrimitiveTrees;
 use super::ray::Nearest;
 use super::ray_setup::{FetchedRays, Source};
 use super::shape::{HitSpace, RayClass, Shape};
 use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
-use super::static_tree::{self, PlacedStatic, PresentMembers, StaticTree};
+use super::static_tree::{self, PlacedStatic, StaticTree};
 use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
 use crate::geometry::Aabb;
@@ -110,7 +111,7 @@ impl TopLevel {
 #[derive(Clone, Copy)]
 enum StreamTree<'a> {
     /// And the primitives that take part.
-    Triangles(&'a BlockTree<TriangleBlock>, Option<&'a PresentMembers>),
+    Triangles(&'a BlockTree<TriangleBlock>, Option<&'a PresentPrimitives>),
     Quads(&'a BlockTree<QuadBlock>),
     Spheres(&'a BlockTree<SphereBlock>),
     Instances(&'a InstanceTree),
