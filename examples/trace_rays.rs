@@ -6,7 +6,7 @@
 
 use firstlight::geometry::Ray;
 use firstlight::geometry::robust::offset_ray_origin;
-use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
+use firstlight::kdtree::{BuildPreset, HitBatch, HitSpace, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use glam::{Affine3A, Vec3, vec3};
 use std::sync::Arc;
 
@@ -15,7 +15,11 @@ fn main() {
     let positions = [vec3(-1.0, 0.0, -1.0), vec3(1.0, 0.0, -1.0), vec3(1.0, 0.0, 1.0), vec3(-1.0, 0.0, 1.0), Vec3::Y];
     let triangles = [[0, 4, 1], [1, 4, 2], [2, 4, 3], [3, 4, 0], [0, 1, 2], [0, 2, 3]];
     let pyramid = Arc::new(MeshTree::build(&positions, &triangles, BuildPreset::Best));
-    let placed = |at: Vec3| Shape::Mesh { tree: pyramid.clone(), world_from_object: Affine3A::from_translation(at) };
+    let placed = |at: Vec3| Shape::Mesh {
+        tree: pyramid.clone(),
+        world_from_object: Affine3A::from_translation(at),
+        space: HitSpace::Object,
+    };
     let scene = SceneTree::build(vec![
         placed(vec3(-1.5, 0.0, 0.0)),
         placed(vec3(1.5, 0.0, 0.0)),

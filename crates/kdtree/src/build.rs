@@ -15,6 +15,7 @@ use super::split::{Split, median_split};
 use super::split_simd::find_split;
 use crate::geometry::Aabb;
 use glam::Vec3;
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// Creates and stores the leaves of a tree.
@@ -38,15 +39,14 @@ pub(super) fn build<M: LeafMaker>(
     config: &BuildConfig,
     maker: &M,
 ) -> (KdNodes, M::Leaves) {
+    let reference = |prim| {
+        let bounds = primitives.bounds(prim);
+        (!bounds.is_empty()).then(|| Reference::new(&bounds, prim))
+    };
     let mut references = Vec::with_capacity(primitives.len());
-    let mut bounds = Aabb::EMPTY;
-    for prim in 0..primitives.len() as u32 {
-        let prim_bounds = primitives.bounds(prim);
-        if !prim_bounds.is_empty() {
-            bounds = bounds.union(prim_bounds);
-            references.push(Reference::new(&prim_bounds, prim));
-        }
-    }
+    references.par_extend((0..primitives.len() as u32).into_par_iter().with_min_len(FORK_ABOVE).filter_map(reference));
+    let bounds =
+        references.par_iter().with_min_len(FORK_ABOVE).map(Reference::bounds).reduce(|| Aabb::EMPTY, Aabb::union);
     let growth = (references.len() as f32 * config.max_growth) as usize + 64;
     let set = InstructionSet::detect();
     let builder = Builder { primitives, config, maker, padding: clip_padding(&bounds), set };

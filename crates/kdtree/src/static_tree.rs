@@ -65,13 +65,7 @@ impl StaticTree {
             n_triangles += member.mesh.triangles.len();
             assert!(n_triangles < MAX_PRIMS, "more than 2^31 triangles");
         }
-        let place = |member: &Member| -> Vec<Vec3> {
-            let map = member.world_from_object;
-            member.mesh.positions.iter().map(|&position| transform_point(&map, position)).collect()
-        };
-        let positions: Vec<Vec<Vec3>> = members.par_iter().map(place).collect();
-        let owner = members.iter().zip(0u32..).flat_map(|(member, i)| vec![i; member.mesh.triangles.len()]).collect();
-        let view = PlacedTriangles { members: &members, positions, owner };
+        let view = PlacedTriangles::new(&members);
         let vertices = |prim| view.vertices(prim);
         let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
         let make_compact = |prims: &[u32]| SharedBlock::pack_if_small(prims, vertices);
@@ -178,27 +172,35 @@ fn groups(members: Vec<Member>) -> Vec<Vec<Member>> {
     groups
 }
 
-/// The builder's view of the members.
+/// The builder's view of the members: all their triangles, in the space of the snapshot.
 struct PlacedTriangles<'a> {
     members: &'a [Member],
-    /// Of each member, in the space of the snapshot.
-    positions: Vec<Vec<Vec3>>,
-    /// The member of each primitive.
-    owner: Vec<u32>,
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
 }
 
-impl PlacedTriangles<'_> {
+impl<'a> PlacedTriangles<'a> {
+    fn new(members: &'a [Member]) -> Self {
+        let count = |of: fn(&Triangles) -> usize| members.iter().map(|member| of(&member.mesh)).sum();
+        let mut positions = Vec::with_capacity(count(|mesh| mesh.positions.len()));
+        let mut triangles = Vec::with_capacity(count(|mesh| mesh.triangles.len()));
+        for Member { mesh, world_from_object, .. } in members {
+            let first = positions.len() as u32;
+            triangles.par_extend(mesh.triangles.par_iter().map(|corners| corners.map(|vertex| first + vertex)));
+            positions.par_extend(mesh.positions.par_iter().map(|&at| transform_point(world_from_object, at)));
+        }
+        Self { members, positions, triangles }
+    }
+
     #[inline]
     fn vertices(&self, prim: u32) -> [Vec3; 3] {
-        let member = self.owner[prim as usize] as usize;
-        let Member { mesh, first, .. } = &self.members[member];
-        mesh.triangles[(prim - first) as usize].map(|vertex| self.positions[member][vertex as usize])
+        self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
     }
 }
 
 impl Primitives for PlacedTriangles<'_> {
     fn len(&self) -> usize {
-        self.owner.len()
+        self.triangles.len()
     }
 
     fn bounds(&self, prim: u32) -> Aabb {
@@ -211,7 +213,8 @@ impl Primitives for PlacedTriangles<'_> {
 
     fn shape(&self, prim: u32) -> Option<[u32; 10]> {
         // A copy in another member may outlive this one.
-        Some(triangle_bits(self.vertices(prim), self.owner[prim as usize]))
+        let member = self.members.partition_point(|member| member.first <= prim) as u32;
+        Some(triangle_bits(self.vertices(prim), member))
     }
 }
 
