@@ -49,6 +49,12 @@ pub enum ReadError {
         /// The limit in bytes.
         limit: u64,
     },
+    /// A compressed file stands for more bytes than one of its length may.
+    #[error("is compressed, and stands for more than {limit} bytes, which no scene of its length does")]
+    Unpacks {
+        /// The limit in bytes.
+        limit: u64,
+    },
     /// The file must be text and is not UTF-8.
     #[error("cannot be read: line {line} is not UTF-8 text")]
     NotText {

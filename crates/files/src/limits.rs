@@ -97,6 +97,14 @@ impl Limits {
         self.film_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
     }
 
+    /// Bytes that this many compressed ones may stand for: more than in any scene, and less than a file of a megabyte
+    /// needs to fill the memory.
+    pub fn most_unpacked(packed: u64) -> u64 {
+        const A_BYTE: u64 = 128;
+        const ALWAYS: u64 = 16 << 20;
+        ALWAYS.saturating_add(packed.saturating_mul(A_BYTE))
+    }
+
     /// How to raise the limits.
     pub fn advice() -> String {
         format!("set {}=2 in the environment to double all limits", Self::VARIABLE)

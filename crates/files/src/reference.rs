@@ -9,6 +9,9 @@ use crate::printable::name;
 use crate::relative::{path_to_text, text_to_path};
 use std::path::{Component, Path, PathBuf};
 
+/// Bytes of a name, at most: no path is longer.
+const LONGEST: usize = 4096;
+
 /// Entries of a folder that are compared with a name, at most.
 const MAX_ENTRIES: usize = 20_000;
 
@@ -77,6 +80,9 @@ impl<'a> References<'a> {
     /// If it may not be read.
     pub fn resolve(&self, base: &Path, name: &str) -> Result<Referred, Outside> {
         let refused = |why| Err(Outside { name_in_model: name.to_owned(), why });
+        if name.len() > LONGEST {
+            return refused("too long for a path");
+        }
         if name.starts_with("//") || name.starts_with("\\\\") {
             return refused("an address of the network");
         }

@@ -109,6 +109,18 @@ impl Warnings {
         }
     }
 
+    /// Adds a warning whose text takes time to make: where enough of its kind are listed, it is only counted.
+    ///
+    /// - `alike`: a sentence of the same kind.
+    pub fn push_like(&mut self, alike: &str, make: impl FnOnce() -> String) {
+        let kind = kind_of(alike);
+        let is_listed = self.kinds.contains_key(&kind) || self.kinds.len() < Self::MAX_KINDS;
+        match self.kinds.get_mut(if is_listed { kind.as_str() } else { "" }) {
+            Some(kind) if kind.listed == Self::MAX_OF_KIND => kind.more += 1,
+            _ => self.push(make()),
+        }
+    }
+
     /// Adds those of another list that are not in this one.
     pub fn append(&mut self, other: &Self) {
         self.extend(other.list.iter().cloned());
@@ -237,6 +249,21 @@ mod tests {
 
     fn texts(warnings: &[Warning]) -> Vec<String> {
         warnings.iter().map(Warning::to_string).collect()
+    }
+
+    #[test]
+    fn what_is_only_counted_is_not_made() {
+        let (mut lazy, mut all) = (Warnings::default(), Warnings::default());
+        let mut made = 0;
+        for line in 0..1000 {
+            let text = format!("a.xml:{line}:1: it is flat");
+            all.push(text.clone());
+            lazy.push_like("a.xml:1:1: it is flat", || {
+                made += 1;
+                text
+            });
+        }
+        assert_eq!((made, lazy), (100, all));
     }
 
     #[test]

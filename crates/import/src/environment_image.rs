@@ -25,7 +25,10 @@ pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Op
         // Texels of one colour each stand for the slopes between those of the image.
         EnvironmentLayout::Interpolated => image.height.saturating_mul(8).min(MAX_INTERPOLATED).max(image.height),
     };
-    let height = height.clamp(1, MAX_HEIGHT);
+    // No more texels than a strip of pixels has, several times over.
+    let texels = u64::from(image.width) * u64::from(image.height);
+    let most = if layout == EnvironmentLayout::Interpolated { height } else { (4 * texels).isqrt() as u32 };
+    let height = height.min(most).clamp(1, MAX_HEIGHT);
     let width = 2 * height;
     let image_from_world = axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
     let texel = |x: i64, y: i64| {
@@ -159,6 +162,13 @@ mod tests {
         }
         // Across the seam, half of each side.
         assert!((at(0, 0).x - (0.45 * 7.0)).abs() < 1e-5, "{}", at(0, 0));
+    }
+
+    #[test]
+    fn a_strip_of_pixels_does_not_become_a_large_image() {
+        let strip = image(4000, 1, |_, _| Vec3::ONE);
+        let found = equirectangular(&strip, EnvironmentLayout::EqualArea, None);
+        assert!(found.len() < 10 * strip.len() && found.linear(0) == Vec3::ONE, "{}", found.len());
     }
 
     #[test]

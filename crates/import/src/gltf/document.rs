@@ -200,10 +200,7 @@ impl Document {
 
     /// Maximum number of bytes of all compressed streams.
     pub(crate) fn most_decoded(&self) -> u64 {
-        /// More than any model is compressed.
-        const A_BYTE: u64 = 128;
-        const ALWAYS: u64 = 16 << 20;
-        (ALWAYS + A_BYTE * self.n_bytes).min(self.options.max_bytes)
+        Limits::most_unpacked(self.n_bytes).min(self.options.max_bytes)
     }
 
     /// Reads the buffers that views refer to.

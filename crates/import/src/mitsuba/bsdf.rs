@@ -310,6 +310,10 @@ impl Converter<'_> {
         let front = self.surface(nested[0], depth + 1)?;
         let Some(&back) = nested.get(1) else { return Ok(front.map(|front| Surface { two_sided: true, ..front })) };
         let (Some(front), Some(other)) = (front, self.surface(back, depth + 1)?) else { return Ok(None) };
+        if self.n_lobes(&front.part) + self.n_lobes(&other.part) > MAX_LOBES {
+            self.tell(node, &format!("two sides of more than {MAX_LOBES} lobes are not modelled: both are the first"));
+            return Ok(Some(Surface { two_sided: true, ..front }));
+        }
         let [a, b] = [(nested[0], front), (back, other)].map(|(node, side)| self.add_material(node, side.part));
         Ok(Some(Surface::two_sided(by_side(a, b))))
     }

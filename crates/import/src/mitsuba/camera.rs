@@ -146,10 +146,11 @@ impl Converter<'_> {
             };
         let (width, height) = (side("width", 768)?, side("height", 576)?);
         let (x, y) = (film.integer("crop_offset_x")?.unwrap_or(0), film.integer("crop_offset_y")?.unwrap_or(0));
-        let rest = |size: u32, at: i64| (i64::from(size) - at).max(1);
+        let rest = |size: u32, at: i64| i64::from(size).saturating_sub(at).max(1);
         let (crop_width, crop_height) = (side("crop_width", rest(width, x))?, side("crop_height", rest(height, y))?);
-        let is_middle =
-            2 * x + i64::from(crop_width) == i64::from(width) && 2 * y + i64::from(crop_height) == i64::from(height);
+        let is_half = |at: i64, rest: i64| at.checked_mul(2) == Some(rest);
+        let is_middle = is_half(x, i64::from(width) - i64::from(crop_width))
+            && is_half(y, i64::from(height) - i64::from(crop_height));
         let shown = match is_middle {
             true => (crop_width, crop_height),
             false => {

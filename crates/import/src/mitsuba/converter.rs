@@ -69,6 +69,8 @@ pub(crate) struct Converter<'a> {
     pub surfaces: HashMap<usize, Option<Surface>>,
     /// Number of shapes so far, with those of instances.
     pub n_shapes: usize,
+    /// Number of their parameters and nested objects.
+    pub n_parts: usize,
     /// By BSDF and emitter.
     pub materials: HashMap<(Option<usize>, Option<usize>), Option<PlacedMaterial>>,
     /// Meshes to be made, by their number in the scene.

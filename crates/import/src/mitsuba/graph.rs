@@ -3,13 +3,16 @@
 //! A value that nothing has asked for is a part of the scene that is not modelled: [`Graph::unread`] lists them, so that
 //! none is lost silently. Start reading at [`Node`].
 
+use crate::model::foreign::cut;
 use firstlight_files::stamp::Stamp;
+use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
 use firstlight_format::locate::line_and_column;
 use glam::{DMat4, DVec3};
 use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A place in one of the files of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +38,7 @@ pub(crate) enum Spectrum {
     /// The same at all wavelengths.
     Uniform(f64),
     /// Wavelengths in nm, increasing, and values; linear in between, 0 outside.
-    Sampled(Vec<(f64, f64)>),
+    Sampled(Arc<[(f64, f64)]>),
 }
 
 /// A typed parameter.
@@ -108,6 +111,8 @@ impl Object {
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     pub files: Vec<SourceFile>,
+    /// Files of spectra, each with its stamp from before it was read.
+    pub other_files: Vec<(PathBuf, Stamp)>,
     pub objects: Vec<Object>,
     pub ids: HashMap<String, usize>,
     /// Folders in which files are looked for, in order.
@@ -138,10 +143,16 @@ impl Graph {
     }
 
     /// A sentence about a place: `scene.xml:3:5: …`.
-    pub(crate) fn sentence(&self, place: Place, message: &str) -> String {
+    fn sentence(&self, place: Place, message: &str) -> String {
         let file = &self.files[place.file as usize];
         let (line, column) = line_and_column(&file.text, place.offset);
         format!("{}:{line}:{column}: {message}", file.path.display())
+    }
+
+    /// Adds a [`sentence`](Self::sentence): the lines before it are counted only where it is listed.
+    pub(crate) fn tell(&self, place: Place, message: &str, warnings: &mut Warnings) {
+        let alike = format!("{}:1:1: {message}", self.files[place.file as usize].path.display());
+        warnings.push_like(&alike, || self.sentence(place, message));
     }
 
     /// Parameters and nested objects that nothing has asked for, of the objects that were asked: the object, the name,
@@ -179,7 +190,7 @@ impl<'a> Node<'a> {
 
     /// How a person refers to it: its id, or its plugin.
     pub(crate) fn called(self) -> &'a str {
-        self.object().id.as_deref().unwrap_or(self.plugin())
+        cut(self.object().id.as_deref().unwrap_or(self.plugin()))
     }
 
     pub(crate) fn error(self, message: impl Into<String>) -> SceneError {

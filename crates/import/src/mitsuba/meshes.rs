@@ -1,7 +1,7 @@
 //! Shapes as meshes: files of other programs with Mitsuba's rules for normals and texture coordinates, and the shapes
 //! that ours lack.
 
-use crate::mitsuba::serialized::read_serialized;
+use crate::mitsuba::serialized::{UnpackedBytes, read_serialized};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::obj::load_obj_with;
 use crate::ply::load_ply_with;
@@ -50,9 +50,11 @@ pub(crate) struct MeshRequest {
 impl MeshRequest {
     /// Makes the mesh.
     ///
+    /// - `room`: of all serialized meshes of the scene.
+    ///
     /// # Errors
     /// A sentence about the file.
-    pub(crate) fn make(&self) -> Result<Mesh, String> {
+    pub(crate) fn make(&self, room: &UnpackedBytes) -> Result<Mesh, String> {
         let mut mesh = match &self.geometry {
             Geometry::Model(format, path) => {
                 // Mitsuba smooths every edge of a file without normals.
@@ -68,7 +70,7 @@ impl MeshRequest {
                 Mesh { slots: Vec::new(), ..model.mesh }
             }
             Geometry::Serialized(path, index) => {
-                let read = read_serialized(path, *index).map_err(|why| format!("{}: {why}", path.display()))?;
+                let read = read_serialized(path, *index, room).map_err(|why| format!("{}: {why}", path.display()))?;
                 match read.mesh.normals.is_empty() && !read.face_normals && !self.face_normals {
                     true => read.mesh.with_smooth_normals(NormalWeight::Angle, None),
                     false if read.face_normals || self.face_normals => read.mesh.flat(),

@@ -20,6 +20,7 @@ pub(crate) mod shape;
 pub(crate) mod spectrum;
 pub(crate) mod texture;
 pub(crate) mod transform;
+pub(crate) mod words;
 
 use crate::mitsuba::converter::Converter;
 use crate::mitsuba::scene::Converted;
@@ -28,6 +29,7 @@ use firstlight_files::reference::References;
 use firstlight_files::relative::path_to_text;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Reads a scene with its meshes.
@@ -43,6 +45,9 @@ pub(crate) fn read_scene(path: &Path, options: &ForeignOptions) -> Result<Foreig
     let Converted { file, parts, part_files, warnings: of_parts } =
         Converter::new(&graph, references, folder, name).convert()?;
     warnings.append(&of_parts);
-    let files = graph.files.iter().map(|file| (file.path.clone(), file.stamp)).collect();
+    let of_text = graph.files.iter().map(|file| (file.path.clone(), file.stamp));
+    let mut known = HashSet::new();
+    let files =
+        of_text.chain(graph.other_files.iter().cloned()).filter(|(path, _)| known.insert(path.clone())).collect();
     Ok(ForeignScene { file, parts, part_files, warnings, files })
 }

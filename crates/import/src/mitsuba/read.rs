@@ -5,10 +5,12 @@
 //!
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/key_topics/scene_format.html>
 
-use crate::mitsuba::graph::{Child, Graph, Object, Parameter, Place, SourceFile, Target, Value};
+use crate::mitsuba::graph::{Child, Graph, Object, Parameter, Place, SourceFile, Spectrum, Target, Value};
 use crate::mitsuba::spectrum;
 use crate::mitsuba::transform;
+use crate::mitsuba::words::{check_tags, hex, is_old, number, numbers, snake_case};
 use firstlight_files::input_file::{FileKind, InputFile};
+use firstlight_files::limits::Limits;
 use firstlight_files::printable;
 use firstlight_files::reference::References;
 use firstlight_files::relative::text_to_path;
@@ -16,6 +18,7 @@ use firstlight_files::stamp::stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
 use glam::{DMat4, DVec3};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Depth of nested elements.
@@ -24,6 +27,10 @@ const MAX_DEPTH: u32 = 100;
 const MAX_INCLUDE_DEPTH: u32 = 15;
 /// Number of files of a scene.
 const MAX_FILES: usize = 1000;
+/// Number of elements of all files: a file may be included again and again.
+const MAX_ELEMENTS: usize = 1 << 22;
+/// Folders in which each file is looked for.
+const MAX_FOLDERS: usize = 16;
 /// Bytes of all attributes in which a parameter was substituted.
 const MAX_SUBSTITUTED: usize = 16 << 20;
 
@@ -46,6 +53,9 @@ pub(crate) fn read_graph(
         references: References::of(path, allow_outside),
         warnings,
         substituted: 0,
+        bytes_left: Limits::of_this_process().scene_bytes,
+        n_elements: 0,
+        spectra: HashMap::new(),
         include_depth: 0,
         unnamed_scene: false,
         old: false,
@@ -66,6 +76,11 @@ struct Reader<'a> {
     references: References<'a>,
     warnings: &'a mut Warnings,
     substituted: usize,
+    /// Bytes of text that may still be read.
+    bytes_left: u64,
+    n_elements: usize,
+    /// Spectra in files of their own, each read once.
+    spectra: HashMap<PathBuf, Spectrum>,
     include_depth: u32,
     unnamed_scene: bool,
     /// Whether the current file has a version before 2.
@@ -78,13 +93,15 @@ impl Reader<'_> {
     /// - `parent`: the object that includes it, and the name that it gives.
     fn file(&mut self, path: &Path, parent: Option<(usize, Option<String>)>) -> Result<(), SceneError> {
         let stamp = stamp(path);
-        let read = InputFile::open(path, FileKind::Scene).and_then(InputFile::text);
+        let read = InputFile::open_within(path, FileKind::Scene, self.bytes_left).and_then(InputFile::text);
         let text = read.map_err(|error| SceneError::in_file(path, error.to_string()))?;
+        self.bytes_left = self.bytes_left.saturating_sub(text.len() as u64);
         let number = self.graph.files.len() as u32;
         self.graph.files.push(SourceFile { path: path.to_owned(), text: text.clone(), stamp });
         if number == 0 {
             self.graph.folders.push(path.parent().map(Path::to_path_buf).unwrap_or_default());
         }
+        check_tags(&text).map_err(|why| SceneError::in_file(path, why))?;
         let document = roxmltree::Document::parse(&text).map_err(|error| {
             let at = error.pos();
             let message = error.to_string();
@@ -135,6 +152,12 @@ impl Reader<'_> {
             Some(text) => reader.substitute(text, place).map(Some),
             None => Ok(None),
         };
+        self.n_elements += 1;
+        if self.n_elements > MAX_ELEMENTS {
+            return Err(self
+                .graph
+                .error(place, format!("a scene may have {MAX_ELEMENTS} elements, with those included")));
+        }
         if depth > MAX_DEPTH {
             return Err(self.graph.error(place, format!("elements are nested more than {MAX_DEPTH} deep")));
         }
@@ -160,10 +183,17 @@ impl Reader<'_> {
                 let folder = self.graph.files[file as usize].path.parent().unwrap_or(Path::new("")).to_owned();
                 match self.references.resolve(&folder, &value) {
                     // Looked in before those that came earlier.
-                    Ok(found) => self.graph.folders.insert(0, folder.join(found.path)),
+                    Ok(found) => {
+                        let folder = folder.join(found.path);
+                        self.graph.folders.retain(|known| *known != folder);
+                        if self.graph.folders.len() >= MAX_FOLDERS {
+                            let most = format!("a scene may name {MAX_FOLDERS} folders in which files are looked for");
+                            return Err(self.graph.error(place, most));
+                        }
+                        self.graph.folders.insert(0, folder);
+                    }
                     Err(outside) => {
-                        let sentence = self.graph.sentence(place, &outside.to_string());
-                        self.warnings.push(sentence);
+                        self.graph.tell(place, &outside.to_string(), self.warnings);
                     }
                 }
             }
@@ -277,7 +307,14 @@ impl Reader<'_> {
             let folders: Vec<PathBuf> = std::iter::once(own).chain(self.graph.folders.iter().cloned()).collect();
             let wrong = |why: String| self.graph.error(place, why);
             let path = find_file(&self.references, &folders, &name).map_err(wrong)?;
-            return spectrum::read_file(&path).map(|spectrum| Some(Value::Spectrum(spectrum)));
+            if let Some(known) = self.spectra.get(&path) {
+                return Ok(Some(Value::Spectrum(known.clone())));
+            }
+            let before = stamp(&path);
+            let read = spectrum::read_file(&path)?;
+            self.graph.other_files.push((path.clone(), before));
+            self.spectra.insert(path, read.clone());
+            return Ok(Some(Value::Spectrum(read)));
         }
         if !matches!(tag, "float" | "integer" | "boolean" | "string" | "rgb" | "color" | "srgb" | "spectrum") {
             return Ok(None);
@@ -456,24 +493,6 @@ pub(crate) fn find_file(references: &References, folders: &[PathBuf], name: &str
     }
 }
 
-fn is_old(version: &str) -> bool {
-    version.trim_start().starts_with(['0', '1']) && version.trim_start()[1..].starts_with('.')
-}
-
-/// `toWorld` as `to_world`, `intIOR` as `int_ior`.
-fn snake_case(name: &str) -> String {
-    let mut out = String::new();
-    let mut before_is_lower = false;
-    for c in name.chars() {
-        if c.is_uppercase() && before_is_lower {
-            out.push('_');
-        }
-        before_is_lower = c.is_lowercase() || c.is_ascii_digit();
-        out.extend(c.to_lowercase());
-    }
-    out
-}
-
 /// What other parameters were called before version 2.
 fn upgrade(object: &mut Object) {
     if object.plugin == "diffuse" {
@@ -502,19 +521,4 @@ fn upgrade(object: &mut Object) {
         let matrix = scale * DMat4::from_translation(DVec3::new(u, v, 0.0));
         object.parameters.push(Parameter::new("to_uv".to_owned(), Value::Transform(matrix), place));
     }
-}
-
-/// A finite number.
-fn number(text: &str) -> Option<f64> {
-    text.trim().parse().ok().filter(|number: &f64| number.is_finite())
-}
-
-/// Numbers between spaces and commas.
-pub(crate) fn numbers(text: &str) -> Option<Vec<f64>> {
-    text.split([' ', ',', '\t', '\r', '\n']).filter(|word| !word.is_empty()).map(number).collect()
-}
-
-/// `#rrggbb` in sRGB, of files before version 2.
-fn hex(text: &str) -> Option<DVec3> {
-    firstlight_format::value::hex_color(text.trim()).map(|rgb| rgb.as_dvec3())
 }

@@ -6,7 +6,8 @@
 use crate::mitsuba::camera::default_camera;
 use crate::mitsuba::converter::Converter;
 use crate::mitsuba::graph::{Graph, Node};
-use crate::mitsuba::meshes::MeshRequest;
+use crate::mitsuba::meshes::{Geometry, MeshRequest};
+use crate::mitsuba::serialized::UnpackedBytes;
 use crate::mitsuba::transform::orthonormal;
 use crate::model::placing::corners_of;
 use firstlight_files::printable;
@@ -53,6 +54,7 @@ impl<'a> Converter<'a> {
             texture_depth: 0,
             surfaces: HashMap::new(),
             n_shapes: 0,
+            n_parts: 0,
             materials: HashMap::new(),
             requests: HashMap::new(),
             one_sided: Vec::new(),
@@ -89,7 +91,7 @@ impl<'a> Converter<'a> {
         for (object, name, place) in self.graph.unread() {
             let (name, plugin) = (printable::name(name), printable::name(&object.plugin));
             let sentence = format!("{name} of the {} {plugin} is not known and has no effect", object.tag);
-            self.warnings.push(self.graph.sentence(place, &sentence));
+            self.graph.tell(place, &sentence, &mut self.warnings);
         }
         let files = self.requests.iter().filter_map(|(request, &number)| Some((number, request.geometry.file()?)));
         let part_files = files.map(|(number, file)| (number, (file.to_owned(), stamp(file)))).collect();
@@ -109,7 +111,7 @@ impl<'a> Converter<'a> {
     /// Tells what is not shown as the scene says, with its place and the object.
     pub(crate) fn tell(&mut self, node: Node, message: &str) {
         let called = printable::name(node.called());
-        self.warnings.push(self.graph.sentence(node.object().place, &format!("`{called}`: {message}")));
+        self.graph.tell(node.object().place, &format!("`{called}`: {message}"), &mut self.warnings);
     }
 
     /// A path as the scene file says it: relative to its folder.
@@ -147,7 +149,10 @@ impl<'a> Converter<'a> {
             match self.sensor(sensor)? {
                 Some(camera) if has_camera => {
                     self.file.film = film;
-                    let name = sensor.object().id.clone().unwrap_or_else(|| format!("sensor {}", sensor.index));
+                    let name = match sensor.object().id {
+                        Some(_) => sensor.called().to_owned(),
+                        None => format!("sensor {}", sensor.index),
+                    };
                     self.file.cameras.0.push((self.names.free(&name), camera));
                 }
                 Some(camera) => (self.file.camera, has_camera) = (camera, true),
@@ -188,8 +193,13 @@ impl<'a> Converter<'a> {
     fn make_meshes(&mut self) -> HashMap<u32, Arc<Mesh>> {
         let mut requests: Vec<(&MeshRequest, u32)> = self.requests.iter().map(|(request, n)| (request, *n)).collect();
         requests.sort_by_key(|(_, number)| *number);
+        let serialized = requests.iter().filter_map(|(request, _)| match &request.geometry {
+            Geometry::Serialized(path, _) => Some(path.as_path()),
+            _ => None,
+        });
+        let room = UnpackedBytes::of_files(serialized.collect::<HashSet<_>>().into_iter());
         let made: Vec<(u32, Result<Mesh, String>)> =
-            requests.par_iter().map(|(request, number)| (*number, request.make())).collect();
+            requests.par_iter().map(|(request, number)| (*number, request.make(&room))).collect();
         let (mut parts, mut lost) = (HashMap::new(), HashSet::new());
         for (number, mesh) in made {
             match mesh {

@@ -12,6 +12,7 @@ use flate2::read::ZlibDecoder;
 use glam::{DVec3, Vec2, Vec3};
 use std::io::Read;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const MAGIC: u16 = 0x041c;
 const NORMALS: u32 = 1;
@@ -21,6 +22,8 @@ const FACE_NORMALS: u32 = 0x10;
 const DOUBLE: u32 = 0x2000;
 /// Of version 5.
 const UVS_5: u32 = 4;
+/// Bytes of the name of a mesh, which is not used.
+const MAX_NAME: u64 = 1 << 16;
 
 /// A mesh as in the file.
 pub(crate) struct Read5 {
@@ -29,17 +32,38 @@ pub(crate) struct Read5 {
     pub face_normals: bool,
 }
 
+/// Bytes that all meshes of a scene may still be decompressed to: a file may have many meshes at one place.
+#[derive(Debug)]
+pub(crate) struct UnpackedBytes {
+    limit: u64,
+    left: AtomicU64,
+}
+
+impl UnpackedBytes {
+    pub(crate) fn new(limit: u64) -> Self {
+        Self { limit, left: AtomicU64::new(limit) }
+    }
+
+    /// What the meshes of these files may be decompressed to.
+    pub(crate) fn of_files<'a>(files: impl Iterator<Item = &'a Path>) -> Self {
+        let length = |file: &Path| file.metadata().map_or(0, |info| info.len());
+        let packed = files.map(length).fold(0, u64::saturating_add);
+        Self::new(Limits::most_unpacked(packed))
+    }
+}
+
 /// Reads the mesh of this index.
 ///
 /// # Errors
 /// A sentence that follows the path.
-pub(crate) fn read_serialized(path: &Path, index: u32) -> Result<Read5, String> {
+pub(crate) fn read_serialized(path: &Path, index: u32, room: &UnpackedBytes) -> Result<Read5, String> {
     let bytes = InputFile::open(path, FileKind::Model).and_then(InputFile::bytes).map_err(|error| error.to_string())?;
-    parse(&bytes, index, Limits::of_this_process().model_bytes)
+    parse(&bytes, index, Limits::of_this_process().model_bytes, room)
 }
 
 /// - `limit`: bytes of the decompressed mesh.
-pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64) -> Result<Read5, String> {
+/// - `room`: of all meshes.
+pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64, room: &UnpackedBytes) -> Result<Read5, String> {
     const DAMAGED: &str = "is damaged: it ends early";
     let header = |at: usize| {
         let word = |at: usize| Some(u16::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
@@ -54,7 +78,7 @@ pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64) -> Result<Read5, Strin
     }
     let start = if index == 0 { 0 } else { offset(bytes, index, version)? };
     header(start).filter(|(magic, _)| *magic == MAGIC).ok_or("is damaged: its directory points elsewhere")?;
-    let mut contents = Contents { from: ZlibDecoder::new(&bytes[start + 4..]).take(limit), limit };
+    let mut contents = Contents { from: ZlibDecoder::new(&bytes[start + 4..]).take(limit), limit, room };
     let flags = contents.u32()?;
     match version {
         5 => {
@@ -63,7 +87,10 @@ pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64) -> Result<Read5, Strin
             contents.version_5(flags)
         }
         _ => {
-            while version == 4 && contents.bytes(1)? != [0] {}
+            let mut letters = 0..MAX_NAME;
+            while version == 4 && contents.bytes(1)? != [0] {
+                letters.next().ok_or("is damaged: the name of the mesh does not end")?;
+            }
             contents.arrays(flags)
         }
     }
@@ -85,19 +112,27 @@ fn offset(bytes: &[u8], index: u32, version: u16) -> Result<usize, String> {
     usize::try_from(u64::from_le_bytes(word)).map_err(|_| "is damaged: its directory points elsewhere".to_owned())
 }
 
-struct Contents<R> {
+struct Contents<'a, R> {
     from: std::io::Take<R>,
     limit: u64,
+    room: &'a UnpackedBytes,
 }
 
-impl<R: Read> Contents<R> {
+impl<R: Read> Contents<'_, R> {
     fn bytes(&mut self, count: u64) -> Result<Vec<u8>, String> {
         if count > self.from.limit() {
             return Err(format!("states more than {} bytes: {}", self.limit, Limits::advice()));
         }
+        let left = &self.room.left;
+        if count > left.load(Ordering::Relaxed) {
+            let most = self.room.limit;
+            return Err(format!("states more than the {most} bytes that all serialized meshes of the scene may have"));
+        }
         // Grows as bytes arrive, whatever the file states.
         let mut bytes = Vec::with_capacity(count.min(1 << 20) as usize);
         let read = self.from.by_ref().take(count).read_to_end(&mut bytes);
+        let _ = left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| Some(left.saturating_sub(bytes.len() as u64)));
         match read {
             Ok(read) if read as u64 == count => Ok(bytes),
             _ => Err("is damaged: it ends early".to_owned()),
@@ -181,6 +216,8 @@ mod tests {
     use flate2::write::ZlibEncoder;
     use std::io::Write;
 
+    static ROOM: UnpackedBytes = UnpackedBytes { limit: u64::MAX, left: AtomicU64::new(u64::MAX) };
+
     fn file(version: u16, contents: &[&[u8]]) -> Vec<u8> {
         let (mut bytes, mut directory) = (Vec::new(), Vec::new());
         for mesh in contents {
@@ -212,13 +249,31 @@ mod tests {
     fn the_mesh_of_each_index_is_read() {
         let bytes = file(4, &[&triangle(1.0), &triangle(3.0)]);
         for (index, area) in [(0, 0.5), (1, 4.5)] {
-            let Read5 { mesh, face_normals } = parse(&bytes, index, 1 << 20).unwrap_or_else(|why| panic!("{why}"));
+            let Read5 { mesh, face_normals } =
+                parse(&bytes, index, 1 << 20, &ROOM).unwrap_or_else(|why| panic!("{why}"));
             assert_eq!((mesh.area(), face_normals), (area, false));
             assert_eq!((mesh.normals[2], mesh.uvs[1]), (Vec3::Z, Vec2::X));
         }
-        let wrong = |index, limit| parse(&bytes, index, limit).err().unwrap();
+        let wrong = |index, limit| parse(&bytes, index, limit, &ROOM).err().unwrap();
         assert!(wrong(2, 1 << 20).contains("2 meshes"), "{}", wrong(2, 1 << 20));
         assert!(wrong(1, 100).contains("more than 100 bytes"), "{}", wrong(1, 100));
+    }
+
+    #[test]
+    fn meshes_at_one_place_have_their_bytes_once() {
+        let bytes = file(4, &[&triangle(1.0)]);
+        let room = UnpackedBytes::new(2 * triangle(1.0).len() as u64);
+        let mut read = std::iter::repeat_with(|| parse(&bytes, 0, 1 << 20, &room));
+        assert!(read.next().unwrap().is_ok() && read.next().unwrap().is_ok());
+        let why = read.next().unwrap().err().unwrap();
+        assert!(why.contains("all serialized meshes"), "{why}");
+    }
+
+    #[test]
+    fn a_name_that_does_not_end_is_no_name() {
+        let bytes = file(4, &[&vec![b'a'; 1 << 20]]);
+        let why = parse(&bytes, 0, 1 << 30, &ROOM).err().unwrap();
+        assert!(why.contains("name of the mesh"), "{why}");
     }
 
     #[test]
@@ -226,13 +281,13 @@ mod tests {
         let bytes = file(4, &[&triangle(1.0), &triangle(3.0)]);
         for length in 0..bytes.len() {
             for index in 0..2 {
-                let _ = parse(&bytes[..length], index, 1 << 20);
+                let _ = parse(&bytes[..length], index, 1 << 20, &ROOM);
             }
         }
         for at in 0..bytes.len() {
             let mut changed = bytes.clone();
             changed[at] ^= 0x55;
-            let _ = parse(&changed, 1, 1 << 20);
+            let _ = parse(&changed, 1, 1 << 20, &ROOM);
         }
     }
 }

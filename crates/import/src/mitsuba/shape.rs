@@ -21,6 +21,8 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
 
 /// Objects of a scene; instances of instances multiply.
 const MAX_OBJECTS: usize = 1 << 20;
+/// Parts of all shapes that are placed, with those of instances: each shape asks for all of its own.
+const MAX_PARTS: usize = 1 << 24;
 /// Depth of instances.
 const MAX_DEPTH: u32 = 8;
 
@@ -39,12 +41,14 @@ impl Converter<'_> {
         if self.n_shapes > MAX_OBJECTS {
             return Err(node.error(format!("the scene has more than {MAX_OBJECTS} shapes")));
         }
+        self.ask(node)?;
         let own = outer * node.transform("to_world")?;
         match node.plugin() {
             // Shown where it is instanced.
             "shapegroup" => return Ok(()),
             "instance" => {
                 for group in node.children("shape")? {
+                    self.ask(group)?;
                     for shape in group.children("shape")? {
                         self.shape(shape, own, depth + 1)?;
                     }
@@ -89,6 +93,15 @@ impl Converter<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Counts the parts of a shape, for all of which it is asked.
+    fn ask(&mut self, node: Node) -> Result<(), SceneError> {
+        self.n_parts += node.object().parameters.len() + node.object().children.len();
+        match self.n_parts > MAX_PARTS {
+            true => Err(node.error(format!("the shapes of the scene have more than {MAX_PARTS} parts"))),
+            false => Ok(()),
+        }
     }
 
     /// The material of this name on the front, and black on the back.

@@ -39,7 +39,7 @@ pub(crate) fn parse(text: &str) -> Result<Spectrum, String> {
 
 pub(crate) fn sampled(pairs: Vec<(f64, f64)>) -> Result<Spectrum, String> {
     match pairs.len() >= 2 && pairs.is_sorted_by(|a, b| a.0 < b.0) {
-        true => Ok(Spectrum::Sampled(pairs)),
+        true => Ok(Spectrum::Sampled(pairs.into())),
         false => Err("a spectrum of at least two increasing wavelengths".to_owned()),
     }
 }
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn spectra_are_a_number_or_pairs() {
         assert_eq!(parse(" 0.5 "), Ok(Spectrum::Uniform(0.5)));
-        assert_eq!(parse("400:0.1, 500:.2"), Ok(Spectrum::Sampled(vec![(400.0, 0.1), (500.0, 0.2)])));
+        assert_eq!(parse("400:0.1, 500:.2"), Ok(Spectrum::Sampled([(400.0, 0.1), (500.0, 0.2)].into())));
         for wrong in ["", "a", "400:1", "500:1 400:1", "400:1 500", "400:nan 500:1"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -5,9 +5,11 @@
 
 use crate::mitsuba::converter::{Converter, Reads};
 use crate::mitsuba::graph::{Node, Spectrum, Value};
-use crate::mitsuba::read::{find_file, numbers};
+use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::{Use, blackbody, sampled};
+use crate::mitsuba::words::numbers;
 use firstlight_files::printable;
+use firstlight_files::relative::path_to_text;
 use firstlight_format::error::SceneError;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
@@ -88,7 +90,10 @@ impl Converter<'_> {
             return Err(node.error("textures are nested too deep, or contain themselves"));
         }
         let source = match node.plugin() {
-            "bitmap" => self.bitmap(node)?,
+            "bitmap" => match self.bitmap(node)? {
+                Some(image) => image,
+                None => return Ok(ColorValue::grey(0.5)),
+            },
             "checkerboard" => self.checkerboard(node, of, reads)?,
             "mesh_attribute" => match node.text("name")? {
                 Some(name) if name.starts_with("vertex_") => {
@@ -102,13 +107,17 @@ impl Converter<'_> {
             },
             plugin => {
                 let Some(rgb) = self.spectrum_plugin(node, of)? else {
+                    let plugin = printable::name(plugin);
                     self.tell(node, &format!("textures of type {plugin} are not modelled: it is grey"));
                     return Ok(ColorValue::grey(0.5));
                 };
                 return Ok(ColorValue::Rgb(limited(rgb, of)));
             }
         };
-        let wanted = node.object().id.clone().unwrap_or_else(|| format!("{} {}", node.plugin(), node.index));
+        let wanted = match node.object().id {
+            Some(_) => node.called().to_owned(),
+            None => format!("{} {}", node.plugin(), node.index),
+        };
         let name = self.names.free(&wanted);
         self.file.textures.0.push((name.clone(), source));
         self.textures.insert((node.index, reads), name.clone());
@@ -161,22 +170,30 @@ impl Converter<'_> {
         })
     }
 
-    fn bitmap(&mut self, node: Node) -> Result<TextureSource, SceneError> {
+    /// `None` for an image that must not be read, which is told.
+    fn bitmap(&mut self, node: Node) -> Result<Option<TextureSource>, SceneError> {
         let name = node.text("filename")?.ok_or_else(|| node.error("a bitmap needs a `filename`"))?;
         node.ignore(&["format", "accel", "max_anisotropy", "gamma", "cache", "channel"]);
         let file = match find_file(&self.references, &self.graph.folders, name) {
             Ok(path) => self.file_path(&path),
-            // Told when it is looked for; or now, if it may not be.
-            Err(why) => {
-                self.tell(node, &why);
-                printable::name(name).into_owned()
-            }
+            Err(why) => match self.references.resolve(self.folder, name) {
+                // It is not there, which is told when it is looked for.
+                Ok(missing) => path_to_text(&missing.path),
+                Err(_) => {
+                    self.tell(node, &format!("{why}; the texture is grey"));
+                    node.skip();
+                    return Ok(None);
+                }
+            },
         };
         let wrap = match node.text("wrap_mode")? {
             None | Some("repeat") => Wrap::Repeat,
             Some("mirror") => Wrap::Mirror,
             Some("clamp") => Wrap::Clamp,
-            Some(other) => return Err(node.error(format!("`wrap_mode` must be repeat, mirror or clamp, not {other}"))),
+            Some(other) => {
+                let other = printable::name(other);
+                return Err(node.error(format!("`wrap_mode` must be repeat, mirror or clamp, not {other}")));
+            }
         };
         let smooth = node.text("filter_type")? != Some("nearest");
         let encoding = if node.boolean_or("raw", false)? { Encoding::Linear } else { Encoding::Auto };
@@ -203,7 +220,7 @@ impl Converter<'_> {
             (*a, *b, *c, *d) = (stretch, repeat, offset, rotate);
             (*e, *f, *g) = (wrap, smooth, encoding);
         }
-        Ok(image)
+        Ok(Some(image))
     }
 
     fn checkerboard(&mut self, node: Node, of: Use, reads: Reads) -> Result<TextureSource, SceneError> {

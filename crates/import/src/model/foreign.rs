@@ -8,6 +8,14 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Characters of a name that are kept: a name is stored with everything that uses it.
+const MOST_OF_A_NAME: usize = 256;
+
+/// The start of a long name.
+pub(crate) fn cut(name: &str) -> &str {
+    name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
+}
+
 /// Options for reading.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ForeignOptions {

@@ -1,5 +1,6 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
+use crate::model::foreign::cut;
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::model::placing::{is_placement, transform};
 use crate::pbrt::lights::{Light, color, light};
@@ -31,8 +32,6 @@ use std::sync::Arc;
 const MAX_OBJECTS: usize = 1 << 20;
 /// Bytes of meshes that formulas may make, for each byte that a scene may have.
 const BYTES_MADE: u64 = 4;
-/// Characters of a name that are kept: a name is stored with everything that uses it.
-const MOST_OF_A_NAME: usize = 256;
 
 /// What a shape is made of.
 #[derive(Clone, Debug)]
@@ -102,6 +101,8 @@ pub(crate) struct Builder<'a> {
     /// Bytes of meshes that may still be made of formulas: a few letters can ask for many triangles.
     pub(super) bytes_left: u64,
     pub(super) n_shapes: u32,
+    /// Shapes that were placed, also those that cannot be shown.
+    n_placed: usize,
     pub(super) n_described: u64,
     pub(super) depth: u32,
 }
@@ -140,6 +141,7 @@ impl<'a> Builder<'a> {
             ply: HashMap::new(),
             bytes_left: Limits::of_this_process().scene_bytes.saturating_mul(BYTES_MADE),
             n_shapes: 0,
+            n_placed: 0,
             n_described: 0,
             depth: 0,
         }
@@ -407,7 +409,8 @@ impl<'a> Builder<'a> {
 
     /// Adds an item to the scene.
     fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
-        if self.objects.len() >= MAX_OBJECTS {
+        self.n_placed += 1;
+        if self.n_placed > MAX_OBJECTS {
             return Err(TooMany);
         }
         let world = DAffine3::from_mat3(self.world) * *ctm;
@@ -530,9 +533,4 @@ fn even_scale(matrix: &DMat3) -> Option<f64> {
     let unit = *matrix * scale.recip();
     let deviation = unit.transpose() * unit - DMat3::IDENTITY;
     deviation.to_cols_array().iter().all(|entry| entry.abs() < 1e-5).then_some(scale)
-}
-
-/// The start of a long name.
-pub(super) fn cut(name: &str) -> &str {
-    name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
 }

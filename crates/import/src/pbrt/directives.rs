@@ -1,7 +1,9 @@
 //! The directives of a scene and of the files that it includes.
 
+use crate::model::foreign::cut;
 use crate::pbrt::build::{Builder, TooMany};
 use crate::pbrt::cursor::{Cursor, SourceText};
+use crate::pbrt::params::Param;
 use crate::pbrt::state::{MaterialRef, State};
 use crate::pbrt::transforms::{look_at, rotation};
 use crate::pbrt::view::{ViewOptions, ViewParts};
@@ -13,7 +15,7 @@ use firstlight_files::reference::References;
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_format::error::{SceneError, suggestion};
 use glam::DAffine3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -21,8 +23,9 @@ use std::rc::Rc;
 const MAX_INCLUDES_DEEP: usize = 32;
 /// Files that are included, all together.
 const MAX_INCLUDES: usize = 10_000;
-/// `Attribute`s that count at a time.
+/// Parameters of the `Attribute`s that count at a time, and their bytes: each shape gets a copy of all of them.
 const MAX_ATTRIBUTES: usize = 256;
+const MAX_ATTRIBUTE_BYTES: usize = 1 << 14;
 /// States that are saved at a time.
 const MAX_STATES: usize = 1024;
 
@@ -91,6 +94,7 @@ pub(crate) struct Reader<'a> {
     view: Option<ViewParts>,
     builder: Builder<'a>,
     files: Vec<(PathBuf, Stamp)>,
+    known_files: HashSet<PathBuf>,
     n_includes: usize,
     /// Bytes of text that may still be read.
     bytes_left: u64,
@@ -109,6 +113,7 @@ impl<'a> Reader<'a> {
             view: None,
             builder: Builder::new(path, allow_outside),
             files: Vec::new(),
+            known_files: HashSet::new(),
             n_includes: 0,
             bytes_left: Limits::of_this_process().scene_bytes,
         }
@@ -133,14 +138,18 @@ impl<'a> Reader<'a> {
         // Taken before reading, so that a change in the meantime is noticed.
         let before = stamp(path);
         let bytes = InputFile::open_within(path, FileKind::Scene, self.bytes_left).and_then(InputFile::bytes);
-        let bytes = bytes.and_then(|bytes| decompressed(bytes, FileKind::Scene, self.bytes_left));
         let bytes = bytes.map_err(|error| failed(error.to_string()))?;
-        self.bytes_left -= bytes.len() as u64;
+        let packed = bytes.len() as u64;
+        let bytes = decompressed(bytes, FileKind::Scene, self.bytes_left);
+        // What cannot be read took as long.
+        let length = bytes.as_ref().map_or(Limits::most_unpacked(packed), |bytes| bytes.len() as u64);
+        self.bytes_left = self.bytes_left.saturating_sub(length);
+        let bytes = bytes.map_err(|error| failed(error.to_string()))?;
         // Names in other encodings are no reason to refuse a scene.
         let text =
             String::from_utf8(bytes).unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned());
         let text = text.strip_prefix(BYTE_ORDER_MARK).map(str::to_owned).unwrap_or(text);
-        if !self.files.iter().any(|(known, _)| known == path) {
+        if self.known_files.insert(path.to_owned()) {
             self.files.push((path.to_owned(), before));
         }
         Ok(SourceText { path: path.to_owned(), text })
@@ -261,10 +270,14 @@ impl<'a> Reader<'a> {
             "Attribute" => {
                 let of = cursor.string()?;
                 let params = cursor.params()?;
-                if self.state.defaults.len() == MAX_ATTRIBUTES {
-                    return Err(cursor.wrong(at, format!("there are more than {MAX_ATTRIBUTES} `Attribute`s")));
+                let list = params.into_list();
+                let lists = || self.state.defaults.iter().map(|(_, list)| list).chain([&list]).flatten();
+                if lists().count() > MAX_ATTRIBUTES || lists().map(Param::n_bytes).sum::<usize>() > MAX_ATTRIBUTE_BYTES
+                {
+                    let most = format!("{MAX_ATTRIBUTES} parameters, or than {MAX_ATTRIBUTE_BYTES} bytes of them");
+                    return Err(cursor.wrong(at, format!("the `Attribute`s that count here have more than {most}")));
                 }
-                Rc::make_mut(&mut self.state.defaults).push((of, params.into_list()));
+                Rc::make_mut(&mut self.state.defaults).push((cut(&of).to_owned(), list));
             }
             "Include" | "Import" => {
                 let file = cursor.string()?;
@@ -321,14 +334,14 @@ impl<'a> Reader<'a> {
                 let params = self.state.with_defaults("material", cursor.params()?);
                 self.builder.describe_material(&material, params);
             }
-            "NamedMaterial" => self.state.material = MaterialRef::Named(cursor.string()?),
+            "NamedMaterial" => self.state.material = MaterialRef::Named(cut(&cursor.string()?).to_owned()),
             "MakeNamedMedium" => {
                 let medium = cursor.string()?;
                 let params = self.state.with_defaults("medium", cursor.params()?);
                 self.builder.describe_medium(&medium, &params);
             }
             "MediumInterface" => {
-                self.state.inside = cursor.string()?;
+                self.state.inside = cut(&cursor.string()?).to_owned();
                 let outside = cursor.optional_string()?;
                 if let Some(outside) = outside.filter(|outside| !outside.is_empty()) {
                     let outside = printable::name(&outside).into_owned();

@@ -25,6 +25,16 @@ pub(crate) struct Param {
 }
 
 impl Param {
+    /// Bytes of its name and its values.
+    pub(crate) fn n_bytes(&self) -> usize {
+        let of_values = match &self.values {
+            Values::Numbers(numbers) => size_of_val(numbers.as_slice()),
+            Values::Strings(strings) => strings.iter().map(|it| size_of_val(it) + it.len()).sum(),
+            Values::Bools(flags) => flags.len(),
+        };
+        self.kind.len() + self.name.len() + of_values
+    }
+
     /// A number.
     pub(crate) fn number(name: &str, number: f64) -> Self {
         Self { kind: "float".to_owned(), name: name.to_owned(), values: Values::Numbers(vec![number]) }

@@ -1,6 +1,7 @@
 //! Materials and textures of a scene: described under their names, and converted when a shape has them.
 
-use crate::pbrt::build::{Builder, cut};
+use crate::model::foreign::cut;
+use crate::pbrt::build::Builder;
 use crate::pbrt::materials::{MaterialScope, emissive, material, with_layers};
 use crate::pbrt::params::Params;
 use crate::pbrt::state::{Described, MaterialRef, State};
@@ -154,6 +155,8 @@ impl Builder<'_> {
         if self.depth >= MAX_DEPTH {
             return None;
         }
+        // A mixture that contains itself finds nothing there.
+        self.material_of.insert(key.clone(), None);
         self.depth += 1;
         let wanted = if described.name.is_empty() { described.kind.as_str() } else { &described.name };
         let wanted = cut(if wanted.is_empty() { "material" } else { wanted }).to_owned();

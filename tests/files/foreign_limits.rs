@@ -1,0 +1,145 @@
+//! Scenes of other renderers that were written to do harm: what they name outside of their folder is not read, and what
+//! would take for ever, or all memory, is refused or cut short.
+
+use firstlight::scene::file::ObjectPart;
+use firstlight::scene::{LoadOptions, LoadedScene, SceneSource, load};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder with these files in `in/`, and the path of the first.
+fn folder(files: &[(&str, String)]) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("in");
+    std::fs::create_dir(&inner).unwrap();
+    files.iter().for_each(|(name, text)| std::fs::write(inner.join(name), text).unwrap());
+    (folder, inner.join(files[0].0))
+}
+
+fn open(path: &Path) -> Result<LoadedScene, String> {
+    load(&SceneSource::Foreign(path.to_owned()), &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+fn mitsuba(body: &str) -> Result<LoadedScene, String> {
+    let scene =
+        format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/><emitter type=\"constant\"/>\n{body}</scene>");
+    open(&folder(&[("a.xml", scene)]).1)
+}
+
+fn pbrt(body: &str) -> Result<LoadedScene, String> {
+    let scene = format!("Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\n{body}");
+    open(&folder(&[("a.pbrt", scene)]).1)
+}
+
+fn told(scene: &LoadedScene) -> String {
+    scene.warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn images_outside_of_the_folder_are_not_read() {
+    let image = |name: &str| {
+        format!(
+            "<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\">\
+             <string name=\"filename\" value=\"{name}\"/></texture></bsdf></shape>\n"
+        )
+    };
+    let (folder, path) = folder(&[("a.xml", String::new())]);
+    let secret = folder.path().join("secret.png");
+    image::RgbImage::from_pixel(1, 1, image::Rgb([255, 0, 0])).save(&secret).unwrap();
+    image::RgbImage::new(1, 1).save(path.with_file_name("own.png")).unwrap();
+    let names = ["../secret.png", secret.to_str().unwrap(), "x/../../secret.png", "..\\secret.png", "own.png"];
+    let body: String = names.into_iter().map(image).collect();
+    std::fs::write(&path, format!("<scene version=\"3.0.0\">{body}</scene>")).unwrap();
+    let scene = open(&path).unwrap();
+    let read: Vec<_> = scene.read_files().into_iter().map(|read| read.name).collect();
+    assert!(read.iter().any(|name| name == "own.png") && !read.iter().any(|name| name.contains("secret")), "{read:?}");
+    assert_eq!(scene.file.textures.names().count(), 1, "{read:?}");
+    assert!(told(&scene).contains("a path out of the folder"), "{}", told(&scene));
+}
+
+#[test]
+fn materials_that_double_themselves_are_read_at_once() {
+    let doubled =
+        |i: u32| format!("<bsdf type=\"twosided\" id=\"t{}\"><ref id=\"t{i}\"/><ref id=\"t{i}\"/></bsdf>", i + 1);
+    let all: String = (0..30).map(doubled).collect();
+    let scene =
+        mitsuba(&format!("<bsdf type=\"diffuse\" id=\"t0\"/>{all}<shape type=\"sphere\"><ref id=\"t30\"/></shape>"));
+    let scene = scene.unwrap();
+    assert!(told(&scene).contains("more than 8 lobes"), "{}", told(&scene));
+    assert!(scene.file.materials.names().count() < 100);
+    let scene = pbrt(
+        "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"]\n\
+         NamedMaterial \"m\"\nShape \"sphere\"\n",
+    );
+    let scene = scene.unwrap();
+    assert!(told(&scene).contains("`m`: its two `materials` are not there"), "{}", told(&scene));
+    assert!(!told(&scene).contains("too many"), "{}", told(&scene));
+}
+
+#[test]
+fn names_are_not_stored_in_full_with_everything_that_has_them() {
+    let long = "a".repeat(100_000);
+    let scene = mitsuba(&format!(
+        "<shape type=\"shapegroup\" id=\"g\"><shape type=\"cube\" id=\"{long}\"/></shape>{}",
+        "<shape type=\"instance\"><ref id=\"g\"/></shape>".repeat(3)
+    ));
+    let names: Vec<usize> = scene.unwrap().file.objects.iter().filter_map(ObjectPart::name).map(str::len).collect();
+    assert!(names.len() == 3 && names.iter().all(|length| *length < 300), "{names:?}");
+    // Cut alike where it is described and where it is used.
+    let scene = pbrt(&format!(
+        "MakeNamedMaterial \"{long}\" \"string type\" \"conductor\"\nNamedMaterial \"{long}\"\nShape \"sphere\"\n"
+    ));
+    assert!(!told(&scene.unwrap()).contains("there is no material"));
+    let texture = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\"";
+    let scene = pbrt(&format!("{texture} \"{long}\"\nShape \"sphere\"\n")).unwrap();
+    assert!(told(&scene).contains("too long for a path"), "{}", told(&scene));
+}
+
+#[test]
+fn what_takes_the_square_of_its_length_is_refused() {
+    let refused = |scene: Result<LoadedScene, String>, why: &str| {
+        let said = scene.err().unwrap_or_else(|| panic!("it opens: {why}"));
+        assert!(said.contains(why), "{said}");
+    };
+    let many = |n: usize, part: fn(usize) -> String| (0..n).map(part).collect::<String>();
+    let spaces = many(100, |i| format!("<a xmlns:a{i}=\"b\">"));
+    refused(mitsuba(&format!("{spaces}{}", "</a>".repeat(100))), "more than 64 namespaces");
+    refused(mitsuba(&format!("<a {}/>", many(5000, |i| format!("a{i}=\"\" ")))), "more than 4096 attributes");
+    refused(mitsuba(&many(17, |i| format!("<path value=\"f{i}\"/>"))), "name 16 folders");
+    assert!(mitsuba(&"<path value=\"f\"/>".repeat(100)).is_ok());
+    // A group is asked for all that is in it at each of its instances.
+    let group = format!("<shape type=\"shapegroup\" id=\"g\">{}</shape>", "<ref id=\"x\"/>".repeat(4200));
+    let instances = format!("<shape type=\"instance\">{}</shape>", "<ref id=\"g\"/>".repeat(4000));
+    refused(mitsuba(&format!("<bsdf type=\"null\" id=\"x\"/>{group}{instances}")), "parts");
+    let attribute = |i| format!("Attribute \"shape\" \"float a{i}\" 1\n");
+    refused(pbrt(&(0..300).map(attribute).collect::<String>()), "more than 256 parameters");
+    let numbers = "1 ".repeat(4000);
+    refused(pbrt(&format!("Attribute \"shape\" \"point3 P\" [{numbers}]")), "bytes of them");
+}
+
+#[test]
+fn sizes_at_the_ends_of_their_range_are_sizes() {
+    let film = |x: i64, y: i64| {
+        let value = |name: &str, value: i64| format!("<integer name=\"{name}\" value=\"{value}\"/>");
+        let offsets = value("crop_offset_x", x) + &value("crop_offset_y", y);
+        let size = value("crop_width", 10) + &value("crop_height", 10);
+        mitsuba(&format!("<sensor type=\"perspective\"><film type=\"hdrfilm\">{offsets}{size}</film></sensor>"))
+    };
+    for (x, y) in [(i64::MAX, i64::MIN), (i64::MIN, i64::MAX), (1 << 62, 1 << 62)] {
+        assert!(told(&film(x, y).unwrap()).contains("off the middle"), "{x} {y}");
+    }
+}
+
+#[test]
+fn spectra_are_files_of_the_scene() {
+    let spectrum = "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" filename=\"a.spd\"/></bsdf>";
+    let scene = format!("<scene version=\"3.0.0\"><shape type=\"sphere\">{spectrum}</shape></scene>");
+    let (_folder, path) = folder(&[("a.xml", scene), ("a.spd", "400 0.5\n700 0.5\n".to_owned())]);
+    let scene = open(&path).unwrap();
+    let names: Vec<_> = scene
+        .read_files()
+        .iter()
+        .flat_map(|read| &read.files)
+        .map(|file| file.file_name().unwrap().to_owned())
+        .collect();
+    assert_eq!(names, ["a.xml", "a.spd"]);
+}
