@@ -107,7 +107,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             resolve(source, SceneFile::parse(&text, path)?, Some(&text), folder, options, &documents)?
         }
         SceneSource::Foreign(path) => {
-            let read = documents.scene(path)?;
+            let read = documents.scene(path, &options.choice().defines)?;
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mut scene = resolve(source, read.file.clone(), None, folder, options, &documents)?;
             let of_files = std::mem::replace(&mut scene.warnings, read.warnings.clone());

@@ -120,14 +120,15 @@ impl MetadataDraft {
         *self.prints.get_or_init(|| {
             let content = self.content.fingerprint();
             let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
-            // The file does not name a replaced environment, nor the camera, time or variant of a model; and a scene that
-            // was stored in an image has no file.
+            // The file does not name a replaced environment, nor the camera, time or variant of a model, nor the values
+            // of its parameters; and a scene that was stored in an image has no file.
             let is_own = |it: &LoadedScene| {
                 it.environment.is_some()
                     || it.choice.at.is_some()
                     || it.choice.shutter.is_some()
                     || it.choice.variant.is_some()
                     || it.choice.camera.is_some()
+                    || !it.choice.defines.is_empty()
                     || it.shot.as_ref().is_some_and(|shot| shot.text.is_some())
             };
             let is_another = opened != Some(content) || self.loaded.as_ref().is_some_and(is_own);

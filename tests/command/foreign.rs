@@ -185,3 +185,29 @@ fn a_name_that_is_none_everywhere_is_not_packed() {
         std::fs::remove_dir_all(path.join("job")).unwrap();
     }
 }
+
+#[test]
+fn the_values_of_parameters_stay_with_the_shapes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mesh = |width: f64| {
+        let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                      element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        format!("{header}-{width} -1 0\n{width} -1 0\n0 1 0\n3 0 1 2\n")
+    };
+    std::fs::write(path.join("wide.ply"), mesh(1.0)).unwrap();
+    std::fs::write(path.join("narrow.ply"), mesh(0.2)).unwrap();
+    let scene = "<scene version=\"3.0.0\"><default name=\"mesh\" value=\"wide.ply\"/><emitter type=\"constant\"/>\
+                 <shape type=\"ply\"><string name=\"filename\" value=\"$mesh\"/></shape></scene>";
+    std::fs::write(path.join("s.xml"), scene).unwrap();
+    let how = "--size 8x6 --spp 2 --seed 1";
+    does(path, &format!("render s.xml -D mesh=narrow.ply -o narrow.png {how}"));
+    does(path, &format!("render s.xml -o wide.png {how}"));
+    does(path, "save s.xml -D mesh=narrow.ply -o saved.ron");
+    does(path, &format!("render saved.ron -o saved.png {how}"));
+    let said = does(path, &format!("render narrow.png -o again.png {how}"));
+    assert!(!said.contains("has changed"), "{said}");
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb8();
+    assert!(pixels("narrow.png") != pixels("wide.png"));
+    assert!(pixels("narrow.png") == pixels("saved.png") && pixels("narrow.png") == pixels("again.png"));
+}

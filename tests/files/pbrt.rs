@@ -230,7 +230,7 @@ fn a_scene_is_saved_as_ours_and_opened_again() {
     let copy = folder.path().join("copy.ron");
     let saved = save_scene(&mut world, Some(&scene), &copy).unwrap();
     let again = open(&copy);
-    let part = |shape| MeshSource::Part { file: "scene/a.pbrt".to_owned(), shape };
+    let part = |shape| MeshSource::Part { file: "scene/a.pbrt".to_owned(), shape, defines: Vec::new() };
     let sources = again.file.objects.iter().map(|object| match object {
         ObjectPart::Mesh { source, .. } => source.clone(),
         other => panic!("{other:?}"),

@@ -211,6 +211,9 @@ pub enum MeshSource {
         file: String,
         /// Index of the shape in the scene, with the files that it includes, from 0.
         shape: u32,
+        /// Names and values of parameters that the scene leaves open, on which its shapes depend.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        defines: Vec<(String, String)>,
     },
     /// A built-in mesh, by name.
     Builtin(String),

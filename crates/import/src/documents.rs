@@ -29,11 +29,9 @@ type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 #[derive(Debug, Default)]
 pub struct Documents {
     options: ReadOptions,
-    /// Names and values of parameters of scenes of other renderers.
-    defines: Vec<(String, String)>,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
-    /// Scenes of other renderers.
-    scenes: Mutex<HashMap<PathBuf, Arc<ForeignScene>>>,
+    /// Scenes of other renderers, with the names and values of their parameters.
+    scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), Arc<ForeignScene>>>,
     /// Of all images that are decoded.
     pixels: ImageBudget,
     /// Images that were decoded and not yet taken, by path.
@@ -64,7 +62,7 @@ impl Documents {
     /// No file yet.
     pub fn new(choice: &ModelChoice) -> Self {
         let options = ReadOptions { allow_outside: choice.allow_outside, ..ReadOptions::default() };
-        Self { options, defines: choice.defines.clone(), ..Self::default() }
+        Self { options, ..Self::default() }
     }
 
     /// Whether models may refer to files outside of their folders.
@@ -96,13 +94,16 @@ impl Documents {
     }
 
     /// The scene of another renderer at `path`, read on first use.
-    pub fn scene(&self, path: &Path) -> Result<Arc<ForeignScene>, SceneError> {
-        if let Some(scene) = lock(&self.scenes).get(path) {
+    ///
+    /// - `defines`: names and values of parameters that it leaves open.
+    pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> Result<Arc<ForeignScene>, SceneError> {
+        let key = (path.to_owned(), defines.to_vec());
+        if let Some(scene) = lock(&self.scenes).get(&key) {
             return Ok(scene.clone());
         }
-        let options = ForeignOptions { allow_outside: self.options.allow_outside, defines: self.defines.clone() };
+        let options = ForeignOptions { allow_outside: self.options.allow_outside, defines: key.1.clone() };
         let scene = Arc::new(read_scene(path, &options)?);
-        Ok(lock(&self.scenes).entry(path.to_owned()).or_insert(scene).clone())
+        Ok(lock(&self.scenes).entry(key).or_insert(scene).clone())
     }
 
     /// A mesh with the normals of its file.

@@ -76,9 +76,9 @@ pub fn load_mesh(
         let (warnings, material_warnings) = (base.warnings, base.material_warnings);
         return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
     }
-    if let MeshSource::Part { file, shape } = source {
+    if let MeshSource::Part { file, shape, defines } = source {
         let path = folder.join(text_to_path(file));
-        let scene = documents.scene(&path)?;
+        let scene = documents.scene(&path, defines)?;
         let mesh = part_of(&scene, &path, *shape)?;
         let is_as_in_file = shading == MeshShading::Auto && simplify.is_none();
         let mesh = if is_as_in_file {
@@ -146,9 +146,9 @@ impl MeshBase {
                 let base = read.base(&Documents::default()).map_err(|error| SceneError::new(error.to_string()))?;
                 (base.mesh, Some(CREASE))
             }
-            MeshSource::Part { file, shape } => {
+            MeshSource::Part { file, shape, defines } => {
                 let path = folder.join(text_to_path(file));
-                let scene = Documents::default().scene(&path)?;
+                let scene = Documents::default().scene(&path, defines)?;
                 (part_base(part_of(&scene, &path, *shape)?, shading), Some(CREASE))
             }
             MeshSource::Obj(file) | MeshSource::Ply(file) | MeshSource::Stl(file) => {

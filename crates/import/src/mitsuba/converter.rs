@@ -60,6 +60,8 @@ pub(crate) struct Converter<'a> {
     pub references: References<'a>,
     /// Of the scene: paths are relative to it.
     pub folder: &'a Path,
+    /// Names and values from the command line.
+    pub defines: &'a [(String, String)],
     /// Of the scene in its folder.
     pub file_name: String,
     pub textures: HashMap<(usize, Reads), String>,

@@ -40,7 +40,13 @@ pub(crate) struct Converted {
 }
 
 impl<'a> Converter<'a> {
-    pub(crate) fn new(graph: &'a Graph, references: References<'a>, folder: &'a Path, file_name: String) -> Self {
+    pub(crate) fn new(
+        graph: &'a Graph,
+        references: References<'a>,
+        folder: &'a Path,
+        file_name: String,
+        defines: &'a [(String, String)],
+    ) -> Self {
         let file = SceneFile::new(CameraPart::looking_at(DVec3::ZERO, DVec3::Z));
         Self {
             graph,
@@ -49,6 +55,7 @@ impl<'a> Converter<'a> {
             warnings: Warnings::default(),
             references,
             folder,
+            defines,
             file_name,
             textures: HashMap::new(),
             texture_depth: 0,

@@ -178,7 +178,7 @@ impl Converter<'_> {
         if material.needs_colors {
             self.colored.entry(shape).or_insert(node.index);
         }
-        let source = MeshSource::Part { file: self.file_name.clone(), shape };
+        let source = MeshSource::Part { file: self.file_name.clone(), shape, defines: self.defines.to_vec() };
         let material = Some(material.name);
         let (shading, simplify, materials) = (MeshShading::Auto, None, None);
         self.file.objects.push(ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform });

@@ -286,7 +286,7 @@ impl<'a> Builder<'a> {
     ) -> Result<Geometry, String> {
         let part = || {
             let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-            MeshSource::Part { file, shape: number }
+            MeshSource::Part { file, shape: number, defines: Vec::new() }
         };
         if kind == "sphere" && is_whole_sphere(params) {
             let source = part();
@@ -451,7 +451,7 @@ impl<'a> Builder<'a> {
                         }
                     }
                     let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-                    mesh(MeshSource::Part { file, shape: *shape }, MeshShading::Auto)
+                    mesh(MeshSource::Part { file, shape: *shape, defines: Vec::new() }, MeshShading::Auto)
                 }
             },
         };
