@@ -112,7 +112,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mut scene = resolve(source, read.file.clone(), None, folder, options, &documents)?;
             let of_files = std::mem::replace(&mut scene.warnings, read.warnings.clone());
             scene.warnings.append(&of_files);
-            scene.text_files = read.files.clone();
+            scene.text_files = read.files.to_vec();
             let bounds = scene.look_at_middle();
             if !scene.has_light() {
                 model =
@@ -378,8 +378,7 @@ impl LoadedScene {
             SceneSource::Scene(path) => read_text(path).and_then(|text| SceneFile::parse(&text, path)).is_ok(),
             SceneSource::Foreign(path) | SceneSource::Model(path) => {
                 let path = absolute(path);
-                let mut files = self.meshes.iter().flatten().flat_map(|mesh| &mesh.files);
-                files.any(|(file, _)| absolute(file) == path)
+                self.mesh_files().into_iter().any(|(file, _)| absolute(file) == path)
             }
         }
     }
@@ -574,12 +573,19 @@ impl LoadedScene {
             SceneSource::Builtin(_) | SceneSource::Picture(_) => None,
         };
         let of_text = self.text_files.iter().map(|(path, _)| path.clone());
-        let of_meshes = self.meshes.iter().flatten().flat_map(|mesh| mesh.files.iter().map(|(path, _)| path.clone()));
+        let of_meshes = self.mesh_files().into_iter().map(|(path, _)| path.clone());
         let of_pictures = self.picture_files.values().map(|(path, _)| path.clone());
         let mut files: Vec<PathBuf> = own.into_iter().chain(of_text).chain(of_meshes).chain(of_pictures).collect();
         files.sort();
         files.dedup();
         files
+    }
+
+    /// The files of all meshes: those of a file with many meshes once.
+    fn mesh_files(&self) -> Vec<&(PathBuf, Stamp)> {
+        let mut seen = HashSet::new();
+        let lists = self.meshes.iter().flatten().filter(|mesh| seen.insert(Arc::as_ptr(&mesh.files)));
+        lists.flat_map(|mesh| mesh.files.iter()).collect()
     }
 
     /// The mesh of a model, if its files have not changed.

@@ -8,8 +8,9 @@ use crate::format::parts::ObjectPart;
 use crate::format::sources::{EnvironmentSource, TextureSource};
 use crate::import::gltf::images::part_of_model;
 use crate::scene::loaded::LoadedScene;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a name in a scene stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +31,7 @@ impl LoadedScene {
             known.insert(name.clone(), 0);
             found.push(ReadFiles { name, files: self.text_files.iter().map(|(path, _)| path.clone()).collect() });
         }
+        let mut seen = HashSet::new();
         for (object, mesh) in self.file.objects.iter().zip(&self.meshes) {
             let (ObjectPart::Mesh { source, .. }, Some(mesh)) = (object, mesh) else { continue };
             // What could not be read as a mesh may be any file of the computer.
@@ -38,12 +40,14 @@ impl LoadedScene {
                 TextureSource::Image { file, .. } => self.picture_file(file),
                 _ => None,
             });
-            let files = mesh.files.iter().map(|(path, _)| path.as_path()).chain(of_textures).map(Path::to_path_buf);
             let first = *known.entry(name.to_owned()).or_insert_with(|| {
                 found.push(ReadFiles { name: name.to_owned(), files: Vec::new() });
                 found.len() - 1
             });
-            found[first].files.extend(files);
+            // Those of a file with many meshes once.
+            let of_mesh = Some(&mesh.files).filter(|files| seen.insert((first, Arc::as_ptr(files))));
+            let of_mesh = of_mesh.into_iter().flat_map(|files| files.iter()).map(|(path, _)| path.as_path());
+            found[first].files.extend(of_mesh.chain(of_textures).map(Path::to_path_buf));
         }
         let of_textures = self.file.textures.iter().filter_map(|(_, texture)| match texture {
             TextureSource::Image { file, .. } => Some(file),
@@ -63,7 +67,7 @@ impl LoadedScene {
         }
         for read in &mut found {
             // The order of the first, which is the one that is named, stays.
-            let mut seen = std::collections::HashSet::new();
+            let mut seen = HashSet::new();
             read.files.retain(|path| seen.insert(path.clone()));
         }
         found

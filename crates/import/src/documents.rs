@@ -44,7 +44,7 @@ pub struct Opened {
     /// The file.
     pub document: Document,
     /// All files that were read for it, each with its stamp from before it was read.
-    pub files: Vec<(PathBuf, Stamp)>,
+    pub files: Arc<[(PathBuf, Stamp)]>,
     /// By the bits of the time.
     posed: Mutex<HashMap<Option<u64>, Arc<Posed>>>,
     /// By the path of the model in texture paths.

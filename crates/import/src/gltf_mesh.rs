@@ -14,6 +14,7 @@ use firstlight_format::sources::{MeshShading, TextureSource};
 use firstlight_mesh::Mesh;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A mesh before simplification and shading, and the materials of its slots.
 #[derive(Default)]
@@ -26,7 +27,7 @@ pub(crate) struct GltfBase {
     /// Warnings about `slots`.
     pub material_warnings: Warnings,
     /// All files that were read for it, each with its stamp.
-    pub files: Vec<(PathBuf, Stamp)>,
+    pub files: Arc<[(PathBuf, Stamp)]>,
 }
 
 /// Which mesh to build, and how.

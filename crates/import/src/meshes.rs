@@ -55,7 +55,7 @@ pub struct LoadedMesh {
     /// Warnings about `slots`, for objects that use them.
     pub material_warnings: Warnings,
     /// All files that were read for it, each with its stamp.
-    pub files: Vec<(PathBuf, Stamp)>,
+    pub files: Arc<[(PathBuf, Stamp)]>,
 }
 
 /// Reads or generates a mesh, then simplifies and shades it.
@@ -86,7 +86,10 @@ pub fn load_mesh(
         } else {
             Arc::new(finish(part_base(mesh, shading), source, shading, simplify, Some(CREASE))?)
         };
-        let files = scene.files.iter().chain(scene.part_files.get(shape)).cloned().collect();
+        let files = match scene.part_files.get(shape) {
+            Some(own) => scene.files.iter().chain([own]).cloned().collect(),
+            None => scene.files.clone(),
+        };
         return Ok(LoadedMesh { mesh, ..LoadedMesh::empty(files) });
     }
     match (source.file(), source.model_format()) {
@@ -96,7 +99,7 @@ pub fn load_mesh(
         }
         _ => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
-            Ok(LoadedMesh { mesh: Arc::new(mesh), ..LoadedMesh::empty(Vec::new()) })
+            Ok(LoadedMesh { mesh: Arc::new(mesh), ..LoadedMesh::empty(Arc::default()) })
         }
     }
 }
@@ -281,7 +284,7 @@ fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
 
 impl LoadedMesh {
     /// Without triangles, materials and warnings: of an object that cannot be shown, or to be filled.
-    pub fn empty(files: Vec<(PathBuf, Stamp)>) -> Self {
+    pub fn empty(files: Arc<[(PathBuf, Stamp)]>) -> Self {
         Self {
             mesh: Arc::default(),
             slots: Vec::new(),

@@ -38,5 +38,5 @@ pub struct ForeignScene {
     /// What is not shown as the file says, each kind once.
     pub warnings: Warnings,
     /// The scene, then the files that it includes, each with its stamp from before it was read.
-    pub files: Vec<(PathBuf, Stamp)>,
+    pub files: Arc<[(PathBuf, Stamp)]>,
 }

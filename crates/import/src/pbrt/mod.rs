@@ -54,5 +54,6 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
         lights: builder.lights,
         ..SceneFile::new(view.camera)
     };
-    Ok(ForeignScene { file, parts: builder.parts, part_files: HashMap::new(), warnings: builder.warnings, files })
+    let (parts, warnings, files) = (builder.parts, builder.warnings, files.into());
+    Ok(ForeignScene { file, parts, part_files: HashMap::new(), warnings, files })
 }
