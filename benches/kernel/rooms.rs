@@ -59,8 +59,7 @@ fn loaded(path: &std::path::Path) -> Room {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     let shapes = extraction.prepared.geometry.tree.shapes().iter();
     let shapes = shapes.filter(|shape| matches!(shape, Shape::Mesh { .. })).cloned().collect();
-    let name =
-        path.ancestors().find_map(|at| at.file_name()).map_or_else(String::new, |name| name.to_string_lossy().into());
+    let name = path.display().to_string();
     Room { name, shapes, eye: vec3(0.5, 0.1, 0.5) }
 }
 
