@@ -381,7 +381,8 @@ fn delta_light(LightInput { light, placement, .. }: &LightInput, origin: DVec3) 
         LightKind::Point(light) => DeltaLight::Point { position, intensity: light.intensity },
         LightKind::Spot(spot) => {
             let axis = light.direction(placement)?.as_vec3().normalize();
-            let cone = Cone::new(axis, spot.inner_angle_deg.to_radians(), spot.outer_angle_deg.to_radians());
+            let [inner, outer] = [spot.inner_angle_deg, spot.outer_angle_deg].map(f64::to_radians);
+            let cone = Cone::new(axis, inner, outer, spot.falloff);
             DeltaLight::Spot { position, intensity: spot.intensity, cone }
         }
         LightKind::Directional(directional) => DeltaLight::Directional {

@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::World;
 use firstlight::frame::{Target, render_offline};
-use firstlight::render::Film;
+use firstlight::render::{Falloff, Film};
 use firstlight::scene::{
     BUILTIN_SCENES, Description, DirectionalLight, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene,
     Material, Placement, PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, SpotLight,
@@ -133,7 +133,8 @@ proptest! {
         let (direction, irradiance) = (towards, Vec3::splat(intensity));
         let [inner_angle_deg, outer_angle_deg] = [0.4 * vfov, 0.5 * vfov];
         for placement in [place, Placement::at(eye)] {
-            let spot = SpotLight { intensity: irradiance, direction, inner_angle_deg, outer_angle_deg };
+            let falloff = Falloff::Linear;
+            let spot = SpotLight { intensity: irradiance, direction, inner_angle_deg, outer_angle_deg, falloff };
             world.spawn((spot, placement));
             world.spawn((DirectionalLight { irradiance, direction }, placement));
         }

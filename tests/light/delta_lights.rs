@@ -3,7 +3,7 @@
 use crate::common::*;
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Cone, DeltaLight, Environment, Film, Fresnel, Integrator, Material, Prepared, RenderSettings,
+    ColorInput, Cone, DeltaLight, Environment, Falloff, Film, Fresnel, Integrator, Material, Prepared, RenderSettings,
     ScalarInput, Shading, Techniques, advance,
 };
 use glam::{DVec3, Vec3};
@@ -17,7 +17,8 @@ fn point(position: Vec3, intensity: f32) -> DeltaLight {
 }
 
 fn spot(position: Vec3, towards: Vec3, intensity: f32, inner_deg: f64, outer_deg: f64) -> DeltaLight {
-    let cone = Cone::new((towards - position).normalize(), inner_deg.to_radians(), outer_deg.to_radians());
+    let cone =
+        Cone::new((towards - position).normalize(), inner_deg.to_radians(), outer_deg.to_radians(), Falloff::Quadratic);
     DeltaLight::Spot { position, intensity: Vec3::splat(intensity), cone }
 }
 

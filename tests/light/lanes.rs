@@ -4,9 +4,9 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, HitSpace, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, CausticPlan, ColorInput, Cone, DeltaLight, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture,
-    Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques,
-    Texture, TexturePattern, Wrap, advance, replay_sample,
+    BadSample, CausticPlan, ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel, Geometry,
+    ImageTexture, Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot,
+    Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -142,7 +142,7 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
     let shining = || placed(procedural::icosphere(1), scaled(Vec3::new(0.5, -0.4, 0.5), Vec3::new(-0.5, 2.6, 0.5)));
     let small = || placed(procedural::icosphere(3), scaled(Vec3::splat(0.15), Vec3::new(1.2, 2.4, 1.0)));
     let sky = Environment::Gradient { zenith: Vec3::new(0.2, 0.4, 0.9), horizon: Vec3::ONE, ground: Vec3::splat(0.1) };
-    let cone = Cone::new(Vec3::new(0.3, -1.0, 0.1).normalize(), 0.3, 0.7);
+    let cone = Cone::new(Vec3::new(0.3, -1.0, 0.1).normalize(), 0.3, 0.7, Falloff::Smooth);
     let without_size = |n: usize| -> Vec<DeltaLight> {
         (0..n)
             .map(|i| {

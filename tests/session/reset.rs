@@ -4,7 +4,7 @@ use bevy_ecs::component::{Component, Mutable};
 use bevy_ecs::prelude::{Entity, World};
 use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOptions, StopAt, Target, Threads};
 use firstlight::mesh::procedural;
-use firstlight::render::{Environment, Integrator, ToneCurve};
+use firstlight::render::{Environment, Falloff, Integrator, ToneCurve};
 use firstlight::scene::{
     Balls, ColorParam, DirectionalLight, GREY, Lens, Linear, Material, MaterialSlots, Placement, PointLight,
     Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
@@ -124,7 +124,13 @@ fn each_component_has_its_level() {
     // No ray can hit these: no tree knows them.
     let up = Placement::at(DVec3::Y);
     let point = stage.light_of(PointLight { intensity: Vec3::ONE, radius: 0.0 }, up);
-    let cone = SpotLight { intensity: Vec3::ONE, direction: DVec3::Z, inner_angle_deg: 1.0, outer_angle_deg: 2.0 };
+    let cone = SpotLight {
+        intensity: Vec3::ONE,
+        direction: DVec3::Z,
+        inner_angle_deg: 1.0,
+        outer_angle_deg: 2.0,
+        falloff: Falloff::Quadratic,
+    };
     let spot = stage.light_of(cone, up);
     let sun = stage.light_of(DirectionalLight { irradiance: Vec3::ONE, direction: DVec3::Z }, up);
     for light in [point, spot] {

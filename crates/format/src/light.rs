@@ -6,6 +6,7 @@ use crate::parts::{LightPart, TransformPart};
 use crate::placement::Placement;
 use crate::value::Rgb;
 use crate::view::unit_direction;
+use firstlight_render::Falloff;
 use glam::{DVec3, Vec3};
 
 /// Emits uniformly in all directions; rendered as an emissive sphere, or as a point if its radius is 0.
@@ -21,10 +22,7 @@ pub struct PointLight {
 
 /// Emits from a point into a cone; rays cannot hit it.
 ///
-/// At the angle a from the axis its intensity is `intensity` · t², with t = (cos a − cos outer) / (cos inner − cos
-/// outer), clamped to 0..1.
-///
-/// Source: glTF 2.0, KHR_lights_punctual.
+/// Between the two angles its intensity falls off from `intensity` to 0, see [`Falloff`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
 #[cfg_attr(feature = "ecs", require(Placement))]
@@ -37,6 +35,8 @@ pub struct SpotLight {
     pub inner_angle_deg: f64,
     /// Degrees from the axis, above 0 and at most 90; no light beyond.
     pub outer_angle_deg: f64,
+    /// How the intensity falls off between the two.
+    pub falloff: Falloff,
 }
 
 /// Emits parallel light from infinitely far away; rays cannot hit it. Like the light of the environment, it is not
@@ -89,10 +89,10 @@ impl LightKind {
         !matches!(self, Self::Directional(_))
     }
 
-    /// Inner and outer angle of its cone, degrees; `None` if it has no cone.
-    pub fn cone_deg(&self) -> Option<(f64, f64)> {
+    /// Inner and outer angle of its cone, degrees, and the falloff between them; `None` if it has no cone.
+    pub fn cone(&self) -> Option<(f64, f64, Falloff)> {
         match self {
-            Self::Spot(light) => Some((light.inner_angle_deg, light.outer_angle_deg)),
+            Self::Spot(light) => Some((light.inner_angle_deg, light.outer_angle_deg, light.falloff)),
             Self::Point(_) | Self::Directional(_) => None,
         }
     }
@@ -162,12 +162,15 @@ impl LightKind {
             LightPart::Point { position, intensity, radius, .. } => {
                 (Self::Point(PointLight { intensity: intensity.0, radius: *radius }), Placement::at(*position))
             }
-            LightPart::Spot { position, direction, intensity, inner_angle, outer_angle, transform, .. } => {
+            LightPart::Spot {
+                position, direction, intensity, inner_angle, outer_angle, falloff, transform, ..
+            } => {
                 let light = SpotLight {
                     intensity: intensity.0,
                     direction: *direction,
                     inner_angle_deg: *inner_angle,
                     outer_angle_deg: *outer_angle,
+                    falloff: *falloff,
                 };
                 let placement = Placement::from_part(transform);
                 let translation = placement.affine().transform_point3(*position);
@@ -191,15 +194,18 @@ impl LightKind {
             Self::Point(PointLight { intensity, radius }) => {
                 LightPart::Point { name, position: placement.translation, intensity: Rgb(intensity), radius }
             }
-            Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg }) => LightPart::Spot {
-                name,
-                position,
-                direction,
-                intensity: Rgb(intensity),
-                inner_angle: inner_angle_deg,
-                outer_angle: outer_angle_deg,
-                transform,
-            },
+            Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg, falloff }) => {
+                LightPart::Spot {
+                    name,
+                    position,
+                    direction,
+                    intensity: Rgb(intensity),
+                    inner_angle: inner_angle_deg,
+                    outer_angle: outer_angle_deg,
+                    falloff,
+                    transform,
+                }
+            }
             Self::Directional(DirectionalLight { irradiance, direction }) => {
                 LightPart::Directional { name, direction, irradiance: Rgb(irradiance), transform: placement.to_part() }
             }

@@ -5,7 +5,7 @@ use crate::bounds::check_stops;
 use crate::key::KeyValue;
 use crate::sources::{MeshShading, MeshSource};
 use crate::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Display, Material, Params, PixelFilter, ToneCurve};
+use firstlight_render::{Display, Falloff, Material, Params, PixelFilter, ToneCurve};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -322,6 +322,9 @@ pub enum LightPart {
         /// Angle from the axis in degrees, at most 90, beyond which there is no light.
         #[serde(default = "default_outer_angle")]
         outer_angle: f64,
+        /// How it falls off between the two.
+        #[serde(default, skip_serializing_if = "is_default")]
+        falloff: Falloff,
         /// Object to world; scaling does not affect the intensity.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,

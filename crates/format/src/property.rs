@@ -253,6 +253,7 @@ impl LightProperty {
 mod tests {
     use super::*;
     use crate::light::{DirectionalLight, PointLight, SpotLight};
+    use firstlight_render::Falloff;
     use glam::Vec3;
 
     #[test]
@@ -265,6 +266,7 @@ mod tests {
                 intensity: Vec3::ONE,
                 inner_angle_deg: 10.0,
                 outer_angle_deg: 20.0,
+                falloff: Falloff::Quadratic,
             }),
             LightKind::Directional(DirectionalLight { direction: DVec3::X, irradiance: Vec3::ONE }),
         ];

@@ -7,6 +7,7 @@ use firstlight_format::bounds;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::value::Rgb;
+use firstlight_render::Falloff;
 use glam::{DAffine3, DVec3};
 
 /// A camera as a scene file says it.
@@ -47,6 +48,7 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
             intensity,
             inner_angle: inner.to_degrees(),
             outer_angle: outer.to_degrees(),
+            falloff: Falloff::Quadratic,
             transform: TransformPart::default(),
         },
         GltfLightKind::Directional => {

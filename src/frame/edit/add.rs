@@ -8,6 +8,7 @@ use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
 use crate::frame::state::selection::Selection;
 use crate::mesh::procedural;
+use crate::render::Falloff;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
@@ -102,6 +103,7 @@ pub fn add(world: &mut World, new: &NewThing) {
                 direction: DVec3::NEG_Y,
                 inner_angle_deg: 20.0,
                 outer_angle_deg: 30.0,
+                falloff: Falloff::Quadratic,
             };
             let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
             spawn(world, "spot light", (light, Placement::at(place + above)))

@@ -9,6 +9,7 @@ use firstlight_format::error::SceneError;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_format::value::Rgb;
+use firstlight_render::Falloff;
 use glam::{DVec3, Vec3};
 
 impl Converter<'_> {
@@ -46,16 +47,20 @@ impl Converter<'_> {
                 if !(outer > 0.0 && inner >= 0.0) || direction.try_normalize().is_none() {
                     return Err(node.error("a spot light needs a direction, and a cutoff_angle above 0"));
                 }
-                if inner < outer {
-                    self.tell(node, "the intensity of a spot light falls off by cosines here, by angles in Mitsuba");
-                }
                 let intensity = Rgb(self.constant_color(node, "intensity", 1.0, Use::Emission)?);
                 let (position, transform) = (matrix.transform_point3(DVec3::ZERO), TransformPart::default());
                 let outer_angle = outer.clamp(1e-3, 90.0);
                 let inner_angle = inner.clamp(0.0, outer_angle);
-                let light =
-                    LightPart::Spot { name, position, direction, intensity, inner_angle, outer_angle, transform };
-                self.file.lights.push(light);
+                self.file.lights.push(LightPart::Spot {
+                    name,
+                    position,
+                    direction,
+                    intensity,
+                    inner_angle,
+                    outer_angle,
+                    falloff: Falloff::Linear,
+                    transform,
+                });
             }
             "directional" => {
                 let matrix = self.world * node.transform("to_world")?;

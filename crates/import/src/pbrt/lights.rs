@@ -6,6 +6,7 @@ use firstlight_files::printable;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_format::value::Rgb;
+use firstlight_render::Falloff;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::PI;
 
@@ -70,6 +71,7 @@ pub(crate) fn light(
                 intensity,
                 inner_angle: inner,
                 outer_angle: outer,
+                falloff: Falloff::Smooth,
                 transform,
             })
         }

@@ -1,6 +1,8 @@
 //! Delta lights: point, spot and directional lights. No ray ever hits one.
 
+use firstlight_simd::{Elementary, Truth, select};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// A light that emits from a single point or in a single direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +32,20 @@ pub enum DeltaLight {
     },
 }
 
-/// Falloff of a spot light from its axis.
+/// How the intensity of a spot light falls off between its inner and its outer angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Falloff {
+    /// t², with t = (cos a − cos outer) / (cos inner − cos outer) at the angle a (glTF 2.0, KHR_lights_punctual).
+    #[default]
+    Quadratic,
+    /// t² (3 − 2t), with the same t (pbrt-v4).
+    Smooth,
+    /// (outer − a) / (outer − inner) (Mitsuba 3).
+    Linear,
+}
+
+/// Cone of a spot light.
 ///
 /// Angles are stored as 1 − cos, which distinguishes narrow cones whose cosine is 1 in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,26 +54,57 @@ pub struct Cone {
     pub axis: Vec3,
     /// 1 − cos of the angle beyond which there is no light, 0..1.
     pub outer: f32,
-    /// Reciprocal of the difference between `outer` and 1 − cos of the angle up to which the intensity is constant;
-    /// finite.
+    /// Reciprocal of the difference between `outer` and 1 − cos of the angle up to which the intensity is constant, or
+    /// for [`Falloff::Linear`] of the difference between both angles, radians; finite.
     pub slope: f32,
+    /// From `outer` inwards.
+    pub falloff: Falloff,
+}
+
+impl Falloff {
+    /// Coefficients of t and of t³; that of t² is the rest of 1.
+    pub(crate) fn coefficients(self) -> [f32; 2] {
+        match self {
+            Self::Quadratic => [0.0, 0.0],
+            Self::Smooth => [0.0, -2.0],
+            Self::Linear => [1.0, 0.0],
+        }
+    }
+}
+
+/// Returns the share of the intensity of a spot light at an angle given as 1 − cos; `outer`, `slope`: as in [`Cone`];
+/// `falloff`: [`Falloff::coefficients`].
+#[inline(always)]
+pub(crate) fn share_in_cone<R: Elementary>(one_minus_cos: R, outer: R, slope: R, falloff: [R; 2]) -> R {
+    let [linear, cube] = falloff;
+    let is_linear = linear.equals(linear.all(1.0));
+    let mut below = outer - one_minus_cos;
+    if is_linear.any() {
+        let angle = |x: R| (x * (-x + 2.0)).at_least(0.0).sqrt().atan2(-x + 1.0);
+        // Sixteen lanes have no angle of 0.
+        let inside = select(one_minus_cos.is_positive(), angle(one_minus_cos), one_minus_cos);
+        below = select(is_linear, angle(outer) - inside, below);
+    }
+    let t = (below * slope).at_least(0.0).at_most(1.0);
+    t * (t * (-(linear + cube) + 1.0 + t * cube) + linear)
 }
 
 impl Cone {
     /// - `axis`: unit.
     /// - `inner`, `outer`: radians from the axis, 0 ≤ `inner` ≤ `outer` ≤ π/2.
-    pub fn new(axis: Vec3, inner: f64, outer: f64) -> Self {
+    pub fn new(axis: Vec3, inner: f64, outer: f64, falloff: Falloff) -> Self {
         // 1 − cos a = 2 sin² (a/2)
         let one_minus_cos = |angle: f64| (2.0 * (0.5 * angle).sin().powi(2)) as f32;
-        let (inner, outer) = (one_minus_cos(inner), one_minus_cos(outer));
-        Self { axis, outer, slope: 1.0 / (outer - inner).max(1e-30) }
+        let width = match falloff {
+            Falloff::Linear => (outer - inner) as f32,
+            Falloff::Quadratic | Falloff::Smooth => one_minus_cos(outer) - one_minus_cos(inner),
+        };
+        Self { axis, outer: one_minus_cos(outer), slope: 1.0 / width.max(1e-30), falloff }
     }
 
     /// Returns the share of the intensity in direction `dir`, 0..1.
     ///
     /// - `dir`: unit, away from the tip.
-    ///
-    /// Source: glTF 2.0, KHR_lights_punctual.
     #[inline]
     pub fn falloff(&self, dir: Vec3) -> f32 {
         self.falloff_at(0.5 * (dir - self.axis).length_squared())
@@ -67,8 +113,7 @@ impl Cone {
     /// Like [`Self::falloff`], at an angle given as 1 − cos.
     #[inline]
     pub fn falloff_at(&self, one_minus_cos: f32) -> f32 {
-        let t = ((self.outer - one_minus_cos) * self.slope).clamp(0.0, 1.0);
-        t * t
+        share_in_cone(one_minus_cos, self.outer, self.slope, self.falloff.coefficients())
     }
 }
 
@@ -115,24 +160,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cone_falls_off_as_gltf_says() {
+    fn a_cone_falls_off_as_gltf_pbrt_and_mitsuba_say() {
         for (inner, outer) in [(0.0, 45.0), (20.0, 30.0), (0.05, 0.1), (89.0, 90.0)] {
             let (inner, outer): (f64, f64) = (f64::to_radians(inner), f64::to_radians(outer));
-            let cone = Cone::new(Vec3::Z, inner, outer);
-            for i in 0..=60 {
-                let angle = outer * 1.1 * f64::from(i) / 60.0;
-                let t = ((angle.cos() - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0);
-                let dir = Vec3::new(angle.sin() as f32, 0.0, angle.cos() as f32);
-                let found = f64::from(cone.falloff(dir));
-                assert!((found - t * t).abs() < 2e-5, "{inner} {outer} {angle}: {found} for {}", t * t);
+            for falloff in [Falloff::Quadratic, Falloff::Smooth, Falloff::Linear] {
+                let cone = Cone::new(Vec3::Z, inner, outer, falloff);
+                for i in 0..=60 {
+                    let angle = outer * 1.1 * f64::from(i) / 60.0;
+                    let t = ((angle.cos() - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0);
+                    let expected = match falloff {
+                        Falloff::Quadratic => t * t,
+                        Falloff::Smooth => t * t * (3.0 - 2.0 * t),
+                        Falloff::Linear => ((outer - angle) / (outer - inner)).clamp(0.0, 1.0),
+                    };
+                    let dir = Vec3::new(angle.sin() as f32, 0.0, angle.cos() as f32);
+                    let found = f64::from(cone.falloff(dir));
+                    let name = format!("{inner} {outer} {falloff:?} {angle}: {found} for {expected}");
+                    assert!((found - expected).abs() < 4e-5, "{name}");
+                }
             }
         }
     }
 
     #[test]
     fn equal_angles_make_a_sharp_edge() {
-        let cone = Cone::new(Vec3::Z, 0.5, 0.5);
-        let at = |angle: f32| cone.falloff(Vec3::new(angle.sin(), 0.0, angle.cos()));
-        assert_eq!([at(0.0), at(0.499), at(0.501), at(3.0)], [1.0, 1.0, 0.0, 0.0]);
+        for falloff in [Falloff::Quadratic, Falloff::Smooth, Falloff::Linear] {
+            let cone = Cone::new(Vec3::Z, 0.5, 0.5, falloff);
+            let at = |angle: f32| cone.falloff(Vec3::new(angle.sin(), 0.0, angle.cos()));
+            assert_eq!([at(0.0), at(0.499), at(0.501), at(3.0)], [1.0, 1.0, 0.0, 0.0]);
+        }
     }
 }

@@ -93,7 +93,9 @@ impl LightArrays {
                     let source = delta.delta()?;
                     let flag = if source.is_far { DELTA | IS_FAR } else { DELTA };
                     let nowhere = Vec3::ZERO.into();
-                    (flag, source.origin, nowhere, nowhere, source.axis, [source.outer, source.slope, 0.0, 0.0])
+                    let [linear, cube] = source.falloff;
+                    let rest = [source.outer, source.slope, linear, cube];
+                    (flag, source.origin, nowhere, nowhere, source.axis, rest)
                 }
             };
             flags.push(if light.is_point && flag & DELTA == 0 { flag | POINT } else { flag });
@@ -181,6 +183,7 @@ impl LightArrays {
             axis: Vector::gather(&self.normal, id),
             outer: Float::gather(&self.length_u, id),
             slope: Float::gather(&self.length_v, id),
+            falloff: [Float::gather(&self.radius, id), Float::gather(&self.lift, id)],
             is_far: flags.has(IS_FAR),
         };
         let DeltaSample { found, target, wi, scale } = source.seen_from(deltas, position);

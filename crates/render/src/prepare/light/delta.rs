@@ -4,8 +4,9 @@
 //! the radiance. The contribution of a sample is the quotient, which is exact, and compared with any BSDF pdf theirs is
 //! so large that the MIS weight against BSDF sampling, which cannot find them, is exactly 1.
 
+use crate::core::delta_light::share_in_cone;
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
-use firstlight_simd::{Real, Vector3, select, select_vector};
+use firstlight_simd::{Elementary, Real, Vector3, select, select_vector};
 
 /// Pdf per steradian of the direction to a delta light: a power of two, far above any BSDF pdf.
 pub(crate) const SHARPNESS: f32 = (1u64 << 50) as f32;
@@ -26,6 +27,8 @@ pub(crate) struct DeltaSource<R: Real> {
     pub axis: Vector3<R>,
     pub outer: R,
     pub slope: R,
+    /// Coefficients of its falloff.
+    pub falloff: [R; 2],
     /// Whether it is infinitely far away.
     pub is_far: R::Mask,
 }
@@ -42,18 +45,18 @@ pub(crate) struct DeltaSample<R: Real> {
     pub scale: R,
 }
 
-impl<R: Real> DeltaSource<R> {
+impl<R: Elementary> DeltaSource<R> {
     #[inline(always)]
     pub fn seen_from(&self, asked: R::Mask, position: Vector3<R>) -> DeltaSample<R> {
-        let Self { origin, axis, outer, slope, is_far } = *self;
+        let Self { origin, axis, outer, slope, falloff, is_far } = *self;
         let offset = origin - position;
         let distance2 = offset.length_squared();
         let distance = distance2.sqrt();
         let wi = offset * (distance.all(1.0) / distance);
         // 1 − cos of the angle between axis and −wi.
         let one_minus_cos = (wi + axis).length_squared() * 0.5;
-        let t = ((outer - one_minus_cos) * slope).at_least(0.0).at_most(1.0);
-        let scale = select(is_far, t.all(SHARPNESS), t * t * SHARPNESS / distance2);
+        let share = share_in_cone(one_minus_cos, outer, slope, falloff);
+        let scale = select(is_far, share.all(SHARPNESS), share * SHARPNESS / distance2);
         let n = wi.abs();
         let around = n.x + n.y + n.z;
         let lift = n.dot(origin.abs()) * gamma(6) + around * distance * gamma(16);

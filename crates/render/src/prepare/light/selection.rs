@@ -1,6 +1,6 @@
 //! Light selection: a few lights by an estimate of the contribution of each, many by a tree of such estimates.
 
-use crate::core::delta_light::Cone;
+use crate::core::delta_light::{Cone, Falloff};
 use crate::core::techniques::Techniques;
 use crate::prepare::light::delta::{EVERYTHING, FAR};
 use crate::prepare::light::emitter::Light;
@@ -197,7 +197,9 @@ impl LightBounds {
         if let Some(cone) = self.cone {
             // With a margin, so that rounding excludes nothing.
             let way = wi + Vector3::in_all(one, cone.axis);
-            let t = (-(way.length_squared() * 0.5) + (cone.outer + 16.0 * f32::EPSILON)) * cone.slope;
+            // An angle would not be the same for sixteen directions: 1 − (a / outer)², about, is above a linear falloff.
+            let slope = if cone.falloff == Falloff::Linear { 1.0 / cone.outer } else { cone.slope };
+            let t = (-(way.length_squared() * 0.5) + (cone.outer + 16.0 * f32::EPSILON)) * slope;
             let t = t.at_least(0.0).at_most(1.0);
             estimate = estimate * (t * t);
         }

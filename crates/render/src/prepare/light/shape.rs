@@ -1,6 +1,6 @@
 //! Points on spheres, quads and triangles seen from a shading point, by solid angle where that is stable.
 
-use crate::core::delta_light::Cone;
+use crate::core::delta_light::{Cone, Falloff};
 use crate::prepare::light::delta::{DeltaSource, FAR, NO_CONE};
 use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle};
@@ -108,14 +108,16 @@ impl LightShape {
     #[inline]
     pub fn delta(&self) -> Option<DeltaSource<f32>> {
         let nowhere = Vec3::ZERO;
+        let (mut falloff, no_cone) = (Falloff::Quadratic.coefficients(), (nowhere, NO_CONE));
         let (origin, (axis, (outer, slope)), is_far) = match *self {
             Self::Sphere { .. } | Self::Quad { .. } | Self::Triangle { .. } => return None,
             Self::Point { position, cone } => {
-                (position, cone.map_or((nowhere, NO_CONE), |cone| (cone.axis, (cone.outer, cone.slope))), false)
+                falloff = cone.map_or(falloff, |cone| cone.falloff.coefficients());
+                (position, cone.map_or(no_cone, |cone| (cone.axis, (cone.outer, cone.slope))), false)
             }
-            Self::Directional { to_light, .. } => (to_light, (nowhere, NO_CONE), true),
+            Self::Directional { to_light, .. } => (to_light, no_cone, true),
         };
-        Some(DeltaSource { origin: origin.into(), axis: axis.into(), outer, slope, is_far })
+        Some(DeltaSource { origin: origin.into(), axis: axis.into(), outer, slope, falloff, is_far })
     }
 
     /// Area of the emitting side, square metres. For delta lights, the factor from their strength to power as for a

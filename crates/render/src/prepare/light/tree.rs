@@ -148,6 +148,7 @@ pub(crate) fn step_down<R: Real>([first, second]: [R; 2], u: R) -> (R::Mask, R, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::delta_light::{Cone, Falloff};
     use crate::core::material_queries::Emission;
     use crate::core::techniques::Techniques;
     use crate::prepare::light::emitter::Light;
@@ -173,7 +174,7 @@ mod tests {
                     3 => LightShape::Point { position: at, cone: None },
                     4 => {
                         let outer = 0.1 + 1.4 * f64::from(a.y);
-                        let cone = crate::core::delta_light::Cone::new(u.normalize(), outer * f64::from(b.x), outer);
+                        let cone = Cone::new(u.normalize(), outer * f64::from(b.x), outer, Falloff::Quadratic);
                         LightShape::Point { position: at, cone: Some(cone) }
                     }
                     _ => LightShape::Directional { to_light: (u + v).normalize(), reach: 8.0 },
@@ -314,7 +315,7 @@ mod tests {
     #[test]
     fn spots_that_shine_elsewhere_are_left_out() {
         // A ceiling of spot lights, each with its own circle on the floor.
-        let cone = crate::core::delta_light::Cone::new(Vec3::NEG_Y, 0.1, 0.17);
+        let cone = Cone::new(Vec3::NEG_Y, 0.1, 0.17, Falloff::Quadratic);
         let at = |i: u32| Vec3::new((i % 16) as f32, 3.0, (i / 16) as f32);
         let light = lights(1, 5).remove(0);
         let spot = |i| Light { shape: LightShape::Point { position: at(i), cone: Some(cone) }, ..light.clone() };
