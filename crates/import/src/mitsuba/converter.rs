@@ -45,7 +45,8 @@ pub(crate) struct PlacedMaterial {
     /// Whether texture coordinates matter.
     pub is_textured: bool,
     pub needs_tangents: bool,
-    pub needs_colors: bool,
+    /// Name of the mesh attribute that it reads, as in Mitsuba.
+    pub attribute: Option<String>,
     /// Whether the back is like the front.
     pub two_sided: bool,
 }
@@ -81,7 +82,9 @@ pub(crate) struct Converter<'a> {
     pub one_sided: Vec<usize>,
     /// By the name of a material: the one that has a black back as well.
     pub backed: HashMap<String, String>,
-    /// Meshes that need vertex colours, and the shape of each.
+    /// Attributes by the name of the texture that reads them.
+    pub attributes: HashMap<String, String>,
+    /// Meshes that need an attribute, and the shape of each.
     pub colored: HashMap<u32, usize>,
     pub names: Names,
     pub material_names: Names,

@@ -4,7 +4,8 @@
 use crate::mitsuba::serialized::{UnpackedBytes, read_serialized};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::obj::load_obj_with;
-use crate::ply::load_ply_with;
+use crate::ply::load_ply_colored;
+use crate::ply::vertices::ColourSource;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_mesh::{Mesh, NormalWeight};
 use glam::{DVec3, Vec2, Vec3};
@@ -45,9 +46,19 @@ pub(crate) struct MeshRequest {
     pub flip_normals: bool,
     /// Whether a normal map needs tangents.
     pub tangents: bool,
+    /// The attribute of the file that is read as colours, `vertex_…` or `face_…`.
+    pub attribute: Option<String>,
 }
 
 impl MeshRequest {
+    fn colors(&self) -> ColourSource<'_> {
+        let Some(attribute) = &self.attribute else { return ColourSource::Srgb };
+        match attribute.split_once('_') {
+            Some((kind, name)) => ColourSource::Attribute { of_faces: kind == "face", name },
+            None => ColourSource::Srgb,
+        }
+    }
+
     /// Makes the mesh.
     ///
     /// - `room`: of all serialized meshes of the scene.
@@ -65,7 +76,7 @@ impl MeshRequest {
                 let options = ModelOptions { normals, ..ModelOptions::default() };
                 let model = match format {
                     ModelFormat::Obj => load_obj_with(path, &options).map_err(|error| error.to_string())?,
-                    _ => load_ply_with(path, &options).map_err(|error| error.to_string())?,
+                    _ => load_ply_colored(path, &options, self.colors()).map_err(|error| error.to_string())?,
                 };
                 Mesh { slots: Vec::new(), ..model.mesh }
             }
@@ -88,13 +99,20 @@ impl MeshRequest {
             mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
         }
-        if self.tangents {
+        // Without tangents of its own, a triangle has the direction of u as in Mitsuba.
+        if self.tangents && is_mirrored(&mesh) {
             mesh = mesh.with_tangents();
             // The bitangent is normal × tangent, also where the texture is mirrored.
             mesh.tangents.iter_mut().for_each(|tangent| tangent.w = 1.0);
         }
         Ok(mesh)
     }
+}
+
+/// Whether the texture is mirrored on any triangle.
+fn is_mirrored(mesh: &Mesh) -> bool {
+    let uv = |vertex: u32| mesh.uvs.get(vertex as usize).copied().unwrap_or_default();
+    mesh.triangles.iter().any(|&[a, b, c]| (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)) < 0.0)
 }
 
 /// From corners with normals and texture coordinates.
@@ -113,10 +131,10 @@ fn cube() -> Mesh {
     let sides = [
         (DVec3::NEG_Y, DVec3::Z, DVec3::X),
         (DVec3::Y, DVec3::NEG_X, DVec3::NEG_Z),
-        (DVec3::X, DVec3::Y, DVec3::Z),
-        (DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y),
-        (DVec3::NEG_X, DVec3::NEG_Y, DVec3::Z),
-        (DVec3::NEG_Z, DVec3::NEG_X, DVec3::Y),
+        (DVec3::X, DVec3::Y, DVec3::NEG_Z),
+        (DVec3::Z, DVec3::Y, DVec3::X),
+        (DVec3::NEG_X, DVec3::Y, DVec3::Z),
+        (DVec3::NEG_Z, DVec3::NEG_Y, DVec3::X),
     ];
     for (normal, u, v) in sides {
         let first = vertices.len() as u32;
@@ -181,5 +199,38 @@ mod tests {
                 triangle.iter().for_each(|&v| assert!(normal.dot(mesh.normals[v as usize].as_dvec3()) > 0.0, "{name}"));
             }
         }
+    }
+
+    #[test]
+    fn attributes_of_faces_and_vertices_become_linear_colours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+            property float heat_0\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\n\
+            property list uchar int vertex_indices\nproperty float tint_1\nproperty float tint_2\n\
+            property float tint_3\nproperty float glaze_r\nproperty float glaze_g\nproperty float glaze_b\nend_header\n\
+            0 0 0 1.5 1 0 0\n1 0 0 2 1 0 0\n1 1 0 2.5 1 0 0\n0 1 0 3 1 0 1\n\
+            3 0 1 2 0.25 0.5 2 1 0 0\n3 0 2 3 0 1 0 0 0 1\n";
+        std::fs::write(&path, text).unwrap();
+        let colors = |attribute: &str| {
+            let request = MeshRequest {
+                geometry: Geometry::Model(ModelFormat::Ply, path.clone()),
+                flip_v: false,
+                face_normals: false,
+                flip_normals: false,
+                tangents: false,
+                attribute: Some(attribute.to_owned()),
+            };
+            let mesh = request.make().unwrap();
+            // Of the corners of both triangles.
+            let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| color.truncate());
+            mesh.triangles.iter().flatten().filter_map(|&vertex| color(vertex)).collect::<Vec<Vec3>>()
+        };
+        let of_faces = |a: Vec3, b: Vec3| [a, a, a, b, b, b];
+        assert_eq!(colors("face_tint"), of_faces(Vec3::new(0.25, 0.5, 2.0), Vec3::Y));
+        assert_eq!(colors("face_glaze_color"), of_faces(Vec3::X, Vec3::Z));
+        assert_eq!(colors("vertex_heat"), [1.5, 2.0, 2.5, 1.5, 2.5, 3.0].map(Vec3::splat));
+        assert_eq!(colors("vertex_color")[5], Vec3::new(1.0, 0.0, 1.0));
+        assert!(colors("face_heat").is_empty() && colors("vertex_tint").is_empty());
     }
 }

@@ -66,6 +66,7 @@ impl<'a> Converter<'a> {
             requests: HashMap::new(),
             one_sided: Vec::new(),
             backed: HashMap::new(),
+            attributes: HashMap::new(),
             colored: HashMap::new(),
             names: Names::default(),
             material_names: Names::default(),
@@ -239,7 +240,7 @@ impl<'a> Converter<'a> {
         plain.sort_unstable();
         for index in plain {
             let node = Node { graph: self.graph, index };
-            self.tell(node, "only colours of vertices called red, green and blue are read: the mesh is white");
+            self.tell(node, "the mesh has no attribute of the name that its texture reads: it is white");
         }
         self.file.objects.retain(|object| part_of(object).is_none_or(|shape| !lost.contains(&shape)));
         parts

@@ -14,7 +14,7 @@ use firstlight_format::error::SceneError;
 use firstlight_format::material_textures::texture_names;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
-use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
+use firstlight_format::sources::{MeshShading, MeshSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Material;
 use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
@@ -166,6 +166,7 @@ impl Converter<'_> {
             face_normals: node.boolean_or("face_normals", false)?,
             flip_normals,
             tangents: material.needs_tangents,
+            attribute: material.attribute.clone(),
             geometry,
         };
         let Some(transform) = self.placement(node, placed) else { return Ok(()) };
@@ -175,7 +176,7 @@ impl Converter<'_> {
         if is_file && !material.two_sided {
             self.one_sided.push(self.file.objects.len());
         }
-        if material.needs_colors {
+        if material.attribute.is_some() {
             self.colored.entry(shape).or_insert(node.index);
         }
         let source = MeshSource::Part { file: self.file_name.clone(), shape, defines: self.defines.to_vec() };
@@ -289,11 +290,14 @@ impl Converter<'_> {
         let placed = surface.map(|surface| {
             let is_textured = self.is_textured(&surface.part);
             let needs_tangents = needs_tangents(&surface.part);
-            let is_color =
-                |name: &String| matches!(self.file.textures.get(name), Some(TextureSource::VertexColors { .. }));
-            let needs_colors = texture_names(&surface.part).iter().any(is_color);
+            let mut attributes = Vec::new();
+            self.attributes_of(&surface.part, &mut attributes);
+            if attributes.get(1..).unwrap_or_default().iter().any(|other| *other != attributes[0]) {
+                self.tell(node, "two attributes of one mesh are not modelled: the first is used for both");
+            }
+            let attribute = attributes.into_iter().next();
             let name = self.add_material(bsdf.or(emitter).unwrap_or(node), surface.part);
-            PlacedMaterial { name, is_textured, needs_tangents, needs_colors, two_sided: surface.two_sided }
+            PlacedMaterial { name, is_textured, needs_tangents, attribute, two_sided: surface.two_sided }
         });
         self.materials.insert(key, placed.clone());
         Ok(placed)
@@ -332,6 +336,15 @@ impl Converter<'_> {
         })
     }
 
+    /// Adds the mesh attributes that a material and its parts read.
+    fn attributes_of(&self, part: &MaterialPart, found: &mut Vec<String>) {
+        found.extend(texture_names(part).iter().filter_map(|name| self.attributes.get(name)).cloned());
+        if let Material::Blend { a, b, .. } = part {
+            let parts = [a, b].into_iter().filter_map(|name| self.file.materials.get(name));
+            parts.for_each(|part| self.attributes_of(part, found));
+        }
+    }
+
     fn is_textured(&self, part: &MaterialPart) -> bool {
         match part {
             Material::Blend { weight, a, b, .. } => {
@@ -349,8 +362,8 @@ fn black() -> Surface {
 
 fn needs_tangents(part: &MaterialPart) -> bool {
     match part {
-        Material::Principled { normal_map, anisotropy, .. } => {
-            matches!(normal_map, ColorValue::Texture(_)) || *anisotropy != ScalarValue::Number(0.0)
+        Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } => {
+            matches!(normal_map, ColorValue::Texture(_))
         }
         _ => false,
     }

@@ -89,22 +89,23 @@ impl Converter<'_> {
         if self.texture_depth > MAX_DEPTH {
             return Err(node.error("textures are nested too deep, or contain themselves"));
         }
+        let mut read_attribute = None;
         let source = match node.plugin() {
             "bitmap" => match self.bitmap(node)? {
                 Some(image) => image,
                 None => return Ok(ColorValue::grey(0.5)),
             },
             "checkerboard" => self.checkerboard(node, of, reads)?,
-            "mesh_attribute" => match node.text("name")? {
-                Some(name) if name.starts_with("vertex_") => {
-                    let tint = Rgb(Vec3::splat(node.float_or("scale", 1.0)? as f32));
-                    TextureSource::VertexColors { channel: None, tint }
+            "mesh_attribute" => {
+                let missing = || node.error("the `name` of a mesh_attribute begins with `vertex_` or `face_`");
+                let attribute = node.text("name")?.ok_or_else(missing)?;
+                if !["vertex_", "face_"].iter().any(|prefix| attribute.starts_with(prefix)) {
+                    return Err(missing());
                 }
-                _ => {
-                    self.tell(node, "attributes of faces are not modelled: the texture is grey");
-                    return Ok(ColorValue::grey(0.5));
-                }
-            },
+                let tint = Rgb(Vec3::splat(node.float_or("scale", 1.0)? as f32));
+                read_attribute = Some(attribute.to_owned());
+                TextureSource::VertexColors { channel: None, tint }
+            }
             plugin => {
                 let Some(rgb) = self.spectrum_plugin(node, of)? else {
                     let plugin = printable::name(plugin);
@@ -120,6 +121,7 @@ impl Converter<'_> {
         };
         let name = self.names.free(&wanted);
         self.file.textures.0.push((name.clone(), source));
+        self.attributes.extend(read_attribute.map(|attribute| (name.clone(), attribute)));
         self.textures.insert((node.index, reads), name.clone());
         Ok(ColorValue::Texture(name))
     }

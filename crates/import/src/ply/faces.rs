@@ -6,7 +6,7 @@ use crate::model::assemble::Indexed;
 use crate::model::polygon::triangulate;
 use crate::ply::header::{Element, Property};
 use crate::ply::rows::{Located, Rows, missing, next_length, skip_list};
-use crate::ply::vertices::{Colours, colour_of};
+use crate::ply::vertices::{ColourProperties, ColourSource, Colours};
 use glam::{Vec2, Vec3};
 use rayon::slice::ParallelSliceMut;
 
@@ -56,7 +56,7 @@ enum FaceRole {
     Indices,
     Uvs,
     Texture,
-    Channel(usize),
+    Channel,
     Ignored,
 }
 
@@ -78,28 +78,26 @@ impl Faces {
     /// Reads the rows of `face` up to the first that is broken; returns the number of those with more numbers than
     /// declared.
     ///
-    /// - `n_textures`: number of textures in the header; `ignored`: receives the indices of properties that are not
-    ///   used.
+    /// - `n_textures`: number of textures in the header; `source`: of the colours, if they are read; `ignored`: receives
+    ///   the indices of properties that are not used.
     pub fn read(
         &mut self,
         element: &Element,
         rows: &mut impl Rows,
         n_textures: usize,
-        wants_colours: bool,
+        source: Option<ColourSource>,
         ignored: &mut Vec<usize>,
     ) -> Result<usize, Located> {
         let indices = index_list(element)?;
-        let colour = colour_of(element).filter(|_| wants_colours);
+        let colour = source.and_then(|source| ColourProperties::of(element, source));
         let roles: Vec<FaceRole> = (0..element.properties.len())
             .map(|i| match &element.properties[i] {
                 _ if i == indices => FaceRole::Indices,
                 // As MeshLab writes them: six numbers per triangle.
                 Property { name, length: Some(_), number } if name == "texcoord" && !number.is_whole() => FaceRole::Uvs,
                 Property { name, length: None, .. } if name == "texnumber" && n_textures > 0 => FaceRole::Texture,
-                _ => match colour.and_then(|(channels, _)| channels.iter().position(|&k| k == i)) {
-                    Some(channel) => FaceRole::Channel(channel),
-                    None => FaceRole::Ignored,
-                },
+                _ if colour.is_some_and(|colour| colour.contains(i)) => FaceRole::Channel,
+                _ => FaceRole::Ignored,
             })
             .collect();
         ignored.extend((0..roles.len()).filter(|&i| roles[i] == FaceRole::Ignored));
@@ -111,7 +109,7 @@ impl Faces {
         let (mut face, mut long_rows) = (OfFace { texture: NO_TEXTURE, ..OfFace::default() }, 0);
         for row in 0..element.count {
             let start = self.corners.len();
-            if let Err(located) = self.read_face(element, row, rows, &roles, &mut face) {
+            if let Err(located) = self.read_face(element, row, rows, &roles, colour, &mut face) {
                 self.corners.truncate(start);
                 self.broken = Some(located);
                 break;
@@ -131,11 +129,11 @@ impl Faces {
                 let is_there = usize::from(face.texture) < n_textures;
                 self.textures.push(if is_there { face.texture } else { NO_TEXTURE });
             }
-            if let Some((_, white)) = colour {
+            if let Some(ColourProperties { white, .. }) = colour {
                 self.colors.push(self.colours.add(face.channels, white));
             }
         }
-        if !self.colours.differ {
+        if !self.colours.differ && !matches!(source, Some(ColourSource::Attribute { .. })) {
             self.colors = Vec::new();
         }
         Ok(long_rows)
@@ -148,11 +146,12 @@ impl Faces {
         row: u64,
         rows: &mut impl Rows,
         roles: &[FaceRole],
+        colour: Option<ColourProperties>,
         face: &mut OfFace,
     ) -> Result<(), Located> {
         let missing = |problem, rows: &_| missing(problem, element, row, rows);
         rows.begin_row().map_err(|problem| missing(problem, rows))?;
-        for (property, &role) in element.properties.iter().zip(roles) {
+        for (i, (property, &role)) in element.properties.iter().zip(roles).enumerate() {
             match (role, property.length) {
                 (FaceRole::Indices, Some(_)) => {
                     for _ in 0..next_length(element, row, property, rows)? {
@@ -173,8 +172,9 @@ impl Faces {
                     let is_number = number >= 0.0 && number < f64::from(NO_TEXTURE);
                     face.texture = if is_number { number as u16 } else { NO_TEXTURE };
                 }
-                (FaceRole::Channel(channel), None) => {
-                    face.channels[channel] = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                (FaceRole::Channel, None) => {
+                    let value = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                    colour.iter().for_each(|colour| colour.store(i, value, &mut face.channels));
                 }
                 (_, None) => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
             }

@@ -21,7 +21,7 @@ use crate::model::texture_map::TextureMap;
 use crate::ply::faces::{Faces, NOWHERE};
 use crate::ply::header::{Element, Encoding, Header};
 use crate::ply::rows::{Bytes, Located, Rows, Text, skip_row};
-use crate::ply::vertices::PlyVertices;
+use crate::ply::vertices::{ColourProperties, ColourSource, PlyVertices};
 use firstlight_files::gzip::{decompressed, start_of_decompressed};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::printable;
@@ -46,13 +46,22 @@ pub fn load_ply(path: &Path) -> Result<ImportedModel, ModelError> {
 /// # Errors
 /// If the file cannot be read, or is not a model with surface area.
 pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
+    load_ply_colored(path, options, ColourSource::Srgb)
+}
+
+/// Like [`load_ply_with`], with colours from elsewhere.
+pub(crate) fn load_ply_colored(
+    path: &Path,
+    options: &ModelOptions,
+    source: ColourSource,
+) -> Result<ImportedModel, ModelError> {
     let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes)
         .and_then(InputFile::bytes)
         .and_then(|bytes| decompressed(bytes, FileKind::Model, options.max_bytes))
         .map_err(|error| ModelError::of(path, Place::File, error))?;
     let at = |(place, problem): Located| ModelError::of(path, place, problem);
     let header = Header::parse(&bytes).map_err(|(line, problem)| at((Place::Line(line), problem)))?;
-    let Contents { vertices, mut faces, unused, long_rows } = Contents::of(&header, &bytes).map_err(at)?;
+    let Contents { vertices, mut faces, unused, long_rows } = Contents::of(&header, &bytes, source).map_err(at)?;
     drop(bytes);
     let mut warnings = Warnings::default();
     let mut warn = |text: String| warnings.push(format!("{}: {text}", path.display()));
@@ -213,15 +222,15 @@ struct Contents {
 }
 
 impl Contents {
-    fn of(header: &Header, bytes: &[u8]) -> Result<Self, Located> {
+    fn of(header: &Header, bytes: &[u8], source: ColourSource) -> Result<Self, Located> {
         match header.encoding {
-            Encoding::Ascii => Self::read(header, Text::new(&bytes[header.body..], header.lines)),
-            Encoding::LittleEndian => Self::read(header, Bytes::<false>::new(bytes, header.body)),
-            Encoding::BigEndian => Self::read(header, Bytes::<true>::new(bytes, header.body)),
+            Encoding::Ascii => Self::read(header, Text::new(&bytes[header.body..], header.lines), source),
+            Encoding::LittleEndian => Self::read(header, Bytes::<false>::new(bytes, header.body), source),
+            Encoding::BigEndian => Self::read(header, Bytes::<true>::new(bytes, header.body), source),
         }
     }
 
-    fn read(header: &Header, mut rows: impl Rows) -> Result<Self, Located> {
+    fn read(header: &Header, mut rows: impl Rows, source: ColourSource) -> Result<Self, Located> {
         let element = |name: &str| header.elements.iter().find(|element| element.name == name);
         let count_of = |name: &str| element(name).map_or(0, |element| element.count);
         let n_vertices = count_of("vertex");
@@ -239,7 +248,8 @@ impl Contents {
         let n_textures = header.textures.len();
         contents.faces.n_vertices = n_vertices;
         // Colours of vertices say more than those of faces.
-        let wants_colours = !element("vertex").is_some_and(vertices::has_colours);
+        let of_vertices = element("vertex").and_then(|vertex| ColourProperties::of(vertex, source));
+        let of_faces = Some(source).filter(|_| of_vertices.is_none());
         // The rows of an element without properties are empty.
         for element in header.elements.iter().filter(|element| element.count > 0 && !element.properties.is_empty()) {
             let least = element.least_bytes(header.encoding);
@@ -251,9 +261,9 @@ impl Contents {
             }
             let mut ignored = Vec::new();
             contents.long_rows += match &*element.name {
-                "vertex" => contents.vertices.read(element, &mut rows, &mut ignored)?,
+                "vertex" => contents.vertices.read(element, &mut rows, source, &mut ignored)?,
                 _ if contents.faces.broken.is_some() => break,
-                "face" => contents.faces.read(element, &mut rows, n_textures, wants_colours, &mut ignored)?,
+                "face" => contents.faces.read(element, &mut rows, n_textures, of_faces, &mut ignored)?,
                 "tristrips" => contents.faces.read_strips(element, &mut rows, &mut ignored)?,
                 name => {
                     contents.unused.push(format!("element {}", printable::name(name)));

@@ -32,15 +32,16 @@ pub(crate) struct Colours {
 impl Colours {
     /// Counts a colour and returns it in linear form.
     ///
-    /// - `encoded`: sRGB, with `white` as maximum.
-    pub fn add(&mut self, encoded: [f64; 3], white: f64) -> Vec3 {
+    /// - `encoded`: sRGB, with `white` as maximum; linear without.
+    pub fn add(&mut self, encoded: [f64; 3], white: Option<f64>) -> Vec3 {
         // A table for bytes, the usual case: the transfer function would take longer than the rest of a vertex.
         static OF_BYTES: LazyLock<[f64; 256]> =
             LazyLock::new(|| std::array::from_fn(|byte| decode_srgb(byte as f64 / 255.0)));
-        let linear = encoded.map(|value| match value as u8 {
-            byte if white == 255.0 && f64::from(byte) == value => OF_BYTES[usize::from(byte)],
-            _ if value.is_nan() => 0.0,
-            _ => decode_srgb((value / white).clamp(0.0, 1.0)),
+        let linear = encoded.map(|value| match (value as u8, white) {
+            (byte, Some(255.0)) if f64::from(byte) == value => OF_BYTES[usize::from(byte)],
+            (_, Some(white)) if !value.is_nan() => decode_srgb((value / white).clamp(0.0, 1.0)),
+            (_, None) if (value as f32).is_finite() => value,
+            _ => 0.0,
         });
         let linear = DVec3::from_array(linear).as_vec3();
         self.differ |= *self.first.get_or_insert(linear) != linear;
@@ -68,38 +69,83 @@ const ROLES: [&[&str]; N_ROLES] = [
     &["nz", "normal_z"],
     &["s", "u", "texture_u", "texture_s"],
     &["t", "v", "texture_v", "texture_t"],
-    RED,
-    GREEN,
-    BLUE,
 ];
 const RED: &[&str] = &["red", "r", "diffuse_red"];
 const GREEN: &[&str] = &["green", "g", "diffuse_green"];
 const BLUE: &[&str] = &["blue", "b", "diffuse_blue"];
-const N_ROLES: usize = 11;
-/// First roles of normals, texture coordinates and colours.
+const N_ROLES: usize = 8;
+/// First roles of normals and texture coordinates.
 const NORMAL: usize = 3;
 const UV: usize = 6;
-const COLOUR: usize = 8;
 
-/// Indices of the properties of a colour, and its maximum.
-pub(crate) fn colour_of(element: &Element) -> Option<([usize; 3], f64)> {
-    let number = |names| element.property(names).filter(|&i| element.properties[i].length.is_none());
-    let channels = [number(RED)?, number(GREEN)?, number(BLUE)?];
-    Some((channels, element.properties[channels[2]].number.white()))
+/// What is read as colours.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ColourSource<'a> {
+    /// Red, green and blue, sRGB: of vertices, otherwise of faces.
+    Srgb,
+    /// An attribute of Mitsuba, linear: three properties, or one for all channels.
+    Attribute { of_faces: bool, name: &'a str },
 }
 
-pub(crate) fn has_colours(element: &Element) -> bool {
-    colour_of(element).is_some()
+/// The properties of a colour.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ColourProperties {
+    /// Index of each channel.
+    channels: [usize; 3],
+    /// Maximum of an sRGB colour; `None` of a linear one.
+    pub white: Option<f64>,
+}
+
+impl ColourProperties {
+    /// `None` if the element has no such colours.
+    pub fn of(element: &Element, source: ColourSource) -> Option<Self> {
+        let number = |names: &[&str]| element.property(names).filter(|&i| element.properties[i].length.is_none());
+        let rgb = || Some([number(RED)?, number(GREEN)?, number(BLUE)?]);
+        match source {
+            ColourSource::Srgb => {
+                let channels = rgb()?;
+                Some(Self { channels, white: Some(element.properties[channels[2]].number.white()) })
+            }
+            ColourSource::Attribute { of_faces, name } => {
+                let part = |prefix: &str, end: &str| number(&[&format!("{prefix}_{end}")]);
+                // The endings of Mitsuba; it adds `_color` to the name of what ends with r, g and b.
+                let of_color = name.strip_suffix("_color").map(|prefix| (prefix, ["r", "g", "b"]));
+                let endings = [["0", "1", "2"], ["1", "2", "3"], ["x", "y", "z"]].map(|ends| (name, ends));
+                let attribute = endings.into_iter().chain(of_color).find_map(|(prefix, ends)| {
+                    let first = part(prefix, ends[0])?;
+                    Some(match (part(prefix, ends[1]), part(prefix, ends[2])) {
+                        (Some(second), Some(third)) => [first, second, third],
+                        _ => [first; 3],
+                    })
+                });
+                let is_here = of_faces == (element.name == "face");
+                let channels = attribute.or_else(|| rgb().filter(|_| name == "color")).filter(|_| is_here)?;
+                Some(Self { channels, white: None })
+            }
+        }
+    }
+
+    /// Stores the value of a property where it belongs.
+    #[inline]
+    pub fn store(&self, property: usize, value: f64, color: &mut [f64; 3]) {
+        (0..3).filter(|&channel| self.channels[channel] == property).for_each(|channel| color[channel] = value);
+    }
+
+    #[inline]
+    pub fn contains(&self, property: usize) -> bool {
+        self.channels.contains(&property)
+    }
 }
 
 impl PlyVertices {
     /// Reads all rows; returns the number of those with more numbers than declared.
     ///
-    /// - `ignored`: receives the indices of properties that are not used.
+    /// - `source`: of the colours; `ignored`: receives the indices of properties that are not used.
     pub fn read(
         &mut self,
         element: &Element,
         rows: &mut impl Rows,
+        source: ColourSource,
         ignored: &mut Vec<usize>,
     ) -> Result<usize, Located> {
         // Role of each property.
@@ -115,37 +161,39 @@ impl PlyVertices {
         if !has[..NORMAL].iter().all(|&has| has) {
             return Err((Place::File, PlyProblem::NoPositions));
         }
-        let [has_normals, has_uvs, has_colours] =
-            [NORMAL..UV, UV..COLOUR, COLOUR..N_ROLES].map(|roles| has[roles].iter().all(|&has| has));
-        let white = colour_of(element).map_or(1.0, |(_, white)| white);
-        let is_used = |role: Option<usize>| match role {
-            None => false,
+        let [has_normals, has_uvs] = [NORMAL..UV, UV..N_ROLES].map(|roles| has[roles].iter().all(|&has| has));
+        let colour = ColourProperties::of(element, source);
+        let is_used = |i: usize| match role_of[i] {
+            None => colour.is_some_and(|colour| colour.contains(i)),
             Some(0..NORMAL) => true,
             Some(NORMAL..UV) => has_normals,
-            Some(UV..COLOUR) => has_uvs,
-            Some(_) => has_colours,
+            Some(_) => has_uvs,
         };
-        ignored.extend((0..role_of.len()).filter(|&i| !is_used(role_of[i])));
+        ignored.extend((0..role_of.len()).filter(|&i| !is_used(i)));
         let (count, model) = (element.count as usize, &mut self.indexed);
         model.positions.reserve_exact(count);
         model.normals.reserve_exact(if has_normals { count } else { 0 });
         model.uvs.reserve_exact(if has_uvs { count } else { 0 });
-        model.colors.reserve_exact(if has_colours { count } else { 0 });
-        let (mut values, mut long_rows) = ([0.0; N_ROLES], 0);
+        model.colors.reserve_exact(if colour.is_some() { count } else { 0 });
+        let (mut values, mut channels, mut long_rows) = ([0.0; N_ROLES], [0.0; 3], 0);
         for row in 0..element.count {
             let missing = |problem, rows: &_| missing(problem, element, row, rows);
             rows.begin_row().map_err(|problem| missing(problem, rows))?;
-            for (property, role) in element.properties.iter().zip(&role_of) {
+            for (i, (property, role)) in element.properties.iter().zip(&role_of).enumerate() {
                 match (property.length, role) {
                     (Some(_), _) => skip_list(element, row, property, rows)?,
                     (None, Some(role)) => {
                         values[*role] = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
                     }
+                    (None, None) if let Some(colour) = colour.filter(|colour| colour.contains(i)) => {
+                        let value = rows.next(property.number).map_err(|problem| missing(problem, rows))?;
+                        colour.store(i, value, &mut channels);
+                    }
                     (None, None) => rows.skip(property.number, 1).map_err(|problem| missing(problem, rows))?,
                 }
             }
             long_rows += usize::from(rows.end_row());
-            let [x, y, z, nx, ny, nz, u, v, red, green, blue] = values;
+            let [x, y, z, nx, ny, nz, u, v] = values;
             model.positions.push(DVec3::new(x, y, z));
             if has_normals {
                 // Normals that are not finite count as missing too.
@@ -156,11 +204,12 @@ impl PlyVertices {
                 self.bad_uvs += usize::from(!uv.is_finite());
                 model.uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO });
             }
-            if has_colours {
-                model.colors.push(self.colours.add([red, green, blue], white).extend(1.0));
+            if let Some(ColourProperties { white, .. }) = colour {
+                model.colors.push(self.colours.add(channels, white).extend(1.0));
             }
         }
-        if !self.colours.differ {
+        // A material says what is the same everywhere; attributes are asked for by name.
+        if !self.colours.differ && matches!(source, ColourSource::Srgb) {
             model.colors = Vec::new();
         }
         Ok(long_rows)
@@ -175,9 +224,9 @@ mod tests {
     fn colours_are_decoded_and_their_mean_is_that_of_light() {
         let mut colours = Colours::default();
         assert!(colours.material().name.is_empty());
-        colours.add([1.0, 0.0, f64::NAN], 1.0);
+        colours.add([1.0, 0.0, f64::NAN], Some(1.0));
         assert_eq!((colours.differ, colours.material().diffuse), (false, Some(Vec3::X)));
-        colours.add([-1.0, 0.0, 300.0], 255.0);
+        colours.add([-1.0, 0.0, 300.0], Some(255.0));
         assert_eq!((colours.differ, colours.material().diffuse), (true, Some(Vec3::new(0.5, 0.0, 0.5))));
     }
 }
