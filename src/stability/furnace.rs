@@ -271,6 +271,7 @@ fn random_scene(seed: u64) -> LightCase {
                 absorption,
                 dispersion: 0.0,
                 compensate: false,
+                beckmann: false,
             };
             is_lossy = true;
         }

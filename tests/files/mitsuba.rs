@@ -1,6 +1,6 @@
 //! Scenes of Mitsuba: what becomes of each part, equality with scenes of our own, and files that lie.
 
-use firstlight::render::{Material, PixelFilter, Wrap};
+use firstlight::render::{Falloff, Material, PixelFilter, Wrap};
 use firstlight::scene::file::{LightPart, MaterialPart, ObjectPart, SceneFile};
 use firstlight::scene::{
     ColorValue, EnvironmentSource, LoadOptions, LoadedScene, MeshSource, ModelChoice, ScalarValue, SceneSource,
@@ -259,6 +259,18 @@ fn materials_are_those_of_the_docs() {
         matches!(part, Material::RoughGlass { alpha: ScalarValue::Number(0.3), ior: 1.5, .. }) && warnings.is_empty(),
         "{part:?} {warnings:?}"
     );
+    let metal = r#"<bsdf type="roughconductor"><float name="alpha_u" value="0.25"/><float name="alpha_v" value="0.05"/>
+        <string name="material" value="Al"/></bsdf>"#;
+    let (part, warnings) = material(metal);
+    let Material::Conductor { alpha, alpha_v, beckmann: true, compensate: false, .. } = &part else {
+        panic!("{part:?}")
+    };
+    assert_eq!((alpha, alpha_v), (&ScalarValue::Number(0.25), &ScalarValue::Number(0.05)));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let mapped = r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant">
+        <vector name="value" value="0.5, 0.7, 1"/></texture><bsdf type="principled"/></bsdf>"#;
+    let (part, _) = material(mapped);
+    assert!(matches!(part, Material::Blend { normal_shadowing: true, .. }), "{part:?}");
     let (part, _) = material(r#"<bsdf type="conductor"/>"#);
     assert_eq!(part, Material::Mirror { reflectance: ColorValue::grey(1.0) });
     let (part, _) = material(r#"<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>"#);
@@ -363,7 +375,10 @@ fn environments_are_turned_and_spots_keep_their_angles() {
             <transform name="to_world"><lookat origin="0 3 0" target="0 0 0"/></transform></emitter>
         <emitter type="constant"/>"#,
     );
-    let LightPart::Spot { inner_angle, outer_angle, direction, .. } = &scene.file.lights[0] else { panic!() };
+    let LightPart::Spot { inner_angle, outer_angle, direction, falloff: Falloff::Linear, .. } = &scene.file.lights[0]
+    else {
+        panic!("{:?}", scene.file.lights)
+    };
     assert_eq!((*inner_angle, *outer_angle, *direction), (40.0, 40.0, DVec3::NEG_Y));
     assert!(matches!(scene.file.environment, EnvironmentSource::Constant(_)));
     let folder = tempfile::tempdir().unwrap();

@@ -358,7 +358,8 @@ fn roughness_textures_and_metals_become_those_of_ours() {
          Material \"conductor\" \"float roughness\" 0.04 \"rgb eta\" [0.2 0.9 1.1] \"rgb k\" [3.9 2.45 2.14]\n{SQUARE}\
          Material \"conductor\" \"float roughness\" 0.04 \"bool remaproughness\" false\n{SQUARE}\
          Material \"dielectric\" \"float roughness\" 0.25 \"spectrum eta\" \"glass-F11\"\n{SQUARE}\
-         Material \"dielectric\"\n{SQUARE}Material \"diffuse\" \"texture reflectance\" \"dark\"\n{SQUARE}"
+         Material \"dielectric\"\n{SQUARE}Material \"diffuse\" \"texture reflectance\" \"dark\"\n{SQUARE}\
+         Material \"conductor\" \"float uroughness\" 0.09 \"float vroughness\" 0.04\n{SQUARE}"
     ));
     assert_eq!(told(&scene), Vec::<String>::new());
     let parts: Vec<&MaterialPart> = scene.file.materials.iter().map(|(_, part)| part).collect();
@@ -373,7 +374,9 @@ fn roughness_textures_and_metals_become_those_of_ours() {
             MaterialPart::RoughGlass { alpha: c, ior, .. },
             MaterialPart::Glass { ior: plain, .. },
             MaterialPart::Diffuse { albedo: ColorValue::Texture(name) },
+            MaterialPart::Conductor { alpha: u, alpha_v: v, .. },
         ] => {
+            assert!((number(u) - 0.3).abs() < 1e-6 && (number(v) - 0.2).abs() < 1e-6, "{u:?} {v:?}");
             // The square root; colours are taken channel by channel.
             assert!(
                 (number(a) - 0.2).abs() < 1e-6 && (number(b) - 0.04).abs() < 1e-7 && (number(c) - 0.5).abs() < 1e-6

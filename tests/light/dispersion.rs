@@ -71,8 +71,14 @@ fn a_white_furnace_loses_nothing_in_any_channel() {
         *dispersion = DISPERSION;
     }
     let alpha = ScalarInput::Constant(0.2);
-    let rough =
-        Material::RoughGlass { alpha, ior: 1.5, absorption: Vec3::ZERO, dispersion: DISPERSION, compensate: true };
+    let rough = Material::RoughGlass {
+        alpha,
+        ior: 1.5,
+        absorption: Vec3::ZERO,
+        dispersion: DISPERSION,
+        compensate: true,
+        beckmann: false,
+    };
     for (name, material) in [("smooth", glass()), ("rough", rough), ("layers", solid)] {
         let from = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 24.0);
         let scene = scene(vec![(sphere(Vec3::ZERO, 1.0), 0)], vec![material], Environment::Constant(Vec3::ONE), from);

@@ -13,13 +13,15 @@ fn color(r: f32, g: f32, b: f32) -> ColorInput {
 
 fn plastic(alpha: f32) -> Material {
     let (diffuse, alpha) = (color(0.7, 0.3, 0.1), ScalarInput::Constant(alpha));
-    Material::Plastic { diffuse, alpha, ior: 1.5, specular: 1.0.into(), nonlinear: true }
+    Material::Plastic { diffuse, alpha, ior: 1.5, specular: 1.0.into(), nonlinear: true, beckmann: false }
 }
 
 /// Spheres and sheets of each kind, alone and blended, on a floor below a light and a sky.
 fn room() -> Prepared {
     let gold = |alpha: f32, compensate| Material::Conductor {
         alpha: ScalarInput::Constant(alpha),
+        alpha_v: 0.0.into(),
+        beckmann: false,
         eta: Vec3::new(0.143, 0.375, 1.442),
         k: Vec3::new(3.983, 2.386, 1.603),
         reflectance: color(1.0, 0.9, 0.8),
@@ -107,7 +109,14 @@ fn furnaces_return_what_falls_in() {
         (Material::Translucent { reflectance: white(), transmittance: white() }, 1.0),
         (Material::ThinGlass { ior: 1.7, reflectance: white(), transmittance: white() }, 1.0),
         (
-            Material::Plastic { diffuse: white(), alpha: 0.0.into(), ior: 1.5, specular: 1.0.into(), nonlinear: false },
+            Material::Plastic {
+                diffuse: white(),
+                alpha: 0.0.into(),
+                ior: 1.5,
+                specular: 1.0.into(),
+                nonlinear: false,
+                beckmann: false,
+            },
             1.0,
         ),
     ];

@@ -243,6 +243,7 @@ fn layers_that_say_no_more_look_like_the_simpler_material() {
         absorption: Vec3::ZERO,
         dispersion: 0.0,
         compensate: true,
+        beckmann: false,
     };
     let pairs = [
         (principled(0.7, |l| (l.metallic, l.roughness) = (1.0, 0.4)), metal(0.7)),

@@ -15,6 +15,7 @@ fn rough(alpha: f32, ior: f32) -> Material {
         absorption: Vec3::ZERO,
         dispersion: 0.0,
         compensate: false,
+        beckmann: false,
     }
 }
 
@@ -78,6 +79,7 @@ fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> P
         absorption: Vec3::new(0.8, 0.3, 0.1),
         dispersion: 0.0,
         compensate: true,
+        beckmann: false,
     };
     let materials = vec![
         diffuse(0.6),
@@ -239,6 +241,7 @@ fn compensated_it_can_hardly_be_seen_in_an_even_world() {
             absorption: Vec3::ZERO,
             dispersion: 0.0,
             compensate: true,
+            beckmann: false,
         };
         let eye = camera(Vec3::new(0.0, 0.4, 4.0), Vec3::ZERO, 20.0);
         let scene = scene(vec![(sphere(Vec3::ZERO, 1.0), 0)], vec![material], Environment::Constant(Vec3::ONE), eye);

@@ -423,7 +423,7 @@ fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
         0.0 => MaterialPart::Glass { ior, absorption, dispersion },
         roughness => {
             let alpha = ScalarValue::Number(roughness * roughness);
-            MaterialPart::RoughGlass { alpha, ior, absorption, dispersion, compensate: true }
+            MaterialPart::RoughGlass { alpha, ior, absorption, dispersion, compensate: true, beckmann: false }
         }
     })
 }

@@ -18,6 +18,13 @@ use glam::Vec3;
 /// Depth of nested BSDFs.
 const MAX_DEPTH: u32 = 32;
 
+/// Microfacets of a rough surface: α along u and v, and their distribution.
+struct Microfacets {
+    u: ScalarValue,
+    v: ScalarValue,
+    beckmann: bool,
+}
+
 impl Converter<'_> {
     /// The material of a BSDF; `None` for `null`, through which light passes.
     pub(crate) fn surface(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
@@ -100,28 +107,32 @@ impl Converter<'_> {
         Ok(())
     }
 
-    /// α along u and v.
-    fn alphas(&mut self, node: Node) -> Result<(ScalarValue, ScalarValue), SceneError> {
-        match node.text("distribution")? {
-            Some("ggx") => {}
-            // Beckmann's is the default of Mitsuba.
-            _ => self.tell(node, "microfacets of Beckmann are not modelled: they are of GGX with the same width"),
-        }
+    /// Microfacets of a rough surface.
+    fn microfacets(&mut self, node: Node) -> Result<Microfacets, SceneError> {
+        // Beckmann's distribution is the default of Mitsuba.
+        let beckmann = match node.text("distribution")? {
+            None | Some("beckmann") => true,
+            Some("ggx") => false,
+            Some(_) => return Err(node.error("`distribution` must be beckmann or ggx")),
+        };
         node.ignore(&["sample_visible"]);
-        if node.has("alpha_u") || node.has("alpha_v") {
-            return Ok((self.scalar(node, "alpha_u", 0.1)?, self.scalar(node, "alpha_v", 0.1)?));
-        }
-        let alpha = self.scalar(node, "alpha", 0.1)?;
-        Ok((alpha.clone(), alpha))
+        let mut alpha = |name: &str| self.scalar(node, name, 0.1).map(within_share);
+        let (u, v) = if node.has("alpha_u") || node.has("alpha_v") {
+            (alpha("alpha_u")?, alpha("alpha_v")?)
+        } else {
+            let alpha = alpha("alpha")?;
+            (alpha.clone(), alpha)
+        };
+        Ok(Microfacets { u, v, beckmann })
     }
 
-    /// One α, and whether that was one for both directions.
-    fn alpha(&mut self, node: Node) -> Result<ScalarValue, SceneError> {
-        let (u, v) = self.alphas(node)?;
+    /// Of a kind of surface that ours models with one width.
+    fn isotropic(&mut self, node: Node) -> Result<(ScalarValue, bool), SceneError> {
+        let Microfacets { u, v, beckmann } = self.microfacets(node)?;
         if u != v {
             self.tell(node, "anisotropy of this kind of surface is not modelled: its width along v is that along u");
         }
-        Ok(within_share(u))
+        Ok((u, beckmann))
     }
 
     fn dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {
@@ -130,7 +141,10 @@ impl Converter<'_> {
         let (absorption, dispersion) = (Vec3::ZERO.into(), 0.0);
         Ok(Surface::two_sided(match node.plugin() {
             "dielectric" => Material::Glass { ior, absorption, dispersion },
-            _ => Material::RoughGlass { alpha: self.alpha(node)?, ior, absorption, dispersion, compensate: false },
+            _ => {
+                let (alpha, beckmann) = self.isotropic(node)?;
+                Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann }
+            }
         }))
     }
 
@@ -152,30 +166,15 @@ impl Converter<'_> {
         } else {
             (self.constant_color(node, "eta", 0.0, Use::Factor)?, self.constant_color(node, "k", 1.0, Use::Factor)?)
         };
-        let (u, v) = match node.plugin() {
+        let Microfacets { u, v, beckmann } = match node.plugin() {
             // Without a real part everything is reflected at every angle.
             "conductor" if eta == Vec3::ZERO => return Ok(Surface::one_sided(Material::Mirror { reflectance })),
-            "conductor" => (0.0.into(), 0.0.into()),
-            _ => self.alphas(node)?,
+            "conductor" => Microfacets { u: 0.0.into(), v: 0.0.into(), beckmann: false },
+            _ => self.microfacets(node)?,
         };
-        match (&u, &v) {
-            (ScalarValue::Number(u), ScalarValue::Number(v)) if u != v => {
-                self.tell(node, "the reflectance of an anisotropic conductor is that of Schlick, not of its η and k");
-                let factor = match reflectance {
-                    ColorValue::Rgb(rgb) => rgb,
-                    ColorValue::Texture(_) => Vec3::ONE,
-                };
-                let normal: [f32; 3] = std::array::from_fn(|i| factor[i] * ior::normal_reflectance(eta[i], k[i]));
-                let normal = ColorValue::Rgb(Vec3::from_array(normal).clamp(Vec3::ZERO, Vec3::ONE));
-                return Ok(Surface::one_sided(anisotropic_metal(normal, *u, *v)));
-            }
-            _ if u != v => {
-                self.tell(node, "textures of two different widths are not modelled: the width along v is that along u");
-            }
-            _ => {}
-        }
-        let (eta, k) = (eta.into(), k.into());
-        Ok(Surface::one_sided(Material::Conductor { alpha: within_share(u), eta, k, reflectance, compensate: false }))
+        let (eta, k, compensate) = (eta.into(), k.into(), false);
+        let (alpha_v, alpha) = (if u == v { 0.0.into() } else { v }, u);
+        Ok(Surface::one_sided(Material::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, compensate }))
     }
 
     fn plastic(&mut self, node: Node) -> Result<Surface, SceneError> {
@@ -183,11 +182,11 @@ impl Converter<'_> {
         let diffuse = self.color(node, "diffuse_reflectance", 0.5, Use::Reflectance)?;
         let specular = within_share(self.scalar(node, "specular_reflectance", 1.0)?);
         let nonlinear = node.boolean_or("nonlinear", false)?;
-        let alpha = match node.plugin() {
-            "plastic" => ScalarValue::Number(0.0),
-            _ => self.alpha(node)?,
+        let (alpha, beckmann) = match node.plugin() {
+            "plastic" => (0.0.into(), false),
+            _ => self.isotropic(node)?,
         };
-        Ok(Surface::one_sided(Material::Plastic { diffuse, alpha, ior, specular, nonlinear }))
+        Ok(Surface::one_sided(Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann }))
     }
 
     /// Whether something of `principled` is there and not 0.
@@ -362,16 +361,32 @@ impl Converter<'_> {
         Ok(Some(Surface { part: Material::blend(weight, a, b), two_sided }))
     }
 
-    /// Mitsuba darkens light that grazes the normal of a map.
-    fn tell_of_shadowing(&mut self, node: Node) -> Result<(), SceneError> {
-        if node.boolean_or("use_shadowing_function", true)? {
-            self.tell(node, "the shadowing function of normal and bump maps is not modelled: it is 1");
+    /// Gives a surface a map of its normals.
+    fn mapped(&mut self, node: Node, part: MaterialPart, map: ColorValue) -> Result<MaterialPart, SceneError> {
+        let has_shadowing = node.boolean_or("use_shadowing_function", true)?;
+        let turns_over = node.boolean_or("flip_invalid_normals", true)?;
+        if has_shadowing != turns_over {
+            self.tell(node, "use_shadowing_function and flip_invalid_normals are modelled together: there is neither");
         }
-        Ok(())
+        let mut part = match part {
+            // It has no shadowing of its own.
+            Material::Principled { .. } if !has_own(&part) => {
+                let name = self.add_material(node, part);
+                Material::blend(ScalarValue::Number(0.0), name.clone(), name)
+            }
+            part => self.whole(node, part),
+        };
+        match &mut part {
+            Material::Blend { normal_map, normal_shadowing, .. } => {
+                (*normal_map, *normal_shadowing) = (map, has_shadowing && turns_over);
+            }
+            Material::Principled { normal_map, .. } => *normal_map = map,
+            _ => {}
+        }
+        Ok(part)
     }
 
     fn bump_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        node.ignore(&["flip_invalid_normals"]);
         let scale = node.float_or("scale", 1.0)? as f32;
         let heights = node.children("texture")?.first().copied();
         let heights = heights.ok_or_else(|| node.error("a bumpmap contains a texture of heights"))?;
@@ -387,13 +402,9 @@ impl Converter<'_> {
                 return Ok(Some(surface));
             }
         }
-        self.tell_of_shadowing(node)?;
         let name = self.names.free(&format!("{heights} as relief"));
         self.file.textures.0.extend(source.map(|source| (name.clone(), source)));
-        let mut part = self.whole(node, surface.part);
-        if let Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } = &mut part {
-            *normal_map = ColorValue::Texture(name);
-        }
+        let part = self.mapped(node, surface.part, ColorValue::Texture(name))?;
         Ok(Some(Surface { part, ..surface }))
     }
 
@@ -407,19 +418,15 @@ impl Converter<'_> {
     }
 
     fn normal_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        node.ignore(&["flip_invalid_normals"]);
         let map = node.child("normalmap")?;
         let map = map.ok_or_else(|| node.error("a normalmap contains a texture called `normalmap`"))?;
         let map = self.texture(map, Use::Factor, Reads::Color)?;
         let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
         if map == ColorValue::Rgb(Vec3::new(0.5, 0.5, 1.0)) {
+            node.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
             return Ok(Some(surface));
         }
-        self.tell_of_shadowing(node)?;
-        let mut part = self.whole(node, surface.part);
-        if let Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } = &mut part {
-            *normal_map = map;
-        }
+        let part = self.mapped(node, surface.part, map)?;
         Ok(Some(Surface { part, ..surface }))
     }
 }
@@ -442,18 +449,6 @@ fn elongation(along: f32, across: f32) -> f32 {
     if across >= 1.0 { 0.0 } else { ((along - across) / (1.0 - across)).clamp(0.0, 1.0).sqrt() }
 }
 
-/// A metal with widths α along u and v.
-fn anisotropic_metal(reflectance: ColorValue, u: f32, v: f32) -> MaterialPart {
-    let mut part = Material::principled(reflectance);
-    if let Material::Principled { metallic, roughness, anisotropy, anisotropy_rotation, .. } = &mut part {
-        let (along, across) = (u.max(v), u.min(v));
-        *metallic = 1.0.into();
-        *roughness = across.clamp(0.0, 1.0).sqrt().into();
-        (*anisotropy, *anisotropy_rotation) = (elongation(along, across).into(), if u >= v { 0.0 } else { 90.0 });
-    }
-    part
-}
-
 /// Whether a surface has holes or normals of its own, which parts of others have not.
 fn has_own(part: &MaterialPart) -> bool {
     match part {
@@ -467,6 +462,9 @@ fn has_own(part: &MaterialPart) -> bool {
 /// Exchanges holes and normals of two surfaces, if both can have them.
 pub(crate) fn exchange_own(one: &mut MaterialPart, other: &mut MaterialPart) {
     use Material::{Blend, Principled};
+    if let (Blend { normal_shadowing: a, .. }, Blend { normal_shadowing: b, .. }) = (&mut *one, &mut *other) {
+        std::mem::swap(a, b);
+    }
     let (
         Blend { opacity: a, normal_map: b, .. } | Principled { opacity: a, normal_map: b, .. },
         Blend { opacity: c, normal_map: d, .. } | Principled { opacity: c, normal_map: d, .. },

@@ -26,12 +26,6 @@ pub(crate) fn conductor_names() -> impl Iterator<Item = &'static str> {
     CONDUCTORS.iter().map(|(name, ..)| *name)
 }
 
-/// Reflectance of a conductor at normal incidence.
-pub(crate) fn normal_reflectance(eta: f32, k: f32) -> f32 {
-    let k2 = k * k;
-    ((eta - 1.0) * (eta - 1.0) + k2) / ((eta + 1.0) * (eta + 1.0) + k2)
-}
-
 const DIELECTRICS: [(&str, f64); 23] = [
     ("vacuum", 1.0),
     ("helium", 1.000036),
@@ -107,6 +101,12 @@ const CONDUCTORS: [(&str, [f32; 3], [f32; 3]); 41] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Reflectance of a conductor at normal incidence.
+    fn normal_reflectance(eta: f32, k: f32) -> f32 {
+        let k2 = k * k;
+        ((eta - 1.0) * (eta - 1.0) + k2) / ((eta + 1.0) * (eta + 1.0) + k2)
+    }
 
     #[test]
     fn metals_have_their_colours() {

@@ -45,6 +45,18 @@ pub(crate) trait MaterialScope {
 
 /// A GGX width where both directions have their own: their geometric mean.
 fn alpha(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> Texture {
+    let (u, v) = alphas(scope, params, prefix);
+    match (u, v) {
+        (Texture::Constant(u), Some(v)) => {
+            scope.tell("its highlights are of the same width in all directions");
+            Texture::Constant((u * v).powf(0.5))
+        }
+        (alpha, _) => alpha,
+    }
+}
+
+/// The widths α along u and v; `None` for the second if it is the first.
+fn alphas(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> (Texture, Option<f32>) {
     let name = |end: &str| format!("{prefix}{end}");
     let both = scope.number(params, &name("roughness"));
     let u = scope.number(params, &name("uroughness")).or(both.clone());
@@ -53,11 +65,13 @@ fn alpha(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> Textu
     // pbrt, version 4: α is the square root of the roughness.
     let width = |roughness: f32| if is_remapped { roughness.max(0.0).sqrt() } else { roughness.max(0.0) };
     let value = match (u, v) {
-        (Some(Texture::Constant(u)), Some(Texture::Constant(v))) => {
-            if u.x != v.x {
-                scope.tell("its highlights are of the same width in all directions");
+        (Some(Texture::Constant(u)), Some(Texture::Constant(v))) if u.x != v.x => {
+            let [u, v] = [u.x, v.x].map(|roughness| width(roughness).min(1.0));
+            // Below this, pbrt takes a surface for smooth.
+            if u.max(v) >= 1e-3 {
+                return (Texture::Constant(Vec3::splat(u)), Some(v.max(1e-4)));
             }
-            Texture::Constant(Vec3::splat((width(u.x) * width(v.x)).sqrt()))
+            Texture::Constant(Vec3::ZERO)
         }
         (Some(texture @ Texture::Varying(_)), _) | (_, Some(texture @ Texture::Varying(_))) => {
             if is_remapped {
@@ -65,17 +79,17 @@ fn alpha(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> Textu
             }
             texture
         }
-        (Some(Texture::Constant(one)), None) | (None, Some(Texture::Constant(one))) => {
+        (Some(Texture::Constant(one)), _) | (None, Some(Texture::Constant(one))) => {
             Texture::Constant(Vec3::splat(width(one.x)))
         }
         (None, None) => Texture::Constant(Vec3::ZERO),
     };
-    match value {
-        // Below this, pbrt takes a surface for smooth.
+    let value = match value {
         Texture::Constant(alpha) if alpha.x < 1e-3 => Texture::Constant(Vec3::ZERO),
         Texture::Constant(alpha) => Texture::Constant(alpha.min(Vec3::ONE)),
         texture => texture,
-    }
+    };
+    (value, None)
 }
 
 /// The roughness of `principled` for a GGX width.
@@ -185,17 +199,22 @@ pub(crate) fn material(
                 ior,
                 specular: 1.0.into(),
                 nonlinear: true,
+                beckmann: false,
             }
         }
         "conductor" => {
-            let width = alpha(scope, params, "");
+            let (width, across) = alphas(scope, params, "");
             let alpha = scope.scalar_value(width);
             match conductor(scope, params, "") {
                 Conductor::Index { eta, k } => {
                     let (eta, k, reflectance) = (Rgb(eta.as_vec3()), Rgb(k.as_vec3()), ColorValue::grey(1.0));
-                    MaterialPart::Conductor { alpha, eta, k, reflectance, compensate: false }
+                    let (alpha_v, beckmann, compensate) = (across.unwrap_or(0.0).into(), false, false);
+                    MaterialPart::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, compensate }
                 }
                 Conductor::Reflectance(reflectance) => {
+                    if across.is_some() {
+                        scope.tell("its highlights are of the same width in all directions");
+                    }
                     MaterialPart::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, compensate: false }
                 }
             }
@@ -217,7 +236,7 @@ pub(crate) fn material(
                 Texture::Constant(Vec3::ZERO) => MaterialPart::Glass { ior, absorption, dispersion },
                 width => {
                     let alpha = scope.scalar_value(width);
-                    MaterialPart::RoughGlass { alpha, ior, absorption, dispersion, compensate: false }
+                    MaterialPart::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann: false }
                 }
             }
         }

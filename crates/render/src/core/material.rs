@@ -33,7 +33,7 @@ materials! {
     Plastic "plastic" (diffuse) {
         /// albedo of the base
         diffuse: P::Color, Color(Reflectance), "colour";
-        /// GGX width of the coat: the square of what other programs call roughness
+        /// width of the coat's microfacets: the square of what other programs call roughness
         alpha: P::Scalar, Scalar(Width) = 0.0, "roughness";
         /// index of refraction of the coat
         ior: f32, Number(Ior) = 1.5, "IOR";
@@ -41,6 +41,8 @@ materials! {
         specular: P::Scalar, Scalar(Share) = 1.0, "specular";
         /// the base colours light at every bounce below the coat
         nonlinear: bool, Flag(Choice) = true, "nonlinear";
+        /// microfacets of Beckmann, without long tails, instead of GGX
+        beckmann: bool, Flag(Choice) = false, "Beckmann";
     }
 
     /// Lambert on both sides: light is reflected and transmitted in all directions, as by paper or a leaf.
@@ -132,17 +134,21 @@ materials! {
         compensate: bool, Flag(Choice) = false, "compensate";
     }
 
-    /// GGX microfacets of a metal with the exact Fresnel term of unpolarised light.
+    /// Microfacets of a metal with the exact Fresnel term of unpolarised light.
     Conductor "conductor" {
-        /// GGX width: the square of what other programs call roughness
+        /// width of the microfacets: the square of what other programs call roughness
         alpha: P::Scalar, Scalar(Width) = 0.0, "roughness";
+        /// the same along the direction of v, where `alpha` is that of u; 0: `alpha`
+        alpha_v: P::Scalar, Scalar(Width) = 0.0, "roughness along v";
+        /// microfacets of Beckmann, without long tails, instead of GGX
+        beckmann: bool, Flag(Choice) = false, "Beckmann";
         /// index of refraction, per channel
         eta: P::Rgb, Rgb(Factor) = Vec3::new(0.143, 0.375, 1.442), "eta";
         /// extinction coefficient, per channel
         k: P::Rgb, Rgb(Factor) = Vec3::new(3.983, 2.386, 1.603), "k";
         /// factor of the reflection
         reflectance: P::Color, Color(Reflectance) = Vec3::ONE, "colour";
-        /// return the energy that single scattering loses
+        /// return the energy that single scattering of GGX loses
         compensate: bool, Flag(Choice) = false, "compensate";
     }
 
@@ -166,9 +172,9 @@ materials! {
         transmittance: P::Color, Color(Reflectance) = Vec3::ONE, "transmitted";
     }
 
-    /// Dielectric with GGX microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
+    /// Dielectric with microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
     RoughGlass "rough_glass" {
-        /// GGX width: the square of what other programs call roughness
+        /// width of the microfacets: the square of what other programs call roughness
         alpha: P::Scalar, Scalar(Width), "roughness";
         /// index of refraction: water 1.33, glass 1.5, diamond 2.4
         ior: f32, Number(Ior) = 1.5, "IOR";
@@ -176,8 +182,10 @@ materials! {
         absorption: P::Rgb, Rgb(Absorption) = Vec3::ZERO, "absorption";
         /// 20 / Abbe number: 0.3 to 0.8 for glass, 0.36 for diamond
         dispersion: f32, Number(Dispersion) = 0.0, "dispersion";
-        /// return the energy that single scattering loses (Kulla and Conty 2017)
+        /// return what single scattering of GGX loses (Kulla and Conty 2017)
         compensate: bool, Flag(Choice) = false, "compensate";
+        /// microfacets of Beckmann, without long tails, instead of GGX
+        beckmann: bool, Flag(Choice) = false, "Beckmann";
     }
 
     /// The classic local model. In path tracing it is diffuse, mirror and glass in shares that sum to 1:
@@ -224,6 +232,8 @@ materials! {
         normal_map: P::Color, Color(Map) = Vec3::new(0.5, 0.5, 1.0), "normals";
         /// factor of their slope
         normal_scale: f32, Number(Scale) = 1.0, "normal scale";
+        /// mapped normals as in Mitsuba 3, which dims light that grazes them
+        normal_shadowing: bool, Flag(Choice) = false, "normal shadowing";
     }
 }
 

@@ -61,9 +61,8 @@ impl Material {
     pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {
             Self::Mirror { .. } | Self::Glass { .. } => true,
-            Self::Metal { alpha, .. } | Self::Conductor { alpha, .. } | Self::RoughGlass { alpha, .. } => {
-                matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
-            }
+            Self::Metal { alpha, .. } | Self::RoughGlass { alpha, .. } => is_mirror(alpha),
+            Self::Conductor { alpha, alpha_v, .. } => is_mirror(alpha) && is_mirror(alpha_v),
             Self::Phong { specular, transparency, .. } => {
                 *transparency > 0.0 || !matches!(specular, ScalarInput::Constant(share) if *share <= 0.0)
             }
@@ -113,6 +112,7 @@ impl Material {
             Self::Principled { clearcoat_normal_map, anisotropy, .. } => {
                 clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
             }
+            Self::Conductor { alpha_v, .. } => can_be_above_zero(alpha_v),
             _ => false,
         };
         of_layers || self.normal_map().is_some()
@@ -126,6 +126,11 @@ impl Material {
             }
             _ => None,
         }
+    }
+
+    /// Whether normals of its map are those of [`crate::shading::tangent::turned_over`], not bent.
+    pub(crate) fn turns_normals_over(&self) -> bool {
+        matches!(self, Self::Blend { normal_shadowing: true, .. })
     }
 
     /// Whether it, or a part of it, needs tangents.
@@ -185,6 +190,11 @@ pub(crate) struct Cutout {
 /// Whether a parameter may be positive somewhere, without evaluating textures.
 fn can_be_above_zero(scalar: &ScalarInput) -> bool {
     !matches!(scalar, ScalarInput::Constant(value) if *value <= 0.0)
+}
+
+/// Whether a surface of this width is a mirror everywhere.
+fn is_mirror(alpha: &ScalarInput) -> bool {
+    matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
 }
 
 /// The light that a material emits.

@@ -64,7 +64,8 @@ impl Material {
             if alpha < SMALLEST_ALPHA {
                 Self::Glass { ior, absorption, dispersion }
             } else {
-                Self::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption, dispersion, compensate: true }
+                let alpha = ScalarInput::Constant(alpha);
+                Self::RoughGlass { alpha, ior, absorption, dispersion, compensate: true, beckmann: false }
             }
         } else {
             self

@@ -7,8 +7,9 @@ use crate::shading::conductor::conductor;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
-use crate::shading::layer_albedo::cosine_mean;
+use crate::shading::layer_albedo::{SchlickAlbedo, cosine_mean};
 use crate::shading::metal::{Metal, schlick, with_further_bounces};
+use crate::shading::microfacets::{Microfacets, SeenMicrofacets};
 use crate::shading::plastic::Plastic;
 use crate::shading::rough_glass::{RoughGlass, RoughGlassSample};
 use crate::shading::scatter::{BsdfSample, Scatter};
@@ -32,7 +33,9 @@ pub(crate) enum Lobe<'a> {
         compensate: bool,
     },
     Conductor {
-        alpha: f32,
+        facets: Microfacets,
+        /// Direction of the first width, in world space; any of isotropic ones.
+        tangent: Vec3,
         eta: Vec3,
         k: Vec3,
         reflectance: Vec3,
@@ -58,7 +61,8 @@ pub(crate) enum Lobe<'a> {
     /// Rough in the sense of [`crate::shading::rough_glass::is_smooth`].
     RoughGlass {
         interface: Interface,
-        alpha: f32,
+        /// Isotropic.
+        facets: Microfacets,
         compensate: bool,
     },
 }
@@ -100,27 +104,36 @@ impl Lobe<'_> {
             Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
                 metal_at(normal, wo, alpha, reflectance, fresnel, compensate)
             }
-            Self::Conductor { alpha, eta, k, compensate, .. } if alpha >= SMALLEST_ALPHA => {
-                let mut metal = metal_at(normal, wo, alpha, Vec3::ONE, Fresnel::Constant, false);
-                if compensate {
-                    let at = |k_of: usize| cosine_mean(|cos| conductor(cos, eta, k)[k_of]);
-                    let lost = ggx::lost_over_returned(normal.dot(wo), alpha);
-                    metal.gain = with_further_bounces(Vec3::new(at(0), at(1), at(2)).into(), lost, alpha);
-                }
-                metal
-            }
             _ => return None,
         };
         metal.facing().then_some(metal)
     }
 
-    /// Factor of the tint of metal that depends on the angle with its microfacets and is not in [`Metal`].
+    /// Reflectance of a conductor at an angle with its microfacets; white for all others.
     #[inline]
     fn angular_tint(&self, cos: f32) -> Vec3 {
         match *self {
             Self::Conductor { eta, k, reflectance, .. } => reflectance * conductor(cos, eta, k),
             _ => Vec3::ONE,
         }
+    }
+
+    /// The microfacets of a rough conductor that faces the viewer, and the factor that adds further bounces between
+    /// them; `None` for all others.
+    fn rough_conductor(&self, wo: Vec3, normal: Vec3) -> Option<(SeenMicrofacets, Vec3)> {
+        let Self::Conductor { facets, tangent, eta, k, compensate, .. } = *self else { return None };
+        let seen = SeenMicrofacets::new(facets, normal, tangent, wo).filter(|_| !facets.is_smooth())?;
+        if !compensate || facets.beckmann {
+            return Some((seen, Vec3::ONE));
+        }
+        let at = |k_of: usize| cosine_mean(|cos| conductor(cos, eta, k)[k_of]);
+        let (lost, alpha) = if facets.is_isotropic() {
+            (ggx::lost_over_returned(normal.dot(wo), facets.alpha[0]), facets.alpha[0])
+        } else {
+            let whole = SchlickAlbedo::along(seen.wo(), facets.alpha).whole();
+            ((1.0 - whole) / whole, (0.5 * Vec2::from(facets.alpha).length_squared()).sqrt())
+        };
+        Some((seen, with_further_bounces(Vec3::new(at(0), at(1), at(2)).into(), lost, alpha).into()))
     }
 }
 
@@ -129,7 +142,8 @@ impl Scatter for Lobe<'_> {
     fn has_non_specular(&self) -> bool {
         match self {
             Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent { .. } => true,
-            Self::Metal { alpha, .. } | Self::Conductor { alpha, .. } => *alpha >= SMALLEST_ALPHA,
+            Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,
+            Self::Conductor { facets, .. } => !facets.is_smooth(),
             Self::Plastic(plastic) => plastic.has_non_specular(),
             Self::Mirror { .. } | Self::Glass(_) | Self::ThinGlass { .. } => false,
         }
@@ -137,10 +151,10 @@ impl Scatter for Lobe<'_> {
 
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
-        if let Self::RoughGlass { interface, alpha, compensate } = *self {
+        if let Self::RoughGlass { interface, facets, compensate } = *self {
             let (normal, interface) =
                 if normal.dot(wo) < 0.0 { (-normal, interface.reversed()) } else { (normal, interface) };
-            let (value, pdf) = RoughGlass::new(normal, wo, alpha, interface, compensate).eval(wi);
+            let (value, pdf) = RoughGlass::new(normal, wo, facets, interface, compensate).eval(wi);
             return (Vec3::splat(value), pdf);
         }
         let cos = normal.dot(wi);
@@ -159,10 +173,17 @@ impl Scatter for Lobe<'_> {
                 (albedo * pdf, pdf)
             }
             Self::Plastic(plastic) => plastic.eval(wo, wi, normal),
+            Self::Conductor { .. } => match self.rough_conductor(wo, normal) {
+                Some((facets, gain)) => {
+                    let (found, cos) = facets.eval(facets.local(wi));
+                    (gain * self.angular_tint(cos) * found.value, found.pdf)
+                }
+                None => (Vec3::ZERO, 0.0),
+            },
             _ => match self.rough_metal(wo, normal) {
                 Some(metal) => {
                     let found = metal.eval(metal.local(wi.into()));
-                    (Vec3::from(found.tint) * self.angular_tint(found.cos) * found.value, found.pdf)
+                    (Vec3::from(found.tint) * found.value, found.pdf)
                 }
                 None => (Vec3::ZERO, 0.0),
             },
@@ -199,10 +220,21 @@ impl Scatter for Lobe<'_> {
                 let tint = fresnel.reflectance(reflectance, normal.dot(wo));
                 Some(specular(1.0, mirrored(wo, normal), tint, None))
             }
-            Self::Conductor { alpha, .. } if alpha < SMALLEST_ALPHA => {
+            Self::Conductor { facets, .. } if facets.is_smooth() => {
                 Some(specular(1.0, mirrored(wo, normal), self.angular_tint(normal.dot(wo)), None))
             }
-            Self::Metal { .. } | Self::Conductor { .. } => {
+            Self::Conductor { .. } => {
+                let (facets, gain) = self.rough_conductor(wo, normal)?;
+                let [wi, local] = facets.sample(u);
+                // Below the surface: light that a second bounce would have returned.
+                if local.z <= 0.0 {
+                    return None;
+                }
+                let (found, cos) = facets.eval(local);
+                let weight = gain * self.angular_tint(cos) * found.weight;
+                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
+            }
+            Self::Metal { .. } => {
                 let metal = self.rough_metal(wo, normal)?;
                 let [wi, local] = metal.sample(u.to_array());
                 // Below the surface: light that a second bounce would have returned.
@@ -210,11 +242,11 @@ impl Scatter for Lobe<'_> {
                     return None;
                 }
                 let found = metal.eval(local);
-                let weight = Vec3::from(found.tint) * self.angular_tint(found.cos) * found.weight;
+                let weight = Vec3::from(found.tint) * found.weight;
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
             }
-            Self::RoughGlass { interface, alpha, compensate } => {
-                let surface = RoughGlass::new(normal, wo, alpha, interface, compensate);
+            Self::RoughGlass { interface, facets, compensate } => {
+                let surface = RoughGlass::new(normal, wo, facets, interface, compensate);
                 surface.sample(u_choice(), u).map(|RoughGlassSample { wi, weight, pdf, passes }| BsdfSample {
                     wi,
                     weight: Vec3::splat(weight),
@@ -311,7 +343,19 @@ mod tests {
     /// Gold.
     fn conductor_of(alpha: f32, compensate: bool) -> Lobe<'static> {
         let (eta, k) = (Vec3::new(0.143, 0.375, 1.442), Vec3::new(3.983, 2.386, 1.603));
-        Lobe::Conductor { alpha, eta, k, reflectance: Vec3::new(1.0, 0.9, 0.8), compensate }
+        let (facets, tangent) = (Microfacets::ggx(alpha), Vec3::X);
+        Lobe::Conductor { facets, tangent, eta, k, reflectance: Vec3::new(1.0, 0.9, 0.8), compensate }
+    }
+
+    const BECKMANN: Microfacets = Microfacets { alpha: [0.4; 2], beckmann: true };
+
+    /// Gold with microfacets of Beckmann of two widths.
+    fn anisotropic() -> Lobe<'static> {
+        let mut lobe = conductor_of(0.3, false);
+        if let Lobe::Conductor { facets, .. } = &mut lobe {
+            *facets = Microfacets { alpha: [0.5, 0.2], beckmann: true };
+        }
+        lobe
     }
 
     fn leaf(reflectance: Vec3, transmittance: Vec3) -> Lobe<'static> {
@@ -365,6 +409,9 @@ mod tests {
         same_mean(1, &metal(0.4, false));
         same_mean(4, &conductor_of(0.3, false));
         same_mean(5, &conductor_of(0.7, true));
+        same_mean(8, &anisotropic());
+        let (interface, facets) = (Interface { eta: 1.5, radiance_eta: 1.5, beyond: MediumId::OUTSIDE }, BECKMANN);
+        same_mean(9, &Lobe::RoughGlass { interface, facets, compensate: false });
         let leaf = leaf(Vec3::new(0.1, 0.4, 0.1), Vec3::new(0.3, 0.5, 0.05));
         same_mean(6, &leaf);
         let waxed = [(Part::Lobe(leaf), 0.8), (Part::Lobe(metal(0.3, false)), 0.2)];
@@ -412,6 +459,7 @@ mod tests {
             Lobe::Diffuse { albedo: Vec3::splat(0.6) },
             metal(0.3, false),
             conductor_of(0.3, false),
+            anisotropic(),
             leaf(Vec3::splat(0.3), Vec3::splat(0.6)),
         ];
         for lobe in lobes {
@@ -420,7 +468,7 @@ mod tests {
             assert!((forth - back).length() < 1e-4 * forth.length());
         }
         // Through a leaf, seen from both sides.
-        let leaf = lobes[3];
+        let leaf = lobes[4];
         let (forth, back) = (leaf.eval(a, -b, Vec3::Z).0 / b.z, leaf.eval(-b, a, Vec3::Z).0 / a.z);
         assert!(forth.x > 0.1 && (forth - back).length() < 1e-6, "{forth} {back}");
     }
@@ -428,7 +476,8 @@ mod tests {
     #[test]
     fn white_conductors_and_leaves_return_all_light() {
         let white = |alpha, compensate| Lobe::Conductor {
-            alpha,
+            facets: Microfacets::ggx(alpha),
+            tangent: Vec3::X,
             eta: Vec3::ZERO,
             k: Vec3::ONE,
             reflectance: Vec3::ONE,

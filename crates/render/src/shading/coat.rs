@@ -8,6 +8,7 @@ use crate::prepare::prepared::Prepared;
 use crate::shading::dielectric::fresnel;
 use crate::shading::glass_loss::scattered_once;
 use crate::shading::integral_table::Between;
+use crate::shading::microfacets::Microfacets;
 use rayon::prelude::*;
 
 /// Entries by angle, uniform in the root of the cosine.
@@ -23,34 +24,34 @@ const ROW: usize = N_COS + 2;
 pub(crate) struct Coat<'a> {
     /// Index of refraction.
     pub ior: f32,
-    /// GGX width.
-    pub alpha: f32,
+    /// Isotropic.
+    pub facets: Microfacets,
     /// One row, or [`N_ALPHA`] of them.
     rows: &'a [f32],
 }
 
 impl<'a> Coat<'a> {
     /// Returns the coat of a plastic; its table is computed if this is the first.
-    pub fn at(scene: &'a Prepared, id: MaterialId, ior: f32, alpha: f32) -> Self {
+    pub fn at(scene: &'a Prepared, id: MaterialId, ior: f32, facets: Microfacets) -> Self {
         let rows = scene.tables.coats[id as usize].get_or_init(|| rows_of(&scene.shading.materials[id as usize]));
-        Self::new(ior, alpha, rows)
+        Self::new(ior, facets, rows)
     }
 
     /// - `rows`: those of this index and width, or of all widths; see [`rows`].
-    pub fn new(ior: f32, alpha: f32, rows: &'a [f32]) -> Self {
-        Self { ior, alpha, rows }
+    pub fn new(ior: f32, facets: Microfacets, rows: &'a [f32]) -> Self {
+        Self { ior, facets, rows }
     }
 
     /// Whether it reflects like a mirror.
     #[inline]
     pub fn is_smooth(&self) -> bool {
-        self.alpha < SMALLEST_ALPHA
+        self.facets.is_smooth()
     }
 
     fn mean(&self, of: impl Fn(&[f32]) -> f32) -> f32 {
         match self.rows.len() / ROW {
             1 => of(self.rows),
-            n => Between::new(self.alpha.max(0.0).sqrt(), n).mean(|i| of(&self.rows[i * ROW..][..ROW])),
+            n => Between::new(self.facets.alpha[0].max(0.0).sqrt(), n).mean(|i| of(&self.rows[i * ROW..][..ROW])),
         }
     }
 
@@ -92,21 +93,21 @@ pub(crate) fn compute(scene: &Prepared) {
 }
 
 fn rows_of(material: &Material) -> Vec<f32> {
-    let Material::Plastic { alpha, ior, .. } = *material else { return Vec::new() };
-    rows(ior, alpha)
+    let Material::Plastic { alpha, ior, beckmann, .. } = *material else { return Vec::new() };
+    rows(ior, alpha, beckmann)
 }
 
 /// The table of a coat of constant width, or of all widths.
-pub(crate) fn rows(ior: f32, alpha: ScalarInput) -> Vec<f32> {
+pub(crate) fn rows(ior: f32, alpha: ScalarInput, beckmann: bool) -> Vec<f32> {
     match alpha {
-        ScalarInput::Constant(alpha) => row(ior, alpha).into(),
+        ScalarInput::Constant(alpha) => row(ior, alpha, beckmann).into(),
         ScalarInput::Texture(_) => {
-            (0..N_ALPHA).flat_map(|i| row(ior, (i as f32 / (N_ALPHA - 1) as f32).powi(2))).collect()
+            (0..N_ALPHA).flat_map(|i| row(ior, (i as f32 / (N_ALPHA - 1) as f32).powi(2), beckmann)).collect()
         }
     }
 }
 
-fn row(ior: f32, alpha: f32) -> [f32; ROW] {
+fn row(ior: f32, alpha: f32, beckmann: bool) -> [f32; ROW] {
     /// Points of a mean over all angles: more for smooth coats, which cost nothing.
     const N_MEAN: [u32; 2] = [1024, 48];
     let is_smooth = alpha < SMALLEST_ALPHA || ior == 1.0;
@@ -116,7 +117,7 @@ fn row(ior: f32, alpha: f32) -> [f32; ROW] {
             (1.0, f64::from(fresnel(cos, eta).0))
         } else {
             // The frame is undefined at exactly grazing incidence; a value close to the limit is used.
-            scattered_once(cos.max(1e-5), alpha.min(1.0), eta, [24, 16])
+            scattered_once(cos.max(1e-5), Microfacets::isotropic(alpha.min(1.0), beckmann), eta, [24, 16])
         }
     };
     // Uniform in the square of the cosine, by which directions are weighted.

@@ -6,6 +6,7 @@ use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::integral_table::{Between, IntegralTable};
+use crate::shading::microfacets::Microfacets;
 use firstlight_simd::Vector3;
 use std::f32::consts::PI;
 
@@ -85,7 +86,7 @@ fn eta_of(layer: usize) -> f32 {
 }
 
 fn lost_at(cos: f32, alpha: f32, eta: f32, n: [u32; 2]) -> f32 {
-    (1.0 - scattered_once(cos, alpha, eta, n).0).max(0.0) as f32
+    (1.0 - scattered_once(cos, Microfacets::isotropic(alpha, false), eta, n).0).max(0.0) as f32
 }
 
 /// Returns the share of light from one direction that single scattering returns on both sides, and on its own side
@@ -93,17 +94,18 @@ fn lost_at(cos: f32, alpha: f32, eta: f32, n: [u32; 2]) -> f32 {
 ///
 /// Integrates over all visible normals by the midpoint rule, like [`ggx::single_scattering_albedo`].
 ///
-/// - `cos`, `alpha`, `eta`: as of [`lost`]; `alpha` at least [`SMALLEST_ALPHA`], `cos` above 0.
+/// - `cos`, `eta`: as of [`lost`]; `cos` above 0; `facets`: isotropic, of width [`SMALLEST_ALPHA`] or more.
 /// - `n_radii`, `n_angles`: points along both axes.
-pub(crate) fn scattered_once(cos: f32, alpha: f32, eta: f32, [n_radii, n_angles]: [u32; 2]) -> (f64, f64) {
+pub(crate) fn scattered_once(cos: f32, facets: Microfacets, eta: f32, [n_radii, n_angles]: [u32; 2]) -> (f64, f64) {
     let wo = Vector3 { x: (1.0 - cos * cos).max(0.0).sqrt(), y: 0.0, z: cos };
+    let alpha = facets.alpha[0];
     let standard = Vector3 { x: wo.x * alpha, y: 0.0, z: wo.z }.normalize();
-    let lambda_o = ggx::lambda(wo, alpha);
+    let lambda_o = facets.lambda(wo);
     let (mut kept, mut reflected) = (0.0, 0.0);
     for i in 0..n_radii {
         // 1 − r², by its cube root: much of the loss is at the rim of the disc.
         let rest = 1.0 - (i as f32 + 0.5) / n_radii as f32;
-        let (gap, weight) = (rest.powi(3), 3.0 * rest * rest);
+        let (gap, weight) = (rest.powi(3), if facets.beckmann { 1.0 } else { 3.0 * rest * rest });
         let up = gap * (1.0 + standard.z);
         let z = up - standard.z;
         let sin = (1.0 - z * z).max(0.0).sqrt();
@@ -111,17 +113,22 @@ pub(crate) fn scattered_once(cos: f32, alpha: f32, eta: f32, [n_radii, n_angles]
             // The other half is symmetric.
             let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
             let (x, y) = (sin * cos_phi + standard.x, sin * sin_phi);
-            let half = Vector3 { x: x * alpha, y: y * alpha, z: up }.normalize();
+            let half = if facets.beckmann {
+                // Without tails: uniform in the cumulative distributions.
+                facets.sample(wo, [rest, (k as f32 + 0.5) / n_angles as f32])
+            } else {
+                Vector3 { x: x * alpha, y: y * alpha, z: up }.normalize()
+            };
             let (reflectance, cos_t) = fresnel(wo.dot(half).clamp(0.0, 1.0), eta);
             let (above, below) = (reflect(wo, half), refract(wo, half, eta, cos_t));
             let seen = 1.0 + lambda_o;
             let mut back = 0.0;
             if above.z > 0.0 {
-                back += reflectance * seen / (seen + ggx::lambda(above, alpha));
+                back += reflectance * seen / (seen + facets.lambda(above));
                 reflected += f64::from(weight * back);
             }
             if below.z < 0.0 && reflectance < 1.0 {
-                let both = ggx::above_and_below(lambda_o, ggx::lambda(below, alpha));
+                let both = ggx::above_and_below(lambda_o, facets.lambda(Vector3 { z: -below.z, ..below }));
                 back += (1.0 - reflectance) * both * seen;
             }
             kept += f64::from(weight * back);

@@ -31,8 +31,6 @@ pub(crate) struct MetalValue<R> {
     pub pdf: R,
     /// f · cos / pdf divided by the tint.
     pub weight: R,
-    /// Cosine with the microfacets that reflect this way.
-    pub cos: R,
 }
 
 impl<R: Real> Metal<R> {
@@ -79,7 +77,7 @@ impl<R: Real> Metal<R> {
         let found = ggx::reflection(self.wo, self.lambda_o, wi, self.alpha);
         let cos = self.wo.dot(found.half);
         let tint = tint(self.schlick, self.reflectance, cos);
-        MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight, cos }
+        MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight }
     }
 }
 

@@ -17,6 +17,7 @@ pub(crate) mod lights;
 mod lookups;
 pub(crate) mod medium;
 pub(crate) mod metal;
+pub(crate) mod microfacets;
 pub(crate) mod mis_state;
 pub(crate) mod paths;
 pub(crate) mod plastic;

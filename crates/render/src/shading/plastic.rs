@@ -1,6 +1,6 @@
 //! A diffuse base under a dielectric coat.
 //!
-//! The coat reflects by the exact Fresnel term, at GGX microfacets if it is rough. What it transmits, T(θ), is scattered
+//! The coat reflects by the exact Fresnel term, at microfacets if it is rough. What it transmits, T(θ), is scattered
 //! by the base, and comes out of the coat again or is reflected back to the base, any number of times:
 //!
 //! f = F D G / (4 cos θₒ cos θᵢ) + ρ / (1 − ρ R) · T(θₒ) T(θᵢ) / (π n²)
@@ -13,7 +13,7 @@ use crate::core::color::luminance;
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::coat::Coat;
 use crate::shading::dielectric::reflect;
-use crate::shading::metal::Metal;
+use crate::shading::microfacets::SeenMicrofacets;
 use crate::shading::scatter::BsdfSample;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
@@ -52,8 +52,8 @@ impl<'a> Plastic<'a> {
         if coat + base > 0.0 { coat / (coat + base) } else { 0.5 }
     }
 
-    fn microfacets(&self, axes: [Vector3<f32>; 3], wo: Vector3<f32>) -> Metal<f32> {
-        Metal::new(axes, wo, self.coat.alpha, Vec3::ONE.into(), false, 0.0)
+    fn microfacets(&self, normal: Vec3, wo: Vec3) -> Option<SeenMicrofacets> {
+        SeenMicrofacets::new(self.coat.facets, normal, normal, wo)
     }
 
     /// f · cos and pdf of all that is not specular; `normal`: unit, on the side of `wo` and of `wi`.
@@ -67,11 +67,12 @@ impl<'a> Plastic<'a> {
         let cosine = cosine_hemisphere_pdf(cos_i);
         let mut value = self.base * (cosine * passed * self.coat.passed(cos_i));
         let mut pdf = (1.0 - pmf) * cosine;
-        if !self.coat.is_smooth() && pmf > 0.0 {
-            let axes = frame_around(normal.into());
-            let metal = self.microfacets(axes, Vector3::from(wo).to_local(&axes));
-            let found = metal.eval(metal.local(wi.into()));
-            value += Vec3::splat(self.specular * self.coat.reflected(found.cos) * found.value);
+        if !self.coat.is_smooth()
+            && pmf > 0.0
+            && let Some(facets) = self.microfacets(normal, wo)
+        {
+            let (found, cos) = facets.eval(facets.local(wi));
+            value += Vec3::splat(self.specular * self.coat.reflected(cos) * found.value);
             pdf += pmf * found.pdf;
         }
         (value, pdf)
@@ -84,15 +85,14 @@ impl<'a> Plastic<'a> {
             return None;
         }
         let pmf = self.pmf(self.coat.passed(cos_o));
-        let axes = frame_around(normal.into());
         let wi = if u_choice >= pmf {
-            Vector3::from(cosine_hemisphere(u)).to_world(&axes).normalize()
+            Vector3::from(cosine_hemisphere(u)).to_world(&frame_around(normal.into())).normalize()
         } else if self.coat.is_smooth() {
             let wi = reflect(wo.into(), normal.into()).into();
             let weight = Vec3::splat(self.specular * self.coat.reflected(cos_o) / pmf);
             return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf, through: None });
         } else {
-            self.microfacets(axes, Vector3::from(wo).to_local(&axes)).sample(u.to_array())[0]
+            self.microfacets(normal, wo)?.sample(u)[0]
         };
         let wi = wi.into();
         let (value, pdf) = self.eval(wo, wi, normal);
@@ -107,6 +107,7 @@ mod tests {
     use crate::sampling::Sampler;
     use crate::shading::coat::rows;
     use crate::shading::interface::{Interface, MediumId};
+    use crate::shading::microfacets::Microfacets;
     use crate::shading::rough_glass::RoughGlass;
     use crate::test_statistics::ChiSquared;
     use std::f64::consts::TAU;
@@ -131,8 +132,8 @@ mod tests {
     fn a_smooth_white_one_returns_all_light_and_none_returns_more() {
         for ior in [1.05, 1.33, 1.5, 2.0] {
             for alpha in [0.0, 0.05, 0.2, 0.5, 1.0] {
-                let rows = rows(ior, alpha.into());
-                let coat = Coat::new(ior, alpha, &rows);
+                let rows = rows(ior, alpha.into(), false);
+                let coat = Coat::new(ior, Microfacets::ggx(alpha), &rows);
                 let plastic = Plastic::new(Vec3::ONE, true, 1.0, coat);
                 for cos in [1.0, 0.7, 0.3, 0.05] {
                     let found = furnace(&plastic, cos, 1 << 14).x;
@@ -158,7 +159,7 @@ mod tests {
                     choice >= crate::shading::dielectric::fresnel(wo.z, eta).0
                 } else {
                     let interface = Interface { eta, radiance_eta: 1.0, beyond: MediumId::OUTSIDE };
-                    let glass = RoughGlass::new(Vec3::Z, wo, alpha, interface, false);
+                    let glass = RoughGlass::new(Vec3::Z, wo, Microfacets::ggx(alpha), interface, false);
                     let Some(sample) = glass.sample(choice, u) else { break };
                     throughput *= sample.weight;
                     sample.passes
@@ -182,8 +183,8 @@ mod tests {
         for (ior, alpha) in [(1.5, 0.0), (1.33, 0.0), (1.5, 0.1), (1.5, 0.4), (1.8, 0.25)] {
             for textured in [false, true] {
                 let input = if textured { ScalarInput::Texture(0) } else { alpha.into() };
-                let rows = rows(ior, input);
-                let plastic = Plastic::new(albedo, true, 1.0, Coat::new(ior, alpha, &rows));
+                let rows = rows(ior, input, false);
+                let plastic = Plastic::new(albedo, true, 1.0, Coat::new(ior, Microfacets::ggx(alpha), &rows));
                 for cos in [0.95, 0.5, 0.15] {
                     let (found, expected) = (furnace(&plastic, cos, 1 << 16), walked(albedo, ior, alpha, cos));
                     let off = (found - expected).abs().max_element();
@@ -196,8 +197,8 @@ mod tests {
 
     #[test]
     fn the_linear_one_is_lighter_and_less_saturated() {
-        let rows = rows(1.5, 0.0.into());
-        let coat = Coat::new(1.5, 0.0, &rows);
+        let rows = rows(1.5, 0.0.into(), false);
+        let coat = Coat::new(1.5, Microfacets::ggx(0.0), &rows);
         // The share of uniform light that a surface of index 1.5 reflects inwards, as tables have it.
         assert!((coat.reflected_inwards() - 0.5963).abs() < 2e-4, "{}", coat.reflected_inwards());
         let albedo = Vec3::new(0.8, 0.4, 0.1);
@@ -212,8 +213,9 @@ mod tests {
         let (rings, sectors, fine, n) = (12, 24, 16, 100_000);
         // Significance 1 % over all nine cases (Šidák: 3.1 σ).
         for (case, alpha) in (0..).zip([0.1, 0.3, 1.0]) {
-            let rows = rows(1.5, alpha.into());
-            let plastic = Plastic::new(Vec3::new(0.6, 0.3, 0.1), true, 0.8, Coat::new(1.5, alpha, &rows));
+            let rows = rows(1.5, alpha.into(), false);
+            let plastic =
+                Plastic::new(Vec3::new(0.6, 0.3, 0.1), true, 0.8, Coat::new(1.5, Microfacets::ggx(alpha), &rows));
             for (view, cos) in (0..).zip([0.9, 0.5, 0.2]) {
                 let wo = direction(cos);
                 let bin = |w: Vec3| {

@@ -23,8 +23,13 @@ pub(crate) fn compute_for(scene: &Prepared) {
                     glass_loss::LOSSES.compute();
                 }
             }
-            Material::Metal { compensate: true, .. } | Material::Conductor { compensate: true, .. } => {
+            Material::Metal { compensate: true, .. } => ggx::ALBEDOS.compute(),
+            Material::Conductor { compensate: true, alpha_v, .. } => {
                 ggx::ALBEDOS.compute();
+                if *alpha_v != ScalarInput::Constant(0.0) {
+                    ggx::SCHLICK_MEANS.compute();
+                    anisotropic_albedo::compute();
+                }
             }
             Material::RoughGlass { compensate: true, .. } => glass_loss::LOSSES.compute(),
             _ => {}

@@ -1,8 +1,7 @@
-//! Rough dielectrics: GGX microfacets that reflect and refract, seen from one direction.
+//! Rough dielectrics: isotropic microfacets that reflect and refract, seen from one direction.
 //!
 //! Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces". Directions are in the frame
-//! of the shading normal (+z). No formula here assumes isotropic microfacets: anisotropy would only change
-//! [`ggx::lambda`], [`ggx::distribution`], [`ggx::sample_visible_normal`] and the orientation of the frame.
+//! of the shading normal (+z). Anisotropy would only change the orientation of the frame.
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
@@ -10,6 +9,7 @@ use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::glass_loss;
 use crate::shading::interface::Interface;
+use crate::shading::microfacets::Microfacets;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
 
@@ -21,7 +21,7 @@ const SMALLEST_COS: f32 = 1e-7;
 
 /// Whether microfacets change directions so little that the surface is that of smooth glass.
 ///
-/// - `alpha`: GGX width; `eta`: index on one side over that on the other.
+/// - `alpha`: width; `eta`: index on one side over that on the other.
 #[inline]
 pub(crate) fn is_smooth(alpha: f32, eta: f32) -> bool {
     // True also if either is NaN.
@@ -62,8 +62,7 @@ const SMALLEST_LOSS: f32 = 1e-5;
 /// A surface seen along `wo`.
 #[derive(Clone, Copy)]
 pub(crate) struct RoughGlass {
-    /// GGX width, dimensionless.
-    alpha: f32,
+    facets: Microfacets,
     interface: Interface,
     /// Shading frame in world space; the last axis is the normal.
     axes: [Vector3<f32>; 3],
@@ -88,15 +87,16 @@ pub(crate) struct RoughGlassSample {
 }
 
 impl RoughGlass {
-    /// - `normal`: unit, on the side of `wo`; `interface`: rough in the sense of [`is_smooth`]; `compensate`: add the
-    ///   light that single scattering loses.
+    /// - `normal`: unit, on the side of `wo`; `facets`: isotropic; `interface`: rough in the sense of [`is_smooth`];
+    ///   `compensate`: add the light that single scattering of GGX loses.
     #[inline]
-    pub fn new(normal: Vec3, wo: Vec3, alpha: f32, interface: Interface, compensate: bool) -> Self {
+    pub fn new(normal: Vec3, wo: Vec3, facets: Microfacets, interface: Interface, compensate: bool) -> Self {
         let axes = frame_around(normal.into());
         let wo = Vector3::from(wo).to_local(&axes);
         let wo = Vector3 { z: wo.z.max(SMALLEST_COS), ..wo };
-        let multiple = if compensate { Multiple::new(wo.z, alpha, interface.eta) } else { None };
-        Self { alpha, interface, axes, wo, lambda_o: ggx::lambda(wo, alpha), multiple }
+        let is_whole = compensate && !facets.beckmann;
+        let multiple = if is_whole { Multiple::new(wo.z, facets.alpha[0], interface.eta) } else { None };
+        Self { facets, interface, axes, wo, lambda_o: facets.lambda(wo), multiple }
     }
 
     /// Returns f · |cos| and the pdf per steradian of [`Self::sample`].
@@ -137,7 +137,7 @@ impl RoughGlass {
         let (share, mean) = sides[usize::from(beyond)];
         let (cos, eta, scale) = if beyond { (-wi.z, 1.0 / eta, radiance_eta * radiance_eta) } else { (wi.z, eta, 1.0) };
         let per_angle = lost * share * cosine_hemisphere_pdf(cos);
-        let back = per_angle * glass_loss::lost(cos, self.alpha, eta) / mean;
+        let back = per_angle * glass_loss::lost(cos, self.facets.alpha[0], eta) / mean;
         (value + back * scale, pdf * (1.0 - lost) + per_angle)
     }
 
@@ -168,7 +168,7 @@ impl RoughGlass {
             }
             u_choice = ((u_choice - multiple.lost) / (1.0 - multiple.lost)).min(1.0f32.next_down());
         }
-        let half = ggx::sample_visible_normal(self.wo, self.alpha, u.to_array());
+        let half = self.facets.sample(self.wo, u.to_array());
         let (reflectance, cos_t) = fresnel(self.cos_o(half), eta);
         let reflects = u_choice < reflectance;
         let wi = if reflects { reflect(self.wo, half) } else { refract(self.wo, half, eta, cos_t) };
@@ -196,7 +196,7 @@ impl RoughGlass {
     fn reflected(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
         let (reflectance, _) = fresnel(self.cos_o(half), self.interface.eta);
         // D / 4 cos θₒ: the Jacobian 1 / (4 ωₒ·h) cancels the cosine of the projected microfacet.
-        let per_angle = reflectance * ggx::distribution(half, self.alpha) / (4.0 * self.wo.z);
+        let per_angle = reflectance * self.facets.distribution(half) / (4.0 * self.wo.z);
         (per_angle * self.both_above(wi), per_angle / (1.0 + self.lambda_o))
     }
 
@@ -212,7 +212,7 @@ impl RoughGlass {
         // over its square (Walter et al. 2007, equation 17).
         let length = (eta - 1.0) * (eta + 1.0) / (eta * cos_o + cos_t);
         let jacobian = cos_t / (length * length);
-        let visible = ggx::distribution(half, self.alpha) * cos_o / self.wo.z;
+        let visible = self.facets.distribution(half) * cos_o / self.wo.z;
         let per_angle = (1.0 - reflectance) * visible * jacobian;
         (per_angle * self.above_and_below(wi) * (radiance_eta * radiance_eta), per_angle / (1.0 + self.lambda_o))
     }
@@ -232,7 +232,7 @@ impl RoughGlass {
     }
 
     fn lambda_i(&self, wi: Vector3<f32>) -> f32 {
-        ggx::lambda(Vector3 { z: wi.z.abs().max(SMALLEST_COS), ..wi }, self.alpha)
+        self.facets.lambda(Vector3 { z: wi.z.abs().max(SMALLEST_COS), ..wi })
     }
 }
 
@@ -268,11 +268,11 @@ mod tests {
     }
 
     fn lobe(alpha: f32, eta: f32) -> Lobe<'static> {
-        Lobe::RoughGlass { interface: interface(eta), alpha, compensate: false }
+        Lobe::RoughGlass { interface: interface(eta), facets: Microfacets::ggx(alpha), compensate: false }
     }
 
     fn whole_lobe(alpha: f32, eta: f32) -> Lobe<'static> {
-        Lobe::RoughGlass { interface: interface(eta), alpha, compensate: true }
+        Lobe::RoughGlass { interface: interface(eta), facets: Microfacets::ggx(alpha), compensate: true }
     }
 
     fn direction(cos: f32) -> Vec3 {

@@ -117,10 +117,71 @@ pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
     if between.dot(wo) > 0.0 { between } else { surface }
 }
 
+/// Returns a mapped normal that faces the viewer, as Mitsuba 3 has it: one that faces away is mirrored at the unmapped
+/// normal.
+///
+/// - All unit; `surface`: the unmapped normal, on the side of `wo`.
+pub(crate) fn turned_over(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
+    if normal.dot(wo) > 0.0 {
+        return normal;
+    }
+    let other = 2.0 * normal.dot(surface) * surface - normal;
+    if other.dot(wo) > 0.0 { other } else { surface }
+}
+
+/// Dims light that grazes a surface with a mapped normal, as if its microfacets, of the width that leads to such
+/// normals, shadowed it (Estevez, Lecocq and Stein 2019, "A Microfacet-Based Shadowing Function to Solve the Bump
+/// Terminator Problem").
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalShadowing {
+    /// Unmapped, unit.
+    surface: Vec3,
+    /// Squared width.
+    alpha2: f32,
+}
+
+impl NormalShadowing {
+    /// - `normal`: mapped; `surface`: unmapped; both unit.
+    pub fn new(normal: Vec3, surface: Vec3) -> Self {
+        Self { surface, alpha2: (0.125 * tan2(normal.dot(surface))).min(1.0) }
+    }
+
+    /// Share of the light from `wi`.
+    pub fn share(&self, wi: Vec3) -> f32 {
+        2.0 / (1.0 + (1.0 + self.alpha2 * tan2(self.surface.dot(wi))).sqrt())
+    }
+}
+
+/// Squared tangent of an angle, finite.
+fn tan2(cos: f32) -> f32 {
+    let cos2 = cos * cos;
+    (1.0 - cos2).max(0.0) / cos2.max(1e-12)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::sampling::{Sampler, cosine_hemisphere};
+
+    #[test]
+    fn turned_normals_face_the_viewer_and_their_shadows_are_those_of_microfacets() {
+        for i in 0..2000 {
+            let sampler = Sampler::new(i, 2, 0, 0);
+            let [normal, wo, wi] =
+                [0, 1, 2].map(|k| cosine_hemisphere(sampler.pair(k)).max(Vec3::new(-1.0, -1.0, 1e-3)));
+            let [normal, wo, wi] = [normal, wo, wi].map(Vec3::normalize);
+            let found = turned_over(normal, Vec3::Z, wo);
+            assert!(found.dot(wo) > 0.0, "{normal}, {wo}: {found}");
+            let is_whole = normal.dot(wo) > 0.0;
+            assert!((found.z - normal.z).abs() < 1e-5 || found == Vec3::Z, "{found} for {normal}");
+            assert!((found.truncate() - normal.truncate()).length() < 1e-5 || !is_whole, "{found} for {normal}");
+            // G1 of GGX microfacets whose squared width is an eighth of the squared slope of the normal.
+            let alpha = (normal.truncate().length() / normal.z / 8_f32.sqrt()).min(1.0);
+            let expected = 1.0 / (1.0 + crate::shading::ggx::lambda(wi.into(), alpha));
+            let share = NormalShadowing::new(normal, Vec3::Z).share(wi);
+            assert!((share - expected).abs() < 1e-3 * expected, "{normal}, {wi}: {share} for {expected}");
+        }
+    }
 
     /// The height u²/10 + v/5 over a skewed plane, against the normal of its points.
     #[test]

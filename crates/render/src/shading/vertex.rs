@@ -40,6 +40,8 @@ pub(crate) struct Vertex {
     /// From `position` towards the smooth surface that the interpolated normals imply, metres; zero where it coincides
     /// with the true surface or bends inwards.
     pub lift: Vec3,
+    /// See [`crate::core::material::Material::turns_normals_over`].
+    pub turns_over: bool,
 }
 
 impl Vertex {
@@ -135,9 +137,11 @@ impl Vertex {
             front,
             wo,
             lift,
+            turns_over: false,
         };
         if asks_for_tangent && let Some((map, scale)) = scene.shading.materials[material as usize].normal_map() {
             vertex.smooth_normal = vertex.turned(scene, map, scale);
+            vertex.turns_over = scene.shading.materials[material as usize].turns_normals_over();
         }
         vertex.seen_along(wo)
     }
@@ -192,7 +196,8 @@ impl Vertex {
 
     #[cold]
     fn with_bent_normal(self) -> Self {
-        Self { normal: tangent::bent(self.smooth_normal, self.interpolated_seen(), self.wo), ..self }
+        let facing = if self.turns_over { tangent::turned_over } else { tangent::bent };
+        Self { normal: facing(self.smooth_normal, self.interpolated_seen(), self.wo), ..self }
     }
 
     /// The shading normal without normal mapping.

@@ -7,6 +7,7 @@ use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_a
 use crate::shading::interface::Interface;
 use crate::shading::layer_albedo::{SchlickAlbedo, bounded_sheen, cosine_mean, hemisphere_mean, sheen_albedo};
 use crate::shading::metal::{mean_reflectance, with_further_bounces};
+use crate::shading::microfacets::Microfacets;
 use crate::shading::principled::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::shading::rough_glass::RoughGlass;
 use crate::shading::scatter::BsdfSample;
@@ -220,7 +221,8 @@ impl<'a> Seen<'a> {
 
     fn rough_glass(&self, interface: Interface) -> RoughGlass {
         let wo = self.frame.to_world(self.wo).normalize();
-        RoughGlass::new(self.frame.z, wo, self.of.mean_alpha().min(1.0), interface, true)
+        let facets = Microfacets::isotropic(self.of.mean_alpha().min(1.0), false);
+        RoughGlass::new(self.frame.z, wo, facets, interface, true)
     }
 
     /// Light from the far side, if transmission is rough.

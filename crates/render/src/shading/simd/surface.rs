@@ -290,6 +290,7 @@ impl StoredPlaces {
             front: self.front >> lane & 1 != 0,
             wo: at(&self.wo),
             lift: Vec3::ZERO,
+            turns_over: false,
         }
     }
 }

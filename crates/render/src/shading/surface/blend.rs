@@ -5,6 +5,7 @@ use crate::shading::bsdf::Lobe;
 use crate::shading::interface::Interface;
 use crate::shading::principled::layers::Principled;
 use crate::shading::scatter::{BsdfSample, Scatter};
+use crate::shading::tangent::NormalShadowing;
 use glam::{Vec2, Vec3};
 
 /// A blend; the weights of its parts sum to at most 1.
@@ -13,6 +14,7 @@ pub(crate) struct Blend<'a> {
     parts: [WeightedPart<'a>; MAX_LOBES],
     n: usize,
     layers: Vec<Principled>,
+    shadowing: Option<NormalShadowing>,
 }
 
 /// A part of a blend.
@@ -37,7 +39,7 @@ impl<'a> Blend<'a> {
     /// - `layers`: the surfaces that [`Part::Layers`] refers to.
     pub fn new(parts: &[(Part<'a>, f32)], layers: Vec<Principled>) -> Self {
         let nothing = WeightedPart { part: parts[0].0, weight: 0.0, pmf: 0.0 };
-        let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers };
+        let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers, shadowing: None };
         // Sampled in proportion to their reflected light; uniformly if all are black.
         let strength = |(part, weight): &(Part, f32)| {
             weight
@@ -55,6 +57,16 @@ impl<'a> Blend<'a> {
             *slot = WeightedPart { part, weight, pmf };
         }
         blend
+    }
+
+    /// With the shadowing of a mapped normal.
+    pub fn shadowed(self, shadowing: Option<NormalShadowing>) -> Self {
+        Self { shadowing, ..self }
+    }
+
+    /// Factor of light from `wi`.
+    fn lit_share(&self, wi: Vec3) -> f32 {
+        self.shadowing.map_or(1.0, |shadowing| shadowing.share(wi))
     }
 
     fn parts(&self) -> &[WeightedPart<'a>] {
@@ -113,6 +125,7 @@ impl Scatter for Blend<'_> {
             sum.0 += p.weight * value;
             sum.1 += p.pmf * pdf;
         }
+        sum.0 *= self.lit_share(wi);
         sum
     }
 
@@ -142,7 +155,7 @@ impl Scatter for Blend<'_> {
             sample.weight = value / pdf;
             sample.pdf = pdf;
         } else {
-            sample.weight *= p.weight / p.pmf;
+            sample.weight *= self.lit_share(sample.wi) * (p.weight / p.pmf);
             sample.probability *= p.pmf;
             sample.pdf = f32::INFINITY;
         }

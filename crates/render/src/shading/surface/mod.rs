@@ -8,12 +8,14 @@ use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::coat::Coat;
 use crate::shading::interface::MediumId;
+use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::Plastic;
 use crate::shading::principled::at::principled_at;
 use crate::shading::principled::layers::Principled;
 use crate::shading::rough_glass;
 use crate::shading::sides::Sides;
 use crate::shading::surface::blend::{Blend, Part};
+use crate::shading::tangent::NormalShadowing;
 use crate::shading::vertex::Vertex;
 use glam::{Vec2, Vec3};
 
@@ -28,7 +30,10 @@ pub(crate) fn blend_at<'a>(
 ) -> Option<Blend<'a>> {
     let mut parts = BlendParts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
     collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
-    (parts.n > 0).then(|| Blend::new(&parts.parts[..parts.n], parts.layers))
+    (parts.n > 0).then(|| {
+        let shadowing = vertex.turns_over.then(|| NormalShadowing::new(vertex.normal, vertex.interpolated_seen()));
+        Blend::new(&parts.parts[..parts.n], parts.layers).shadowed(shadowing)
+    })
 }
 
 /// The parts of a blend so far, with their weights.
@@ -96,11 +101,9 @@ fn collect<'a>(
             }
         }
         Material::Glass { .. } => parts.push(clear_lobe(scene, sides, leaf), weight),
-        Material::RoughGlass { alpha, compensate, .. } => {
-            parts.push(
-                rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.texture_point), *compensate),
-                weight,
-            );
+        Material::RoughGlass { alpha, compensate, beckmann, .. } => {
+            let alpha = alpha.eval(scene, vertex.texture_point);
+            parts.push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, *beckmann, *compensate), weight);
         }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, sides.as_deref_mut()) {
@@ -120,10 +123,10 @@ fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lo
 
 /// Replaces smooth glass by rough glass, if microfacets of this width change directions.
 #[inline]
-fn rough_lobe(smooth: Lobe<'static>, alpha: f32, compensate: bool) -> Lobe<'static> {
+fn rough_lobe(smooth: Lobe<'static>, alpha: f32, beckmann: bool, compensate: bool) -> Lobe<'static> {
     match smooth {
         Lobe::Glass(interface) if !rough_glass::is_smooth(alpha, interface.eta) => {
-            Lobe::RoughGlass { interface, alpha: alpha.min(1.0), compensate }
+            Lobe::RoughGlass { interface, facets: Microfacets::isotropic(alpha.min(1.0), beckmann), compensate }
         }
         _ => smooth,
     }
@@ -156,15 +159,24 @@ pub(crate) fn lobe_at<'a>(
             fresnel: *fresnel,
             compensate: *compensate,
         }),
-        Material::Conductor { alpha, eta, k, reflectance, compensate } => Some(Lobe::Conductor {
-            alpha: alpha.eval(scene, uv).clamp(0.0, 1.0),
-            eta: *eta,
-            k: *k,
-            reflectance: reflectance.eval(scene, uv),
-            compensate: *compensate,
-        }),
-        Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
-            let coat = Coat::at(scene, id, *ior, alpha.eval(scene, uv).clamp(0.0, 1.0));
+        Material::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, compensate } => {
+            let along = alpha.eval(scene, uv).clamp(0.0, 1.0);
+            let across = alpha_v.eval(scene, uv).clamp(0.0, 1.0);
+            let facets = Microfacets { alpha: [along, if across > 0.0 { across } else { along }], beckmann: *beckmann };
+            let is_isotropic = facets.is_isotropic();
+            let tangent = if is_isotropic { Vec3::ZERO } else { vertex.tangent.along(Vec2::X, vertex.normal) };
+            Some(Lobe::Conductor {
+                facets: if is_isotropic { facets } else { facets.at_least_rough() },
+                tangent,
+                eta: *eta,
+                k: *k,
+                reflectance: reflectance.eval(scene, uv),
+                compensate: *compensate,
+            })
+        }
+        Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann } => {
+            let facets = Microfacets::isotropic(alpha.eval(scene, uv).clamp(0.0, 1.0), *beckmann);
+            let coat = Coat::at(scene, id, *ior, facets);
             let albedo = diffuse.eval(scene, uv).clamp(Vec3::ZERO, Vec3::ONE);
             let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
             Some(Lobe::Plastic(Plastic::new(albedo, *nonlinear, specular, coat)))
@@ -181,8 +193,8 @@ pub(crate) fn lobe_at<'a>(
             here,
         }),
         Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
-        Material::RoughGlass { alpha, compensate, .. } => {
-            Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *compensate))
+        Material::RoughGlass { alpha, compensate, beckmann, .. } => {
+            Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *beckmann, *compensate))
         }
         Material::Emissive { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Blend { .. } => {
             None
