@@ -221,7 +221,7 @@ mod tests {
                 tangents: false,
                 attribute: Some(attribute.to_owned()),
             };
-            let mesh = request.make().unwrap();
+            let mesh = request.make(&UnpackedBytes::new(0)).unwrap();
             // Of the corners of both triangles.
             let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| color.truncate());
             mesh.triangles.iter().flatten().filter_map(|&vertex| color(vertex)).collect::<Vec<Vec3>>()
