@@ -27,6 +27,7 @@
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | the world: components, loading, saving, animation, extraction of the snapshot |
 //! | [`import`] | OBJ, PLY, STL, glTF, and scenes of pbrt and Mitsuba, as meshes and parts of a scene file |
+//! | [`export`] | scenes as files of pbrt and Mitsuba |
 //! | [`format`](mod@format) | the scene file: values, checks and their limits, placements, lights, keys |
 //! | [`files`], `console` (feature `cli`) | bounded reading, whole-file writing, escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
@@ -35,6 +36,7 @@
 
 pub use bevy_ecs;
 pub use embed::{Error, Image, RenderOptions, Scene};
+pub use firstlight_export as export;
 pub use firstlight_files::{self as files, printable};
 pub use firstlight_format as format;
 pub use firstlight_import as import;

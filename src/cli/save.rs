@@ -1,18 +1,22 @@
-//! `firstlight save SCENE -o out.ron`: saves a model, a built-in scene or the scene of an image as a scene file.
+//! `firstlight save SCENE -o out.ron`: saves a model, a built-in scene or the scene of an image as a scene file, or as
+//! one of pbrt or Mitsuba.
 
 use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
-use crate::cli::console::inform;
+use crate::cli::console::{inform, tell};
 use crate::cli::failure::Failure;
 use clap::Args;
-use firstlight::scene::{Description, WriteError};
+use firstlight::export::export;
+use firstlight::format::scene_format::SceneFormat;
+use firstlight::scene::{Description, WriteError, whole_scene};
 use std::path::PathBuf;
 
 #[derive(Args, Clone, Debug)]
 pub struct SaveArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Scene file; mesh and image paths in it are relative to its folder.
-    #[arg(short, long, value_name = "OUT.ron")]
+    /// Scene file (.ron), whose paths are relative to its folder; or scene of pbrt (.pbrt) or Mitsuba (.xml), with its
+    /// meshes and images in a folder beside it.
+    #[arg(short, long, value_name = "OUT.ron|.pbrt|.xml")]
     output: PathBuf,
     /// Replace an existing scene file, whose comments and layout are lost.
     #[arg(long)]
@@ -20,8 +24,10 @@ pub struct SaveArgs {
 }
 
 pub fn run(args: &SaveArgs) -> Result<(), Failure> {
-    if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
-        return Err(Failure::Usage(format!("{}: the name of a scene file must end in .ron", args.output.display())));
+    let format = SceneFormat::of(&args.output);
+    if format.is_none() && !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
+        let extensions = SceneFormat::extensions();
+        return Err(Failure::Usage(format!("{}: the name of a scene must end in {extensions}", args.output.display())));
     }
     let mut files = OverwriteArgs::default().files();
     if let Some(path) = args.scene.source()?.path() {
@@ -35,6 +41,12 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let scene = args.scene.load(None, &mut files, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
+    if let Some(format) = format {
+        let warnings = export(&whole_scene(&mut world, &scene), format, &args.output, args.overwrite)?;
+        tell(&warnings);
+        inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced())));
+        return Ok(());
+    }
     let description = Description::of(&mut world, Some(&scene));
     let saved = match args.overwrite {
         true => description.save(&args.output)?,

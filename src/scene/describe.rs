@@ -53,8 +53,19 @@ pub struct Description {
 impl Description {
     /// Describes the contents of `world`; `loaded`: the scene that was opened into it, if any.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
+        Self::with_textures(world, loaded, false).0
+    }
+
+    /// The same with the textures in use and their names.
+    ///
+    /// - `names_all`: whether materials that come with the file of a mesh are named as well.
+    pub(super) fn with_textures(
+        world: &mut World,
+        loaded: Option<&LoadedScene>,
+        names_all: bool,
+    ) -> (Self, Vec<(Arc<SurfaceTexture>, String)>) {
         let inputs = SceneInputs::of(world);
-        let mut writer = Writer::new(loaded);
+        let mut writer = Writer { names_all, ..Writer::new(loaded) };
         let animation = world.get_resource::<Animation>().cloned();
         let moved = Moved::of(animation.as_ref(), &inputs);
         let objects = writer.objects(world, &inputs, &moved);
@@ -101,7 +112,7 @@ impl Description {
             animation: animation_part,
         };
         let folder = loaded.map(|loaded| loaded.folder.clone()).unwrap_or_default();
-        Self { file, folder, loose_meshes: writer.loose_meshes, losses: writer.losses }
+        (Self { file, folder, loose_meshes: writer.loose_meshes, losses: writer.losses }, writer.textures)
     }
 }
 
@@ -119,6 +130,8 @@ struct DescribedItem {
 #[derive(Default)]
 struct Writer<'a> {
     loaded: Option<&'a LoadedScene>,
+    /// Whether materials that come with the file of a mesh are named as well.
+    names_all: bool,
     /// Loaded meshes and groups of spheres by address, and textures by name.
     loaded_meshes: HashMap<usize, &'a LoadedMesh>,
     loaded_balls: HashMap<usize, &'a ObjectPart>,
@@ -157,7 +170,8 @@ impl<'a> Writer<'a> {
     fn objects(&self, world: &mut World, inputs: &SceneInputs, moved: &Moved) -> Vec<DescribedItem> {
         let item = |object: &crate::scene::world::inputs::ObjectInput| {
             let origin = world.get::<MeshOrigin>(object.entity).cloned();
-            let own = origin.as_ref().is_some_and(|origin| origin.own_materials)
+            let own = !self.names_all
+                && origin.as_ref().is_some_and(|origin| origin.own_materials)
                 && !object.slots.iter().any(|&slot| moved.has_material(slot))
                 && self.has_own_materials(world, &object.shape, &object.slots);
             DescribedItem {
@@ -380,7 +394,7 @@ impl<'a> Writer<'a> {
         let file_has_materials = self.loaded_meshes.get(&address(mesh)).is_some_and(|known| !known.slots.is_empty());
         let (material, materials) = match &item.slots[..] {
             _ if item.own => (None, None),
-            [] if !file_has_materials => (None, None),
+            [] if !file_has_materials && !self.names_all => (None, None),
             [] => (Some(self.material_name(None)), None),
             [slot] => (Some(self.material_name(Some(*slot))), None),
             slots => (None, Some(slots.iter().map(|slot| self.material_name(Some(*slot))).collect())),

@@ -26,6 +26,7 @@ mod source;
 mod spawn;
 mod texture_names;
 mod unpacked_files;
+mod whole;
 pub(crate) mod world;
 
 pub use crate::files::{input_file, whole_file};
@@ -86,3 +87,4 @@ pub use read_files::ReadFiles;
 pub use save::{SavedScene, save_scene};
 pub use source::SceneSource;
 pub(crate) use spawn::texture_of;
+pub use whole::whole_scene;

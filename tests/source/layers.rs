@@ -23,13 +23,14 @@ const FILES: &str = "crates/files/src";
 const CONSOLE: &str = "src/console";
 const FORMAT: &str = "crates/format/src";
 const IMPORT: &str = "crates/import/src";
+const EXPORT: &str = "crates/export/src";
 const SCENE: &str = "src/scene";
 const FRAME: &str = "src/frame";
 const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 27] = [
+const LAYERS: [(&str, &[&str]); 28] = [
     (SIMD, &[]),
     (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -48,8 +49,9 @@ const LAYERS: [(&str, &[&str]); 27] = [
     (FILES, &[]),
     (FORMAT, &[FILES, RENDER]),
     (IMPORT, &[FILES, FORMAT, RENDER, MESH, KDTREE, GEOMETRY]),
+    (EXPORT, &[FILES, FORMAT, RENDER, MESH, KDTREE, GEOMETRY]),
     (CONSOLE, &[FILES]),
-    (SCENE, &[FILES, CONSOLE, FORMAT, IMPORT]),
+    (SCENE, &[FILES, CONSOLE, FORMAT, IMPORT, EXPORT]),
     (FRAME, &[FILES, CONSOLE, FORMAT, IMPORT, SCENE]),
     ("src/cluster", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME]),
     ("src/report", &[FILES, CONSOLE, SCENE, FRAME]),
@@ -63,7 +65,7 @@ const LAYERS: [(&str, &[&str]); 27] = [
 ];
 
 /// The folders in which no files may import each other in a circle.
-const PACKAGES: [&str; 8] = [SIMD, KDTREE, MESH, RENDER, FILES, FORMAT, IMPORT, "src"];
+const PACKAGES: [&str; 9] = [SIMD, KDTREE, MESH, RENDER, FILES, FORMAT, IMPORT, EXPORT, "src"];
 
 /// The path of a module below `src`, in its parts.
 type Module = Vec<String>;

@@ -1,0 +1,333 @@
+//! Surfaces as BSDFs, and textures: the inverse of `bsdf` and `texture` of the reader.
+//!
+//! | here | Mitsuba |
+//! |---|---|
+//! | `diffuse`, `mirror` | `diffuse`, `conductor` |
+//! | `plastic` | `plastic`, `roughplastic` |
+//! | `metal` | `roughconductor`; `principled` for the Fresnel term of Schlick |
+//! | `conductor` | `conductor`, `roughconductor` |
+//! | `glass`, `rough_glass`, `thin_glass` | `dielectric`, `roughdielectric`, `thindielectric` |
+//! | `translucent` | `principledthin`, told |
+//! | `blend` | `blendbsdf`; by side two BSDFs of `twosided` |
+
+use crate::mitsuba::{FORMATS, Writer};
+use crate::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
+use firstlight_files::write_error::WriteError;
+use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
+use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3, Mat2, Vec3};
+
+type Result<T = ()> = std::result::Result<T, WriteError>;
+
+/// GGX width below which a surface is smooth.
+const SMOOTH: f32 = 1e-4;
+
+impl Writer<'_> {
+    /// The BSDF of a material, with holes and normals.
+    pub(crate) fn surface(&mut self, surface: &Surface, id: &str, name: &str) -> Result {
+        if surface.emits_behind {
+            self.tell(name, "only its front emits light");
+        }
+        let mut n_open = 0;
+        let mut attributes = vec![("id", id)];
+        if let Some(opacity) = &surface.opacity {
+            self.xml.open("bsdf", &[&[("type", "mask")], &attributes[..]].concat());
+            self.scalar("opacity", opacity)?;
+            attributes.clear();
+            n_open += 1;
+        }
+        // A coloured back needs no other side; a black one none at all.
+        let (bsdf, is_two_sided) = match &surface.bsdf {
+            Bsdf::Sides(front, back) if back.is_black() && front.is_opaque() => (&**front, false),
+            bsdf => (bsdf, bsdf.is_opaque() && !bsdf.is_black()),
+        };
+        if is_two_sided {
+            self.xml.open("bsdf", &[&[("type", "twosided")], &attributes[..]].concat());
+            attributes.clear();
+            n_open += 1;
+        }
+        let sides: Vec<&Bsdf> = match bsdf {
+            Bsdf::Sides(front, back) if is_two_sided => vec![front, back],
+            bsdf => vec![bsdf],
+        };
+        for side in sides {
+            let mut n_inside = 0;
+            let mut attributes = std::mem::take(&mut attributes);
+            if let Some(Normals { map, is_relief }) = &surface.normals {
+                let plugin = if *is_relief { "bumpmap" } else { "normalmap" };
+                self.xml.open("bsdf", &[&[("type", plugin)], &attributes[..]].concat());
+                attributes.clear();
+                self.texture(if *is_relief { "" } else { "normalmap" }, map, *is_relief)?;
+                if let Some(height) = self.scene.textures[&map.name].texture.relief.filter(|_| *is_relief) {
+                    self.xml.float("scale", height);
+                }
+                self.xml.value("boolean", "use_shadowing_function", "false");
+                n_inside += 1;
+            }
+            self.bsdf(side, &attributes, !is_two_sided && !surface.bsdf.is_opaque(), name)?;
+            (0..n_inside).for_each(|_| self.xml.close());
+        }
+        (0..n_open).for_each(|_| self.xml.close());
+        Ok(())
+    }
+
+    /// - `wrap`: whether opaque parts get a back of their own.
+    fn bsdf(&mut self, bsdf: &Bsdf, attributes: &[(&str, &str)], wrap: bool, name: &str) -> Result {
+        if wrap && bsdf.is_opaque() && !bsdf.is_black() {
+            self.xml.open("bsdf", &[&[("type", "twosided")], attributes].concat());
+            self.bsdf(bsdf, &[], false, name)?;
+            self.xml.close();
+            return Ok(());
+        }
+        match bsdf {
+            Bsdf::Mix(share, a, b) => {
+                self.xml.open("bsdf", &[&[("type", "blendbsdf")], attributes].concat());
+                self.scalar("weight", share)?;
+                self.bsdf(a, &[], wrap, name)?;
+                self.bsdf(b, &[], wrap, name)?;
+                self.xml.close();
+                Ok(())
+            }
+            Bsdf::Sides(front, back) => {
+                if !back.is_black() {
+                    self.tell(name, "its back is like its front");
+                }
+                self.bsdf(front, attributes, wrap, name)
+            }
+            Bsdf::Plain(material) => self.plain(material, &Color::Rgb(Vec3::ONE), attributes, name),
+            Bsdf::Tinted(material, tint) => self.plain(material, tint, attributes, name),
+        }
+    }
+
+    fn plain(&mut self, material: &Material<Written>, tint: &Color, attributes: &[(&str, &str)], name: &str) -> Result {
+        let smooth = |alpha: &Scalar| matches!(alpha, Scalar::Number(alpha) if *alpha < SMOOTH);
+        let open = |writer: &mut Self, plugin: &str| {
+            writer.xml.open("bsdf", &[&[("type", plugin)], attributes].concat());
+        };
+        match material {
+            Material::Diffuse { albedo } => {
+                open(self, "diffuse");
+                self.color("reflectance", albedo)?;
+            }
+            Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
+                open(self, if smooth(alpha) { "plastic" } else { "roughplastic" });
+                self.color("diffuse_reflectance", diffuse)?;
+                self.iors(*ior);
+                if *specular != Scalar::Number(1.0) {
+                    self.scalar("specular_reflectance", specular)?;
+                }
+                self.xml.value("boolean", "nonlinear", if *nonlinear { "true" } else { "false" });
+                if !smooth(alpha) {
+                    let alpha = match alpha {
+                        Scalar::Number(alpha) => *alpha,
+                        Scalar::Texture(Use { name: texture, change }) => {
+                            self.tell(name, "the texture of the roughness of its coat becomes its mean");
+                            change.of(self.scene.textures[texture].texture.mean()).x
+                        }
+                    };
+                    self.width(&Scalar::Number(alpha.max(SMOOTH)))?;
+                }
+            }
+            Material::Translucent { reflectance, transmittance } => {
+                self.tell(name, "diffuse transmission becomes that of Disney's model, which depends on the angle");
+                return self.translucent(reflectance, transmittance, attributes, name);
+            }
+            Material::Mirror { reflectance } => {
+                open(self, "conductor");
+                self.xml.value("string", "material", "none");
+                self.factor("specular_reflectance", reflectance)?;
+            }
+            Material::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, .. } => {
+                self.tell_of_loss(material, name);
+                open(self, "principled");
+                self.color("base_color", reflectance)?;
+                self.xml.float("metallic", 1.0);
+                self.scalar("roughness", &alpha.root())?;
+            }
+            Material::Metal { alpha, reflectance, .. } => {
+                self.tell_of_loss(material, name);
+                open(self, if smooth(alpha) { "conductor" } else { "roughconductor" });
+                self.xml.value("string", "material", "none");
+                self.factor("specular_reflectance", reflectance)?;
+                if !smooth(alpha) {
+                    self.width(alpha)?;
+                }
+            }
+            Material::Conductor { alpha, eta, k, reflectance, .. } => {
+                self.tell_of_loss(material, name);
+                open(self, if smooth(alpha) { "conductor" } else { "roughconductor" });
+                self.xml.rgb("eta", eta.0);
+                self.xml.rgb("k", k.0);
+                self.factor("specular_reflectance", reflectance)?;
+                if !smooth(alpha) {
+                    self.width(alpha)?;
+                }
+            }
+            Material::Glass { ior, .. } => {
+                open(self, "dielectric");
+                self.iors(*ior);
+                self.factor("specular_transmittance", tint)?;
+            }
+            Material::RoughGlass { alpha, ior, .. } => {
+                self.tell_of_loss(material, name);
+                open(self, if smooth(alpha) { "dielectric" } else { "roughdielectric" });
+                self.iors(*ior);
+                if !smooth(alpha) {
+                    self.width(alpha)?;
+                }
+                self.factor("specular_transmittance", tint)?;
+            }
+            Material::ThinGlass { ior, reflectance, transmittance } => {
+                open(self, "thindielectric");
+                self.iors(*ior);
+                self.factor("specular_reflectance", reflectance)?;
+                self.factor("specular_transmittance", transmittance)?;
+            }
+            Material::Principled { .. }
+            | Material::Phong { .. }
+            | Material::Emissive { .. }
+            | Material::Blend { .. } => unreachable!("it was taken apart"),
+        }
+        self.xml.close();
+        Ok(())
+    }
+
+    /// Tells of the energy that single scattering loses.
+    fn tell_of_loss(&mut self, material: &Material<Written>, name: &str) {
+        if loses_light(material) {
+            self.tell(name, "the light that its microfacets scatter several times is lost");
+        }
+    }
+
+    /// Two shares of a surface of Disney: one reflects, the other transmits.
+    fn translucent(
+        &mut self,
+        reflectance: &Color,
+        transmittance: &Color,
+        attributes: &[(&str, &str)],
+        name: &str,
+    ) -> Result {
+        let mean = |writer: &Self, color: &Color| match color {
+            Color::Rgb(rgb) => *rgb,
+            Color::Texture(Use { name, .. }) => writer.scene.textures[name].texture.mean(),
+        };
+        let [back, through] = [reflectance, transmittance].map(|color| mean(self, color).max_element());
+        let share = if back + through > 0.0 { through / (back + through) } else { 0.5 };
+        let part = |writer: &mut Self, color: &Color, share: f32, diff_trans: f32| {
+            writer.xml.open("bsdf", &[("type", "principledthin")]);
+            let color = match color {
+                Color::Rgb(rgb) => Color::Rgb(if share > 0.0 { (*rgb / share).min(Vec3::ONE) } else { *rgb }),
+                Color::Texture(Use { name, .. }) => {
+                    Color::Texture(Use { name: name.clone(), change: Change::Times(1.0 / share.max(1e-3)) })
+                }
+            };
+            writer.color("base_color", &color)?;
+            writer.xml.float("eta", 1.0);
+            writer.xml.float("diff_trans", diff_trans);
+            writer.xml.close();
+            Ok(())
+        };
+        let _ = name;
+        self.xml.open("bsdf", &[&[("type", "blendbsdf")], attributes].concat());
+        self.xml.float("weight", share);
+        part(self, reflectance, 1.0 - share, 0.0)?;
+        part(self, transmittance, share, 2.0)?;
+        self.xml.close();
+        Ok(())
+    }
+
+    fn iors(&mut self, ior: f32) {
+        // Mitsuba refuses two equal ones.
+        self.xml.float("int_ior", if ior == 1.0 { 1.000_001 } else { ior });
+        self.xml.float("ext_ior", 1.0);
+    }
+
+    fn width(&mut self, alpha: &Scalar) -> Result {
+        self.xml.value("string", "distribution", "ggx");
+        self.scalar("alpha", alpha)
+    }
+
+    /// A factor, which is 1 if it is not given.
+    fn factor(&mut self, name: &str, color: &Color) -> Result {
+        if *color == Color::Rgb(Vec3::ONE) { Ok(()) } else { self.color(name, color) }
+    }
+
+    pub(crate) fn color(&mut self, name: &str, color: &Color) -> Result {
+        match color {
+            Color::Rgb(rgb) => self.xml.rgb(name, *rgb),
+            Color::Texture(wanted) => self.texture(name, wanted, false)?,
+        }
+        Ok(())
+    }
+
+    fn scalar(&mut self, name: &str, scalar: &Scalar) -> Result {
+        match scalar {
+            Scalar::Number(number) => self.xml.float(name, *number),
+            Scalar::Texture(wanted) => self.texture(name, wanted, true)?,
+        }
+        Ok(())
+    }
+
+    /// - `name`: of the parameter, empty for one without a name; `is_number`: whether a number is read from it.
+    fn texture(&mut self, name: &str, wanted: &Use, is_number: bool) -> Result {
+        let scene = self.scene;
+        let texture = &scene.textures[&wanted.name].texture;
+        if texture.uv_set != 0 {
+            self.tell(&wanted.name, "the second texture coordinates are left out: it uses the first");
+        }
+        let (matrix, offset) = (texture.uv_matrix, texture.uv_offset);
+        match &texture.pattern {
+            TexturePattern::White => {
+                self.xml.open("texture", &[("name", name), ("type", "mesh_attribute")]);
+                self.xml.value("string", "name", "vertex_color");
+                let scale = wanted.change.of(texture.tint).x;
+                if scale != 1.0 {
+                    self.xml.float("scale", scale);
+                }
+            }
+            TexturePattern::Checker { a, b } => {
+                self.xml.open("texture", &[("name", name), ("type", "checkerboard")]);
+                let [a, b] = [*a, *b].map(|color| wanted.change.of(color));
+                // Mitsuba exchanges them where it reads a number.
+                let (first, second) = if is_number { (b, a) } else { (a, b) };
+                self.xml.rgb("color0", first);
+                self.xml.rgb("color1", second);
+                // Its squares have sides of 1/2.
+                self.to_uv(0.5 * matrix, 0.5 * offset.as_dvec2());
+            }
+            TexturePattern::Image { wrap, smooth, .. } => {
+                if texture.vertex_colors {
+                    self.tell(&wanted.name, "the vertex colours that it is multiplied by are left out");
+                }
+                if wrap[0] != wrap[1] {
+                    self.tell(&wanted.name, "it continues along v as along u");
+                }
+                let picture = self.folder.picture(scene, wanted, is_number, &FORMATS)?;
+                self.xml.open("texture", &[("name", name), ("type", "bitmap")]);
+                self.xml.value("string", "filename", &picture.file);
+                if picture.is_linear {
+                    self.xml.value("boolean", "raw", "true");
+                }
+                match wrap[0] {
+                    Wrap::Repeat => {}
+                    Wrap::Mirror => self.xml.value("string", "wrap_mode", "mirror"),
+                    Wrap::Clamp => self.xml.value("string", "wrap_mode", "clamp"),
+                }
+                if !smooth {
+                    self.xml.value("string", "filter_type", "nearest");
+                }
+                // The top row is at v = 0 there, at v = 1 here.
+                let flip = Mat2::from_cols_array(&[1.0, 0.0, 0.0, -1.0]);
+                let offset = offset.as_dvec2();
+                self.to_uv(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
+            }
+        }
+        self.xml.close();
+        Ok(())
+    }
+
+    fn to_uv(&mut self, matrix: Mat2, offset: DVec2) {
+        let DMat2 { x_axis: x, y_axis: y } = matrix.as_dmat2();
+        let linear = DMat3::from_cols(x.extend(0.0), y.extend(0.0), DVec3::Z);
+        self.xml.transform("to_uv", &DAffine3::from_mat3_translation(linear, offset.extend(0.0)));
+    }
+}

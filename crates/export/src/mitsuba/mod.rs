@@ -1,0 +1,269 @@
+//! Mitsuba 3: scenes in XML. Start reading at [`text`].
+//!
+//! Source: <https://mitsuba.readthedocs.io>
+
+mod bsdf;
+mod view;
+mod xml;
+
+use crate::environment::{FINE, round_image};
+use crate::folder::Folder;
+use crate::mitsuba::xml::Xml;
+use crate::number::number;
+use crate::objects::{Geometry, Placed, placed, radiance_of};
+use crate::picture::exr;
+use crate::scene::WholeScene;
+use crate::surface::Surface;
+use firstlight_files::printable;
+use firstlight_files::warnings::Warnings;
+use firstlight_files::whole_file::unwritable;
+use firstlight_files::write_error::WriteError;
+use firstlight_format::light::LightKind;
+use firstlight_format::names::Names;
+use firstlight_format::parts::LightPart;
+use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
+use firstlight_render::Environment;
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Image files that Mitsuba reads.
+const FORMATS: [&str; 10] = ["png", "jpg", "jpeg", "bmp", "tga", "exr", "hdr", "pfm", "ppm", "rgbe"];
+
+/// From the axes of Mitsuba's sphere, whose texture has its poles at ±Z, to those of ours, with poles at ±Y.
+const SPHERE_AXES: DMat3 = DMat3::from_cols(DVec3::NEG_X, DVec3::Z, DVec3::NEG_Y);
+
+/// A scene that is being written.
+struct Writer<'a> {
+    scene: &'a WholeScene,
+    folder: &'a mut Folder,
+    warnings: &'a mut Warnings,
+    xml: Xml,
+    surfaces: HashMap<String, Surface>,
+    /// Identifiers of materials.
+    ids: HashMap<String, String>,
+    /// Identifiers of everything.
+    taken: Names,
+}
+
+/// The text of a scene; its meshes and images go to the folder.
+pub(crate) fn text(scene: &WholeScene, folder: &mut Folder, warnings: &mut Warnings) -> Result<String, WriteError> {
+    let xml = Xml::default();
+    let (surfaces, ids, taken) = (HashMap::new(), HashMap::new(), Names::default());
+    let mut writer = Writer { scene, folder, warnings, xml, surfaces, ids, taken };
+    writer.xml.open("scene", &[("version", "3.0.0")]);
+    writer.scene()?;
+    writer.xml.close();
+    Ok(writer.xml.text)
+}
+
+impl Writer<'_> {
+    fn scene(&mut self) -> Result<(), WriteError> {
+        let names = self.scene.used_materials();
+        for name in &names {
+            let surface = Surface::of(self.scene, name, self.warnings);
+            self.surfaces.insert(name.clone(), surface);
+        }
+        let emits = |name: &str| self.surfaces.get(name).is_some_and(|surface| surface.radiance.is_some());
+        let all = placed(self.scene, emits, self.warnings);
+        self.view();
+        self.environment()?;
+        for light in &self.scene.file.lights {
+            self.light(light);
+        }
+        for name in names {
+            let id = self.id(&name);
+            let surface = self.surfaces[&name].clone();
+            self.surface(&surface, &id, &name)?;
+            self.ids.insert(name, id);
+        }
+        let mut known_groups: HashMap<usize, String> = HashMap::new();
+        for (i, placed) in all.iter().enumerate() {
+            let Some(group) = placed.group else {
+                self.shape(placed)?;
+                continue;
+            };
+            if i > 0 && placed.is_part_of(&all[i - 1]) {
+                continue;
+            }
+            let known = known_groups.get(&group).cloned();
+            let is_new = known.is_none();
+            let id = known.unwrap_or_else(|| self.id("group"));
+            if is_new {
+                known_groups.insert(group, id.clone());
+                self.xml.open("shape", &[("type", "shapegroup"), ("id", &id)]);
+                for part in all[i..].iter().take_while(|part| part.is_part_of(placed)) {
+                    self.shape(&Placed { world: DAffine3::IDENTITY, ..part.clone() })?;
+                }
+                self.xml.close();
+            }
+            self.xml.open("shape", &[("type", "instance")]);
+            self.xml.transform("to_world", &placed.world);
+            self.xml.leaf("ref", &[("id", &id)]);
+            self.xml.close();
+        }
+        Ok(())
+    }
+
+    /// An identifier of its own. In Mitsuba, a period separates objects from their parameters.
+    fn id(&mut self, wanted: &str) -> String {
+        self.taken.free(&wanted.replace(['.', '\n', '\r', '\t'], "_"))
+    }
+
+    fn tell(&mut self, name: &str, what: &str) {
+        self.warnings.push(format!("`{}`: {what}", printable::name(name)));
+    }
+
+    fn shape(&mut self, placed: &Placed) -> Result<(), WriteError> {
+        let plugin = match &placed.geometry {
+            Geometry::Sphere => "sphere",
+            Geometry::Square => "rectangle",
+            Geometry::Mesh(..) => "ply",
+        };
+        let is_mirrored = placed.world.matrix3.determinant() < 0.0;
+        let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        self.xml.open("shape", &[("type", plugin)]);
+        match &placed.geometry {
+            Geometry::Sphere => {
+                if self.surfaces.get(&placed.material).is_some_and(Surface::is_textured) {
+                    // Its texture runs the other way round, so it is mirrored and would be inside out.
+                    self.xml.transform("to_world", &(placed.world * DAffine3::from_mat3(SPHERE_AXES)));
+                    self.xml.value("boolean", "flip_normals", if is_mirrored { "false" } else { "true" });
+                } else {
+                    self.xml.vector("point", "center", placed.world.translation);
+                    self.xml.float("radius", placed.world.matrix3.determinant().abs().cbrt());
+                }
+            }
+            Geometry::Square => self.xml.transform("to_world", &placed.world),
+            Geometry::Mesh(mesh, slot) => {
+                let file = self.folder.mesh(mesh, *slot, is_mirrored, &placed.name)?;
+                self.xml.value("string", "filename", &file);
+                if mesh.normals.is_empty() {
+                    self.xml.value("boolean", "face_normals", "true");
+                }
+                let world = if is_mirrored { placed.world * mirror } else { placed.world };
+                self.xml.transform("to_world", &world);
+            }
+        }
+        let surface = self.surfaces.get(&placed.material).cloned();
+        if let Some(id) = self.ids.get(&placed.material) {
+            self.xml.leaf("ref", &[("id", id)]);
+        }
+        if let Some(Surface { radiance, absorption, .. }) = surface {
+            if absorption != Vec3::ZERO {
+                self.xml.open("medium", &[("name", "interior"), ("type", "homogeneous")]);
+                // A colour is at most 1.
+                self.xml.rgb("sigma_t", absorption / absorption.max_element());
+                self.xml.float("scale", absorption.max_element());
+                self.xml.rgb("albedo", Vec3::ZERO);
+                self.xml.close();
+            }
+            if let Some(radiance) = radiance {
+                self.xml.open("emitter", &[("type", "area")]);
+                self.color("radiance", &radiance)?;
+                self.xml.close();
+            }
+        }
+        self.xml.close();
+        Ok(())
+    }
+
+    fn light(&mut self, light: &LightPart) {
+        let (kind, placement) = LightKind::from_part(light);
+        let direction = kind.direction(&placement);
+        let name = light.name().unwrap_or("light");
+        if let Some((center, radius, radiance)) = radiance_of(light) {
+            self.xml.open("shape", &[("type", "sphere")]);
+            self.xml.vector("point", "center", center);
+            self.xml.float("radius", radius);
+            self.xml.open("bsdf", &[("type", "diffuse")]);
+            self.xml.rgb("reflectance", Vec3::ZERO);
+            self.xml.close();
+            self.xml.open("emitter", &[("type", "area")]);
+            self.xml.rgb("radiance", radiance);
+            self.xml.close();
+            self.xml.close();
+            return;
+        }
+        match (kind, direction) {
+            (LightKind::Point(light), _) => {
+                self.xml.open("emitter", &[("type", "point")]);
+                self.xml.vector("point", "position", placement.translation);
+                self.xml.rgb("intensity", light.intensity);
+                self.xml.close();
+            }
+            (LightKind::Spot(light), Some(direction)) => {
+                if light.inner_angle_deg < light.outer_angle_deg {
+                    self.tell(name, "the edge of its cone falls off as Mitsuba has it, by angles");
+                }
+                self.xml.open("emitter", &[("type", "spot")]);
+                let (x, y) = direction.any_orthonormal_pair();
+                let axes = DMat3::from_cols(x, y, direction);
+                self.xml.transform("to_world", &DAffine3::from_mat3_translation(axes, placement.translation));
+                self.xml.rgb("intensity", light.intensity);
+                self.xml.float("cutoff_angle", light.outer_angle_deg);
+                self.xml.float("beam_width", light.inner_angle_deg);
+                self.xml.close();
+            }
+            (LightKind::Directional(light), Some(direction)) => {
+                self.xml.open("emitter", &[("type", "directional")]);
+                self.xml.vector("vector", "direction", direction);
+                self.xml.rgb("irradiance", light.irradiance);
+                self.xml.close();
+            }
+            _ => self.tell(name, "a light without a direction is left out"),
+        }
+    }
+
+    fn environment(&mut self) -> Result<(), WriteError> {
+        match &self.scene.environment {
+            Environment::Black => return Ok(()),
+            Environment::Constant(radiance) => {
+                self.xml.open("emitter", &[("type", "constant")]);
+                self.xml.rgb("radiance", *radiance);
+                self.xml.close();
+                return Ok(());
+            }
+            Environment::Gradient { .. } | Environment::Image { .. } => {}
+        }
+        let copied = match (&self.scene.file.environment, &self.scene.environment_file) {
+            (EnvironmentSource::Image { scale, rotate, layout, axes: None, .. }, Some(file))
+                if is_interpolated(*layout, &self.scene.environment) && scale.0 == Vec3::splat(scale.0.x) =>
+            {
+                let extension = file.extension().and_then(|it| it.to_str()).map(str::to_ascii_lowercase);
+                extension.filter(|it| FORMATS.contains(&it.as_str())).map(|it| (file.clone(), it, scale.0.x, *rotate))
+            }
+            _ => None,
+        };
+        let (file, scale, rotate) = match copied {
+            Some((file, extension, scale, rotate)) => (self.folder.copy(&file, &extension)?, scale, rotate),
+            None => {
+                let (width, height, texels) = round_image(&self.scene.environment);
+                let bytes = exr(width, height, &texels).map_err(|error| unwritable(Path::new("environment"), error))?;
+                (self.folder.add("environment", "exr", &bytes)?, 1.0, 0.0)
+            }
+        };
+        self.xml.open("emitter", &[("type", "envmap")]);
+        self.xml.value("string", "filename", &file);
+        if scale != 1.0 {
+            self.xml.float("scale", scale);
+        }
+        // The middle of the image is in direction +Z there, −Z here.
+        self.xml.open("transform", &[("name", "to_world")]);
+        self.xml.leaf("rotate", &[("y", "1"), ("angle", &number(rotate + 180.0))]);
+        self.xml.close();
+        self.xml.close();
+        Ok(())
+    }
+}
+
+/// Whether the image of an environment looks the same if its colours are interpolated.
+fn is_interpolated(layout: EnvironmentLayout, environment: &Environment) -> bool {
+    match layout {
+        EnvironmentLayout::Interpolated => true,
+        EnvironmentLayout::Equirectangular => {
+            matches!(environment, Environment::Image { image, .. } if image.height >= FINE)
+        }
+        EnvironmentLayout::EqualArea => false,
+    }
+}

@@ -1,0 +1,265 @@
+//! Surfaces as materials, and textures: the inverse of `materials` and `textures` of the reader.
+//!
+//! | here | pbrt |
+//! |---|---|
+//! | `diffuse` | `diffuse` |
+//! | `plastic` | `coateddiffuse` |
+//! | `mirror`, `metal`, `conductor` | `conductor` |
+//! | `glass`, `rough_glass`, `thin_glass` | `dielectric`, `thindielectric` |
+//! | `translucent` | `diffusetransmission` |
+//! | `blend` | `mix` |
+
+use crate::pbrt::text::List;
+use crate::pbrt::{FORMATS, Writer};
+use crate::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
+use firstlight_files::write_error::WriteError;
+use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
+use glam::{DVec2, Vec3};
+
+type Result<T = ()> = std::result::Result<T, WriteError>;
+
+/// Thickness of a coat: that of pbrt absorbs light, that of ours has none.
+const THIN: f64 = 1e-6;
+
+impl Writer<'_> {
+    /// Writes a material; returns its name in pbrt.
+    pub(crate) fn surface(&mut self, surface: &Surface, name: &str) -> Result<String> {
+        if surface.absorption != Vec3::ZERO {
+            let list = List::default().string("type", "homogeneous").rgb("sigma_a", surface.absorption);
+            let list = list.rgb("sigma_s", Vec3::ZERO);
+            self.text.directive("MakeNamedMedium", &[&format!("inside of {name}")], list);
+        }
+        self.bsdf(&surface.bsdf, surface.normals.as_ref(), name)
+    }
+
+    fn bsdf(&mut self, bsdf: &Bsdf, normals: Option<&Normals>, name: &str) -> Result<String> {
+        let list = match bsdf {
+            Bsdf::Mix(share, a, b) => {
+                let [a, b] = [self.bsdf(a, normals, name)?, self.bsdf(b, normals, name)?];
+                let list = List::default().string("type", "mix").strings("materials", &[&a, &b]);
+                self.scalar(list, "amount", share)?
+            }
+            Bsdf::Sides(front, _) => {
+                self.tell(name, "its back is like its front");
+                return self.bsdf(front, normals, name);
+            }
+            Bsdf::Tinted(material, tint) => {
+                if *tint != Color::Rgb(Vec3::ONE) {
+                    self.tell(name, "the colour of the light that passes its surface is left out");
+                }
+                let list = self.plain(material, name)?;
+                self.with_normals(list, normals)?
+            }
+            Bsdf::Plain(material) => {
+                let list = self.plain(material, name)?;
+                self.with_normals(list, normals)?
+            }
+        };
+        let id = self.taken.free(name);
+        self.text.directive("MakeNamedMaterial", &[&id], list);
+        Ok(id)
+    }
+
+    fn with_normals(&mut self, list: List, normals: Option<&Normals>) -> Result<List> {
+        match normals {
+            None => Ok(list),
+            Some(Normals { map, is_relief: true }) => {
+                let height = self.scene.textures[&map.name].texture.relief.unwrap_or(1.0);
+                let height = if let Change::Times(factor) = map.change { factor * height } else { height };
+                let map = Use { change: Change::Times(height), ..map.clone() };
+                Ok(list.texture("displacement", &self.texture(&map, true)?))
+            }
+            Some(Normals { map, .. }) => {
+                let picture = self.folder.picture(self.scene, map, false, &FORMATS)?;
+                Ok(list.string("normalmap", &picture.file))
+            }
+        }
+    }
+
+    fn plain(&mut self, material: &Material<Written>, name: &str) -> Result<List> {
+        let list = |kind: &str| List::default().string("type", kind);
+        match material {
+            Material::Diffuse { albedo } => self.color(list("diffuse"), "reflectance", albedo),
+            Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
+                if *specular != Scalar::Number(1.0) {
+                    self.tell(name, "the reflection of its coat has its full strength");
+                }
+                let diffuse = match diffuse {
+                    // The albedo of a base that colours light once, for one that does at every bounce below the coat.
+                    Color::Rgb(albedo) if !nonlinear => {
+                        let inside = inner_reflectance(*ior);
+                        Color::Rgb(albedo.map(|albedo| albedo / (1.0 - inside + albedo * inside)))
+                    }
+                    texture @ Color::Texture(_) if !nonlinear => {
+                        self.tell(name, "the texture below its coat is more saturated");
+                        texture.clone()
+                    }
+                    same => same.clone(),
+                };
+                let list = self.color(list("coateddiffuse"), "reflectance", &diffuse)?;
+                let list = self.width(list, alpha)?;
+                Ok(list.float("eta", *ior).float("thickness", THIN))
+            }
+            Material::Translucent { reflectance, transmittance } => {
+                let list = self.color(list("diffusetransmission"), "reflectance", reflectance)?;
+                self.color(list, "transmittance", transmittance)
+            }
+            Material::Mirror { reflectance } => {
+                if *reflectance != Color::Rgb(Vec3::ONE) {
+                    self.tell(name, "its reflectance rises at grazing angles, as that of a metal");
+                }
+                self.color(list("conductor"), "reflectance", reflectance)
+            }
+            Material::Metal { alpha, reflectance, fresnel, .. } => {
+                if *fresnel == Fresnel::Constant {
+                    self.tell(name, "its reflectance rises at grazing angles, as that of a metal");
+                }
+                self.tell_of_loss(material, name);
+                let list = self.color(list("conductor"), "reflectance", reflectance)?;
+                self.width(list, alpha)
+            }
+            Material::Conductor { alpha, eta, k, reflectance, .. } => {
+                if *reflectance != Color::Rgb(Vec3::ONE) {
+                    self.tell(name, "the factor of its reflection is left out");
+                }
+                self.tell_of_loss(material, name);
+                self.width(list("conductor").rgb("eta", eta.0).rgb("k", k.0), alpha)
+            }
+            Material::Glass { ior, .. } => Ok(list("dielectric").float("eta", *ior)),
+            Material::RoughGlass { alpha, ior, .. } => {
+                self.tell_of_loss(material, name);
+                self.width(list("dielectric").float("eta", *ior), alpha)
+            }
+            Material::ThinGlass { ior, reflectance, transmittance } => {
+                if [reflectance, transmittance].into_iter().any(|factor| *factor != Color::Rgb(Vec3::ONE)) {
+                    self.tell(name, "the colour of its pane is left out");
+                }
+                Ok(list("thindielectric").float("eta", *ior))
+            }
+            Material::Principled { .. }
+            | Material::Phong { .. }
+            | Material::Emissive { .. }
+            | Material::Blend { .. } => unreachable!("it was taken apart"),
+        }
+    }
+
+    /// Tells of the energy that single scattering loses.
+    fn tell_of_loss(&mut self, material: &Material<Written>, name: &str) {
+        if loses_light(material) {
+            self.tell(name, "the light that its microfacets scatter several times is lost");
+        }
+    }
+
+    /// A GGX width, used as it is.
+    fn width(&mut self, list: List, alpha: &Scalar) -> Result<List> {
+        Ok(self.scalar(list, "roughness", alpha)?.flag("remaproughness", false))
+    }
+
+    fn color(&mut self, list: List, name: &str, color: &Color) -> Result<List> {
+        Ok(match color {
+            Color::Rgb(rgb) => list.rgb(name, *rgb),
+            Color::Texture(wanted) => list.texture(name, &self.texture(wanted, false)?),
+        })
+    }
+
+    fn scalar(&mut self, list: List, name: &str, scalar: &Scalar) -> Result<List> {
+        Ok(match scalar {
+            Scalar::Number(number) => list.float(name, *number),
+            Scalar::Texture(wanted) => list.texture(name, &self.texture(wanted, true)?),
+        })
+    }
+
+    /// The name of a texture, which is written on its first use.
+    pub(crate) fn texture(&mut self, wanted: &Use, is_number: bool) -> Result<String> {
+        let key = format!("{is_number} {wanted:?}");
+        if let Some(known) = self.textures.get(&key) {
+            return Ok(known.clone());
+        }
+        let scene = self.scene;
+        let texture = &scene.textures[&wanted.name].texture;
+        if texture.uv_set != 0 {
+            self.tell(&wanted.name, "the second texture coordinates are left out: it uses the first");
+        }
+        let matrix = texture.uv_matrix;
+        let is_straight = matrix.x_axis.y.abs() + matrix.y_axis.x.abs() <= 1e-6 * matrix.x_axis.length();
+        if !is_straight {
+            self.tell(&wanted.name, "pbrt does not rotate textures");
+        }
+        let scale = match is_straight {
+            true => DVec2::new(matrix.x_axis.x.into(), matrix.y_axis.y.into()),
+            false => DVec2::new(matrix.x_axis.length().into(), matrix.y_axis.length().into()),
+        };
+        let offset = texture.uv_offset.as_dvec2();
+        let place = |list: List| {
+            let list = if scale == DVec2::ONE { list } else { list.float("uscale", scale.x).float("vscale", scale.y) };
+            if offset == DVec2::ZERO { list } else { list.float("udelta", offset.x).float("vdelta", offset.y) }
+        };
+        let constant = |list: List, name: &str, color: Vec3| match is_number {
+            true => list.float(name, color.x),
+            false => list.rgb(name, color),
+        };
+        let (class, list) = match &texture.pattern {
+            TexturePattern::White => {
+                self.tell(&wanted.name, "pbrt has no colours of vertices: they are white");
+                ("constant", constant(List::default(), "value", wanted.change.of(texture.tint)))
+            }
+            TexturePattern::Checker { a, b } => {
+                let list = constant(List::default(), "tex1", wanted.change.of(*a));
+                ("checkerboard", place(constant(list, "tex2", wanted.change.of(*b))))
+            }
+            TexturePattern::Image { wrap, smooth, .. } => {
+                if texture.vertex_colors {
+                    self.tell(&wanted.name, "the vertex colours that it is multiplied by are left out");
+                }
+                if wrap[0] != wrap[1] || wrap[0] == Wrap::Mirror {
+                    self.tell(&wanted.name, "outside of its image it repeats, or its edge continues");
+                }
+                let picture = self.folder.picture(scene, wanted, is_number, &FORMATS)?;
+                let mut list = place(List::default().string("filename", &picture.file));
+                if wrap[0] == Wrap::Clamp {
+                    list = list.string("wrap", "clamp");
+                }
+                if picture.is_linear {
+                    list = list.string("encoding", "linear");
+                }
+                if !smooth {
+                    list = list.string("filter", "point");
+                }
+                ("imagemap", list)
+            }
+        };
+        let name = self.texture_names.free(&wanted.name);
+        self.text.directive("Texture", &[&name, if is_number { "float" } else { "spectrum" }, class], list);
+        self.textures.insert(key, name.clone());
+        Ok(name)
+    }
+}
+
+/// The share of uniform light inside of a dielectric that its surface reflects back.
+fn inner_reflectance(ior: f32) -> f32 {
+    const STEPS: u32 = 1024;
+    let reflectance = |cos: f64| {
+        let n = f64::from(ior);
+        let sin2 = n * n * (1.0 - cos * cos);
+        if sin2 >= 1.0 {
+            return 1.0;
+        }
+        let outside = (1.0 - sin2).sqrt();
+        let (s, p) = ((n * cos - outside) / (n * cos + outside), (cos - n * outside) / (cos + n * outside));
+        0.5 * (s * s + p * p)
+    };
+    let cos = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
+    ((0..STEPS).map(|i| 2.0 * cos(i) * reflectance(cos(i))).sum::<f64>() / f64::from(STEPS)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glass_reflects_most_of_the_light_inside() {
+        // Duderstadt's value for 1.5 is 0.596; a surface that is none reflects nothing.
+        assert!((inner_reflectance(1.5) - 0.5963).abs() < 1e-3, "{}", inner_reflectance(1.5));
+        assert!(inner_reflectance(1.0).abs() < 1e-6);
+    }
+}
