@@ -7,13 +7,15 @@ use crate::cli::number::{between, parse_positive, parse_size};
 use crate::cli::stop::Stop;
 use clap::Args;
 use firstlight::cluster::engine::shell_word;
+use firstlight::frame::PictureFormat;
 use firstlight::frame::oidn::{Oidn, OidnError};
 use firstlight::render::{
     ErrorMetric, GuideGatherer, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
 };
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, LinearPicture, ReferenceImage, ReferenceKey, ReferenceStore,
-    SceneOutcome, csv, denoised_curves, denoised_text, foreign_share, measure_curve, page, summary_text, timed,
+    SceneOutcome, ZTest, against_text, csv, denoised_curves, denoised_text, foreign_share, measure_curve, page,
+    summary_text, timed, write_difference,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
@@ -46,6 +48,15 @@ pub struct ReportArgs {
     /// Rendering the default reference takes about 16 times as long as the last step; it is cached for the next report.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
+    /// Variance of one sample of the reference per pixel (.exr), as the render tests of Mitsuba store it: adds a z-test.
+    ///
+    /// All pixels get the same number of samples then.
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    reference_variance: Option<PathBuf>,
+    /// Also save the relative difference from the reference: red is brighter, blue is darker (.png), or as numbers
+    /// with their sign (.exr).
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    difference: Option<PathBuf>,
     /// Output folder for the HTML page and the CSV table.
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
@@ -84,13 +95,23 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
         )));
     }
     let given = args.reference.as_deref().map(ReferenceImage::read).transpose().map_err(Failure::Failed)?;
+    let variance = args.reference_variance.as_deref().map(LinearPicture::read_exr).transpose();
+    let variance = variance.map_err(Failure::Failed)?;
+    if let (Some(variance), Some(given)) = (&variance, &given)
+        && (variance.width, variance.height) != (given.picture.width, given.picture.height)
+    {
+        return Err(Failure::Usage("the reference and its variance have different sizes".to_owned()));
+    }
+    if let Some(path) = &args.difference {
+        PictureFormat::of(path)?;
+    }
     let folder = OutFolder::new(&args.output)?;
     let again = folder.clone();
     stop.undo(move || drop(again));
     let (html, table) = (args.output.join("index.html"), args.output.join("steps.csv"));
     let mut files = OverwriteArgs::default().files();
-    files.read_all(args.reference.clone())?;
-    files.write_all([html.clone(), table.clone()], files.replace())?;
+    files.read_all(args.reference.iter().chain(&args.reference_variance).cloned())?;
+    files.write_all([html.clone(), table.clone()].into_iter().chain(args.difference.clone()), files.replace())?;
     let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
@@ -105,6 +126,13 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     write_whole(&table, csv(&outcomes).as_bytes())?;
     print(lines(summary_text(&outcomes).trim_end()))?;
     print(lines(denoised_text(&outcomes).trim_end()))?;
+    if let (Some(_), [outcome]) = (&given, &outcomes[..]) {
+        let test = |variance| ZTest::of(&outcome.last, outcome.curve.last().spp, &outcome.reference, variance);
+        print(lines(against_text(outcome, variance.as_ref().map(test).as_ref()).trim_end()))?;
+        if let Some(path) = &args.difference {
+            write_difference(&outcome.last, &outcome.reference, path)?;
+        }
+    }
     print(vec![html.display().to_string(), table.display().to_string()])?;
     for mismatch in outcomes.iter().filter_map(SceneOutcome::mismatch) {
         remark(format_args!("warning: {mismatch}"));
@@ -241,7 +269,10 @@ impl ReportScene {
         let light_traced = extraction.prepared.features().caustics;
         let room = Room::for_film(size.0, size.1, light_traced, &[Purpose::Exr]);
         drop(room.map_err(|error| Failure::Failed(error.to_string()))?);
-        let allocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
+        let allocation = match args.reference_variance {
+            Some(_) => SampleAllocation::Uniform,
+            None => SampleAllocation::Adaptive(ErrorMetric::RelativeMse),
+        };
         let settings = RenderSettings { seed: args.seed, allocation, ..world.resource::<Rendering>().0 };
         Ok(Self {
             title: scene.source.title(),
