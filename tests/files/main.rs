@@ -4,6 +4,7 @@ mod animation;
 mod bad_input;
 mod bad_values;
 mod draco;
+mod export;
 mod foreign_limits;
 mod gltf;
 mod gltf_writer;

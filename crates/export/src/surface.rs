@@ -428,6 +428,7 @@ impl Taking<'_> {
                 ior: coat,
                 specular: 1.0.into(),
                 nonlinear: false,
+                beckmann: false,
             },
         });
         let glass = match (thin_walled, &alpha) {
@@ -442,7 +443,8 @@ impl Taking<'_> {
             }
             (false, alpha) => {
                 let alpha = alpha.clone();
-                let rough = Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: true };
+                let rough =
+                    Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: true, beckmann: false };
                 Bsdf::Tinted(rough, base_color)
             }
         };

@@ -108,7 +108,7 @@ impl Writer<'_> {
                 open(self, "diffuse");
                 self.color("reflectance", albedo)?;
             }
-            Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
+            Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann } => {
                 open(self, if smooth(alpha) { "plastic" } else { "roughplastic" });
                 self.color("diffuse_reflectance", diffuse)?;
                 self.iors(*ior);
@@ -124,7 +124,7 @@ impl Writer<'_> {
                             change.of(self.scene.textures[texture].texture.mean()).x
                         }
                     };
-                    self.width(&Scalar::Number(alpha.max(SMOOTH)))?;
+                    self.width(&Scalar::Number(alpha.max(SMOOTH)), *beckmann)?;
                 }
             }
             Material::Translucent { reflectance, transmittance } => {
@@ -149,17 +149,23 @@ impl Writer<'_> {
                 self.xml.value("string", "material", "none");
                 self.factor("specular_reflectance", reflectance)?;
                 if !smooth(alpha) {
-                    self.width(alpha)?;
+                    self.width(alpha, false)?;
                 }
             }
-            Material::Conductor { alpha, eta, k, reflectance, .. } => {
+            Material::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, .. } => {
                 self.tell_of_loss(material, name);
-                open(self, if smooth(alpha) { "conductor" } else { "roughconductor" });
+                let is_even = *alpha_v == Scalar::Number(0.0);
+                let is_smooth = smooth(alpha) && (is_even || smooth(alpha_v));
+                open(self, if is_smooth { "conductor" } else { "roughconductor" });
                 self.xml.rgb("eta", eta.0);
                 self.xml.rgb("k", k.0);
                 self.factor("specular_reflectance", reflectance)?;
-                if !smooth(alpha) {
-                    self.width(alpha)?;
+                if !is_smooth && is_even {
+                    self.width(alpha, *beckmann)?;
+                } else if !is_smooth {
+                    self.xml.value("string", "distribution", distribution(*beckmann));
+                    self.scalar("alpha_u", alpha)?;
+                    self.scalar("alpha_v", alpha_v)?;
                 }
             }
             Material::Glass { ior, .. } => {
@@ -167,12 +173,12 @@ impl Writer<'_> {
                 self.iors(*ior);
                 self.factor("specular_transmittance", tint)?;
             }
-            Material::RoughGlass { alpha, ior, .. } => {
+            Material::RoughGlass { alpha, ior, beckmann, .. } => {
                 self.tell_of_loss(material, name);
                 open(self, if smooth(alpha) { "dielectric" } else { "roughdielectric" });
                 self.iors(*ior);
                 if !smooth(alpha) {
-                    self.width(alpha)?;
+                    self.width(alpha, *beckmann)?;
                 }
                 self.factor("specular_transmittance", tint)?;
             }
@@ -241,8 +247,8 @@ impl Writer<'_> {
         self.xml.float("ext_ior", 1.0);
     }
 
-    fn width(&mut self, alpha: &Scalar) -> Result {
-        self.xml.value("string", "distribution", "ggx");
+    fn width(&mut self, alpha: &Scalar, beckmann: bool) -> Result {
+        self.xml.value("string", "distribution", distribution(beckmann));
         self.scalar("alpha", alpha)
     }
 
@@ -330,4 +336,9 @@ impl Writer<'_> {
         let linear = DMat3::from_cols(x.extend(0.0), y.extend(0.0), DVec3::Z);
         self.xml.transform("to_uv", &DAffine3::from_mat3_translation(linear, offset.extend(0.0)));
     }
+}
+
+/// Name of a distribution of microfacets.
+fn distribution(beckmann: bool) -> &'static str {
+    if beckmann { "beckmann" } else { "ggx" }
 }

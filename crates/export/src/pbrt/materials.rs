@@ -80,7 +80,8 @@ impl Writer<'_> {
         let list = |kind: &str| List::default().string("type", kind);
         match material {
             Material::Diffuse { albedo } => self.color(list("diffuse"), "reflectance", albedo),
-            Material::Plastic { diffuse, alpha, ior, specular, nonlinear } => {
+            Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann } => {
+                self.tell_of_beckmann(*beckmann, name);
                 if *specular != Scalar::Number(1.0) {
                     self.tell(name, "the reflection of its coat has its full strength");
                 }
@@ -118,15 +119,22 @@ impl Writer<'_> {
                 let list = self.color(list("conductor"), "reflectance", reflectance)?;
                 self.width(list, alpha)
             }
-            Material::Conductor { alpha, eta, k, reflectance, .. } => {
+            Material::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, .. } => {
+                self.tell_of_beckmann(*beckmann, name);
                 if *reflectance != Color::Rgb(Vec3::ONE) {
                     self.tell(name, "the factor of its reflection is left out");
                 }
                 self.tell_of_loss(material, name);
-                self.width(list("conductor").rgb("eta", eta.0).rgb("k", k.0), alpha)
+                let metal = list("conductor").rgb("eta", eta.0).rgb("k", k.0);
+                if *alpha_v == Scalar::Number(0.0) {
+                    return self.width(metal, alpha);
+                }
+                let metal = self.scalar(metal, "uroughness", alpha)?;
+                Ok(self.scalar(metal, "vroughness", alpha_v)?.flag("remaproughness", false))
             }
             Material::Glass { ior, .. } => Ok(list("dielectric").float("eta", *ior)),
-            Material::RoughGlass { alpha, ior, .. } => {
+            Material::RoughGlass { alpha, ior, beckmann, .. } => {
+                self.tell_of_beckmann(*beckmann, name);
                 self.tell_of_loss(material, name);
                 self.width(list("dielectric").float("eta", *ior), alpha)
             }
@@ -147,6 +155,12 @@ impl Writer<'_> {
     fn tell_of_loss(&mut self, material: &Material<Written>, name: &str) {
         if loses_light(material) {
             self.tell(name, "the light that its microfacets scatter several times is lost");
+        }
+    }
+
+    fn tell_of_beckmann(&mut self, beckmann: bool, name: &str) {
+        if beckmann {
+            self.tell(name, "its microfacets are those of GGX, with longer tails than Beckmann's");
         }
     }
 

@@ -1,0 +1,190 @@
+//! Scenes that are saved as files of pbrt and Mitsuba open again, with the same surfaces and the same light.
+
+use bevy_ecs::prelude::World;
+use firstlight::export::export;
+use firstlight::format::scene_format::SceneFormat;
+use firstlight::frame::{Target, render_offline};
+use firstlight::render::Film;
+use firstlight::scene::file::{MaterialPart, SceneFile};
+use firstlight::scene::{
+    BUILTIN_SCENES, Extraction, LoadOptions, LoadedScene, Rendering, SceneInputs, SceneSource, load, whole_scene,
+};
+use glam::Vec3;
+use std::path::Path;
+
+fn open(source: SceneSource) -> (World, LoadedScene) {
+    let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let mut world = World::new();
+    scene.spawn(&mut world);
+    (world, scene)
+}
+
+/// Writes a scene and opens it again; returns what was told as well.
+fn there_and_back(from: SceneSource, format: SceneFormat, folder: &Path) -> (World, LoadedScene, Vec<String>) {
+    let (mut world, scene) = open(from);
+    let path = folder.join(format!("out.{}", format.file_extension()));
+    let told = export(&whole_scene(&mut world, &scene), format, &path, true).unwrap();
+    let (world, scene) = open(SceneSource::Foreign(path));
+    (world, scene, told.iter().map(|warning| warning.to_string()).collect())
+}
+
+fn written(folder: &Path, text: &str) -> SceneSource {
+    let path = folder.join("scene.ron");
+    SceneFile::parse(text, &path).unwrap_or_else(|error| panic!("{error}"));
+    std::fs::write(&path, text).unwrap();
+    SceneSource::Scene(path)
+}
+
+#[test]
+fn every_built_in_scene_is_written_and_opens_again() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, ..) in BUILTIN_SCENES {
+        // Its many spheres are many files of nothing but time.
+        if *name == "ten-thousand-balls" {
+            continue;
+        }
+        let (mut world, scene) = open(SceneSource::Builtin((*name).to_owned()));
+        let whole = whole_scene(&mut world, &scene);
+        for format in SceneFormat::ALL {
+            let path = folder.path().join(format!("{name}.{}", format.file_extension()));
+            export(&whole, format, &path, false).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let again = export(&whole, format, &path, false).unwrap_err().to_string();
+            assert!(again.contains("already exists"), "{again}");
+            let read = open(SceneSource::Foreign(path)).1;
+            let told: Vec<String> = read.warnings.iter().map(|warning| warning.to_string()).collect();
+            assert!(!told.iter().any(|line| line.contains("left out") || line.contains("cannot")), "{name}: {told:?}");
+            assert_eq!(read.file.max_depth.unwrap_or(1001), scene.file.max_depth.unwrap_or(1001), "{name}");
+        }
+    }
+}
+
+/// Surfaces that both say, those of Mitsuba alone, and those of pbrt alone.
+const SURFACES: [&[&str]; 3] = [
+    &[
+        "diffuse(albedo: (0.1, 0.2, 0.3))",
+        "plastic(diffuse: (0.5, 0.25, 0.125), ior: 1.4)",
+        "plastic(diffuse: 0.5, alpha: 0.2)",
+        "conductor(eta: (0.2, 0.9, 1.1), k: (3.9, 2.4, 2.1))",
+        "conductor(alpha: 0.3, eta: (0.2, 0.9, 1.1), k: (3.9, 2.4, 2.1))",
+        "glass(ior: 1.33)",
+        "rough_glass(alpha: 0.25, ior: 1.7)",
+        "thin_glass(ior: 1.6)",
+    ],
+    &[
+        "plastic(diffuse: 0.5, alpha: 0.2, specular: 0.5, nonlinear: false)",
+        "conductor(alpha: 0.3, reflectance: (0.5, 0.6, 0.7))",
+        "mirror(reflectance: (0.9, 0.8, 0.7))",
+        "thin_glass(ior: 1.6, reflectance: 0.5, transmittance: (0.5, 0.25, 1))",
+        "emissive(radiance: (3, 2, 1))",
+    ],
+    &[
+        "translucent(reflectance: (0.2, 0.3, 0.4), transmittance: 0.25)",
+        "glass(ior: 1.5, absorption: (0.5, 0.25, 2))",
+        "rough_glass(alpha: 0.25, absorption: (0.5, 0.25, 2))",
+    ],
+];
+
+#[test]
+fn surfaces_come_back_with_all_their_numbers() {
+    for (format, own) in [(SceneFormat::Mitsuba, 1), (SceneFormat::Pbrt, 2)] {
+        let surfaces: Vec<&str> = SURFACES[0].iter().chain(SURFACES[own]).copied().collect();
+        let materials: String = surfaces.iter().enumerate().map(|(i, it)| format!("\"m{i}\": {it},")).collect();
+        let ball = |i| format!("sphere(center: ({}, 1, 0), radius: 0.25, material: \"m{i}\"),", i);
+        let balls: String = (0..surfaces.len()).map(ball).collect();
+        let text = format!(
+            "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), materials: {{{materials}}}, objects: [{balls}], \
+             environment: constant(0.5))"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let from = written(folder.path(), &text);
+        let before = SceneFile::parse(&text, "a.ron").unwrap();
+        let (_, after, told) = there_and_back(from, format, folder.path());
+        assert!(told.is_empty(), "{told:?}");
+        let part = |file: &SceneFile, i: usize| -> MaterialPart {
+            file.materials.get(file.objects[i].material().unwrap()).unwrap().clone()
+        };
+        for (i, surface) in surfaces.iter().enumerate() {
+            let (wanted, found) = (part(&before, i), part(&after.file, i));
+            assert!(format!("{wanted:?}") == format!("{found:?}"), "{format:?}, {surface}: {found:?}");
+        }
+    }
+}
+
+/// Mean radiance of the four quarters of an image of 64 × 48 pixels.
+fn quarters(world: &mut World, scene: &LoadedScene) -> [Vec3; 4] {
+    let inputs = SceneInputs::of(world);
+    let extraction = Extraction::of_world(world, &inputs, &scene.trees);
+    assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
+    let settings = world.resource::<Rendering>().0;
+    let mut film = Film::new(64, 48);
+    let target = Target { spp: Some(128), ..Target::default() };
+    render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
+    let means = film.means();
+    let quarter = |k: usize| {
+        let of = |i: &usize| (i % 64 >= 32, i / 64 >= 24) == (k % 2 == 1, k >= 2);
+        (0..64 * 48).filter(of).map(|i| means[i]).sum::<Vec3>() / 768.0
+    };
+    std::array::from_fn(quarter)
+}
+
+/// Everything that has a place or a direction: textures, mirrored and shared meshes, lens, environment, lights.
+const PLACES: &str = r#"(
+    camera: (eye: (0.5, 1.5, 6), look_at: (0, 0.8, 0), vfov: 40, lens_radius: 0.02, focus_distance: 6),
+    film: (width: 64, height: 48),
+    environment: image(file: "sky.png", scale: 0.5, rotate: 70),
+    textures: {
+        "squares": checker(a: (0.8, 0.2, 0.1), b: 0.05, squares: (4, 2), offset: (0.25, 0)),
+        "image": image(file: "sky.png", repeat: (2, 1), offset: (0.3, 0.1), tint: (0.9, 0.8, 0.5)),
+        "share": image(file: "sky.png", channel: g, encoding: linear),
+        "holes": checker(a: 1, b: 0, squares: (6, 3)),
+    },
+    materials: {
+        "floor": diffuse(albedo: "image"),
+        "ball": diffuse(albedo: "squares"),
+        "paint": plastic(diffuse: "image", ior: 1.5),
+        "a": diffuse(albedo: (0.1, 0.5, 0.1)),
+        "b": mirror(),
+        "mixed": blend(weight: "share", a: "a", b: "b"),
+        "grid": blend(weight: 0, a: "a", b: "a", opacity: "holes"),
+        "lamp": emissive(radiance: (6, 5, 4)),
+        "glow": blend(weight: 0.5, a: "a", b: "lamp"),
+    },
+    objects: [
+        quad(name: "floor", corner: (-3, 0, 3), edge_u: (6, 0, 0), edge_v: (0, 0, -6), material: "floor"),
+        quad(name: "slanted", corner: (-3, 0, -3), edge_u: (2, 0, 0), edge_v: (0.5, 2, 0), material: "paint"),
+        quad(name: "wall", corner: (1, 0, -3), edge_u: (2, 0, 0), edge_v: (0, 2, 0), material: "mixed"),
+        quad(name: "grid", corner: (1, 0.1, 2), edge_u: (1, 0, 0), edge_v: (0, 1, 0), material: "grid"),
+        sphere(name: "ball", center: (-1, 0.6, 0), radius: 0.6, material: "ball", transform: (rotate: (30, 40, 50))),
+        mesh(name: "one", source: builtin("torus"), material: "paint", transform: (translate: (1, 0.5, 0), scale: 0.5)),
+        mesh(name: "two", source: builtin("torus"), material: "paint",
+             transform: (translate: (1.5, 1.2, -1), rotate: (40, 0, 0), scale: (0.4, 0.4, -0.5))),
+        mesh(name: "alone", source: builtin("cube"), material: "glow",
+             transform: (translate: (0, 0.3, 1), rotate: (0, 30, 0), scale: (-0.3, 0.2, 0.2))),
+        triangle(name: "tip", vertices: ((0, 2, 0), (0.5, 2, 0), (0, 2.5, 0)), material: "ball"),
+    ],
+    lights: [
+        point(name: "bulb", position: (0, 3, 1), intensity: (2, 1, 1), radius: 0.1),
+        spot(name: "spot", position: (2, 4, 2), direction: (-1, -2, -1), intensity: 9, inner_angle: 20,
+             outer_angle: 20),
+        directional(name: "sun", direction: (1, -2, -1), irradiance: (0.5, 0.5, 0.25)),
+    ],
+)"#;
+
+#[test]
+fn the_light_of_every_quarter_of_the_image_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    // Brighter to the right and downwards, each in its own colour.
+    let sky = image::RgbImage::from_fn(32, 16, |x, y| image::Rgb([8 * x as u8, 16 * y as u8, 100]));
+    sky.save(folder.path().join("sky.png")).unwrap();
+    let from = written(folder.path(), PLACES);
+    let (mut world, scene) = open(from.clone());
+    let wanted = quarters(&mut world, &scene);
+    for format in SceneFormat::ALL {
+        let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
+        let found = quarters(&mut world, &scene);
+        for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
+            let ratio = *found / *wanted;
+            assert!((ratio - 1.0).abs().max_element() < 0.03, "{format:?}, quarter {k}: {ratio}, told {told:?}");
+        }
+    }
+}
