@@ -169,7 +169,8 @@ impl SceneArgs {
         let environment = self.environment()?;
         let environment = environment.as_deref();
         let choice = self.how.choice();
-        let (progress, choice) = (Some(progress), Some(&choice));
+        let told = |_, text: &str| progress(text);
+        let (progress, choice): (Option<&(dyn Fn(_, &str) + Sync)>, _) = (Some(&told), Some(&choice));
         let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;

@@ -350,6 +350,13 @@ impl Session {
         crate::frame::state::selection::box_of(&mut self.world, entity)
     }
 
+    /// The object or light at this position in the image, fractions from the upper left corner.
+    pub fn entity_at(&self, x: f64, y: f64) -> Option<Entity> {
+        let aspect = self.world.resource::<PictureSize>().aspect();
+        let scene = self.world.resource::<RenderState>().extraction.as_ref()?;
+        crate::frame::state::selection::pick(scene, x, y, aspect).map(|picked| picked.entity)
+    }
+
     /// Memory of all trees in bytes.
     pub fn tree_bytes(&self) -> usize {
         self.world.resource::<RenderState>().trees.bytes()

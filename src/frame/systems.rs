@@ -435,5 +435,5 @@ pub fn present(
     (status.display, status.integrator) = (shown.display, shown.settings.integrator);
     status.done = stats.done && stats.generation == shown.generation;
     status.paused = paused.0;
-    status.loading = beside.progress();
+    (status.opening, status.loading) = beside.progress();
 }

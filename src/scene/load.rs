@@ -1,5 +1,6 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
+use crate::console::thousands;
 use crate::files::input_file::{FileKind, InputFile};
 use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
@@ -31,6 +32,7 @@ use crate::scene::hit_spaces::{StaticJob, own_trees};
 use crate::scene::image_metadata::{ImageMetadata, MetadataError};
 use crate::scene::known_meshes::KnownMeshes;
 use crate::scene::load_meshes::{LostMesh, ObjectMeshes, load_meshes};
+use crate::scene::load_stage::LoadStage;
 use crate::scene::loaded::LoadedScene;
 use crate::scene::model_light::{Model, light_as_in, light_model};
 use crate::scene::source::SceneSource;
@@ -61,7 +63,7 @@ pub struct LoadOptions<'a> {
     /// The previous state of the scene: files that have not changed on disk are not read again.
     pub known: Option<&'a LoadedScene>,
     /// Called with a description of each step.
-    pub progress: Option<&'a (dyn Fn(&str) + Sync)>,
+    pub progress: Option<&'a (dyn Fn(LoadStage, &str) + Sync)>,
 }
 
 impl LoadOptions<'_> {
@@ -74,9 +76,9 @@ impl LoadOptions<'_> {
         self.aspect.unwrap_or(16.0 / 9.0)
     }
 
-    fn say(&self, text: &str) {
+    fn say(&self, stage: LoadStage, text: &str) {
         if let Some(progress) = self.progress {
-            progress(text);
+            progress(stage, text);
         }
     }
 }
@@ -89,7 +91,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     if let SceneSource::Picture(path) = source {
         return load_picture(path, options);
     }
-    options.say(&format!("loading {}", source.title()));
+    options.say(LoadStage::Reading, &format!("reading {}", source.title()));
     let start = Instant::now();
     let documents = Documents::new(options.choice());
     let mut model = None;
@@ -275,7 +277,7 @@ fn resolve(
         &scene.folder,
         documents,
         |object| before.as_ref()?.fresh_mesh(&scene.folder, object),
-        |source| options.say(&format!("loading {}", source.name())),
+        |source| options.say(LoadStage::Reading, &format!("reading {}", source.name())),
     );
     for mesh in meshes.iter().flatten() {
         scene.warnings.append(&mesh.warnings);
@@ -502,7 +504,7 @@ impl LoadedScene {
             self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
             return Ok(());
         }
-        options.say(&format!("loading {name}"));
+        options.say(LoadStage::Images, &format!("reading {name}"));
         // Also if it cannot be read, since it may appear later.
         self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
         let read = ahead.map_or_else(|| documents.picture(path), |(_, read)| read);
@@ -610,7 +612,8 @@ impl LoadedScene {
             if let Shape::Spheres(balls) = &shape
                 && !self.trees.has(&shape)
             {
-                options.say(&format!("building a kd-tree over {} spheres", balls.centers.len()));
+                let n = thousands(balls.centers.len());
+                options.say(LoadStage::Trees, &format!("building a kd-tree over {n} spheres"));
             }
             let added = if options.preview { self.trees.add_preview(&shape) } else { self.trees.add(&shape) };
             added.map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
@@ -621,12 +624,14 @@ impl LoadedScene {
         if let Some(job) = StaticJob::next(&inputs, &self.trees, origin_of(&inputs)) {
             let (triangles, meshes) = (job.n_triangles(), job.n_meshes());
             let of = if meshes == 1 { String::new() } else { format!(" of {meshes} meshes") };
-            options.say(&format!("building a kd-tree over {triangles} triangles{of}"));
+            let triangles = thousands(triangles);
+            options.say(LoadStage::Trees, &format!("building a kd-tree over {triangles} triangles{of}"));
             self.trees.take_statics(job.build(options.preview));
         }
         // The others have trees of their own, which many objects may share.
         for tree in own_trees(&inputs, &self.trees).into_iter().filter(|tree| !tree.is_built()) {
-            options.say(&format!("building a kd-tree over {} triangles", tree.n_triangles()));
+            let n = thousands(tree.n_triangles());
+            options.say(LoadStage::Trees, &format!("building a kd-tree over {n} triangles"));
             tree.ensure_built();
         }
         Ok(())

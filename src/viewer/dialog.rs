@@ -1,8 +1,8 @@
 //! File dialogs of the desktop.
 //!
 //! A dialog is a separate program, zenity or kdialog, whichever is installed: toolkits and message buses would be more
-//! code than the whole window, for something that dropping a file on the window does as well. A thread waits for it, so
-//! that rendering continues.
+//! code than the whole window. Where there is neither, [`browser`](crate::viewer::browser) is shown inside the window. A
+//! thread waits for the program, so that rendering continues.
 
 use crate::format::model_format::ModelFormat;
 use crate::format::scene_format::SceneFormat;
@@ -27,12 +27,26 @@ pub enum DialogPurpose {
 }
 
 impl DialogPurpose {
-    fn title(self) -> &'static str {
+    pub fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a scene, a model or an image",
             Self::AddMesh => "Add a model",
             Self::Texture { .. } => "Choose a texture image",
         }
+    }
+
+    /// The kinds of files in words.
+    pub fn files(self) -> &'static str {
+        match self {
+            Self::Open => "Scenes, models, saved images",
+            Self::AddMesh => "Models",
+            Self::Texture { .. } => "Images",
+        }
+    }
+
+    /// File name extensions.
+    pub fn extensions(self) -> Vec<String> {
+        self.patterns().split(' ').map(|pattern| pattern.trim_start_matches("*.").to_owned()).collect()
     }
 
     /// File name patterns in shell syntax.
@@ -77,15 +91,15 @@ impl Dialog {
         Self { waker, open: Arc::default(), sender, receiver }
     }
 
-    /// Shows a dialog that starts in `folder`.
+    /// Shows a dialog that starts in `folder`; returns false if this system has none.
     ///
     /// # Errors
-    /// If this system has no dialog; the message is for users.
-    pub fn ask(&self, purpose: DialogPurpose, folder: &Path) -> Result<(), String> {
+    /// If it cannot be started; the message is for users.
+    pub fn ask(&self, purpose: DialogPurpose, folder: &Path) -> Result<bool, String> {
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let found = find(&path).ok_or("no file dialog found (install zenity or kdialog): drop a file on the window")?;
+        let Some(found) = find(&path) else { return Ok(false) };
         if self.open.swap(true, Ordering::AcqRel) {
-            return Ok(());
+            return Ok(true);
         }
         let arguments = arguments(found.1, purpose, folder);
         let (sender, waker, open) = (self.sender.clone(), self.waker.clone(), self.open.clone());
@@ -99,7 +113,7 @@ impl Dialog {
             waker();
         };
         let spawned = std::thread::Builder::new().name("dialog".to_owned()).spawn(work);
-        spawned.map(drop).map_err(|error| {
+        spawned.map(|_| true).map_err(|error| {
             self.open.store(false, Ordering::Release);
             format!("cannot show a dialog: {error}")
         })

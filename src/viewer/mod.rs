@@ -17,13 +17,16 @@
 //! | `change` | the effect of mesh simplification on the image |
 //! | `reaction` | input latency |
 //! | `help` | the list of keys |
+//! | `bar`, `menu`, `palette`, `openable` | what can be clicked: buttons, menus, the list of commands, scenes and files |
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
-//! | `dialog` | file dialogs of the desktop |
+//! | `dialog`, `browser` | file dialogs: of the desktop, or inside the window |
 //! | `question` | questions before edits are lost |
 //! | [`display`] | detection of the display server |
 
 mod app;
+mod bar;
+mod browser;
 mod camera_text;
 mod change;
 mod dialog;
@@ -32,7 +35,10 @@ mod handles;
 mod help;
 mod input;
 pub mod keys;
+mod menu;
+mod openable;
 mod overlay;
+mod palette;
 mod panel;
 mod presenter;
 mod question;

@@ -1,15 +1,16 @@
-//! Overlays on the image: the status line, messages, and the legend of an inspection.
+//! Overlays on the image: messages, and the legend of an inspection.
 
 use crate::files::printable;
 use crate::render::{Legend, scale_color};
+use crate::scene::LoadStage;
 use crate::viewer::toasts::{Toast, Tone};
-use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
+use egui::{Align2, Color32, Context, CornerRadius, Frame, Margin, Order, RichText, Stroke, Vec2};
 
 /// Background of panels and lists, nearly opaque because they are read for longer.
 pub const PANE: Color32 = Color32::from_rgba_premultiplied(19, 20, 23, 246);
 /// Background of other overlays, dark so that text is readable on any image.
 pub const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
-const TEXT: Color32 = Color32::from_gray(228);
+pub const TEXT: Color32 = Color32::from_gray(228);
 /// Colour of the names of keys.
 pub const KEY: Color32 = Color32::from_rgb(250, 205, 125);
 const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
@@ -31,42 +32,39 @@ pub fn style(context: &Context) {
     });
 }
 
-/// Draws the status line at the lower edge; it ignores the mouse.
-pub fn status_line(context: &Context, left: &str, right: &str) {
-    let (left, right) = (&*printable::line(left), &*printable::line(right));
-    let screen = context.content_rect();
-    egui::Area::new("status".into())
-        .order(Order::Foreground)
-        .interactable(false)
-        .fixed_pos(screen.left_bottom())
-        .pivot(Align2::LEFT_BOTTOM)
-        .show(context, |ui| {
-            let font = FontId::proportional(TEXT_SIZE);
-            let (margin, gap) = (8.0, 24.0);
-            let width = screen.width();
-            let layout = |text: &str, color, room: f32| {
-                let mut job = egui::text::LayoutJob::simple(text.to_owned(), font.clone(), color, room.max(0.0));
-                job.wrap = egui::text::TextWrapping::truncate_at_width(room.max(0.0));
-                context.fonts_mut(|fonts| fonts.layout_job(job))
-            };
-            let left = layout(left, TEXT, width - 2.0 * margin);
-            let room = width - 2.0 * margin - gap - left.size().x;
-            let height = left.size().y + 8.0;
-            let (rect, _) = ui.allocate_exact_size(Vec2::new(width, height), egui::Sense::hover());
-            ui.painter().rect_filled(rect, 0.0, GLASS);
-            ui.painter().galley(rect.left_top() + Vec2::new(margin, 4.0), left, TEXT);
-            // Settings that do not fit beside the figures are omitted as a whole: a partial word is useless.
-            let right = layout(right, Color32::from_gray(165), f32::INFINITY);
-            if right.size().x <= room {
-                let at = rect.right_top() + Vec2::new(-margin - right.size().x, 4.0);
-                ui.painter().galley(at, right, TEXT);
-            }
-        });
-}
-
 /// Style of a key's name.
 pub fn style_key(key: &str) -> RichText {
     RichText::new(key).size(TEXT_SIZE - 1.0).color(KEY)
+}
+
+/// Draws the progress of opening a scene in the middle of the image; it ignores the mouse.
+///
+/// - `seconds`: since it began.
+pub fn opening(context: &Context, stage: LoadStage, text: &str, seconds: u64) {
+    let width = 320.0_f32.min(context.content_rect().width() - 40.0).max(60.0);
+    egui::Area::new("opening".into())
+        .order(Order::Foreground)
+        .interactable(false)
+        .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+        .show(context, |ui| {
+            glass().inner_margin(Margin::same(14)).show(ui, |ui| {
+                ui.set_width(width);
+                ui.label(RichText::new(&*printable::line(text)).size(TEXT_SIZE + 1.0));
+                ui.add_space(4.0);
+                let n = LoadStage::ALL.len() as f32;
+                let done = LoadStage::ALL.iter().filter(|other| **other < stage).count() as f32;
+                ui.add(egui::ProgressBar::new((done + 0.5) / n).desired_height(8.0));
+                ui.horizontal(|ui| {
+                    for other in LoadStage::ALL {
+                        let word = RichText::new(other.label()).size(TEXT_SIZE - 1.0);
+                        ui.label(if other == stage { word.strong() } else { word.weak() });
+                    }
+                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                        ui.label(RichText::new(format!("{seconds} s")).size(TEXT_SIZE - 1.0));
+                    });
+                });
+            });
+        });
 }
 
 /// Draws messages in the upper left corner; they ignore the mouse.

@@ -1,68 +1,88 @@
-//! Text of the status line: quality of the image, and settings.
+//! Text of the status line: what is on the image and how good it is, and settings; and how figures are written.
 
-use crate::frame::{DenoiseFilter, Denoising, Status, f_number, f_stop};
+use crate::frame::{DenoiseFilter, Denoising, Status, Target, f_number, f_stop};
 use crate::render::{Integrator, ToneCurve};
-use std::fmt::Write as _;
 
-/// The figures: state, samples, seconds, speed, resolution, error, and the cause of the last restart.
-pub fn figures(status: &Status) -> String {
-    let mut line = String::new();
+/// Seconds of rendering from which the time to go can be told.
+const MIN_SECONDS: f64 = 0.5;
+
+/// Seconds for which somebody may wait.
+const PATIENCE: f64 = 1800.0;
+/// Errors worth waiting for where the target is farther away.
+const MILESTONES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+
+/// What is on the image, how good it is, and how long it will take: one noise, that of what is shown.
+pub fn line(status: &Status, target: Target) -> String {
     if let Some(loading) = &status.loading {
-        write!(line, "{loading}…   ").expect("a string takes all");
+        return format!("{loading} …");
     }
-    // Explains why the sample count does not grow.
-    if status.paused {
-        line += "paused   ";
+    let state = if status.paused {
+        "paused, "
     } else if status.done {
-        line += "finished   ";
-    }
-    // With a region, its samples and its error: those of the whole image would not belong together.
-    let of_region = status.region.map(|(_, spp)| spp);
-    let (spp, place) = of_region.map_or((status.spp, ""), |spp| (spp, " in the region"));
-    write!(
-        line,
-        "{spp} spp{place}   {}   {:.2} Mrays/s   {}×{}",
-        seconds(status.seconds),
-        status.mrays(),
-        status.film_width,
-        status.film_height
-    )
-    .expect("a string takes all");
-    if status.divider > 1 {
-        write!(line, " (1/{})", status.divider).expect("a string takes all");
-    }
-    let error = status.estimated_error.map_or("–".to_owned(), percent);
-    write!(line, "   error {error}{place}").expect("a string takes all");
-    if let Some(denoised) = status.denoised_error {
-        // It may be older than the samples.
-        let of = if status.denoised_spp == spp { String::new() } else { format!(" of {} spp", status.denoised_spp) };
-        write!(line, " (denoised {}{of})", percent(denoised)).expect("a string takes all");
-    }
-    let shown = match (status.denoising, status.denoised_error) {
-        (Denoising::Raw, _) => "   raw",
-        // Only at full resolution, and only once it is done, is an image denoised with a known error.
-        (Denoising::Denoised, None) => "   smoothed",
-        (Denoising::Denoised, Some(_)) if status.mixes_raw => "   denoised, mixed with raw",
-        (Denoising::Denoised, Some(_)) => "   denoised",
-        (Denoising::Split, None) => "   raw | smoothed",
-        (Denoising::Split, Some(_)) => "   raw | denoised",
+        "finished, "
+    } else {
+        ""
     };
-    line += shown;
-    let is_denoised = status.denoising != Denoising::Raw && status.denoised_error.is_some();
-    if is_denoised && status.denoised_by != DenoiseFilter::Own {
-        write!(line, " by {}", status.denoised_by.label()).expect("a string takes all");
-    }
-    if status.awaits_denoised {
-        line += ", denoising…";
-    }
-    if !status.restart_cause.is_empty() {
-        write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
-    }
-    line
+    let place = if status.region.is_some() { " in the region" } else { "" };
+    let raw = status.estimated_error.map(percent);
+    let denoised = status.denoised_error.map(percent).filter(|_| status.denoising != Denoising::Raw);
+    let by = match status.denoised_by {
+        DenoiseFilter::Own => String::new(),
+        filter => format!(" by {}", filter.label()),
+    };
+    let noise = match (&raw, &denoised) {
+        (Some(raw), Some(denoised)) if status.denoising == Denoising::Split => {
+            format!("noise {raw} | denoised{by}: {denoised}")
+        }
+        (_, Some(denoised)) => format!("noise {denoised}{place}, denoised{by}"),
+        (Some(raw), None) => format!("noise {raw}{place}"),
+        // While it moves, and until there are samples to compare.
+        (None, None) if status.divider > 1 => "preview".to_owned(),
+        (None, None) => "first samples".to_owned(),
+    };
+    let denoising = if status.awaits_denoised { ", denoising …" } else { "" };
+    let time = time_to_go(status, target).filter(|_| state.is_empty()).and_then(|seconds| {
+        if seconds <= PATIENCE {
+            // Beside the noise of a denoised image, the goal of its samples would be another figure.
+            let to = target.error.filter(|_| denoised.is_none()).map_or("go".to_owned(), percent);
+            return Some(format!(", {} to {to}", about(seconds)));
+        }
+        // A goal that is days away says little: the best one that is not.
+        let error = status.estimated_error.filter(|_| denoised.is_none())?;
+        let within = |goal: &&f64| **goal < 0.8 * error && seconds_to(status.seconds, error, **goal) <= PATIENCE;
+        let goal = MILESTONES.iter().find(within)?;
+        Some(format!(", {} to {}", about(seconds_to(status.seconds, error, *goal)), percent(*goal)))
+    });
+    format!("{state}{noise}{denoising}{}", time.unwrap_or_default())
 }
 
-/// Settings that differ from the default: lens, exposure, tone curve, model; and the key for help.
-pub fn settings(status: &Status) -> String {
+/// Seconds until the error has fallen to `goal`, as the square root of the samples grows.
+fn seconds_to(seconds: f64, error: f64, goal: f64) -> f64 {
+    seconds * ((error / goal).powi(2) - 1.0)
+}
+
+/// Seconds until the target is reached.
+fn time_to_go(status: &Status, target: Target) -> Option<f64> {
+    let seconds = Some(status.seconds).filter(|seconds| *seconds >= MIN_SECONDS)?;
+    let by_error =
+        target.error.zip(status.estimated_error).map(|(goal, error)| seconds * ((error / goal).powi(2) - 1.0));
+    let by_samples = target.spp.map(|goal| seconds * (f64::from(goal) / f64::from(status.spp.max(1)) - 1.0));
+    let by_time = target.seconds.map(|goal| goal - seconds);
+    let soonest = [by_error, by_samples, by_time].into_iter().flatten().min_by(f64::total_cmp)?;
+    (soonest.is_finite() && soonest > 0.0).then_some(soonest)
+}
+
+/// A duration that is only estimated.
+fn about(seconds: f64) -> String {
+    match seconds {
+        s if s < 9.5 => format!("about {:.0} s", s.max(1.0)),
+        s if s < 95.0 => format!("about {:.0} s", (s / 5.0).round() * 5.0),
+        s => format!("about {:.0} min", s / 60.0),
+    }
+}
+
+/// Settings that differ from the default: lens, exposure, tone curve, model.
+pub fn settings(status: &Status) -> Vec<String> {
     let mut parts = Vec::new();
     if status.integrator == Integrator::Phong {
         parts.push("Phong".to_owned());
@@ -78,8 +98,7 @@ pub fn settings(status: &Status) -> String {
     if status.display.tone_curve != ToneCurve::default() {
         parts.push(tone_curve(status.display.tone_curve).to_owned());
     }
-    parts.push("N: panel, H: keys".to_owned());
-    parts.join("   ")
+    parts
 }
 
 pub fn tone_curve(curve: ToneCurve) -> &'static str {
@@ -133,19 +152,6 @@ pub fn bytes(n: u64) -> String {
     }
 }
 
-/// Formats 1234567 as 1,234,567.
-pub fn thousands(n: usize) -> String {
-    let digits = n.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,59 +160,64 @@ mod tests {
     use glam::UVec2;
 
     #[test]
-    fn figures_say_what_matters() {
-        let mut status = Status { spp: 37, seconds: 12.34, bounce_mrays: 4.567, ..Status::default() };
-        (status.film_width, status.film_height, status.divider) = (320, 180, 4);
-        (status.estimated_error, status.restart_cause) = (Some(0.0234), "camera moved".to_owned());
-        assert_eq!(
-            figures(&status),
-            "37 spp   12.3 s   4.57 Mrays/s   320×180 (1/4)   error 2.3 %   raw   restarted: camera moved"
-        );
-        (status.estimated_error, status.divider) = (None, 1);
-        assert!(figures(&status).contains("320×180   error –"));
-        // What gets all samples is what the figures are about.
+    fn the_line_has_one_noise_that_of_what_is_shown() {
+        let mut status = Status { spp: 37, seconds: 10.0, divider: 4, ..Status::default() };
+        let target = Target { error: Some(0.005), ..Target::default() };
+        let line = |status: &Status| line(status, target);
+        assert_eq!(line(&status), "preview");
+        status.divider = 1;
+        assert_eq!(line(&status), "first samples");
+        // Twice the error takes four times the samples.
+        status.estimated_error = Some(0.01);
+        assert_eq!(line(&status), "noise 1.0 %, about 30 s to 0.50 %");
+        (status.denoising, status.awaits_denoised) = (Denoising::Denoised, true);
+        assert_eq!(line(&status), "noise 1.0 %, denoising …, about 30 s to 0.50 %");
+        (status.awaits_denoised, status.denoised_error) = (false, Some(0.004));
+        assert_eq!(line(&status), "noise 0.40 %, denoised, about 30 s to go");
+        status.denoised_by = DenoiseFilter::Oidn;
+        assert_eq!(line(&status), "noise 0.40 %, denoised by Open Image Denoise, about 30 s to go");
+        (status.denoised_by, status.denoising) = (DenoiseFilter::Own, Denoising::Split);
+        assert_eq!(line(&status), "noise 1.0 % | denoised: 0.40 %, about 30 s to go");
+        // A denoised image that is there but not shown does not matter.
+        status.denoising = Denoising::Raw;
         let region = Region { start: UVec2::ZERO, end: UVec2::splat(32) };
         status.region = Some((region, 512));
-        status.estimated_error = Some(0.012);
-        assert!(figures(&status).starts_with("512 spp in the region   12.3 s"));
-        assert!(figures(&status).contains("error 1.2 % in the region"));
-        status.region = None;
-        (status.denoising, status.estimated_error, status.denoised_error) =
-            (Denoising::Denoised, Some(0.02), Some(0.004));
-        status.denoised_spp = status.spp;
-        assert!(
-            figures(&status).contains("error 2.0 % (denoised 0.40 %)   denoised   restarted"),
-            "{}",
-            figures(&status)
-        );
-        status.denoised_by = DenoiseFilter::Oidn;
-        assert!(figures(&status).contains("   denoised by Open Image Denoise   "), "{}", figures(&status));
-        status.denoised_by = DenoiseFilter::Own;
-        status.denoising = Denoising::Split;
-        assert!(figures(&status).contains("   raw | denoised   "));
-        status.denoised_error = None;
-        assert!(figures(&status).contains("   raw | smoothed   "));
-        (status.denoising, status.awaits_denoised) = (Denoising::Denoised, true);
-        assert!(figures(&status).contains("   smoothed, denoising…   "));
-        status.denoising = Denoising::Raw;
-        assert!(figures(&status).contains("%   raw, denoising…   "));
-        status.awaits_denoised = false;
-        (status.denoising, status.denoised_error) = (Denoising::Denoised, Some(0.03));
-        (status.denoised_spp, status.mixes_raw) = (8, true);
-        assert!(figures(&status).contains("(denoised 3.0 % of 8 spp)   denoised, mixed with raw   "));
-        status.done = true;
-        assert!(figures(&status).starts_with("finished   37 spp"));
+        assert_eq!(line(&status), "noise 1.0 % in the region, about 30 s to 0.50 %");
+        (status.region, status.done) = (None, true);
+        assert_eq!(line(&status), "finished, noise 1.0 %");
         status.paused = true;
-        assert!(figures(&status).starts_with("paused   37 spp"));
+        assert_eq!(line(&status), "paused, noise 1.0 %");
+        status.loading = Some("reading duck.glb".to_owned());
+        assert_eq!(line(&status), "reading duck.glb …", "no figures of what is not there yet");
+    }
+
+    #[test]
+    fn the_time_to_go_is_that_of_the_first_limit_to_be_reached() {
+        let status = Status { spp: 100, seconds: 50.0, estimated_error: Some(0.02), ..Status::default() };
+        let target = |spp, seconds, error| time_to_go(&status, Target { spp, seconds, error });
+        assert_eq!(target(None, None, Some(0.01)), Some(150.0));
+        assert_eq!(target(Some(300), None, Some(0.01)), Some(100.0));
+        assert_eq!(target(Some(300), Some(60.0), Some(0.01)), Some(10.0));
+        assert_eq!(target(None, None, None), None);
+        assert_eq!(target(None, None, Some(0.05)), None, "reached");
+        let far = Status { spp: 1, seconds: 10.0, estimated_error: Some(0.5), ..Status::default() };
+        let target = Target { error: Some(0.005), ..Target::default() };
+        assert_eq!(line(&far, target), "noise 50 %, about 16 min to 5.0 %", "the target is a day away");
+        let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
+        assert_eq!(line(&denoised, target), "noise 5.0 %, denoised");
+        assert_eq!(
+            [0.2, 43.0, 200.0, 7300.0, 1e6].map(about),
+            ["about 1 s", "about 45 s", "about 3 min", "about 2 h", "days"]
+        );
     }
 
     #[test]
     fn settings_tell_only_what_is_unusual() {
         let mut status = Status::default();
-        assert_eq!(settings(&status), "N: panel, H: keys");
+        assert!(settings(&status).is_empty());
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.display.exposure_stops = -1.0 / 3.0;
-        assert_eq!(settings(&status), "focus 2.50 m, f/1.6   -0.3 stops   N: panel, H: keys");
+        assert_eq!(settings(&status), ["focus 2.50 m, f/1.6", "-0.3 stops"]);
     }
 
     #[test]
@@ -216,10 +227,5 @@ mod tests {
         assert_eq!(percent(f64::INFINITY), "–");
         let lengths = [metres(f64::INFINITY), metres(5e6), metres(1234.0), metres(0.5), metres(0.002), metres(2e-6)];
         assert_eq!(lengths, ["∞", "5000 km", "1.23 km", "50.0 cm", "2.00 mm", "2.00 µm"]);
-    }
-
-    #[test]
-    fn large_numbers_are_grouped() {
-        assert_eq!([0, 999, 1000, 1_234_567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
     }
 }

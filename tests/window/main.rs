@@ -4,6 +4,7 @@
 mod desktop;
 
 mod guest;
+mod mouse;
 mod navigation;
 mod noise;
 mod saving;

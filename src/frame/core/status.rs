@@ -4,6 +4,7 @@ use crate::files::printable;
 use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 use crate::frame::core::rig::Rig;
 use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, Legend, RayCounts, Region};
+use crate::scene::LoadStage;
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -88,6 +89,8 @@ pub struct Status {
     pub restarts: u64,
     /// What is being loaded or built in the background.
     pub loading: Option<String>,
+    /// The stage of the scene that is being opened.
+    pub opening: Option<LoadStage>,
     /// Messages, the newest last.
     pub messages: VecDeque<Message>,
     /// Texts of earlier messages that no longer apply, such as errors of a scene file that has been corrected.

@@ -10,12 +10,14 @@
 //! | `property` | parameters of materials, lights and shapes |
 //! | `sky` | colours, strength and rotation of the environment |
 //! | `texture` | textures in place of colours |
+//! | `dress` | ready materials |
 //! | `place` | moving, rotating and scaling the selection |
 //! | `keys` | keys and settings of the animation |
 //! | `add`, `new_entity`, `spot` | new objects, their names and positions, copies, removal |
 //! | `remesh` | meshes made again in the background |
 
 mod add;
+mod dress;
 mod keys;
 pub(crate) mod new_entity;
 mod place;
@@ -146,6 +148,11 @@ pub enum Edit {
         /// The material.
         material: Id,
     },
+    /// Give the selected objects a material of the [`library`](crate::scene::library), the same to all that ask for it.
+    Dress {
+        /// Name of the material in the library.
+        name: String,
+    },
     /// Give an object its own copy of its material.
     OwnMaterial {
         /// The object.
@@ -270,6 +277,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
                 slots.0 = vec![material];
             }
         }
+        Edit::Dress { name } => dress::dress(world, &name)?,
         Edit::OwnMaterial { id } => {
             let object = thing(world, id)?;
             add::own_material(world, object)?;

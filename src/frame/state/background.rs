@@ -6,8 +6,8 @@ use crate::frame::state::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
 use crate::scene::hit_spaces::{BuiltStatics, StaticJob};
 use crate::scene::{
-    LoadOptions, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis,
-    load, read_picture,
+    LoadOptions, LoadStage, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees,
+    UpAxis, load, read_picture,
 };
 use bevy_ecs::prelude::{Entity, Resource};
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub enum Finished {
 struct TaskBoard {
     finished: Vec<Finished>,
     /// Progress of the newest load.
-    progress: Option<String>,
+    progress: Option<(LoadStage, String)>,
     /// Number of the newest load; results of older ones are dropped.
     newest_load: u64,
     building: usize,
@@ -98,15 +98,15 @@ impl BackgroundTasks {
         let (up, environment) = how;
         let number = self.with(|board| {
             board.newest_load += 1;
-            board.progress = Some(format!("loading {}", source.title()));
+            board.progress = Some((LoadStage::Reading, format!("reading {}", source.title())));
             board.newest_load
         });
         let this = self.clone();
         let work = move || {
-            let say = |text: &str| {
+            let say = |stage: LoadStage, text: &str| {
                 this.with(|board| {
                     if board.newest_load == number {
-                        board.progress = Some(text.to_owned());
+                        board.progress = Some((stage, text.to_owned()));
                     }
                 });
                 this.wake();
@@ -264,11 +264,12 @@ impl BackgroundTasks {
         self.with(|board| std::mem::take(&mut board.finished))
     }
 
-    /// What is being loaded or built now, for messages.
-    pub fn progress(&self) -> Option<String> {
+    /// What is being loaded or built now, for messages; and the stage of the scene that is opened, if one is.
+    pub fn progress(&self) -> (Option<LoadStage>, Option<String>) {
         self.with(|board| {
             let building = (board.building > 0).then(|| "building a kd-tree".to_owned());
-            board.progress.clone().or_else(|| board.mesh_in_the_making()).or(building)
+            let (stage, text) = board.progress.clone().unzip();
+            (stage, text.or_else(|| board.mesh_in_the_making()).or(building))
         })
     }
 

@@ -69,9 +69,27 @@ impl App {
     }
 
     pub(super) fn act(&mut self, action: Action) {
+        self.act_at(action, self.input.place());
+    }
+
+    /// Shows the menu of the image under the mouse, and selects what is there.
+    pub(super) fn open_menu_here(&mut self) {
+        let [x, y] = self.input.place();
+        let there = self.session.entity_at(x, y);
+        if there.is_none_or(|entity| !self.session.world().resource::<Selection>().0.contains(&entity)) {
+            self.session.send(Command::Edit(Edit::PickAt { x, y, add: false }));
+        }
+        let point = self.mouse();
+        self.here.open(egui::pos2(point.x as f32, point.y as f32), [x, y]);
+    }
+
+    /// Carries out an action; one that is about a place of the image, at `place`, fractions of its size.
+    pub(super) fn act_at(&mut self, action: Action, place: [f64; 2]) {
         let now = Instant::now();
+        let [x, y] = place;
+        self.needs_tick = true;
         match action {
-            Action::Send(command) => self.session.send(command),
+            Action::Send(command) => self.open(command, now),
             Action::TogglePause => {
                 let paused = self.session.status().paused;
                 self.session.send(if paused { Command::Resume } else { Command::Pause });
@@ -93,9 +111,10 @@ impl App {
                     Err(error) => self.toasts.add(Tone::Problem, format!("cannot print the camera: {error}"), now),
                 }
             }
-            Action::Explain => {
-                let [x, y] = self.input.place();
-                self.session.send(Command::ExplainAt { x, y });
+            Action::Explain => self.session.send(Command::ExplainAt { x, y }),
+            Action::FocusHere => {
+                self.session.send(Command::FocusAt { x, y });
+                self.session.send(Command::PivotAt { x, y });
             }
             Action::Brush => self.toggle_brush(now),
             Action::ClearRegion => self.session.send(Command::SetRegion { region: None }),
@@ -129,14 +148,19 @@ impl App {
             Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),
             Action::FocusFollows => {
                 let follows = self.session.world().resource::<Focus>().target;
-                let [x, y] = self.input.place();
                 self.session.send(match follows {
                     FocusTarget::Cursor(_) => Command::ToggleFocusLock,
                     _ => Command::FocusFollows { x, y },
                 });
             }
             Action::OpenDialog => self.ask_for_file(DialogPurpose::Open, now),
+            Action::AddDialog => self.ask_for_file(DialogPurpose::AddMesh, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,
+            Action::Section(title) => {
+                (self.panel.shown, self.panel.section) = (true, Some(title));
+                self.overlays = true;
+            }
+            Action::Palette => self.palette.open(),
             Action::ToggleHelp => self.help.toggle(),
             Action::ToggleOverlays => self.overlays = !self.overlays,
             Action::ToggleFullscreen => {
@@ -215,9 +239,17 @@ impl App {
     /// Shows a dialog; [`Self::take_files`] receives the result.
     fn ask_for_file(&mut self, purpose: DialogPurpose, now: Instant) {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
+        // A file name alone is in the folder in which the program runs.
+        let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or_else(|| self.options.folder.clone());
-        if let Err(reason) = self.dialog.ask(purpose, &folder) {
-            self.toasts.add(Tone::Problem, reason, now);
+        match self.dialog.ask(purpose, &folder) {
+            Ok(true) => {}
+            Ok(false) => {
+                let screen = self.presenter.as_ref().map(|presenter| presenter.egui_context().content_rect().size());
+                self.browser.open(purpose, &folder, screen.unwrap_or_default());
+                self.repaint_at = Some(now);
+            }
+            Err(reason) => self.toasts.add(Tone::Problem, reason, now),
         }
     }
 

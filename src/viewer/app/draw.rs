@@ -1,22 +1,36 @@
 //! Drawing of the image and the overlays to the window.
 
-use crate::frame::{Explaining, Projector, SceneBounds, ViewMode};
+use crate::frame::{Explaining, Projector, SceneBounds, Selection, StopAt, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, WIDGET_REPAINT_DELAY};
+use crate::viewer::menu::MenuInput;
 use crate::viewer::presenter::{PresentError, Presenter};
-use crate::viewer::{help as key_list, overlay, panel, status, story};
+use crate::viewer::{bar, help as key_list, overlay, panel, status, story};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
-/// An inspection that takes longer is reported as in progress; until it is done another image is shown.
-const SLOW: Duration = Duration::from_millis(150);
+/// An inspection, or opening a scene, that takes longer is reported as in progress; until it is done another image is
+/// shown.
+pub(super) const SLOW: Duration = Duration::from_millis(150);
+
+/// The texts of the bar.
+#[derive(Default, PartialEq, Eq)]
+pub(super) struct Figures {
+    pub left: String,
+    /// From the most important one.
+    pub right: Vec<String>,
+}
 
 impl App {
-    pub(super) fn figures(&self) -> String {
-        let status = self.session.status();
-        format!("{}\n{}", status::figures(status), status::settings(status))
+    /// The texts of the bar: on the left what is on the image, on the right settings and what one may do.
+    pub(super) fn figures(&self) -> Figures {
+        let (status, world) = (self.session.status(), self.session.world());
+        let mut right = status::settings(status);
+        let is_selected = !world.resource::<Selection>().0.is_empty();
+        right.push(if is_selected { "right click: what to do with it" } else { "click: select" }.to_owned());
+        Figures { left: status::line(status, world.resource::<StopAt>().0), right }
     }
 
     fn draw(&mut self, now: Instant) -> Result<(), PresentError> {
@@ -40,6 +54,8 @@ impl App {
         let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
         self.handles.update(&mut self.session, self.panel.gizmo, size);
         let projector = Projector::new(&self.session.status().rig, size);
+        let active = self.session.world().resource::<Selection>().active().filter(|_| self.here.is_open());
+        let chosen_name = active.and_then(|entity| self.panel.label_of(&self.session, entity));
         let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
         let path_filter = &mut self.path_filter;
         let around = panel::Around {
@@ -57,7 +73,12 @@ impl App {
         let mut asked = panel::Asked::default();
         let navigation = self.input.navigation();
         let (question, mut answer) = (&self.leaving.question, None);
-        let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
+        let opening = self.opening_since.filter(|since| now >= *since + SLOW);
+        let opening = session.status().opening.zip(opening);
+        let (mut clicked, mut clicked_here, mut file) = (None, None, None);
+        let menu_input = MenuInput { session, navigation, recent: self.memory.recent() };
+        let (here, palette, browser) = (&mut self.here, &mut self.palette, &mut self.browser);
+        let chosen_name = chosen_name.as_deref();
         let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
         let presented = presenter.present(|context| {
             if overlays {
@@ -72,22 +93,28 @@ impl App {
                 }
                 handles.draw(context);
                 brush.draw(context, session.status());
+                clicked = bar::show(context, &menu_input, panel.shown, &figures.left, &figures.right);
                 if panel.shown {
                     panel::show(context, panel, session, &around, &mut asked);
                 }
-                // Beside the panel, above the status line.
-                let mut free = context.available_rect();
-                free.max.y -= 30.0;
-                handles.draw_hint(context, free);
+                // Beside the panel, above the bar.
+                handles.draw_hint(context, context.available_rect());
                 let picture = session.picture();
                 if let Some((inspection, _)) = is_late {
                     overlay::legend(context, &format!("{}: working …", inspection.label()), None);
                 } else if picture.inspection != Inspection::Picture {
                     overlay::legend(context, picture.inspection.label(), picture.legend);
                 }
-                overlay::status_line(context, left, right);
                 overlay::toasts(context, toasts);
             }
+            if let Some((stage, since)) = opening {
+                let text = session.status().loading.as_deref().unwrap_or_default();
+                overlay::opening(context, stage, text, (now - since).as_secs());
+            }
+            clicked_here = here.show(context, &menu_input, chosen_name);
+            file = browser.show(context);
+            let found = palette.show(context, &menu_input);
+            clicked = clicked.take().or(found);
             if help.open {
                 key_list::draw(context, help, navigation);
             }
@@ -118,6 +145,15 @@ impl App {
         // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.execute(asked, now);
+        if let Some((purpose, path)) = file {
+            self.open(purpose.command(path), now);
+        }
+        if let Some(action) = clicked {
+            self.act(action);
+        }
+        if let Some((action, place)) = clicked_here {
+            self.act_at(action, place);
+        }
         if let Some(answer) = answer {
             self.leaving.answer = Some(answer);
             self.needs_tick = true;

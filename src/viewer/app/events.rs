@@ -44,12 +44,18 @@ impl ApplicationHandler<Wake> for App {
             self.needs_tick = true;
             return;
         }
+        let was_over_bar = self.over_bar;
+        if let WindowEvent::CursorMoved { position, .. } = &event {
+            self.over_bar = self.is_bar_at([position.x, position.y]);
+        }
+        let in_menu = self.in_menu();
         let Some(presenter) = &mut self.presenter else { return };
-        let response = presenter.on_window_event(&event);
+        let mut response = presenter.on_window_event(&event);
+        // Overlays know where the mouse was when they were drawn last.
+        response.consumed |= self.over_bar && matches!(event, WindowEvent::MouseInput { .. });
         // Overlays get the keyboard only during text input; they always want Tab, which the window uses itself.
-        let typing = presenter.egui_context().wants_keyboard_input();
-        let in_menu = egui::Popup::is_any_open(presenter.egui_context());
-        if response.repaint && self.has_widgets() && !self.input.is_dragging() {
+        let typing = presenter.egui_context().wants_keyboard_input() || self.palette.open || self.browser.is_open();
+        if response.repaint && (was_over_bar || self.has_widgets()) && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
         self.needs_tick = true;
@@ -108,6 +114,8 @@ impl ApplicationHandler<Wake> for App {
                     self.repaint_at = Some(now);
                 }
             }
+            // It closes the menu, and does nothing else.
+            WindowEvent::MouseInput { state, .. } if state.is_pressed() && in_menu => self.repaint_at = Some(now),
             WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
                 if state.is_pressed() && !response.consumed && self.brush.press(self.input.place()) =>
             {
@@ -133,7 +141,9 @@ impl ApplicationHandler<Wake> for App {
                 self.session.send(Command::Edit(Edit::Begin));
             }
             WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
-                self.input.button(button, state.is_pressed(), now);
+                if self.input.button(button, state.is_pressed(), now) {
+                    self.open_menu_here();
+                }
                 self.reaction.asked(now);
                 // The selection is an overlay and does not change the image.
                 self.repaint_at = Some(now);

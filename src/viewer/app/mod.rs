@@ -26,15 +26,20 @@ use crate::frame::{
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::scene::{ModelChoice, SceneSource, UpAxis};
+use crate::viewer::app::draw::Figures;
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
+use crate::viewer::bar;
+use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
 use crate::viewer::display;
 use crate::viewer::display::DisplayServer;
 use crate::viewer::handles::Handles;
 use crate::viewer::help::Help;
 use crate::viewer::input::Input;
+use crate::viewer::menu::HereMenu;
 use crate::viewer::overlay;
+use crate::viewer::palette::Palette;
 use crate::viewer::panel::PanelState;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::reaction::Reaction;
@@ -202,9 +207,12 @@ struct App {
     session: Session,
     saver: Saver,
     dialog: Dialog,
+    browser: Browser,
     input: Input,
     toasts: Toasts,
     help: Help,
+    palette: Palette,
+    here: HereMenu,
     panel: PanelState,
     handles: Handles,
     brush: RegionTool,
@@ -213,6 +221,8 @@ struct App {
     memory: Memory,
     reaction: Reaction,
     overlays: bool,
+    /// The mouse is on the bar, or was when it moved last.
+    over_bar: bool,
     // Before the window, so that the device is dropped before the display.
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
@@ -230,9 +240,11 @@ struct App {
     unseen_since: Option<Instant>,
     /// Number of the image that the window shows.
     shown_picture: Option<u64>,
-    shown_figures: String,
+    shown_figures: Figures,
     /// An inspection that is to be shown but not ready yet, and since when.
     inspected_since: Option<(Inspection, Instant)>,
+    /// Since when a scene is being opened.
+    opening_since: Option<Instant>,
     /// The active entity of the selection, as far as it has been told.
     selected: Option<Entity>,
     last_tick: Option<Instant>,
@@ -289,9 +301,12 @@ impl App {
             session,
             saver: Saver::new(&options.folder, waker.clone()),
             dialog: Dialog::new(waker),
+            browser: Browser::default(),
             input: Input::new(options.width, options.height, memory.navigation()),
             toasts,
             help: Help::default(),
+            palette: Palette::default(),
+            here: HereMenu::default(),
             panel: PanelState::default(),
             handles: Handles::default(),
             brush: RegionTool::default(),
@@ -302,6 +317,7 @@ impl App {
             selected: None,
             reaction: Reaction::default(),
             overlays: true,
+            over_bar: false,
             presenter: None,
             window: None,
             title: String::new(),
@@ -312,8 +328,9 @@ impl App {
             seen: 0,
             unseen_since: None,
             shown_picture: None,
-            shown_figures: String::new(),
+            shown_figures: Figures::default(),
             inspected_since: None,
+            opening_since: None,
             last_tick: None,
             last_draw: None,
             wake_at: None,
@@ -332,7 +349,6 @@ impl App {
         overlay::style(presenter.egui_context());
         (self.window, self.presenter) = (Some(window), Some(presenter));
         self.resized();
-        self.toasts.add(Tone::News, "H: keys, N: panel", Instant::now());
         Ok(())
     }
 
@@ -404,6 +420,14 @@ impl App {
             self.toasts.add(Tone::Problem, trouble, now);
         }
         let status = self.session.status();
+        match (status.opening, self.opening_since) {
+            // A scene that is there at once would only flash.
+            (Some(_), None) => (self.opening_since, self.repaint_at) = (Some(now), Some(now + draw::SLOW)),
+            // The seconds go on.
+            (Some(_), Some(_)) => self.repaint_at = Some(self.repaint_at.unwrap_or(now + FIGURES_INTERVAL)),
+            (None, Some(_)) => (self.opening_since, self.repaint_at) = (None, Some(now)),
+            (None, None) => {}
+        }
         for text in &status.withdrawn {
             self.toasts.withdraw(text);
         }
@@ -482,7 +506,23 @@ impl App {
     /// Whether there are widgets on the window that react to the mouse.
     fn has_widgets(&self) -> bool {
         let explains = self.session.world().resource::<Explaining>().story.is_some();
-        self.help.open || self.leaving.question.is_some() || self.overlays && (self.panel.shown || explains)
+        let is_open = self.help.open || self.palette.open || self.here.is_open() || self.leaving.question.is_some();
+        is_open
+            || self.browser.is_open()
+            || self.overlays && (self.panel.shown || explains || self.over_bar || self.in_menu())
+    }
+
+    /// Whether a menu is open.
+    fn in_menu(&self) -> bool {
+        self.presenter.as_ref().is_some_and(|presenter| egui::Popup::is_any_open(presenter.egui_context()))
+    }
+
+    /// Whether a place of the window, in physical pixels, is that of the bar.
+    fn is_bar_at(&self, place: [f64; 2]) -> bool {
+        let Some(presenter) = self.presenter.as_ref().filter(|_| self.overlays) else { return false };
+        let scale = presenter.pixels_per_point();
+        let [x, y] = place.map(|pixels| pixels as f32 / scale);
+        bar::is_at(egui::pos2(x, y), self.input.size()[1] as f32 / scale)
     }
 
     /// Whether focus follows the mouse, and the mouse is not in the panel.

@@ -320,13 +320,13 @@ impl Input {
         })
     }
 
-    /// Handles a mouse button press or release.
-    pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) {
+    /// Handles a mouse button press or release; returns true for a right click, which asks for a menu.
+    pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) -> bool {
         if self.captured {
-            return;
+            return false;
         }
         if !pressed {
-            let Some(drag) = self.drag.take_if(|drag| drag.button == button) else { return };
+            let Some(drag) = self.drag.take_if(|drag| drag.button == button) else { return false };
             if drag.kind == DragKind::Look && !drag.moved {
                 // The second click of a double click focuses, and keeps the selection of the first.
                 let second = self.last_press.is_none();
@@ -335,9 +335,9 @@ impl Input {
             if drag.kind == DragKind::Fly {
                 self.release_motions(now, Motion::flies);
             }
-            return;
+            return button == MouseButton::Right && !drag.moved && drag.kind != DragKind::Zoom;
         }
-        let Some(kind) = self.kind_of_drag(button) else { return };
+        let Some(kind) = self.kind_of_drag(button) else { return false };
         if kind == DragKind::Focus {
             self.sum.focus = Some(self.place());
         }
@@ -354,6 +354,7 @@ impl Input {
         }
         let ctrl = self.modifiers.control_key();
         self.drag = Some(Drag { kind, button, last: self.cursor, moved: false, ctrl });
+        false
     }
 
     /// Handles a mouse movement to this position of the window, physical pixels.

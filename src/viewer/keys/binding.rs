@@ -32,6 +32,31 @@ pub enum Trigger {
     Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
     /// A gesture, described in words; `input` implements it.
     Mouse(&'static str),
+    /// A click in a menu, and a line of the list of commands.
+    Item(Item),
+}
+
+/// A command by name, to be clicked.
+pub struct Item {
+    pub name: &'static str,
+    /// The menus that show it; the list of commands has it in any case.
+    pub menus: &'static [Menu],
+    pub action: Action,
+}
+
+/// Where a command can be clicked: a part of the menu, or the menu of the image under the mouse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Menu {
+    File,
+    Edit,
+    Add,
+    View,
+    Lens,
+    Image,
+    Inspect,
+    Window,
+    /// Right click on the image.
+    Here,
 }
 
 /// A key with its modifiers.
@@ -86,6 +111,8 @@ pub enum Action {
     Inspect(Inspection),
     /// Explains the pixel under the mouse.
     Explain,
+    /// Focuses on what is under the mouse, and moves the pivot there.
+    FocusHere,
     /// The next drag selects a rectangle that gets all samples.
     Brush,
     ClearRegion,
@@ -104,7 +131,13 @@ pub enum Action {
     FocusFollows,
     /// Shows a dialog to choose a file to open.
     OpenDialog,
+    /// Shows a dialog to choose a model to add.
+    AddDialog,
     TogglePanel,
+    /// Opens the panel at this section.
+    Section(&'static str),
+    /// Shows the list of commands, with its search.
+    Palette,
     ToggleHelp,
     ToggleOverlays,
     ToggleFullscreen,

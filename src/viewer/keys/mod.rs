@@ -5,12 +5,14 @@
 //! layout); all others are identified by the character that the key types.
 
 mod binding;
+mod build;
 mod page;
 mod presets;
 mod table;
 mod words;
 
-pub use binding::{Action, Binding, Chord, KeyGroup, Motion, Trigger, Typed};
+pub use binding::{Action, Binding, Chord, Item, KeyGroup, Menu, Motion, Trigger, Typed};
+pub use build::{REDO, UNDO};
 pub use page::markdown;
 pub use presets::shown;
 pub use table::BINDINGS;
@@ -21,6 +23,31 @@ use winit::keyboard::{Key, KeyCode, ModifiersState, PhysicalKey};
 
 fn triggers() -> impl Iterator<Item = &'static Trigger> {
     BINDINGS.iter().flat_map(|group| group.bindings).flat_map(|binding| binding.triggers)
+}
+
+/// Every command that can be clicked, in the order of the table, with its line.
+pub fn items() -> impl Iterator<Item = (&'static Item, &'static Binding)> {
+    BINDINGS.iter().flat_map(|group| group.bindings).flat_map(|binding| {
+        binding.triggers.iter().filter_map(move |trigger| match trigger {
+            Trigger::Item(item) => Some((item, binding)),
+            _ => None,
+        })
+    })
+}
+
+/// The commands of a menu.
+pub fn menu(of: Menu) -> impl Iterator<Item = &'static Item> {
+    items().map(|(item, _)| item).filter(move |item| item.menus.contains(&of))
+}
+
+/// The first key that does this under a preset, for display.
+pub fn shortcut(navigation: Navigation, wanted: &Action) -> Option<String> {
+    presets::shown(navigation).into_iter().flat_map(|(_, bindings)| bindings).flat_map(|it| it.triggers).find_map(
+        |trigger| match trigger {
+            Trigger::Press(chord, action) if action == wanted => Some(chord.label()),
+            _ => None,
+        },
+    )
 }
 
 /// The movement of a held key.
@@ -69,8 +96,29 @@ mod tests {
     fn the_list_tells_of_every_part_of_the_panel() {
         for title in crate::viewer::panel::SECTIONS {
             let wanted = format!("Panel: {title}");
-            assert!(triggers().any(|trigger| matches!(trigger, Trigger::Mouse(name) if *name == wanted)), "{wanted}");
+            assert!(items().any(|(item, _)| item.name == wanted && item.action == Action::Section(title)), "{wanted}");
         }
+    }
+
+    #[test]
+    fn what_a_key_does_can_also_be_clicked() {
+        // Escape leaves whatever is open, and those have a button of their own.
+        for trigger in triggers() {
+            let Trigger::Press(chord, action) = trigger else { continue };
+            let is_known = *action == Action::Leave || items().any(|(item, _)| item.action == *action);
+            assert!(is_known, "{} is no command of the menus", chord.label());
+        }
+        let names: Vec<&str> = items().map(|(item, _)| item.name).collect();
+        for (i, name) in names.iter().enumerate() {
+            assert!(!names[i + 1..].contains(name), "{name} is there twice");
+        }
+        assert!(menu(Menu::Here).any(|item| item.name == "Delete"));
+        assert_eq!(shortcut(Navigation::Firstlight, &UNDO).as_deref(), Some("Ctrl+Z"));
+        let handles = Action::Gizmo(Some(crate::frame::gizmo::Mode::Move));
+        assert_eq!(shortcut(Navigation::Blender, &handles).as_deref(), Some("G"));
+        assert_eq!(shortcut(Navigation::Firstlight, &handles), None);
+        // R, which restarts, rotates in Blender.
+        assert_eq!(shortcut(Navigation::Blender, &Action::Send(Command::Restart)), None);
     }
 
     #[test]
@@ -120,7 +168,10 @@ mod tests {
         assert_eq!(pressed(key("K"), ModifiersState::SHIFT), Some(Action::Screenshot { linear: true }));
         assert_eq!(pressed(key("q"), none), None, "Q alone flies");
         assert_eq!(pressed(key("q"), ModifiersState::CONTROL), Some(Action::Quit));
-        assert_eq!(pressed(key("}"), ModifiersState::SHIFT), Some(Action::Send(table::WIDER)));
+        assert_eq!(
+            pressed(key("}"), ModifiersState::SHIFT),
+            Some(Action::Send(Command::ScaleAperture { factor: 1.05 }))
+        );
         assert_eq!(pressed(Key::Named(NamedKey::Escape), none), Some(Action::Leave));
         assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyW)), Some(Motion::Forward));
         assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyH)), None);

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use winit::keyboard::{KeyCode, NamedKey};
 
 impl Chord {
-    fn label(&self) -> String {
+    pub(super) fn label(&self) -> String {
         let key = match self.key {
             Typed::Text(text) => text.to_uppercase(),
             Typed::Named(NamedKey::Escape) => "Esc".to_owned(),
@@ -25,9 +25,13 @@ impl Chord {
 impl Binding {
     /// The names of the keys for the user.
     pub fn keys(&self) -> String {
+        let is_item = |trigger: &&Trigger| matches!(trigger, Trigger::Item(_));
+        // The name of a command stands for a key that it does not have.
+        let has_keys = !self.triggers.iter().all(|trigger| is_item(&trigger));
         let labels: Vec<String> = self
             .triggers
             .iter()
+            .filter(|trigger| !(has_keys && is_item(trigger)))
             .map(|trigger| match trigger {
                 Trigger::Hold(code, _) => match code {
                     KeyCode::ArrowLeft => "⬅".to_owned(),
@@ -39,6 +43,7 @@ impl Binding {
                 Trigger::Press(chord, _) => chord.label(),
                 Trigger::Digit { ctrl, .. } => if *ctrl { "Ctrl+1…9" } else { "Shift+1…9" }.to_owned(),
                 Trigger::Mouse(gesture) => (*gesture).to_owned(),
+                Trigger::Item(item) => item.name.to_owned(),
             })
             .collect();
         labels.join("  ")
@@ -49,7 +54,7 @@ impl Binding {
 pub fn markdown() -> String {
     let mut page = String::from(
         "# Keys and mouse\n\n\
-         H shows this list in the window. It is written from the table in `src/viewer/keys/table.rs`, which the window obeys;\n\
+         H shows this list in the window. It is written from the table in `src/viewer/keys/table/`, which the window obeys;\n\
          after a change there, `FIRSTLIGHT_BLESS=1 cargo test keys_page` writes it again. The groups at the end are those of the\n\
          presets that are chosen in the panel under Camera; they take the place of Fly, Orbit and the same keys.\n",
     );

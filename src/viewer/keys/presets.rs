@@ -3,7 +3,8 @@
 
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::table::{BINDINGS, edit, named, send, shifted, text};
+use crate::viewer::keys::build::{edit, named, send, shifted, text};
+use crate::viewer::keys::table::BINDINGS;
 use winit::keyboard::NamedKey;
 
 /// Groups of the table that presets replace.

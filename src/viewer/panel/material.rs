@@ -3,6 +3,7 @@
 //! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
 //! objects ([`shared_by`]).
 
+use crate::console::thousands;
 use crate::frame::{self, Edit, Session};
 use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
 use crate::scene::{
@@ -12,7 +13,6 @@ use crate::scene::{
 use crate::viewer::panel::state::Asked;
 use crate::viewer::panel::texture;
 use crate::viewer::panel::widgets::{color, row, row_with_hint, rows, slider, vector};
-use crate::viewer::status::thousands;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
 use glam::DVec3;

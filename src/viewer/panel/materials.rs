@@ -1,5 +1,6 @@
 //! The list of materials, with the editor of the chosen one.
 
+use crate::console::thousands;
 use crate::frame::{Edit, Selection, Session};
 use crate::scene::{Inventory, MaterialEntry, SurfaceMaterial};
 use crate::viewer::panel::list::{Listed, Which, list};
@@ -7,7 +8,6 @@ use crate::viewer::panel::material::{editor, shared_by};
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::swatch::swatch;
 use crate::viewer::panel::widgets::{choice, name_field};
-use crate::viewer::status::thousands;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};

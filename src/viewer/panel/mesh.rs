@@ -1,11 +1,12 @@
 //! The mesh of the selection: faces, normals, and simplification.
 
+use crate::console::thousands;
 use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
 use crate::scene::{MeshOrigin, MeshShading, Shape};
 use crate::viewer::change::Difference;
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::{row, rows};
-use crate::viewer::status::{metres, percent, thousands};
+use crate::viewer::status::{metres, percent};
 use egui::Ui;
 
 pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {

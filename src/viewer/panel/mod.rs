@@ -11,6 +11,7 @@
 //! | `mesh` | mesh of the selection: normals, simplification |
 //! | `scene` | the list of objects, adding, opening |
 //! | `materials`, `lights` | the lists of materials and of lights; the environment |
+//! | `ready` | the library of ready materials |
 //! | `material`, `texture` | the editor of a material |
 //! | `statistics`, `messages` | figures; what was said |
 //! | `state` | what it remembers, shows and asks for |
@@ -25,6 +26,7 @@ mod materials;
 mod mesh;
 mod messages;
 mod picture;
+mod ready;
 mod scene;
 mod selected;
 mod state;
@@ -59,8 +61,6 @@ pub const SECTIONS: [&str; 16] = [
 ];
 
 const WIDTH: f32 = 288.0;
-/// Space for the status line.
-const FOOT: i8 = 30;
 
 /// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
@@ -68,7 +68,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         left: 10,
         right: 4,
         top: 8,
-        bottom: FOOT,
+        bottom: 4,
     });
     let before = asked.commands.len();
     state.change.follow(session);
@@ -79,25 +79,31 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Leaves space for the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
+            let wanted = state.section.take();
+            let section = |ui: &mut Ui, title, open, contents: &mut dyn FnMut(&mut Ui)| {
+                self::section(ui, title, open, wanted == Some(title), contents);
+            };
             let [render, animation, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
-            section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
-            section(ui, animation, animation::can_play(session), |ui| animation::time_line(ui, session, around, asked));
-            section(ui, camera, false, |ui| camera::camera(ui, session, around, asked));
-            section(ui, views, false, |ui| camera::views(ui, session, around, asked));
-            section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
-            section(ui, display, false, |ui| picture::display(ui, session, asked));
+            section(ui, render, true, &mut |ui| picture::render(ui, &mut state.scale, session, around, asked));
+            section(ui, animation, animation::can_play(session), &mut |ui| {
+                animation::time_line(ui, session, around, asked)
+            });
+            section(ui, camera, false, &mut |ui| camera::camera(ui, session, around, asked));
+            section(ui, views, false, &mut |ui| camera::views(ui, session, around, asked));
+            section(ui, lens, true, &mut |ui| camera::lens(ui, session, around, asked));
+            section(ui, display, false, &mut |ui| picture::display(ui, session, asked));
             // Above the sections that change with the selection, so that its buttons do not move.
-            section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
-            section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
-            section(ui, mesh, true, |ui| mesh::mesh(ui, state, session, asked));
+            section(ui, add, false, &mut |ui| scene::add(ui, &mut state.mesh_path, asked));
+            section(ui, selected, true, &mut |ui| selected::selected(ui, state, session, asked));
+            section(ui, mesh, true, &mut |ui| mesh::mesh(ui, state, session, asked));
             let [.., objects, materials, lights, sky, open, statistics, messages] = SECTIONS;
-            section(ui, objects, true, |ui| scene::objects(ui, state, session, asked));
-            section(ui, materials, false, |ui| materials::materials(ui, state, session, asked));
-            section(ui, lights, false, |ui| lights::lights(ui, state, session, asked));
-            section(ui, sky, false, |ui| lights::sky(ui, session, asked));
-            section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
-            section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
-            section(ui, messages, true, |ui| messages::messages(ui, session));
+            section(ui, objects, true, &mut |ui| scene::objects(ui, state, session, asked));
+            section(ui, materials, false, &mut |ui| materials::materials(ui, state, session, asked));
+            section(ui, lights, false, &mut |ui| lights::lights(ui, state, session, asked));
+            section(ui, sky, false, &mut |ui| lights::sky(ui, session, asked));
+            section(ui, open, false, &mut |ui| scene::open(ui, session, around.recent, asked));
+            section(ui, statistics, true, &mut |ui| statistics::statistics(ui, session, around));
+            section(ui, messages, true, &mut |ui| messages::messages(ui, session));
         });
     });
     // All edits between pressing and releasing a mouse button are one undo step, also if a colour picker or a menu
@@ -127,6 +133,12 @@ fn style(ui: &mut Ui) {
     }
 }
 
-fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
-    egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open).show(ui, contents);
+/// - `open`: whether it is open at first.
+/// - `wanted`: it is to be opened now, and seen.
+fn section(ui: &mut Ui, title: &str, open: bool, wanted: bool, contents: &mut dyn FnMut(&mut Ui)) {
+    let header = egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
+    let shown = header.open(wanted.then_some(true)).show(ui, contents);
+    if wanted {
+        shown.header_response.scroll_to_me(Some(egui::Align::TOP));
+    }
 }

@@ -1,15 +1,14 @@
 //! The scene: the list of objects, adding objects, and opening other scenes.
 
-use crate::files::printable;
-use crate::frame::{Command, Edit, NewThing, Selection, Session};
+use crate::frame::{Edit, NewThing, Selection, Session};
 use crate::scene::{MeshSource, ObjectEntry};
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::openable;
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::choice;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
-use std::path::Path;
 
 impl Listed for ObjectEntry {
     fn entity(&self) -> Entity {
@@ -40,22 +39,20 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
     });
 }
 
-/// Opening of a file by dialog, and recent files.
+/// Opening of a file by dialog, recent files, and the built-in scenes.
 pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
     if ui.button("File …").on_hover_text("open a scene, a model or a saved image (Ctrl+O)").clicked() {
         asked.dialog = Some(DialogPurpose::Open);
     }
-    let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();
-    if others.peek().is_none() {
-        ui.weak("no recent files; you can also drop a file on the window");
+    ui.weak("or drop a file on the window");
+    if let Some(command) = openable::recent(ui, session, recent) {
+        asked.send(command);
     }
-    for name in others {
-        let short = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-        let (short, whole) = (printable::name(&short), printable::line(name));
-        if ui.selectable_label(false, &*short).on_hover_text(&*whole).clicked() {
-            asked.send(Command::Open { path: crate::scene::text_to_path(name) });
+    ui.collapsing("Built-in scenes", |ui| {
+        if let Some(command) = openable::scenes(ui) {
+            asked.send(command);
         }
-    }
+    });
 }
 
 pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {

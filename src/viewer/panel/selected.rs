@@ -4,6 +4,7 @@ use crate::frame::{Edit, Property, Selection, Session, gizmo};
 use crate::scene::animation::{LightProperty, ObjectProperty, PropertyInfo, Quantity};
 use crate::scene::{LightInput, Shape};
 use crate::viewer::panel::material;
+use crate::viewer::panel::ready::library_of_materials;
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
 use egui::Ui;
@@ -26,7 +27,7 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
             ui.weak(format!("and {} more", selection.0.len() - 1));
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for mode in gizmo::Mode::ALL {
             let on = state.gizmo == Some(mode);
             if ui.selectable_label(on, mode.label()).clicked() {
@@ -56,6 +57,9 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
                 });
             }
         });
+        ui.collapsing("Material library", |ui| library_of_materials(ui, &mut state.balls, asked))
+            .header_response
+            .on_hover_text("ready materials: gold, glass, car paint …");
         let inventory = state.inventory(session);
         material::of_object(ui, session, &inventory, object, asked);
     }

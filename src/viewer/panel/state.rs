@@ -12,6 +12,8 @@ use std::rc::Rc;
 /// State of the panel.
 pub struct PanelState {
     pub shown: bool,
+    /// The section to open and to scroll to.
+    pub section: Option<&'static str>,
     /// The handles over the selection.
     pub gizmo: Option<gizmo::Mode>,
     pub change: PictureChange,
@@ -26,6 +28,8 @@ pub struct PanelState {
     pub object_list: ListState,
     pub material_list: ListState,
     pub light_list: ListState,
+    /// The balls of the library of materials, once they have been shown.
+    pub balls: Option<egui::TextureHandle>,
     /// The material whose editor is open in the list.
     pub material: Option<Entity>,
 }
@@ -50,6 +54,7 @@ impl Default for PanelState {
     fn default() -> Self {
         Self {
             shown: false,
+            section: None,
             gizmo: None,
             change: PictureChange::default(),
             mesh_path: String::new(),
@@ -59,6 +64,7 @@ impl Default for PanelState {
             object_list: ListState::default(),
             material_list: ListState::default(),
             light_list: ListState::default(),
+            balls: None,
             material: None,
         }
     }

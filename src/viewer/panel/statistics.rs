@@ -1,10 +1,11 @@
 //! Figures: speed, error, sizes, latency.
 
+use crate::console::thousands;
 use crate::frame::{History, LatencyHistogram, Session};
 use crate::scene::Shape;
 use crate::viewer::panel::state::Around;
 use crate::viewer::panel::widgets::{row, rows};
-use crate::viewer::status::{bytes, percent, seconds, thousands};
+use crate::viewer::status::{bytes, percent, seconds};
 use egui::Ui;
 
 pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
@@ -12,11 +13,17 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
     rows(ui, "statistics", |ui| {
         let mut figure = |name: &str, text: String| row(ui, name, |ui| drop(ui.label(text)));
         figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
+        let coarse = if status.divider > 1 { format!(", 1/{} of the window", status.divider) } else { String::new() };
+        figure("image", format!("{} × {}{coarse}", status.film_width, status.film_height));
         figure("rays", format!("{:.2} M/s", status.mrays()));
         let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
         figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));
         figure("", format!("{shadow:.2} shadow"));
         figure("error estimate", status.estimated_error.map_or("–".to_owned(), percent));
+        if let Some(denoised) = status.denoised_error {
+            let mixed = if status.mixes_raw { ", mixed with raw" } else { "" };
+            figure("denoised", format!("{} of {} spp{mixed}", percent(denoised), status.denoised_spp));
+        }
         if let Some(caustics) = status.caustics {
             figure("caustics", caustics.to_string());
         }

@@ -1,0 +1,56 @@
+//! Ready materials for the selection.
+
+use crate::frame::edit::new_entity::{new_material, plain_name};
+use crate::frame::state::selection::Selection;
+use crate::scene::{MaterialSlots, SurfaceMaterial, library};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, World};
+
+/// Gives the selected objects the material of this name of the library.
+pub fn dress(world: &mut World, name: &str) -> Result<(), String> {
+    let (_, material) = library().iter().find(|(known, _)| known == name).ok_or("there is no such ready material")?;
+    let selected = world.resource::<Selection>().0.clone();
+    let objects: Vec<Entity> =
+        selected.into_iter().filter(|&entity| world.get::<MaterialSlots>(entity).is_some()).collect();
+    if objects.is_empty() {
+        return Err("select an object to give it a material".to_owned());
+    }
+    // One that the scene has already, unless it was changed since.
+    let mut materials = world.query::<(Entity, &Name, &SurfaceMaterial)>();
+    let known = materials.iter(world).filter(|(_, known, has)| plain_name(known.as_str()) == name && *has == material);
+    let known = known.map(|(entity, ..)| entity).next();
+    let material = known.unwrap_or_else(|| new_material(world, name, material.0.clone()));
+    for object in objects {
+        if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {
+            slots.0 = vec![material];
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_ecs::prelude::With;
+
+    #[test]
+    fn objects_share_a_ready_material_until_it_is_changed() {
+        let mut world = World::new();
+        let objects: Vec<Entity> = (0..3).map(|_| world.spawn(MaterialSlots(Vec::new())).id()).collect();
+        let mut dressed = |world: &mut World, i: usize, name: &str| {
+            world.insert_resource(Selection(vec![objects[i]]));
+            dress(world, name).map(|()| world.get::<MaterialSlots>(objects[i]).unwrap().0[0])
+        };
+        let gold = dressed(&mut world, 0, "gold").unwrap();
+        assert_eq!(dressed(&mut world, 1, "gold"), Ok(gold));
+        let glass = library().iter().find(|(name, _)| name == "glass").unwrap().1.clone();
+        world.entity_mut(gold).insert(glass);
+        let other = dressed(&mut world, 2, "gold").unwrap();
+        assert_ne!(other, gold);
+        assert_eq!(world.get::<Name>(other).unwrap().as_str(), "gold 2");
+        assert_eq!(world.query_filtered::<Entity, With<SurfaceMaterial>>().iter(&world).count(), 2);
+        assert!(dressed(&mut world, 0, "kryptonite").is_err());
+        world.insert_resource(Selection(Vec::new()));
+        assert!(dress(&mut world, "gold").is_err());
+    }
+}

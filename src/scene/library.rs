@@ -1,0 +1,43 @@
+//! Materials to choose from: `assets/materials/library.ron`, a scene with a ball of each.
+
+use crate::format::scene_file::SceneFile;
+use crate::scene::spawn::material;
+use crate::scene::world::components::SurfaceMaterial;
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+/// Materials of the scene that are not offered: what is behind the balls.
+const N_BEHIND: usize = 1;
+
+/// The ready materials with their names, in the order of the balls of [`LIBRARY_BALLS`].
+pub fn library() -> &'static [(String, SurfaceMaterial)] {
+    static LIBRARY: OnceLock<Vec<(String, SurfaceMaterial)>> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
+        let text = include_str!("../../assets/materials/library.ron");
+        let file = SceneFile::parse(text, "library.ron").expect("a test reads it");
+        let (textures, materials) = (HashMap::new(), HashMap::new());
+        let n = file.materials.iter().count() - N_BEHIND;
+        let read =
+            file.materials.iter().take(n).map(|(name, part)| (name.to_owned(), material(part, &textures, &materials)));
+        read.collect()
+    })
+}
+
+/// An image (PNG) of a ball of each ready material, from left to right; each is as wide as the image is high.
+pub const LIBRARY_BALLS: &[u8] = include_bytes!("../../assets/materials/library.png");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_a_ball_of_each_material() {
+        let library = library();
+        let balls = image::load_from_memory(LIBRARY_BALLS).unwrap();
+        assert_eq!(balls.width(), balls.height() * library.len() as u32);
+        for name in ["gold", "brushed steel", "frosted glass", "water", "car paint"] {
+            assert!(library.iter().any(|(known, _)| known == name), "{name}");
+        }
+        assert!(library.iter().all(|(name, _)| name != "backdrop"));
+    }
+}

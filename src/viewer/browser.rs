@@ -1,0 +1,70 @@
+//! Choosing a file inside the window, where the desktop has no dialog.
+
+use crate::viewer::dialog::DialogPurpose;
+use egui::Context;
+use egui_file_dialog::{DialogState, FileDialog};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The browser of files, while it is open.
+#[derive(Default)]
+pub struct Browser {
+    open: Option<(DialogPurpose, Box<FileDialog>)>,
+}
+
+impl Browser {
+    /// Opens the browser in a folder.
+    pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, screen: egui::Vec2) {
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
+        let size = egui::vec2(720.0, 440.0).min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));
+        let extensions = purpose.extensions();
+        // Creating folders is no part of choosing a file.
+        let mut dialog = FileDialog::new()
+            .title(purpose.title())
+            .initial_directory(folder)
+            .default_size(size)
+            .min_size(egui::vec2(120.0, 80.0))
+            .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
+            .show_new_folder_button(false)
+            .show_left_panel(screen.x >= 560.0)
+            .add_file_filter(purpose.files(), Arc::new(move |path: &Path| is_one(path, &extensions)))
+            .default_file_filter(purpose.files());
+        dialog.pick_file();
+        self.open = Some((purpose, Box::new(dialog)));
+    }
+
+    pub fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// Draws the browser; returns the file that was chosen.
+    pub fn show(&mut self, context: &Context) -> Option<(DialogPurpose, PathBuf)> {
+        let (purpose, dialog) = self.open.as_mut()?;
+        dialog.update(context);
+        let chosen = dialog.take_picked().map(|path| (*purpose, path));
+        if chosen.is_some() || *dialog.state() != DialogState::Open {
+            self.open = None;
+        }
+        chosen
+    }
+}
+
+/// Whether a file has one of these extensions.
+fn is_one(path: &Path, extensions: &[String]) -> bool {
+    path.extension().is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_any_case_are_shown_and_others_are_not() {
+        let extensions = DialogPurpose::Open.extensions();
+        for (name, shown) in
+            [("a.obj", true), ("A.GLB", true), ("room.ron", true), ("notes.txt", false), ("obj", false)]
+        {
+            assert_eq!(is_one(Path::new(name), &extensions), shown, "{name}");
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Menus of commands: that of the bar, and that of the image under the mouse.
+//!
+//! Their lines are those of the table of [`keys`](crate::viewer::keys), scenes and recent files aside.
+
+use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
+use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
+use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
+use crate::viewer::openable;
+use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
+
+/// What menus show.
+pub struct MenuInput<'a> {
+    pub session: &'a Session,
+    pub navigation: Navigation,
+    /// Recent scenes, the latest first.
+    pub recent: &'a [String],
+}
+
+/// The parts of the menu of the bar that are menus themselves.
+const PARTS: [(&str, Menu); 6] = [
+    ("Edit", Menu::Edit),
+    ("Add", Menu::Add),
+    ("View", Menu::View),
+    ("Lens", Menu::Lens),
+    ("Image", Menu::Image),
+    ("Inspect", Menu::Inspect),
+];
+/// Height of the longest menu, points; windows below it scroll.
+const TALL: f32 = 460.0;
+
+/// The menu of the bar; returns the command that was clicked.
+pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
+    let mut chosen = None;
+    let mut choose = |action: Option<Action>| chosen = chosen.take().or(action);
+    scrolled(ui, |ui| {
+        for (i, item) in menu(Menu::File).enumerate() {
+            choose(line(ui, input, item));
+            if i == 0 {
+                ui.menu_button("Open recent", |ui| {
+                    scrolled(ui, |ui| choose(openable::recent(ui, input.session, input.recent).map(Action::Send)));
+                });
+                ui.menu_button("Scenes", |ui| scrolled(ui, |ui| choose(openable::scenes(ui).map(Action::Send))));
+            }
+        }
+        ui.separator();
+        for (title, part) in PARTS {
+            ui.menu_button(title, |ui| {
+                scrolled(ui, |ui| {
+                    for item in menu(part) {
+                        choose(line(ui, input, item));
+                    }
+                    if part == Menu::Add {
+                        ui.menu_button("Built-in mesh", |ui| choose(built_in_mesh(ui)));
+                    }
+                });
+            });
+        }
+        ui.separator();
+        for item in menu(Menu::Window) {
+            choose(line(ui, input, item));
+        }
+    });
+    chosen
+}
+
+/// Scrolls what is taller than the window.
+fn scrolled(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    let height = ui.ctx().content_rect().height();
+    if height >= TALL {
+        return contents(ui);
+    }
+    ui.set_min_width(190.0);
+    egui::ScrollArea::vertical().max_height((height - 20.0).max(40.0)).show(ui, contents);
+}
+
+fn built_in_mesh(ui: &mut Ui) -> Option<Action> {
+    let clicked = BUILTIN_MESHES.iter().find(|name| ui.button(**name).clicked())?;
+    let source = MeshSource::Builtin((*clicked).to_owned());
+    Some(Action::Send(Command::Edit(Edit::Add(NewThing::Mesh(source)))))
+}
+
+fn ready_material(ui: &mut Ui) -> Option<Action> {
+    let (name, _) = library().iter().find(|(name, _)| ui.button(name).clicked())?;
+    Some(dress(name))
+}
+
+fn dress(name: &str) -> Action {
+    Action::Send(Command::Edit(Edit::Dress { name: name.to_owned() }))
+}
+
+fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
+    let key = shortcut(input.navigation, &item.action).unwrap_or_default();
+    let button = Button::new(name_of(input.session, item)).shortcut_text(RichText::new(key).weak());
+    let line = ui.add_enabled(is_possible(input.session, &item.action), button);
+    let is_clicked = line.on_hover_text(effect_of(&item.action)).clicked();
+    is_clicked.then(|| item.action.clone())
+}
+
+/// The name, for undo and redo with what they are about.
+fn name_of(session: &Session, item: &Item) -> String {
+    let history = session.world().resource::<History>();
+    let step = match &item.action {
+        action if *action == UNDO => history.undo_label(),
+        action if *action == REDO => history.redo_label(),
+        _ => None,
+    };
+    step.map_or_else(|| item.name.to_owned(), |step| format!("{}: {step}", item.name))
+}
+
+fn effect_of(action: &Action) -> &'static str {
+    items().find(|(item, _)| item.action == *action).map_or("", |(_, binding)| binding.effect)
+}
+
+/// Text about a command of the bar: its name, its key, and what it does.
+pub fn hint(input: &MenuInput, action: &Action) -> String {
+    let Some((item, binding)) = items().find(|(item, _)| item.action == *action) else { return String::new() };
+    let key = shortcut(input.navigation, action).map(|key| format!(" ({key})")).unwrap_or_default();
+    let name = name_of(input.session, item);
+    if name.eq_ignore_ascii_case(binding.effect) || name != item.name {
+        return format!("{name}{key}");
+    }
+    format!("{name}{key}: {}", binding.effect)
+}
+
+/// Whether a command would do anything now.
+pub fn is_possible(session: &Session, action: &Action) -> bool {
+    let history = session.world().resource::<History>();
+    match action {
+        action if *action == UNDO => history.undo_label().is_some(),
+        action if *action == REDO => history.redo_label().is_some(),
+        Action::Gizmo(Some(_)) | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
+            !session.world().resource::<Selection>().0.is_empty()
+        }
+        _ => true,
+    }
+}
+
+/// The menu of the image at the place of a right click.
+#[derive(Default)]
+pub struct HereMenu {
+    /// Where it was asked for, points, and the same as a fraction of the image.
+    at: Option<(Pos2, [f64; 2])>,
+    is_new: bool,
+}
+
+impl HereMenu {
+    pub fn open(&mut self, point: Pos2, place: [f64; 2]) {
+        (self.at, self.is_new) = (Some((point, place)), true);
+    }
+
+    pub fn is_open(&self) -> bool {
+        self.at.is_some()
+    }
+
+    /// Draws the menu while it is open; returns the command that was clicked, and the place that it is about.
+    ///
+    /// - `name`: of what is selected.
+    pub fn show(&mut self, context: &Context, input: &MenuInput, name: Option<&str>) -> Option<(Action, [f64; 2])> {
+        let (point, place) = self.at?;
+        let mut chosen = None;
+        let open = std::mem::take(&mut self.is_new).then_some(SetOpenCommand::Bool(true));
+        let id = Id::new("menu of the image");
+        let popup = Popup::new(id, context.clone(), PopupAnchor::Position(point), LayerId::background());
+        let popup = popup.kind(PopupKind::Menu).layout(egui::Layout::top_down_justified(egui::Align::Min));
+        let shown = popup.style(egui::containers::menu::menu_style).open_memory(open).show(|ui| {
+            scrolled(ui, |ui| {
+                ui.label(RichText::new(name.unwrap_or("nothing here")).strong());
+                ui.separator();
+                for item in menu(Menu::Here) {
+                    chosen = chosen.take().or(line(ui, input, item));
+                }
+                ui.menu_button("Material", |ui| {
+                    scrolled(ui, |ui| chosen = chosen.take().or(ready_material(ui)));
+                });
+                ui.menu_button("Add", |ui| {
+                    for item in menu(Menu::Add) {
+                        chosen = chosen.take().or(line(ui, input, item));
+                    }
+                });
+            });
+        });
+        if shown.is_none() {
+            self.at = None;
+        }
+        chosen.map(|action| (action, place))
+    }
+}
+
+/// Every line of the list of commands: what can be clicked, ready materials, built-in scenes and recent files.
+///
+/// Name, what it does, key.
+pub fn all(input: &MenuInput) -> Vec<(String, String, String, Action)> {
+    let lines = items().map(|(item, binding)| {
+        let key = shortcut(input.navigation, &item.action).unwrap_or_default();
+        (item.name.to_owned(), binding.effect.to_owned(), key, item.action.clone())
+    });
+    let open = |name: &str| Action::Send(Command::Open { path: crate::scene::text_to_path(name) });
+    let scenes = BUILTIN_SCENES
+        .iter()
+        .map(|(name, about, _)| (format!("Scene: {name}"), (*about).to_owned(), String::new(), open(name)));
+    let files = input.recent.iter().map(|name| (format!("Open: {name}"), String::new(), String::new(), open(name)));
+    let materials = library().iter().map(|(name, _)| {
+        (format!("Material: {name}"), "give it to the selection".to_owned(), String::new(), dress(name))
+    });
+    lines.chain(materials).chain(scenes).chain(files).collect()
+}

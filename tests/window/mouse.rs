@@ -1,0 +1,174 @@
+//! What a person does by mouse alone, with the buttons and menus of the real window.
+#![cfg(all(feature = "viewer", target_os = "linux"))]
+
+use crate::desktop::{Desktop, Program, until};
+use crate::guest::seen;
+use firstlight::scene::file::SceneFile;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Height of the windows here.
+const HEIGHT: i32 = 600;
+/// A ball in front of a white sky, so that what is dark is a menu.
+const ROOM: &str = "(camera: (eye: (0, 1, 6), look_at: (0, 1, 0), vfov: 40), environment: constant(1),
+    materials: { \"grey\": diffuse(albedo: 0.5) }, objects: [
+        sphere(name: \"ball\", center: (0, 1.5, 0), radius: 0.8, material: \"grey\"),
+        plane(name: \"floor\", point: (0, 0, 0), normal: (0, 1, 0), material: \"grey\"),
+    ])";
+
+fn is_dark(program: &Program, (x, y): (i32, i32)) -> bool {
+    program.pixels().get_pixel(x as u32, y as u32).0.iter().all(|value| *value < 70)
+}
+
+/// Clicks where there is a button, once the window has had time to see the mouse.
+fn click(program: &Program, button: u32, at: (i32, i32)) {
+    program.point_at(at.0, at.1);
+    std::thread::sleep(Duration::from_millis(250));
+    program.drag(button, at, (0, 0));
+}
+
+/// Clicks, and waits for a menu at another place; as a person does, again where nothing happens for seconds.
+fn open(program: &Program, button: u32, at: (i32, i32), menu: (i32, i32)) {
+    let mut clicked: Option<Instant> = None;
+    until("the menu to open", || {
+        if clicked.is_none_or(|then| then.elapsed() > Duration::from_secs(5)) {
+            click(program, button, at);
+            clicked = Some(Instant::now());
+        }
+        is_dark(program, menu).then_some(())
+    });
+    // It has its final place one frame later.
+    std::thread::sleep(Duration::from_millis(300));
+}
+
+/// Clicks a line of a menu, and waits until the menu is gone.
+fn choose(program: &Program, at: (i32, i32), menu: (i32, i32)) {
+    click(program, 1, at);
+    until("the menu to close", || (!is_dark(program, menu)).then_some(()));
+}
+
+/// A place in the lower left corner of the menu of the bar.
+const MENU: (i32, i32) = (9, HEIGHT - 36);
+
+fn open_menu(program: &Program) {
+    open(program, 1, (34, HEIGHT - 13), MENU);
+}
+
+/// Chooses a line of the menu of the bar, by its distance from the lower edge of the window.
+fn choose_in_menu(program: &Program, up: i32) {
+    open_menu(program);
+    choose(program, (60, HEIGHT - up), MENU);
+}
+
+fn title_is(program: &Program, expected: &str) {
+    until(&format!("the title {expected}"), || (program.title() == format!("firstlight — {expected}")).then_some(()));
+}
+
+/// Saves the scene by the menu; returns what was written.
+fn saved(program: &Program, path: &Path) -> SceneFile {
+    std::fs::remove_file(path).expect("the file of the scene");
+    choose_in_menu(program, 371);
+    until("the scene to be saved", || SceneFile::parse(&std::fs::read_to_string(path).ok()?, path).ok())
+}
+
+#[test]
+fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
+    let Some(desktop) = Desktop::start() else { return };
+    let path = desktop.folder().join("room.ron");
+    std::fs::write(&path, ROOM).expect("a file");
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    let ball = (380, 200);
+    // In the frame of the menu of the image, and its lines below the place of the right click.
+    let frame = (ball.0 + 4, ball.1 + 30);
+    let place = |line: i32| (ball.0 + 30, ball.1 + 43 + 21 * line);
+    let here = |line: i32| {
+        open(&program, 3, ball, frame);
+        choose(&program, place(line), frame);
+    };
+    let [focus, copy, delete, material] = [1, 5, 6, 11];
+    let undo = || click(&program, 1, (75, HEIGHT - 13));
+    here(copy);
+    title_is(&program, "*room.ron");
+    assert_eq!(saved(&program, &path).objects.len(), 3);
+    title_is(&program, "room.ron");
+    undo();
+    title_is(&program, "*room.ron");
+    assert_eq!(saved(&program, &path).objects.len(), 2, "undone");
+    here(delete);
+    title_is(&program, "*room.ron");
+    undo();
+    title_is(&program, "room.ron");
+    // Gold, the first of the ready materials: their menu ends beside its line.
+    open(&program, 3, ball, frame);
+    open(&program, 1, place(material), (510, 140));
+    choose(&program, (530, 118), frame);
+    title_is(&program, "*room.ron");
+    here(focus);
+    let file = saved(&program, &path);
+    assert_eq!(file.objects[0].material(), Some("gold"));
+    assert!(file.materials.iter().any(|(name, _)| name == "gold"));
+    let focus = file.camera.focus_distance.expect("what was clicked is in focus");
+    assert!((focus - 5.25).abs() < 0.2, "{focus}");
+    // A picture, and away.
+    choose_in_menu(&program, 329);
+    until("the picture", || desktop.folder().join("room-0001.png").is_file().then_some(()));
+    open_menu(&program);
+    click(&program, 1, (60, HEIGHT - 38));
+    assert!(program.ended().success());
+}
+
+#[test]
+fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
+    let Some(desktop) = Desktop::start() else { return };
+    let folder = desktop.folder();
+    std::fs::write(folder.join("room.ron"), ROOM).expect("a file");
+    let tent = "v 0 0 0\nv 1 0 0\nv 0 0 -1\nv 0 1 0\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    std::fs::write(folder.join("a.obj"), tent).expect("a file");
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[("PATH", "/nowhere")]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    open_menu(&program);
+    let browser = (300, 450);
+    open(&program, 1, (60, HEIGHT - 434), browser);
+    until("the model to open", || {
+        // Below the folder of the settings, once it has been read; and the button at the lower right.
+        click(&program, 1, (230, 163));
+        click(&program, 1, (710, 539));
+        (program.title() == "firstlight — a.obj").then_some(())
+    });
+    until("the browser to close", || (!is_dark(&program, browser)).then_some(()));
+    let other = (230, HEIGHT - 413);
+    open_menu(&program);
+    open(&program, 1, (60, HEIGHT - 413), other);
+    click(&program, 1, (260, HEIGHT - 413));
+    title_is(&program, "room.ron");
+    until("the menu to close", || (!is_dark(&program, MENU)).then_some(()));
+    open_menu(&program);
+    open(&program, 1, (60, HEIGHT - 392), (230, HEIGHT - 392));
+    click(&program, 1, (260, HEIGHT - 370));
+    title_is(&program, "cornell");
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_command_is_found_by_its_name() {
+    let Some(desktop) = Desktop::start() else { return };
+    std::fs::write(desktop.folder().join("room.ron"), ROOM).expect("a file");
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    let list = (450, 400);
+    program.key("slash");
+    until("the list of commands", || is_dark(&program, list).then_some(()));
+    program.type_text("delete");
+    program.key("Escape");
+    until("the list to close", || (!is_dark(&program, list)).then_some(()));
+    program.key("slash");
+    until("the list of commands", || is_dark(&program, list).then_some(()));
+    program.type_text("Quit");
+    program.key("Return");
+    assert!(program.ended().success());
+}
