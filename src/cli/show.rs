@@ -18,7 +18,7 @@ use std::path::PathBuf;
 pub struct ShowArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Size of the window in pixels; of the image if there is no display.
+    /// Size of the window in logical pixels, at most that of the screen; of the image if there is no display.
     #[arg(long, value_name = "WxH", value_parser = crate::cli::number::parse_size)]
     size: Option<(u32, u32)>,
     /// Number of worker threads [default: all cores].

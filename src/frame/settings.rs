@@ -26,10 +26,16 @@ pub struct Settings {
     pub recent: Vec<String>,
     /// Key bindings and gestures.
     pub navigation: Navigation,
+    /// Whether the user has been asked for them.
+    pub greeted: bool,
     /// The noise of the image in the window.
     pub denoising: Denoising,
     /// What denoises it.
     pub denoiser: DenoiseFilter,
+    /// Whether the panel is shown.
+    pub panel: bool,
+    /// Which of its sections are open, by their titles; others are as in a new window.
+    pub sections: BTreeMap<String, bool>,
 }
 
 impl Default for Settings {
@@ -40,8 +46,11 @@ impl Default for Settings {
             display: None,
             recent: Vec::new(),
             navigation: Navigation::default(),
+            greeted: false,
             denoising: Denoising::Denoised,
             denoiser: DenoiseFilter::default(),
+            panel: false,
+            sections: BTreeMap::new(),
         }
     }
 }

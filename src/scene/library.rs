@@ -1,4 +1,4 @@
-//! Materials to choose from: `assets/materials/library.ron`, a scene with a ball of each.
+//! Materials to choose from: `assets/materials/library.ron`, a scene with a sphere of each.
 
 use crate::format::scene_file::SceneFile;
 use crate::scene::spawn::material;
@@ -6,10 +6,10 @@ use crate::scene::world::components::SurfaceMaterial;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// Materials of the scene that are not offered: what is behind the balls.
+/// Materials of the scene that are not offered: what is behind the spheres.
 const N_BEHIND: usize = 1;
 
-/// The ready materials with their names, in the order of the balls of [`LIBRARY_BALLS`].
+/// The ready materials with their names, in the order of the spheres of [`LIBRARY_IMAGE`].
 pub fn library() -> &'static [(String, SurfaceMaterial)] {
     static LIBRARY: OnceLock<Vec<(String, SurfaceMaterial)>> = OnceLock::new();
     LIBRARY.get_or_init(|| {
@@ -23,18 +23,18 @@ pub fn library() -> &'static [(String, SurfaceMaterial)] {
     })
 }
 
-/// An image (PNG) of a ball of each ready material, from left to right; each is as wide as the image is high.
-pub const LIBRARY_BALLS: &[u8] = include_bytes!("../../assets/materials/library.png");
+/// An image (PNG) of a sphere of each ready material, from left to right; each is as wide as the image is high.
+pub const LIBRARY_IMAGE: &[u8] = include_bytes!("../../assets/materials/library.png");
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn there_is_a_ball_of_each_material() {
+    fn there_is_a_sphere_of_each_material() {
         let library = library();
-        let balls = image::load_from_memory(LIBRARY_BALLS).unwrap();
-        assert_eq!(balls.width(), balls.height() * library.len() as u32);
+        let spheres = image::load_from_memory(LIBRARY_IMAGE).unwrap();
+        assert_eq!(spheres.width(), spheres.height() * library.len() as u32);
         for name in ["gold", "brushed steel", "frosted glass", "water", "car paint"] {
             assert!(library.iter().any(|(known, _)| known == name), "{name}");
         }

@@ -1,6 +1,5 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
-use crate::console::thousands;
 use crate::files::input_file::{FileKind, InputFile};
 use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
@@ -36,6 +35,7 @@ use crate::scene::load_stage::LoadStage;
 use crate::scene::loaded::LoadedScene;
 use crate::scene::model_light::{Model, light_as_in, light_model};
 use crate::scene::source::SceneSource;
+use crate::scene::thousands::thousands;
 use crate::scene::world::components::{Balls, Shape};
 use crate::scene::world::extent::{Extent, ExtentCache};
 use crate::scene::world::inputs::SceneInputs;

@@ -16,12 +16,19 @@ pub fn is_at(place: Pos2, height: f32) -> bool {
     place.y >= height - HEIGHT
 }
 
+/// The texts of the bar.
+#[derive(Default, PartialEq, Eq)]
+pub struct Figures {
+    /// What is on the image and how good it is; cut where there is no room.
+    pub left: String,
+    /// Settings and hints, from the most important one; those without room are left out.
+    pub right: Vec<String>,
+}
+
 /// Draws the bar; returns the command that was clicked.
 ///
-/// - `left`: what is on the image and how good it is; cut where there is no room.
-/// - `right`: settings and hints, from the most important one; those without room are left out.
 /// - `panel`: whether the panel is shown.
-pub fn show(context: &Context, input: &MenuInput, panel: bool, left: &str, right: &[String]) -> Option<Action> {
+pub fn show(context: &Context, input: &MenuInput, panel: bool, figures: &Figures) -> Option<Action> {
     let mut chosen = None;
     let frame = Frame::NONE.fill(GLASS).inner_margin(Margin::symmetric(5, 0));
     let bar = TopBottomPanel::bottom("bar").frame(frame).exact_height(HEIGHT).show_separator_line(false);
@@ -48,7 +55,7 @@ pub fn show(context: &Context, input: &MenuInput, panel: bool, left: &str, right
                         chosen = Some(action);
                     }
                 }
-                texts(ui, left, right);
+                texts(ui, &figures.left, &figures.right);
             });
         });
     });

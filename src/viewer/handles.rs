@@ -157,8 +157,8 @@ impl Handles {
                     painter.add(shape);
                 }
                 (Handle::Axis(_), mode) => {
-                    painter.add(egui::Shape::line(line.clone(), Stroke::new(4.5, Color32::from_black_alpha(90))));
-                    painter.add(egui::Shape::line(line.clone(), Stroke::new(2.5, color)));
+                    painter.add(egui::Shape::line(line.clone(), Stroke::new(6.5, Color32::from_black_alpha(170))));
+                    painter.add(egui::Shape::line(line.clone(), Stroke::new(3.5, color)));
                     match (mode, &line[..]) {
                         (Mode::Move, [start, end]) => draw_arrow(&painter, *start, *end, color),
                         (Mode::Scale, [_, end]) => {
@@ -236,8 +236,8 @@ fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color:
 fn draw_arrow(painter: &egui::Painter, start: Pos2, end: Pos2, color: Color32) {
     let along = (end - start).normalized();
     let across = egui::vec2(-along.y, along.x);
-    let points = vec![end + 11.0 * along, end + 5.0 * across, end - 5.0 * across];
-    painter.add(egui::Shape::convex_polygon(points, color, Stroke::NONE));
+    let points = vec![end + 14.0 * along, end + 6.5 * across, end - 6.5 * across];
+    painter.add(egui::Shape::convex_polygon(points, color, Stroke::new(1.5, Color32::from_black_alpha(170))));
 }
 
 fn pos(place: DVec2) -> Pos2 {

@@ -21,7 +21,7 @@
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
 //! | `dialog`, `browser` | file dialogs: of the desktop, or inside the window |
-//! | `question` | questions before edits are lost |
+//! | `question`, `greeting` | questions before edits are lost; that of the first start |
 //! | [`display`] | detection of the display server |
 
 mod app;
@@ -31,6 +31,7 @@ mod camera_text;
 mod change;
 mod dialog;
 pub mod display;
+mod greeting;
 mod handles;
 mod help;
 mod input;

@@ -53,7 +53,10 @@ pub fn opening(context: &Context, stage: LoadStage, text: &str, seconds: u64) {
                 ui.add_space(4.0);
                 let n = LoadStage::ALL.len() as f32;
                 let done = LoadStage::ALL.iter().filter(|other| **other < stage).count() as f32;
-                ui.add(egui::ProgressBar::new((done + 0.5) / n).desired_height(8.0));
+                let (bar, _) = ui.allocate_exact_size(Vec2::new(width, 8.0), egui::Sense::hover());
+                let part = egui::Rect::from_min_size(bar.min, Vec2::new(width * (done + 0.5) / n, 8.0));
+                ui.painter().rect_filled(bar, 3.0, Color32::from_gray(45));
+                ui.painter().rect_filled(part, 3.0, ui.visuals().selection.bg_fill);
                 ui.horizontal(|ui| {
                     for other in LoadStage::ALL {
                         let word = RichText::new(other.label()).size(TEXT_SIZE - 1.0);
@@ -85,8 +88,8 @@ pub fn toasts(context: &Context, toasts: &[Toast]) {
 
 /// Draws the legend of an inspection in the lower left corner; it ignores the mouse.
 pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
-    // Its position depends on its height in the last frame.
-    egui::Area::new(egui::Id::new(("legend", legend.is_some())))
+    // Its position and its width depend on those in the last frame: each title has its own.
+    egui::Area::new(egui::Id::new(("legend", title, legend.is_some())))
         .order(Order::Foreground)
         .interactable(false)
         .fixed_pos(context.content_rect().left_bottom() + Vec2::new(10.0, -34.0))

@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_name_comes_before_what_only_mentions_it() {
         let line = |name: &str, effect: &str| (name.to_owned(), effect.to_owned(), String::new(), Action::Brush);
-        let lines = vec![line("Save", "undo is lost"), line("Undo", "take back"), line("Redo", "again")];
+        let lines = vec![line("Save", "undo is lost"), line("Undo", "one step"), line("Redo", "again")];
         let names = |search| matches(lines.clone(), search).into_iter().map(|(name, ..)| name).collect::<Vec<_>>();
         assert_eq!(names("undo"), ["Undo", "Save"]);
         assert_eq!(names("").len(), 3);

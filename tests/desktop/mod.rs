@@ -60,6 +60,10 @@ impl Desktop {
             return None;
         }
         let folder = tempfile::tempdir().expect("a folder for the test");
+        // The question of the first start would cover what tests look at.
+        let settings = folder.path().join("config/firstlight");
+        std::fs::create_dir_all(&settings).expect("a folder for settings");
+        std::fs::write(settings.join("settings.ron"), "(greeted: true)").expect("settings");
         let number_file = folder.path().join("display");
         // Without `-noreset` the server starts over when its last window goes.
         let server = Command::new("sh")

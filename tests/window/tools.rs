@@ -101,7 +101,7 @@ fn the_mouse_looks_orbits_or_is_captured_and_flies_as_fast_as_what_is_under_it_i
     program.xdotool("mousemove_relative -- -30 0");
     assert_eq!(camera_when(&program, "the view to stay", |_| true), turned, "let go, it only points");
     go_home();
-    // A tap of W goes a share of the way to what is under the mouse; the wheel multiplies it.
+    // A tap of W goes a share of the way to what is under the mouse; the wheel with Ctrl multiplies it.
     let step = |x: i32, y: i32| {
         program.point_at(x, y);
         std::thread::sleep(Duration::from_millis(100));
@@ -112,9 +112,11 @@ fn the_mouse_looks_orbits_or_is_captured_and_flies_as_fast_as_what_is_under_it_i
     };
     let (near, far) = (step(320, 330), step(320, 110));
     assert!(far > 1.5 * near, "{near} to the floor, {far} to the horizon");
+    program.xdotool("keydown ctrl");
     for _ in 0..4 {
         program.xdotool("click 4");
     }
+    program.xdotool("keyup ctrl");
     let faster = step(320, 330);
     // A synthetic wheel has buttons and no axis: winit tells of their press and of their release, so each click counts twice.
     let expected = 1.25f64.powi(8);

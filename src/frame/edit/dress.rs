@@ -37,7 +37,7 @@ mod tests {
     fn objects_share_a_ready_material_until_it_is_changed() {
         let mut world = World::new();
         let objects: Vec<Entity> = (0..3).map(|_| world.spawn(MaterialSlots(Vec::new())).id()).collect();
-        let mut dressed = |world: &mut World, i: usize, name: &str| {
+        let dressed = |world: &mut World, i: usize, name: &str| {
             world.insert_resource(Selection(vec![objects[i]]));
             dress(world, name).map(|()| world.get::<MaterialSlots>(objects[i]).unwrap().0[0])
         };

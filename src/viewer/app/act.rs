@@ -203,8 +203,9 @@ impl App {
     }
 
     /// Sets keys and gestures, for this window and later ones.
-    fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
+    pub(super) fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
         self.input.set_navigation(navigation, now);
+        self.greeting = false;
         let trouble = self.memory.keep_navigation(navigation);
         self.toasts.add(Tone::News, format!("navigation: {} (H lists the keys)", navigation.label()), now);
         if let Some(trouble) = trouble {
@@ -338,7 +339,9 @@ impl App {
                 let short = kept.cut_short.map_or_else(String::new, |(spp, wanted)| {
                     format!(" (with {spp} of {wanted} samples per pixel, because the window was closed)")
                 });
-                let news = format!("saved {}{coarse}{short}", kept.path.display());
+                // The whole path: a window has no folder that one could see.
+                let path = std::path::absolute(&kept.path).unwrap_or_else(|_| kept.path.clone());
+                let news = format!("saved {}{coarse}{short}", path.display());
                 console::inform(&news);
                 // Replaces the message that saving has started.
                 self.toasts.add(Tone::News, format!("screenshot: {news}"), now);

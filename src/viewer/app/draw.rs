@@ -3,25 +3,14 @@
 use crate::frame::{Explaining, Projector, SceneBounds, Selection, StopAt, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
-use crate::viewer::app::{App, REPAINT_DELAY, WIDGET_REPAINT_DELAY};
+use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
+use crate::viewer::bar::Figures;
 use crate::viewer::menu::MenuInput;
 use crate::viewer::presenter::{PresentError, Presenter};
-use crate::viewer::{bar, help as key_list, overlay, panel, status, story};
+use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
-
-/// An inspection, or opening a scene, that takes longer is reported as in progress; until it is done another image is
-/// shown.
-pub(super) const SLOW: Duration = Duration::from_millis(150);
-
-/// The texts of the bar.
-#[derive(Default, PartialEq, Eq)]
-pub(super) struct Figures {
-    pub left: String,
-    /// From the most important one.
-    pub right: Vec<String>,
-}
 
 impl App {
     /// The texts of the bar: on the left what is on the image, on the right settings and what one may do.
@@ -75,11 +64,13 @@ impl App {
         let (question, mut answer) = (&self.leaving.question, None);
         let opening = self.opening_since.filter(|since| now >= *since + SLOW);
         let opening = session.status().opening.zip(opening);
-        let (mut clicked, mut clicked_here, mut file) = (None, None, None);
+        let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
+        let (mut clicked, mut clicked_here, mut file, mut greeted) = (None, None, None, None);
+        // Once there is something to look at, and nothing more urgent is asked.
+        let greets = self.greeting && overlays && question.is_none() && !session.status().scene.is_empty();
         let menu_input = MenuInput { session, navigation, recent: self.memory.recent() };
         let (here, palette, browser) = (&mut self.here, &mut self.palette, &mut self.browser);
         let chosen_name = chosen_name.as_deref();
-        let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
         let presented = presenter.present(|context| {
             if overlays {
                 if let Some(story) = &session.world().resource::<Explaining>().story {
@@ -93,7 +84,7 @@ impl App {
                 }
                 handles.draw(context);
                 brush.draw(context, session.status());
-                clicked = bar::show(context, &menu_input, panel.shown, &figures.left, &figures.right);
+                clicked = bar::show(context, &menu_input, panel.shown, &figures);
                 if panel.shown {
                     panel::show(context, panel, session, &around, &mut asked);
                 }
@@ -112,6 +103,9 @@ impl App {
                 overlay::opening(context, stage, text, (now - since).as_secs());
             }
             clicked_here = here.show(context, &menu_input, chosen_name);
+            if greets {
+                greeted = greeting::show(context);
+            }
             file = browser.show(context);
             let found = palette.show(context, &menu_input);
             clicked = clicked.take().or(found);
@@ -145,6 +139,10 @@ impl App {
         // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.execute(asked, now);
+        if let Some(navigation) = greeted {
+            self.greeting = false;
+            self.set_navigation(navigation, now);
+        }
         if let Some((purpose, path)) = file {
             self.open(purpose.command(path), now);
         }

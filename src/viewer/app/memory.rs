@@ -5,6 +5,7 @@ use crate::frame::{
     SettingsStore, ViewMode,
 };
 use crate::scene::SceneSource;
+use crate::viewer::panel::PanelState;
 
 /// The settings store, and its content as far as it is known here.
 pub struct Memory {
@@ -123,10 +124,34 @@ impl Memory {
         self.store.settings().0.navigation
     }
 
-    /// Stores keys and gestures for the next window.
+    /// Whether the user has never been asked for keys and gestures.
+    pub fn is_new(&self) -> bool {
+        let settings = self.store.settings().0;
+        !settings.greeted && settings.navigation == Navigation::default()
+    }
+
+    /// Stores keys and gestures for the next window; the user is not asked for them again.
     pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
         let mut settings = self.store.settings().0;
-        settings.navigation = navigation;
+        (settings.navigation, settings.greeted) = (navigation, true);
+        self.store.keep_settings(&settings).err().map(String::from)
+    }
+
+    /// The panel as the last window left it.
+    pub fn panel(&self) -> PanelState {
+        let settings = self.store.settings().0;
+        PanelState::remembered(settings.panel, &settings.sections)
+    }
+
+    /// Stores which parts of the panel are open, if that has changed.
+    pub fn keep_panel(&self, panel: &PanelState) -> Option<String> {
+        let mut settings = self.store.settings().0;
+        let before = settings.clone();
+        settings.panel = panel.shown;
+        settings.sections.extend(panel.open.iter().map(|(title, open)| ((*title).to_owned(), *open)));
+        if settings == before {
+            return None;
+        }
         self.store.keep_settings(&settings).err().map(String::from)
     }
 

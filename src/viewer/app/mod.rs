@@ -26,10 +26,9 @@ use crate::frame::{
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::scene::{ModelChoice, SceneSource, UpAxis};
-use crate::viewer::app::draw::Figures;
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
-use crate::viewer::bar;
+use crate::viewer::bar::{self, Figures};
 use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
 use crate::viewer::display;
@@ -124,6 +123,9 @@ const WIDGET_REPAINT_DELAY: Duration = Duration::from_millis(33);
 const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 /// Time after the last resize after which the size is considered final.
 const RESIZE_DELAY: Duration = Duration::from_millis(500);
+/// An inspection, or opening a scene, that takes longer is reported as in progress; until it is done another image is
+/// shown.
+const SLOW: Duration = Duration::from_millis(150);
 /// Exit status of a program that is stopped twice, by the convention of shells.
 const STOPPED: i32 = 130;
 /// Target at which a window stops by itself, so that the machine does not run for ever: the error is invisible.
@@ -180,6 +182,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     // Also if the display is gone.
     app.session.end_record();
     app.keep_window_size();
+    app.keep_panel();
     for saved in app.saver.finish() {
         app.report_saved(saved);
     }
@@ -213,6 +216,8 @@ struct App {
     help: Help,
     palette: Palette,
     here: HereMenu,
+    /// The question of the first start is shown.
+    greeting: bool,
     panel: PanelState,
     handles: Handles,
     brush: RegionTool,
@@ -307,7 +312,8 @@ impl App {
             help: Help::default(),
             palette: Palette::default(),
             here: HereMenu::default(),
-            panel: PanelState::default(),
+            greeting: memory.is_new(),
+            panel: memory.panel(),
             handles: Handles::default(),
             brush: RegionTool::default(),
             path_filter: PathFilter::default(),
@@ -341,7 +347,7 @@ impl App {
     }
 
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
-        let size = LogicalSize::new(self.options.width, self.options.height);
+        let size = fitting(event_loop, self.options.width, self.options.height);
         self.title = title(&self.options.source.title(), false);
         let attributes = Window::default_attributes().with_title(&self.title).with_inner_size(size);
         let window = Arc::new(event_loop.create_window(attributes).map_err(ViewerError::NoWindow)?);
@@ -389,6 +395,13 @@ impl App {
         let _ = crate::console::print(figures);
     }
 
+    /// Stores the state of the panel, at exit.
+    fn keep_panel(&self) {
+        if let Some(trouble) = self.memory.keep_panel(&self.panel) {
+            log::warn!("{trouble}");
+        }
+    }
+
     /// Stores the window's size. Not only at exit: X11 ends the program itself when the display is lost.
     fn keep_window_size(&mut self) {
         self.keep_size_at = None;
@@ -422,7 +435,7 @@ impl App {
         let status = self.session.status();
         match (status.opening, self.opening_since) {
             // A scene that is there at once would only flash.
-            (Some(_), None) => (self.opening_since, self.repaint_at) = (Some(now), Some(now + draw::SLOW)),
+            (Some(_), None) => (self.opening_since, self.repaint_at) = (Some(now), Some(now + SLOW)),
             // The seconds go on.
             (Some(_), Some(_)) => self.repaint_at = Some(self.repaint_at.unwrap_or(now + FIGURES_INTERVAL)),
             (None, Some(_)) => (self.opening_since, self.repaint_at) = (None, Some(now)),
@@ -557,6 +570,22 @@ impl App {
     }
 }
 
+/// The size of the first window, logical pixels: at most what the monitor has room for beside frames and bars.
+fn fitting(event_loop: &ActiveEventLoop, width: u32, height: u32) -> LogicalSize<f64> {
+    let wanted = LogicalSize::new(f64::from(width), f64::from(height));
+    let Some(monitor) = event_loop.primary_monitor().or_else(|| event_loop.available_monitors().next()) else {
+        return wanted;
+    };
+    let room = monitor.size().to_logical::<f64>(monitor.scale_factor());
+    fit_into(wanted, room)
+}
+
+/// Leaves room for the title, the frame and the bars of the desktop; a monitor without a size has no limit.
+fn fit_into(wanted: LogicalSize<f64>, monitor: LogicalSize<f64>) -> LogicalSize<f64> {
+    let most = |size: f64, least: f64| if size > 0.0 { (0.98 * size).min(size - least).max(64.0) } else { f64::MAX };
+    LogicalSize::new(wanted.width.min(most(monitor.width, 8.0)), wanted.height.min(most(monitor.height, 64.0)))
+}
+
 /// Returns the window title; an asterisk marks unsaved edits.
 fn title(scene: &str, unsaved: bool) -> String {
     let name = short_name(scene);
@@ -571,4 +600,21 @@ fn title(scene: &str, unsaved: bool) -> String {
 /// Returns the name of a scene without its folder.
 fn short_name(scene: &str) -> String {
     Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy()).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_window_fits_the_monitor() {
+        let fit = |width, height, monitor: (f64, f64)| {
+            let size = fit_into(LogicalSize::new(width, height), LogicalSize::new(monitor.0, monitor.1));
+            (size.width, size.height)
+        };
+        assert_eq!(fit(1280.0, 720.0, (1920.0, 1080.0)), (1280.0, 720.0));
+        // Twice as many dots for each logical pixel.
+        assert_eq!(fit(1280.0, 720.0, (800.0, 500.0)), (784.0, 436.0));
+        assert_eq!(fit(1280.0, 720.0, (0.0, 0.0)), (1280.0, 720.0));
+    }
 }

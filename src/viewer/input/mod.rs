@@ -391,12 +391,13 @@ impl Input {
 
     /// Handles a wheel movement in notches, positive away from the user; returns true if the flying speed changed.
     pub fn wheel(&mut self, notches: f64, now: Instant) -> bool {
-        let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
-        let zooms = self.navigation != Navigation::Firstlight && !flies && !self.modifiers.shift_key();
-        if zooms || self.modifiers.control_key() {
-            self.sum.dolly -= notches * ZOOM_NOTCH.ln();
-        } else if self.modifiers.shift_key() {
+        // In flight, the wheel is for the speed.
+        let drags = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
+        let flies = drags || self.held.iter().any(|held| held.motion.flies());
+        if self.modifiers.shift_key() && !flies {
             self.sum.zoom -= notches * ZOOM_NOTCH.ln();
+        } else if !flies && !self.modifiers.control_key() {
+            self.sum.dolly -= notches * ZOOM_NOTCH.ln();
         } else {
             // The distance so far is counted with the old speed.
             self.count(now);

@@ -9,6 +9,10 @@ mod build;
 mod page;
 mod presets;
 mod table;
+mod table_edit;
+mod table_image;
+mod table_view;
+mod table_window;
 mod words;
 
 pub use binding::{Action, Binding, Chord, Item, KeyGroup, Menu, Motion, Trigger, Typed};

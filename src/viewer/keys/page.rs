@@ -54,7 +54,7 @@ impl Binding {
 pub fn markdown() -> String {
     let mut page = String::from(
         "# Keys and mouse\n\n\
-         H shows this list in the window. It is written from the table in `src/viewer/keys/table/`, which the window obeys;\n\
+         H shows this list in the window. It is written from the table in `src/viewer/keys/table.rs`, which the window obeys;\n\
          after a change there, `FIRSTLIGHT_BLESS=1 cargo test keys_page` writes it again. The groups at the end are those of the\n\
          presets that are chosen in the panel under Camera; they take the place of Fly, Orbit and the same keys.\n",
     );

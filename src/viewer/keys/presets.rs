@@ -102,8 +102,10 @@ const FLY: Binding = Binding {
     triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("with W A S D Q E")],
     effect: "look around and fly; Shift: four times as fast",
 };
-const FLY_SPEED: Binding =
-    Binding { triggers: &[Trigger::Mouse("Right drag + wheel")], effect: "change the flying speed" };
+const FLY_SPEED: Binding = Binding {
+    triggers: &[Trigger::Mouse("Right drag + wheel"), Trigger::Mouse("Ctrl+wheel")],
+    effect: "change the flying speed",
+};
 
 /// The groups of a preset.
 pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {

@@ -3,9 +3,9 @@
 //! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
 //! objects ([`shared_by`]).
 
-use crate::console::thousands;
 use crate::frame::{self, Edit, Session};
 use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
+use crate::scene::thousands;
 use crate::scene::{
     ColorParam, InWorld, Inventory, Material, MaterialEntry, MaterialProperty, ObjectInput, ScalarParam,
     SurfaceMaterial,

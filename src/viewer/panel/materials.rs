@@ -1,7 +1,7 @@
 //! The list of materials, with the editor of the chosen one.
 
-use crate::console::thousands;
 use crate::frame::{Edit, Selection, Session};
+use crate::scene::thousands;
 use crate::scene::{Inventory, MaterialEntry, SurfaceMaterial};
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::material::{editor, shared_by};

@@ -1,7 +1,7 @@
 //! The mesh of the selection: faces, normals, and simplification.
 
-use crate::console::thousands;
 use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
+use crate::scene::thousands;
 use crate::scene::{MeshOrigin, MeshShading, Shape};
 use crate::viewer::change::Difference;
 use crate::viewer::panel::state::{Asked, PanelState};

@@ -14,11 +14,13 @@
 //! | `ready` | the library of ready materials |
 //! | `material`, `texture` | the editor of a material |
 //! | `statistics`, `messages` | figures; what was said |
+//! | `sections` | their titles |
 //! | `state` | what it remembers, shows and asks for |
-//! | `list`, `swatch`, `widgets` | building blocks |
+//! | `list`, `swatch`, `widgets`, `hints` | building blocks |
 
 mod animation;
 mod camera;
+mod hints;
 mod lights;
 mod list;
 mod material;
@@ -28,6 +30,7 @@ mod messages;
 mod picture;
 mod ready;
 mod scene;
+mod sections;
 mod selected;
 mod state;
 mod statistics;
@@ -35,30 +38,11 @@ mod swatch;
 mod texture;
 mod widgets;
 
+pub use sections::SECTIONS;
 pub use state::{Around, Asked, PanelState};
 
 use crate::frame::{Command, Edit, Session};
 use egui::{Context, RichText, Ui};
-
-/// The sections of the panel, from the top; the list of keys mentions each.
-pub const SECTIONS: [&str; 16] = [
-    "Render",
-    "Animation",
-    "Camera",
-    "Views",
-    "Lens",
-    "Display",
-    "Add",
-    "Selected",
-    "Mesh",
-    "Objects",
-    "Materials",
-    "Lights",
-    "Environment",
-    "Open",
-    "Statistics",
-    "Messages",
-];
 
 const WIDTH: f32 = 288.0;
 
@@ -79,9 +63,10 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Leaves space for the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
-            let wanted = state.section.take();
-            let section = |ui: &mut Ui, title, open, contents: &mut dyn FnMut(&mut Ui)| {
-                self::section(ui, title, open, wanted == Some(title), contents);
+            let (wanted, mut open_now) = (state.section.take(), std::mem::take(&mut state.open));
+            let mut section = |ui: &mut Ui, title, open, contents: &mut dyn FnMut(&mut Ui)| {
+                let is_open = open_now.entry(title).or_insert(open);
+                self::section(ui, title, is_open, wanted == Some(title), contents);
             };
             let [render, animation, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, &mut |ui| picture::render(ui, &mut state.scale, session, around, asked));
@@ -104,6 +89,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, open, false, &mut |ui| scene::open(ui, session, around.recent, asked));
             section(ui, statistics, true, &mut |ui| statistics::statistics(ui, session, around));
             section(ui, messages, true, &mut |ui| messages::messages(ui, session));
+            state.open = open_now;
         });
     });
     // All edits between pressing and releasing a mouse button are one undo step, also if a colour picker or a menu
@@ -133,11 +119,14 @@ fn style(ui: &mut Ui) {
     }
 }
 
-/// - `open`: whether it is open at first.
+/// - `is_open`: changed by a click on the title.
 /// - `wanted`: it is to be opened now, and seen.
-fn section(ui: &mut Ui, title: &str, open: bool, wanted: bool, contents: &mut dyn FnMut(&mut Ui)) {
-    let header = egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
-    let shown = header.open(wanted.then_some(true)).show(ui, contents);
+fn section(ui: &mut Ui, title: &str, is_open: &mut bool, wanted: bool, contents: &mut dyn FnMut(&mut Ui)) {
+    *is_open |= wanted;
+    let shown = egui::CollapsingHeader::new(RichText::new(title).strong()).open(Some(*is_open)).show(ui, contents);
+    if shown.header_response.clicked() {
+        *is_open = !*is_open;
+    }
     if wanted {
         shown.header_response.scroll_to_me(Some(egui::Align::TOP));
     }

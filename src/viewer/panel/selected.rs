@@ -57,9 +57,9 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
                 });
             }
         });
-        ui.collapsing("Material library", |ui| library_of_materials(ui, &mut state.balls, asked))
+        ui.collapsing("Material library", |ui| library_of_materials(ui, &mut state.spheres, asked))
             .header_response
-            .on_hover_text("ready materials: gold, glass, car paint …");
+            .on_hover_text("ready materials: gold, glass, porcelain …");
         let inventory = state.inventory(session);
         material::of_object(ui, session, &inventory, object, asked);
     }

@@ -5,13 +5,17 @@ use crate::scene::Inventory;
 use crate::viewer::change::PictureChange;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::list::ListState;
+use crate::viewer::panel::sections::SECTIONS;
 use crate::viewer::reaction::Reaction;
 use bevy_ecs::prelude::Entity;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// State of the panel.
 pub struct PanelState {
     pub shown: bool,
+    /// Which sections are open, as far as they have been shown.
+    pub open: BTreeMap<&'static str, bool>,
     /// The section to open and to scroll to.
     pub section: Option<&'static str>,
     /// The handles over the selection.
@@ -28,13 +32,21 @@ pub struct PanelState {
     pub object_list: ListState,
     pub material_list: ListState,
     pub light_list: ListState,
-    /// The balls of the library of materials, once they have been shown.
-    pub balls: Option<egui::TextureHandle>,
+    /// The spheres of the library of materials, once they have been shown.
+    pub spheres: Option<egui::TextureHandle>,
     /// The material whose editor is open in the list.
     pub material: Option<Entity>,
 }
 
 impl PanelState {
+    /// The panel as an earlier window left it.
+    ///
+    /// - `open`: which sections are open, by their titles.
+    pub fn remembered(shown: bool, open: &BTreeMap<String, bool>) -> Self {
+        let open = SECTIONS.iter().filter_map(|title| Some((*title, *open.get(*title)?))).collect();
+        Self { shown, open, ..Self::default() }
+    }
+
     /// Returns the inventory, rebuilt only if it is shown and the scene has changed.
     pub fn inventory(&mut self, session: &Session) -> Rc<Inventory> {
         let revision = session.revision();
@@ -54,6 +66,7 @@ impl Default for PanelState {
     fn default() -> Self {
         Self {
             shown: false,
+            open: BTreeMap::new(),
             section: None,
             gizmo: None,
             change: PictureChange::default(),
@@ -64,7 +77,7 @@ impl Default for PanelState {
             object_list: ListState::default(),
             material_list: ListState::default(),
             light_list: ListState::default(),
-            balls: None,
+            spheres: None,
             material: None,
         }
     }

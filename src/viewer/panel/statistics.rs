@@ -1,8 +1,8 @@
 //! Figures: speed, error, sizes, latency.
 
-use crate::console::thousands;
 use crate::frame::{History, LatencyHistogram, Session};
 use crate::scene::Shape;
+use crate::scene::thousands;
 use crate::viewer::panel::state::Around;
 use crate::viewer::panel::widgets::{row, rows};
 use crate::viewer::status::{bytes, percent, seconds};
@@ -14,7 +14,7 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         let mut figure = |name: &str, text: String| row(ui, name, |ui| drop(ui.label(text)));
         figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
         let coarse = if status.divider > 1 { format!(", 1/{} of the window", status.divider) } else { String::new() };
-        figure("image", format!("{} × {}{coarse}", status.film_width, status.film_height));
+        figure("resolution", format!("{} × {}{coarse}", status.film_width, status.film_height));
         figure("rays", format!("{:.2} M/s", status.mrays()));
         let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
         figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));

@@ -5,6 +5,7 @@
 
 use crate::files::printable;
 use crate::frame::Edit;
+use crate::viewer::panel::hints::hint_of;
 use crate::viewer::panel::state::Asked;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -14,8 +15,9 @@ pub fn rows<R>(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui) -> R) -> R 
     egui::Grid::new(id).num_columns(2).min_col_width(74.0).spacing([8.0, 4.0]).show(ui, contents).inner
 }
 
+/// A row whose label [`hint_of`] explains.
 pub fn row<R>(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
-    row_with_hint(ui, name, "", contents)
+    row_with_hint(ui, name, hint_of(name), contents)
 }
 
 /// A row whose hint is shown when the mouse rests on the label.

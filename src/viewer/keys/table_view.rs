@@ -35,7 +35,10 @@ pub const FLY: KeyGroup = KeyGroup {
             effect: "fly up, down",
         },
         Binding { triggers: &[Trigger::Mouse("Shift")], effect: "fly four times as fast, while held" },
-        Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "change the flying speed" },
+        Binding {
+            triggers: &[Trigger::Mouse("Ctrl+wheel"), Trigger::Mouse("wheel while flying")],
+            effect: "change the flying speed",
+        },
         Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look around" },
         Binding {
             triggers: &[
@@ -79,7 +82,7 @@ pub const ORBIT: KeyGroup = KeyGroup {
                 send("+", DOLLY_IN),
                 send("=", DOLLY_IN),
                 send("-", DOLLY_OUT),
-                Trigger::Mouse("Ctrl+wheel"),
+                Trigger::Mouse("Wheel"),
                 send_item("Move nearer", &[], DOLLY_IN),
                 send_item("Move farther", &[], DOLLY_OUT),
             ],

@@ -1,12 +1,8 @@
 //! The table of keys, gestures and commands: the menus, the list of commands, the list of keys and `docs/keys.md` are
 //! made from it.
 
-mod edit;
-mod image;
-mod view;
-mod window;
-
 use crate::viewer::keys::binding::KeyGroup;
+use crate::viewer::keys::{table_edit as edit, table_image as image, table_view as view, table_window as window};
 
 pub static BINDINGS: &[KeyGroup] = &[
     view::FLY,
