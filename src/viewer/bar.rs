@@ -59,6 +59,9 @@ pub fn show(context: &Context, input: &MenuInput, panel: bool, figures: &Figures
             });
         });
     });
+    if chosen.is_some() {
+        egui::Popup::close_all(context);
+    }
     chosen
 }
 

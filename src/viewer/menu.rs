@@ -91,6 +91,8 @@ fn dress(name: &str) -> Action {
 fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
     let key = shortcut(input.navigation, &item.action).unwrap_or_default();
     let button = Button::new(name_of(input.session, item)).shortcut_text(RichText::new(key).weak());
+    // A long name makes the menu wider, and moves no line.
+    let button = button.wrap_mode(egui::TextWrapMode::Extend);
     let line = ui.add_enabled(is_possible(input.session, &item.action), button);
     let is_clicked = line.on_hover_text(effect_of(&item.action)).clicked();
     is_clicked.then(|| item.action.clone())
@@ -179,7 +181,11 @@ impl HereMenu {
                 });
             });
         });
-        if shown.is_none() {
+        if chosen.is_some() {
+            // Also where it was chosen in a menu of the menu.
+            Popup::close_all(context);
+        }
+        if shown.is_none() || chosen.is_some() {
             self.at = None;
         }
         chosen.map(|action| (action, place))

@@ -18,7 +18,11 @@ impl App {
         let (status, world) = (self.session.status(), self.session.world());
         let mut right = status::settings(status);
         let is_selected = !world.resource::<Selection>().0.is_empty();
-        right.push(if is_selected { "right click: what to do with it" } else { "click: select" }.to_owned());
+        let hints: &[&str] = match is_selected {
+            true => &["right click: what to do with it"],
+            false => &["click: select", "drop a file: open"],
+        };
+        right.extend(hints.iter().map(|hint| (*hint).to_owned()));
         Figures { left: status::line(status, world.resource::<StopAt>().0), right }
     }
 

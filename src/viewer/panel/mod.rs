@@ -123,7 +123,9 @@ fn style(ui: &mut Ui) {
 /// - `wanted`: it is to be opened now, and seen.
 fn section(ui: &mut Ui, title: &str, is_open: &mut bool, wanted: bool, contents: &mut dyn FnMut(&mut Ui)) {
     *is_open |= wanted;
-    let shown = egui::CollapsingHeader::new(RichText::new(title).strong()).open(Some(*is_open)).show(ui, contents);
+    let header = egui::CollapsingHeader::new(RichText::new(title).strong());
+    // Both, so that a section that is open at first does not unfold.
+    let shown = header.default_open(*is_open).open(Some(*is_open)).show(ui, contents);
     if shown.header_response.clicked() {
         *is_open = !*is_open;
     }
