@@ -50,11 +50,14 @@ impl ApplicationHandler<Wake> for App {
         }
         let in_menu = self.in_menu();
         let Some(presenter) = &mut self.presenter else { return };
-        let mut response = presenter.on_window_event(&event);
+        // Overlays get the keyboard only during text input. Tab, which the window uses itself, would give it to a button.
+        let typing = presenter.egui_context().wants_keyboard_input() || self.palette.open || self.browser.is_open();
+        let mut response = match is_tab(&event) && !typing {
+            true => egui_winit::EventResponse::default(),
+            false => presenter.on_window_event(&event),
+        };
         // Overlays know where the mouse was when they were drawn last.
         response.consumed |= self.over_bar && matches!(event, WindowEvent::MouseInput { .. });
-        // Overlays get the keyboard only during text input; they always want Tab, which the window uses itself.
-        let typing = presenter.egui_context().wants_keyboard_input() || self.palette.open || self.browser.is_open();
         if response.repaint && (was_over_bar || self.has_widgets()) && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
@@ -218,6 +221,10 @@ impl App {
         }
         true
     }
+}
+
+fn is_tab(event: &WindowEvent) -> bool {
+    matches!(event, WindowEvent::KeyboardInput { event, .. } if event.logical_key == Key::Named(NamedKey::Tab))
 }
 
 /// Whether an open menu takes a key: those that move in it, choose, and close it.
