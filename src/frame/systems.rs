@@ -317,7 +317,7 @@ pub fn reset(
 
 /// Passes the job, the target, the region and the number of threads to the workers.
 ///
-/// Reads [`RenderState`], [`StopAt`], [`Threads`], [`Paused`]; writes [`FrameChanges`] and to the [`Renderer`].
+/// Reads [`RenderState`], [`StopAt`], [`Threads`], [`Paused`], [`BackgroundTasks`]; writes [`FrameChanges`] and to the [`Renderer`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn accumulate(
     stop_at: Res<StopAt>,
@@ -326,7 +326,7 @@ pub fn accumulate(
     hidden: Res<Hidden>,
     size: Res<PictureSize>,
     brush: Res<RenderRegion>,
-    renderer: Res<Renderer>,
+    (renderer, beside): (Res<Renderer>, Res<BackgroundTasks>),
     mut shown: ResMut<RenderState>,
     mut found: ResMut<FrameChanges>,
 ) {
@@ -345,7 +345,9 @@ pub fn accumulate(
         shown.region = brush.0;
         found.0.add(Level::Reschedule, "region");
     }
-    let paused = paused.0 || hidden.0 || size.is_empty();
+    // An empty scene has nothing to show, and the one that opens needs the processor.
+    let opens_first = shown.inputs.objects.is_empty() && beside.progress().0.is_some();
+    let paused = paused.0 || hidden.0 || size.is_empty() || opens_first;
     if shown.paused != paused {
         orders.paused = Some(paused);
         shown.paused = paused;
