@@ -1,6 +1,6 @@
 //! `firstlight report [SCENES]`: error versus time, as an HTML page, a table and a few lines of text.
 
-use crate::cli::args::{OverwriteArgs, SceneArgs};
+use crate::cli::args::{OpenArgs, OverwriteArgs, SceneArgs};
 use crate::cli::console::{Bar, inform, lines, print, remark};
 use crate::cli::failure::Failure;
 use crate::cli::number::{between, parse_positive, parse_size};
@@ -43,6 +43,8 @@ pub struct ReportArgs {
     /// [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,
+    #[command(flatten)]
+    how: OpenArgs,
     /// Converged linear image (.exr) of the scene [default: rendered with 16 times the samples and cached].
     ///
     /// Rendering the default reference takes about 16 times as long as the last step; it is cached for the next report.
@@ -186,7 +188,7 @@ fn measure_all(
     // All scenes are loaded first, so that an error in the last argument is reported at once.
     let mut scenes = Vec::new();
     for name in names {
-        let scene = SceneArgs { scene: name.clone(), ..SceneArgs::default() };
+        let scene = SceneArgs { scene: name.clone(), how: args.how.clone() };
         scenes.push(ReportScene::new(args, &scene.load(None, files, &|_| ())?, given)?);
     }
     let limits = CurveLimits {

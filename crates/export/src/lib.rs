@@ -1,24 +1,17 @@
 //! Scenes as files of other renderers: pbrt-v4 (`.pbrt`) and Mitsuba 3 (`.xml`).
 //!
-//! A [`WholeScene`] has everything at hand: the scene file, its meshes and its images. `surface` takes its materials
-//! apart into the plain surfaces that other renderers have, `objects` its objects into spheres, squares and meshes;
-//! `mitsuba` and `pbrt` write the text, and `folder` the meshes (binary PLY) and images beside it. What a format
-//! cannot say is told once for each kind. The inverse is `firstlight-import`. Start reading at [`export`].
+//! A [`WholeScene`] has everything at hand: the scene file, its meshes and its images. `common/surface` takes its
+//! materials apart into the plain surfaces that other renderers have, `common/objects` its objects into spheres, squares
+//! and meshes; `mitsuba` and `pbrt` write the text, and `common/folder` the meshes (binary PLY) and images beside it.
+//! What a format cannot say is told once for each kind. The inverse is `firstlight-import`. Start reading at [`export`].
 
-pub(crate) mod environment;
-pub(crate) mod folder;
+mod common;
 pub(crate) mod mitsuba;
-pub(crate) mod number;
-pub(crate) mod objects;
 pub(crate) mod pbrt;
-pub(crate) mod picture;
-pub(crate) mod ply;
-pub mod scene;
-pub(crate) mod surface;
 
-pub use scene::{WholeScene, WholeTexture};
+pub use common::scene::{WholeScene, WholeTexture};
 
-use crate::folder::Folder;
+use crate::common::folder::Folder;
 use firstlight_files::relative::path_to_text;
 use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::{write_new, write_whole};

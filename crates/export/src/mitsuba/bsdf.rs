@@ -10,8 +10,8 @@
 //! | `translucent` | `principledthin`, told |
 //! | `blend` | `blendbsdf`; by side two BSDFs of `twosided` |
 
+use crate::common::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use crate::mitsuba::{FORMATS, Writer};
-use crate::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use firstlight_files::write_error::WriteError;
 use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3, Mat2, Vec3};

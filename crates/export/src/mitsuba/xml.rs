@@ -1,6 +1,6 @@
 //! Text in XML: elements with their attributes, indented.
 
-use crate::number::number;
+use crate::common::number::number;
 use glam::{DAffine3, DVec3, Vec3};
 
 #[derive(Default)]

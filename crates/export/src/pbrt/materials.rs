@@ -9,9 +9,9 @@
 //! | `translucent` | `diffusetransmission` |
 //! | `blend` | `mix` |
 
+use crate::common::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use crate::pbrt::text::List;
 use crate::pbrt::{FORMATS, Writer};
-use crate::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use firstlight_files::write_error::WriteError;
 use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
 use glam::{DVec2, Vec3};

@@ -1,6 +1,6 @@
 //! Text of pbrt: directives with their parameters.
 
-use crate::number::number;
+use crate::common::number::number;
 use glam::{DAffine3, DVec3, Vec3};
 
 #[derive(Default)]

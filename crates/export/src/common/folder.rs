@@ -1,9 +1,9 @@
 //! The folder of meshes and images beside a scene.
 
-use crate::picture::{self, Picture};
-use crate::ply;
-use crate::scene::WholeScene;
-use crate::surface::Use;
+use crate::common::picture::{self, Picture};
+use crate::common::ply;
+use crate::common::scene::WholeScene;
+use crate::common::surface::Use;
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_files::whole_file::{Replace, WholeFile, unwritable};

@@ -1,6 +1,6 @@
 //! Objects as spheres, squares and meshes with a transform, and which of them share a mesh.
 
-use crate::scene::WholeScene;
+use crate::common::scene::WholeScene;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::parts::{LightPart, ObjectPart, RadiiPart, ball_grid};

@@ -4,7 +4,7 @@
 //! `principled` becomes a mixture of metal, glass and a coated diffuse surface, `phong` one of diffuse, mirror and
 //! glass. Start reading at [`Surface::of`].
 
-use crate::scene::WholeScene;
+use crate::common::scene::WholeScene;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::parts::{InFile, MaterialPart};

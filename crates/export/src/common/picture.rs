@@ -1,6 +1,6 @@
 //! Images as other renderers can use them: without factors, channels and inversion, which they lack.
 
-use crate::surface::{Change, Use};
+use crate::common::surface::{Change, Use};
 use exr::prelude::{AnyChannel, AnyChannels, Encoding as ExrEncoding, FlatSamples, Image, Layer, LayerAttributes};
 use exr::prelude::{WritableImage, f16};
 use firstlight_render::{Channel, Encoding, ImageTexture, Texels, Texture, TexturePattern};

@@ -1,0 +1,10 @@
+//! What both formats share: surfaces, images, meshes and the files beside the text.
+
+pub(crate) mod environment;
+pub(crate) mod folder;
+pub(crate) mod number;
+pub(crate) mod objects;
+pub(crate) mod picture;
+pub(crate) mod ply;
+pub mod scene;
+pub(crate) mod surface;
