@@ -298,7 +298,7 @@ impl Writer<'_> {
                 self.xml.rgb("color0", first);
                 self.xml.rgb("color1", second);
                 // Its squares have sides of 1/2.
-                self.to_uv(0.5 * matrix, 0.5 * offset.as_dvec2());
+                self.transform_uv(0.5 * matrix, 0.5 * offset.as_dvec2());
             }
             TexturePattern::Image { wrap, smooth, .. } => {
                 if texture.vertex_colors {
@@ -324,14 +324,14 @@ impl Writer<'_> {
                 // The top row is at v = 0 there, at v = 1 here.
                 let flip = Mat2::from_cols_array(&[1.0, 0.0, 0.0, -1.0]);
                 let offset = offset.as_dvec2();
-                self.to_uv(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
+                self.transform_uv(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
             }
         }
         self.xml.close();
         Ok(())
     }
 
-    fn to_uv(&mut self, matrix: Mat2, offset: DVec2) {
+    fn transform_uv(&mut self, matrix: Mat2, offset: DVec2) {
         let DMat2 { x_axis: x, y_axis: y } = matrix.as_dmat2();
         let linear = DMat3::from_cols(x.extend(0.0), y.extend(0.0), DVec3::Z);
         self.xml.transform("to_uv", &DAffine3::from_mat3_translation(linear, offset.extend(0.0)));
