@@ -65,11 +65,18 @@ enum MaterialKey {
 impl Extraction {
     /// Builds everything. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
-        Self::about(origin_of(inputs), inputs, trees, None)
+        Self::about(origin_of(inputs), inputs, trees, None, None)
     }
 
-    /// - `before`: the same scene at another time, whose tables are shared as far as they are equal.
-    fn about(origin: DVec3, inputs: &SceneInputs, trees: &Trees, before: Option<(&SceneInputs, &Prepared)>) -> Self {
+    /// - `base`: the same scene at another time of the exposure.
+    /// - `before`: a snapshot whose tables are shared as far as they are equal.
+    fn about(
+        origin: DVec3,
+        inputs: &SceneInputs,
+        trees: &Trees,
+        base: Option<&SceneInputs>,
+        before: Option<&Prepared>,
+    ) -> Self {
         let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
@@ -77,7 +84,7 @@ impl Extraction {
         }
         let mut geometry = (Vec::new(), Vec::new());
         let mut entities = Vec::new();
-        let spaces = hit_spaces(inputs, trees, origin, before.map(|(base, _)| base));
+        let spaces = hit_spaces(inputs, trees, origin, base);
         for (object, space) in inputs.objects.iter().zip(spaces) {
             match shape_of(object, trees, origin, space) {
                 Ok((shape, mesh)) => {
@@ -126,7 +133,7 @@ impl Extraction {
         let snapshot = Snapshot::new(geometry, shading, camera);
         let prepared = match before {
             None => Prepared::new(snapshot),
-            Some((_, before)) => before.with_snapshot(snapshot),
+            Some(before) => before.with_snapshot(snapshot),
         };
         Self { origin, prepared, problems, entities, delta_lights, ids: materials.ids, order: materials.order }
     }
@@ -181,7 +188,7 @@ impl Extraction {
         let camera = camera_of(inputs);
         let moved = origin_for(&camera.view) != self.origin;
         if moved || part == SnapshotPart::Geometry {
-            *self = Self::new(inputs, trees);
+            *self = Self::about(origin_of(inputs), inputs, trees, None, Some(&self.prepared));
             return moved;
         }
         if part == SnapshotPart::Shading {
@@ -205,7 +212,7 @@ impl Extraction {
     pub fn at(&self, animation: &Animation, inputs: &SceneInputs, trees: &Trees, seconds: f64) -> Prepared {
         let then = animation.inputs_at(inputs, seconds);
         if then.objects != inputs.objects || !same_shapes(&then.lights, &inputs.lights) {
-            return Self::about(self.origin, &then, trees, Some((inputs, &self.prepared))).prepared;
+            return Self::about(self.origin, &then, trees, Some(inputs), Some(&self.prepared)).prepared;
         }
         let mut prepared = self.prepared.clone();
         if then.lights != inputs.lights || then.materials != inputs.materials {

@@ -60,6 +60,12 @@ impl SceneTree {
         &self.objects.shapes
     }
 
+    /// The trees that its meshes share. [`Self::build_with`] makes trees over some of the shapes of them without building
+    /// any.
+    pub fn statics(&self) -> Vec<Arc<StaticTree>> {
+        self.top.statics.iter().map(|placed| placed.tree.clone()).collect()
+    }
+
     /// The transforms of an object, by its index.
     pub fn instance(&self, object: usize) -> &Instance {
         &self.objects.instances[object]

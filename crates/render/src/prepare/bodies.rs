@@ -224,7 +224,7 @@ impl Bodies {
                     if local.cmplt(bounds.min).any() || local.cmpgt(bounds.max).any() {
                         continue;
                     }
-                    let alone = SceneTree::build(vec![shape.clone()]);
+                    let alone = SceneTree::build_with(vec![shape.clone()], &geometry.tree.statics());
                     for (material, body) in parts {
                         let counts = |hit: &Hit| geometry.objects[object].material_of(hit.prim) == *material;
                         let winding = winding(&alone, point, &counts);
@@ -239,7 +239,8 @@ impl Bodies {
             }
         }
         for (body, shapes) in open {
-            let winding = winding(&SceneTree::build(shapes), point, &|_| true);
+            let alone = SceneTree::build_with(shapes, &geometry.tree.statics());
+            let winding = winding(&alone, point, &|_| true);
             rows.extend((0..winding).map(|_| body));
         }
         rows.sort_unstable();

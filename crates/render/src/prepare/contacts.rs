@@ -61,11 +61,13 @@ impl Contacts {
             return Self::default();
         }
         let shapes = geometry.tree.shapes();
+        let statics = geometry.tree.statics();
         let mut alone: FxHashMap<u32, Arc<SceneTree>> = FxHashMap::default();
         let mut of_object = vec![Vec::new(); shapes.len()];
         for (clear, other) in pairs {
             let tree = alone.entry(other);
-            let tree = tree.or_insert_with(|| Arc::new(SceneTree::build(vec![shapes[other as usize].clone()])));
+            let only = || vec![shapes[other as usize].clone()];
+            let tree = tree.or_insert_with(|| Arc::new(SceneTree::build_with(only(), &statics)));
             of_object[clear as usize].push(Other { object: other, alone: tree.clone() });
         }
         Self { of_object }
