@@ -30,8 +30,6 @@ use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
 const MAX_OBJECTS: usize = 1 << 20;
-/// Bytes of meshes that formulas may make, for each byte that a scene may have.
-const BYTES_MADE: u64 = 4;
 
 /// What a shape is made of.
 #[derive(Clone, Debug)]
@@ -139,7 +137,8 @@ impl<'a> Builder<'a> {
             resolved: HashMap::new(),
             with_normals: HashMap::new(),
             ply: HashMap::new(),
-            bytes_left: Limits::of_this_process().scene_bytes.saturating_mul(BYTES_MADE),
+            // Meshes of formulas may have as many bytes as a scene: trees over them take several times as many.
+            bytes_left: Limits::of_this_process().scene_bytes,
             n_shapes: 0,
             n_placed: 0,
             n_described: 0,
