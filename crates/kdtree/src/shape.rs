@@ -58,6 +58,27 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Whether both are the same geometry: by value, and meshes and clouds if they share their tree.
+    pub fn is_same(&self, other: &Self) -> bool {
+        use Shape::*;
+        match (self, other) {
+            (Sphere { center: a, radius: r }, Sphere { center: b, radius: s }) => (a, r) == (b, s),
+            (Plane { point: a, normal: n }, Plane { point: b, normal: m }) => (a, n) == (b, m),
+            (Quad { corner: a, edge_u: u, edge_v: v }, Quad { corner: b, edge_u: other_u, edge_v: other_v }) => {
+                (a, u, v) == (b, other_u, other_v)
+            }
+            (Triangle { vertices: a }, Triangle { vertices: b }) => a == b,
+            (
+                Mesh { tree: a, world_from_object: map, space },
+                Mesh { tree: b, world_from_object: other_map, space: other_space },
+            ) => Arc::ptr_eq(a, b) && (map, space) == (other_map, other_space),
+            (Spheres { tree: a, world_from_object: map }, Spheres { tree: b, world_from_object: other_map }) => {
+                Arc::ptr_eq(a, b) && map == other_map
+            }
+            _ => false,
+        }
+    }
+
     /// Map from the space in which hits are decided to that of the snapshot.
     pub(super) fn world_from_object(&self) -> Affine3A {
         match self {

@@ -21,6 +21,7 @@ pub(crate) mod plan_cache;
 pub(crate) mod prepared;
 mod radiance_unit;
 pub(crate) mod surface_table;
+mod touching;
 
 pub use exposed::{Exposed, moment_of_sample};
 pub use prepared::{Features, Moments, Prepared};

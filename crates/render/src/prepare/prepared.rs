@@ -10,7 +10,7 @@ use crate::prepare::bodies::{Bodies, Boundary};
 use crate::prepare::bound::radiance_bound;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
-use crate::prepare::contacts::{ContactScene, Contacts};
+use crate::prepare::contacts::{ContactScene, Contacts, ContactsBefore};
 use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
@@ -139,7 +139,7 @@ impl Prepared {
         Self { snapshot, tables, surfaces: self.surfaces.clone(), moments: None }
     }
 
-    /// Returns the tables for another snapshot; those of the environment are shared if it is the same.
+    /// Returns the tables for another snapshot; what is the same in both, and takes long, is not computed again.
     pub fn with_snapshot(&self, snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, Some(self)));
@@ -221,18 +221,23 @@ impl Prepared {
 }
 
 impl Tables {
-    /// - `before`: a scene that may have the same environment, whose tables are then shared.
+    /// - `before`: a scene that may have some of the same objects, or the same environment, whose tables are then shared.
     fn build(geometry: &Geometry, shading: &Shading, before: Option<&Prepared>) -> Self {
         let Shading { materials, textures, environment, air, delta_lights } = shading;
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, textures, delta_lights);
+        let contacts_before = before.map(|before| ContactsBefore {
+            geometry: &before.geometry,
+            materials: &before.shading.materials,
+            contacts: &before.tables.contacts,
+        });
         let before = before.filter(|before| is_same(&before.shading.environment, environment));
         let (ambient, environment_sampler) = match before.map(|before| &before.tables) {
             Some(tables) => (tables.ambient.clone(), tables.environment_sampler.clone()),
             None => (AmbientLight::of(environment), EnvironmentSampler::build(environment).map(Arc::new)),
         };
         let bodies = Bodies::build(geometry, materials);
-        let contacts = Contacts::build(geometry, materials);
+        let contacts = Contacts::build(geometry, materials, contacts_before);
         let mut casters = CasterTable::build(geometry, materials, &lights);
         if !delta_lights.is_empty() {
             casters = casters.map(|casters| casters.with_media(geometry, &bodies, &lights));
