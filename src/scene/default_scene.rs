@@ -5,7 +5,6 @@ use crate::format::choice::UpAxis;
 use crate::format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
-use crate::format::value::Named;
 use crate::format::value::{ColorValue, Rgb};
 use crate::import::framing::Framing;
 use crate::import::meshes::LoadedMesh;
@@ -108,10 +107,10 @@ pub fn is_inner(light: &LightPart) -> bool {
 
 /// Adds a material under a new name, which is returned.
 fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> String {
-    let is_taken = |name: &String| file.materials.names().any(|known| known == name);
+    let is_taken = |name: &String| file.materials.get(name).is_some();
     let names = std::iter::once(wanted.to_owned()).chain((2..).map(|number: u64| format!("{wanted} {number}")));
     let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
-    file.materials.0.push((name.clone(), material));
+    file.materials.0.insert(name.clone(), material);
     name
 }
 
@@ -154,7 +153,7 @@ pub fn around(
         transform,
     };
     let file = SceneFile {
-        materials: Named(if has_materials { Vec::new() } else { vec![(CLAY.to_owned(), clay)] }),
+        materials: (!has_materials).then(|| (CLAY.to_owned(), clay)).into_iter().collect(),
         objects: vec![model],
         ..SceneFile::new(framing.camera())
     };

@@ -249,12 +249,12 @@ impl<'a> Writer<'a> {
 
     fn materials(&mut self) -> Named<MaterialPart> {
         let named = std::mem::take(&mut self.named);
-        let mut parts: Vec<(String, MaterialPart)> =
+        let mut parts: Named<MaterialPart> =
             named.into_iter().map(|(_, name, material)| (name, material.map(self))).collect();
         if let Some(grey) = self.grey.clone() {
-            parts.push((grey, GREY.map(self)));
+            parts.0.insert(grey, GREY.map(self));
         }
-        Named(parts)
+        parts
     }
 
     fn texture_name(&mut self, texture: &Arc<SurfaceTexture>) -> String {
@@ -278,14 +278,13 @@ impl<'a> Writer<'a> {
 
     /// The textures of the file in its order, used or not, then all others.
     fn textures(&self) -> Named<TextureSource> {
-        let of_file = self.loaded.map(|loaded| loaded.file.textures.0.clone()).unwrap_or_default();
-        let mut textures = of_file;
+        let mut textures = self.loaded.map(|loaded| loaded.file.textures.clone()).unwrap_or_default();
         for (texture, name) in &self.textures {
             if !self.loaded_textures.contains_key(&**name) {
-                textures.push((name.clone(), self.with_path_from_folder(texture)));
+                textures.0.insert(name.clone(), self.with_path_from_folder(texture));
             }
         }
-        Named(textures)
+        textures
     }
 
     /// The textures of a mesh's own materials have paths relative to the working directory: makes them absolute.

@@ -662,7 +662,7 @@ fn leave_out_pictures(file: &mut SceneFile, lost: &HashSet<String>) {
     if !file.textures.iter().any(|(_, source)| is_lost(source)) {
         return;
     }
-    file.textures.0.retain(|(_, source)| !is_lost(source));
+    file.textures.0.retain(|_, source| !is_lost(source));
     let names: HashSet<&str> = file.textures.names().collect();
     for (_, part) in &mut file.materials.0 {
         *part = without_lost_textures(part, |name| names.contains(name));

@@ -251,3 +251,22 @@ fn one_thread_and_sixty_four_render_the_same_bits() {
     };
     assert_eq!(render(1), render(64));
 }
+
+/// A few letters ask for many triangles: what all shapes of this kind take together is limited, and the rest is told.
+#[test]
+fn shapes_of_formulas_end_where_their_bytes_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let shape = "Shape \"sphere\" \"float zmax\" 0.9\nShape \"loopsubdiv\" \"integer levels\" 4 \"point3 P\" \
+                 [0 0 0 1 0 0 0 1 0 0 0 1] \"integer indices\" [0 2 1 0 1 3 1 2 3 0 3 2]\n";
+    let scene = format!("Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\n{}", shape.repeat(40));
+    std::fs::write(folder.path().join("many.pbrt"), scene).unwrap();
+    let output = Command::new(PROGRAM)
+        .args(["info", "--json", "many.pbrt"])
+        .current_dir(&folder)
+        .env("FIRSTLIGHT_LIMITS", "0.01")
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("there are too many shapes like it") && said.contains("FIRSTLIGHT_LIMITS"), "{said}");
+}

@@ -149,8 +149,7 @@ impl Maker<'_> {
         }
         let materials: Vec<_> = used.keys().map(|&index| &surfaces.materials[index]).collect();
         let emits = materials.iter().any(|surface| surface.emits);
-        let named: Named<_> =
-            Named(materials.iter().map(|surface| (surface.name.clone(), surface.part.clone())).collect());
+        let named: Named<_> = materials.iter().map(|surface| (surface.name.clone(), surface.part.clone())).collect();
         let textures = textures_of(&named, &surfaces.textures);
         warnings.extend(self.notes(&materials.iter().map(|s| (&*s.name, &*s.notes)).collect::<Vec<_>>()));
         let optional = facts.unknown_extensions.iter().filter(|name| !document.requires(name));
@@ -165,7 +164,7 @@ impl Maker<'_> {
         let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), camera_of(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;
         let file = SceneFile {
-            cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
+            cameras: if cameras.len() > 1 { cameras.iter().cloned().collect() } else { Named::default() },
             textures,
             materials: named,
             objects,
@@ -275,5 +274,5 @@ fn textures_of(
     all: &[(String, TextureSource)],
 ) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
-    Named(all.iter().filter(|(name, _)| names.contains(name)).cloned().collect())
+    all.iter().filter(|(name, _)| names.contains(name)).cloned().collect()
 }

@@ -129,7 +129,7 @@ impl<'a> Converter<'a> {
 
     pub(crate) fn add_material(&mut self, node: Node, part: MaterialPart) -> String {
         let name = self.material_names.free(node.called());
-        self.file.materials.0.push((name.clone(), part));
+        self.file.materials.0.insert(name.clone(), part);
         name
     }
 
@@ -161,7 +161,7 @@ impl<'a> Converter<'a> {
                         Some(_) => sensor.called().to_owned(),
                         None => format!("sensor {}", sensor.index),
                     };
-                    self.file.cameras.0.push((self.names.free(&name), camera));
+                    self.file.cameras.0.insert(self.names.free(&name), camera);
                 }
                 Some(camera) => (self.file.camera, has_camera) = (camera, true),
                 None => self.file.film = film,

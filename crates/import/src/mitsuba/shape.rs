@@ -116,7 +116,7 @@ impl Converter<'_> {
         }
         let mut add = |wanted: &str, part: MaterialPart| {
             let name = self.material_names.free(wanted);
-            self.file.materials.0.push((name.clone(), part));
+            self.file.materials.0.insert(name.clone(), part);
             name
         };
         let black = add("black", Material::Diffuse { albedo: ColorValue::grey(0.0) });

@@ -120,7 +120,7 @@ impl Converter<'_> {
             None => format!("{} {}", node.plugin(), node.index),
         };
         let name = self.names.free(&wanted);
-        self.file.textures.0.push((name.clone(), source));
+        self.file.textures.0.insert(name.clone(), source);
         self.attributes.extend(read_attribute.map(|attribute| (name.clone(), attribute)));
         self.textures.insert((node.index, reads), name.clone());
         Ok(ColorValue::Texture(name))

@@ -30,6 +30,9 @@ use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
 const MAX_OBJECTS: usize = 1 << 20;
+/// Meshes that formulas make may have this fraction of the bytes of a scene: reading them and building their trees takes
+/// as long as for a text of such a size.
+const SCENE_BYTES_PER_BYTE_MADE: u64 = 4;
 
 /// What a shape is made of.
 #[derive(Clone, Debug)]
@@ -137,8 +140,7 @@ impl<'a> Builder<'a> {
             resolved: HashMap::new(),
             with_normals: HashMap::new(),
             ply: HashMap::new(),
-            // Meshes of formulas may have as many bytes as a scene: trees over them take several times as many.
-            bytes_left: Limits::of_this_process().scene_bytes,
+            bytes_left: Limits::of_this_process().scene_bytes / SCENE_BYTES_PER_BYTE_MADE,
             n_shapes: 0,
             n_placed: 0,
             n_described: 0,

@@ -28,7 +28,6 @@ use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::pbrt::directives::Reader;
 use firstlight_format::error::SceneError;
 use firstlight_format::scene_file::SceneFile;
-use firstlight_format::value::Named;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -48,8 +47,8 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
         max_depth: Some(view.max_depth),
         display: view.display,
         environment: builder.environment,
-        textures: Named(builder.used_textures),
-        materials: Named(builder.materials),
+        textures: builder.used_textures.into_iter().collect(),
+        materials: builder.materials.into_iter().collect(),
         objects: builder.objects,
         lights: builder.lights,
         ..SceneFile::new(view.camera)

@@ -6,7 +6,6 @@
 use crate::model::assemble::Indexed;
 use crate::pbrt::params::Params;
 use glam::DVec3;
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 /// Triangles that a surface may have after subdivision; three levels are always made.
@@ -62,31 +61,33 @@ fn weight(valence: usize) -> f64 {
 impl Surface {
     /// The neighbours of each vertex, in the orientation of the triangles.
     fn rings(&self) -> Result<Vec<Ring>, String> {
-        let mut next: Vec<HashMap<u32, u32>> = vec![HashMap::new(); self.positions.len()];
-        for &[a, b, c] in &self.triangles {
-            for [at, from, to] in [[a, b, c], [b, c, a], [c, a, b]] {
-                if next[at as usize].insert(from, to).is_some() {
-                    return Err("more than two of its triangles share an edge, or they face opposite ways".to_owned());
-                }
-            }
+        // Per corner of a triangle: its vertex, and the two others in order.
+        let corners = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]];
+        let mut steps: Vec<[u32; 3]> = self.triangles.iter().flat_map(corners).collect();
+        steps.sort_unstable();
+        if steps.windows(2).any(|pair| pair[0][..2] == pair[1][..2]) {
+            return Err("more than two of its triangles share an edge, or they face opposite ways".to_owned());
         }
-        let ring = |next: &HashMap<u32, u32>| {
-            let targets: std::collections::HashSet<u32> = next.values().copied().collect();
+        let mut rest = &steps[..];
+        let ring = |vertex: u32| {
+            let (own, others) = rest.split_at(rest.partition_point(|step| step[0] == vertex));
+            rest = others;
+            let mut targets: Vec<u32> = own.iter().map(|step| step[2]).collect();
+            targets.sort_unstable();
             // Where a boundary begins, no triangle leads.
-            let begins = next.keys().filter(|from| !targets.contains(from));
-            let start = begins.copied().min();
+            let start = own.iter().map(|step| step[1]).find(|from| targets.binary_search(from).is_err());
             let mut ring = Ring { vertices: Vec::new(), is_boundary: start.is_some() };
-            let Some(first) = start.or_else(|| next.keys().copied().min()) else { return ring };
+            let Some(first) = start.or(own.first().map(|step| step[1])) else { return ring };
             let mut at = first;
             loop {
                 ring.vertices.push(at);
-                match next.get(&at) {
-                    Some(&to) if to != first && ring.vertices.len() <= next.len() => at = to,
+                match own.binary_search_by_key(&at, |step| step[1]) {
+                    Ok(i) if own[i][2] != first && ring.vertices.len() <= own.len() => at = own[i][2],
                     _ => return ring,
                 }
             }
         };
-        Ok(next.iter().map(ring).collect())
+        Ok((0..self.positions.len() as u32).map(ring).collect())
     }
 
     fn sum(&self, vertices: &[u32]) -> DVec3 {
@@ -129,24 +130,23 @@ impl Surface {
         let rings = self.rings()?;
         let mut positions: Vec<DVec3> =
             self.positions.iter().zip(&rings).map(|(at, ring)| self.moved(*at, ring)).collect();
-        // The vertices across each edge, whose ends are in ascending order.
-        let mut across: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+        // Each edge, with its ends in ascending order, and the vertex across it in each of its triangles.
         let edge = |a: u32, b: u32| [a.min(b), a.max(b)];
-        for &[a, b, c] in &self.triangles {
-            for [from, to, other] in [[a, b, c], [b, c, a], [c, a, b]] {
-                across.entry(edge(from, to)).or_default().push(other);
+        let sides = |&[a, b, c]: &[u32; 3]| [(edge(a, b), c), (edge(b, c), a), (edge(c, a), b)];
+        let mut sides: Vec<([u32; 2], u32)> = self.triangles.iter().flat_map(sides).collect();
+        sides.sort_unstable();
+        let edges: Vec<[u32; 2]> = sides.chunk_by(|a, b| a.0 == b.0).map(|group| group[0].0).collect();
+        let first = positions.len();
+        positions.extend(sides.chunk_by(|a, b| a.0 == b.0).map(|group| {
+            let ends = self.sum(&group[0].0);
+            match group {
+                [(_, a), (_, b)] => 0.375 * ends + 0.125 * self.sum(&[*a, *b]),
+                _ => 0.5 * ends,
             }
-        }
-        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry(edge(a, b)).or_insert_with(|| {
-                let ends = self.sum(&[a, b]);
-                positions.push(match &across[&edge(a, b)][..] {
-                    others @ [_, _] => 0.375 * ends + 0.125 * self.sum(others),
-                    _ => 0.5 * ends,
-                });
-                (positions.len() - 1) as u32
-            })
+        }));
+        let middle = |a: u32, b: u32| {
+            let rank = edges.binary_search(&edge(a, b)).expect("each edge of a triangle is listed");
+            (first + rank) as u32
         };
         let mut triangles = Vec::with_capacity(4 * self.triangles.len());
         for &[a, b, c] in &self.triangles {
