@@ -87,3 +87,20 @@ fn all_that_is_said_goes_through_the_console() {
     assert!(others.is_empty(), "use console::print and console::remark:\n{}", others.join("\n"));
     assert!(!found(&["stdout()"], &[]).is_empty());
 }
+
+/// Texts that list the formats of scenes list all of them.
+#[test]
+fn lists_of_scene_formats_are_whole() {
+    let whole = firstlight_format::scene_format::SceneFormat::extensions();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let pages = ["README.md", "docs/keys.md", "docs/command-line.md"].map(|name| {
+        let text = std::fs::read_to_string(root.join(name)).unwrap_or_default();
+        (name.to_owned(), text)
+    });
+    let lists = |(path, text): &(String, String)| {
+        let wrong = |line: &&str| line.contains("(.ron, ") && !line.contains(&whole);
+        text.lines().filter(wrong).map(|line| format!("{path}: {}", line.trim())).collect::<Vec<_>>()
+    };
+    let wrong: Vec<String> = sources().iter().chain(&pages).flat_map(lists).collect();
+    assert!(wrong.is_empty(), "not {whole}:\n{}", wrong.join("\n"));
+}

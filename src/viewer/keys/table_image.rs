@@ -132,7 +132,7 @@ pub const FILES: KeyGroup = KeyGroup {
         },
         Binding {
             triggers: &[Trigger::Mouse("Drop a file")],
-            effect: "open a scene (.ron, .pbrt), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
+            effect: "open a scene (.ron, .pbrt, .xml), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
         },
         Binding {
             triggers: &[

@@ -45,7 +45,7 @@ pub(crate) struct ContactsBefore<'a> {
 impl ContactsBefore<'_> {
     /// Returns what is known of pairs with overlapping boxes: whether they touch, if both objects are here what they
     /// are among `shapes`.
-    fn verdicts(&self, shapes: &[Shape]) -> impl Fn((u32, u32)) -> Option<bool> {
+    fn known_pairs(&self, shapes: &[Shape]) -> impl Fn((u32, u32)) -> Option<bool> {
         let clear = clear_objects(self.geometry, self.materials);
         let before = self.geometry.tree.shapes();
         let same: Vec<bool> = shapes.iter().zip(before).map(|(now, before)| now.is_same(before)).collect();
@@ -90,7 +90,7 @@ impl Contacts {
         let shapes = geometry.tree.shapes();
         let clear = clear_objects(geometry, materials);
         let pairs = match &before {
-            Some(before) => touching(shapes, &clear, before.verdicts(shapes)),
+            Some(before) => touching(shapes, &clear, before.known_pairs(shapes)),
             None => touching(shapes, &clear, |_| None),
         };
         if pairs.is_empty() {
