@@ -66,6 +66,20 @@ enum TemplateValue {
     Directives(Vec<SlurmOption>),
 }
 
+/// A string of JSON that is the same string in YAML, which breaks lines at more characters, and allows fewer.
+fn yaml_string(text: &str) -> String {
+    let mut quoted = String::new();
+    for c in serde_json::Value::from(text).to_string().chars() {
+        match c {
+            '\u{7f}'..='\u{9f}' | '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' => {
+                quoted += &format!("\\u{:04x}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted
+}
+
 impl TemplateValue {
     fn quoted(&self, language: Language) -> String {
         match (self, language) {
@@ -76,7 +90,7 @@ impl TemplateValue {
                 name.clone()
             }
             (Self::Text(text), Language::Shell) => shell_word(text),
-            (Self::Text(text), Language::Yaml) => serde_json::Value::from(&**text).to_string(),
+            (Self::Text(text), Language::Yaml) => yaml_string(text),
             (Self::Directives(options), _) => {
                 let lines = options.iter().map(|SlurmOption(option)| format!("SBATCH {option}"));
                 lines.collect::<Vec<_>>().join("\n#")
@@ -223,6 +237,10 @@ mod tests {
         assert_eq!(words, Some(vec![hostile.clone(), "'".to_owned(), "3".to_owned()]));
         let string: String = serde_json::from_str(&fill("@A@", Language::Yaml, &values)).unwrap();
         assert_eq!(string, hostile);
+        // YAML breaks lines at the first, the third and the fourth, and allows none of them.
+        let breaks = "a\u{85}\u{7f}\u{2028}\u{2029}\u{feff}é";
+        assert_eq!(yaml_string(breaks), r#""a\u0085\u007f\u2028\u2029\ufeffé""#);
+        assert_eq!(serde_json::from_str::<String>(&yaml_string(breaks)).unwrap(), breaks);
     }
 
     #[test]

@@ -172,6 +172,9 @@ impl Job {
         if job.parts > Self::MOST_PARTS || n_frames > Self::MOST_FRAMES {
             return content(&format!("has more than {} parts or {} frames", Self::MOST_PARTS, Self::MOST_FRAMES));
         }
+        if job.error.is_some_and(|error| !(error > 0.0 && error.is_finite())) {
+            return content("has an error target that is not above 0");
+        }
         // Both are arguments of `render`.
         if job.scene.starts_with('-') {
             return content("has an option in place of a scene");

@@ -194,21 +194,26 @@ fn check_entries(
     if zip.len() > MOST_FILES {
         return Err(UnpackError::TooMany(zip.len()));
     }
-    let (mut names, mut data, mut places) = (HashSet::new(), HashSet::new(), BTreeSet::new());
+    let (mut names, mut places) = (HashSet::new(), BTreeSet::new());
+    // Where the bytes of each file begin and end, with its name.
+    let mut spans = Vec::new();
     let mut size = 0_u64;
     for i in 0..zip.len() {
         let file = zip.by_index_raw(i)?;
         let name = name_of(&file)?;
-        // The same bytes under several names.
-        if !data.insert(file.header_start()) {
-            return Err(UnpackError::Damaged(name));
-        }
+        let Some(data) = file.data_start() else { return Err(UnpackError::Damaged(name)) };
+        spans.push((file.header_start(), data.saturating_add(file.compressed_size()), name.clone()));
         // Two names may be spellings of one.
         if !places.insert(text_to_path(&name)) {
             return Err(UnpackError::Twice(name));
         }
         names.insert(name);
         size = size.saturating_add(file.size());
+    }
+    // The same bytes for several files.
+    spans.sort_unstable();
+    if let Some([_, (.., shared)]) = spans.array_windows().find(|[(_, end, _), (next, ..)]| next < end) {
+        return Err(UnpackError::Damaged(shared.clone()));
     }
     // What is below a file follows it.
     let mut pairs = places.iter().zip(places.iter().skip(1));

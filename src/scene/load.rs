@@ -1,6 +1,7 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
 use crate::files::input_file::{FileKind, InputFile};
+use crate::files::limits::has_room;
 use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
 use crate::files::stamp::{Stamp, stamp};
@@ -358,6 +359,18 @@ fn resolve(
             _ => {}
         }
     }
+    if let Some(file) = scene.environment_without_room() {
+        let place = at(text, &title, ENVIRONMENT);
+        let name = printable::name(&file);
+        scene.warnings.push(format!("{place}`{name}`: not enough memory; an environment of one colour is shown"));
+        lost.insert(file);
+    }
+    let n_objects = scene.file.objects.len() as u64;
+    if !has_room(n_objects * OBJECT_BYTES) {
+        let size = (n_objects * OBJECT_BYTES) >> 20;
+        let wanted = format!("its {n_objects} objects take about {size} MiB to render, more than is available");
+        return Err(SceneError::in_file(&title, wanted));
+    }
     leave_out_pictures(&mut scene.file, &lost);
     if let EnvironmentSource::Image { file, layout, axes, .. } = &scene.file.environment
         && (*layout != EnvironmentLayout::default() || axes.is_some())
@@ -648,6 +661,22 @@ fn at(text: Option<&str>, title: &Path, path: &str) -> String {
 
 fn quoted(name: &str) -> String {
     format!("`{}`", printable::name(name))
+}
+
+/// Bytes that an object takes to be rendered, with its share of trees and tables.
+const OBJECT_BYTES: u64 = 4_500;
+
+/// Bytes per pixel of an environment, to be sampled.
+const ENVIRONMENT_BYTES: u64 = 32;
+
+impl LoadedScene {
+    /// The environment image, if there is no memory for the tables from which it is sampled.
+    fn environment_without_room(&self) -> Option<String> {
+        let EnvironmentSource::Image { file, .. } = &self.file.environment else { return None };
+        let image = self.pictures.get(file)?;
+        let pixels = u64::from(image.width) * u64::from(image.height);
+        (!has_room(pixels * ENVIRONMENT_BYTES)).then(|| file.clone())
+    }
 }
 
 /// Removes the textures and the environment of images that cannot be read. Materials get what is shown instead, so that

@@ -270,3 +270,30 @@ fn shapes_of_formulas_end_where_their_bytes_do() {
     let said = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
     assert!(said.contains("there are too many shapes like it") && said.contains("FIRSTLIGHT_LIMITS"), "{said}");
 }
+
+/// What a scene takes beyond the memory of the process is refused or left out, with its size; nothing is aborted.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_scene_beyond_the_memory_of_the_process_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = "camera: (eye: (0, 0, 5), look_at: (0, 0, 0))";
+    image::GrayImage::from_pixel(4096, 4096, image::Luma([99])).save(folder.path().join("sky.png")).unwrap();
+    let sky = format!("({camera}, environment: image(file: \"sky.png\"))");
+    let sphere = "sphere(radius: 1, material: \"m\"), ";
+    let spheres = format!(
+        "({camera}, environment: constant(1), materials: {{ \"m\": mirror() }}, objects: [{}])",
+        sphere.repeat(100_000)
+    );
+    std::fs::write(folder.path().join("sky.ron"), sky).unwrap();
+    std::fs::write(folder.path().join("spheres.ron"), spheres).unwrap();
+    for (scene, code, expected) in [
+        ("sky.ron", 0, "`sky.png`: not enough memory; an environment of one colour is shown"),
+        ("spheres.ron", 1, "its 100000 objects take about 429 MiB to render, more than is available"),
+    ] {
+        let line =
+            format!("ulimit -v 700000; exec {PROGRAM} render {scene} -o {scene}.png --spp 1 --size 8x6 --threads 2");
+        let output = Command::new("bash").args(["-c", &line]).current_dir(folder.path()).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(code) && said.contains(expected), "{:?} {said}", output.status);
+    }
+}

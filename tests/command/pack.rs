@@ -348,6 +348,24 @@ fn archives_have_limits_for_all_files_together() {
     bytes[entries[1] + 42..entries[1] + 46].copy_from_slice(&first);
     std::fs::write(path.join("bomb.zip"), bytes).unwrap();
     assert!(said().contains("damaged"), "{}", said());
+    // The second one lies inside of the first.
+    let stored = options.compression_method(zip::CompressionMethod::Stored);
+    let archive = |files: &[(&str, &[u8])]| {
+        let mut out = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, bytes) in files {
+            out.start_file(*name, stored).unwrap();
+            out.write_all(bytes).unwrap();
+        }
+        out.finish().unwrap().into_inner()
+    };
+    let inner = archive(&[("1.bin", b"inner")]);
+    let mut bytes = archive(&[("0.bin", &inner), ("1.bin", b"inner"), ("SHA256SUMS", b"")]);
+    let entries: Vec<usize> = (0..bytes.len() - 4).filter(|&i| bytes[i..].starts_with(b"PK\x01\x02")).collect();
+    // Behind the header of the first: 30 bytes and its name. Among the entries is the one inside.
+    let inside = 30 + "0.bin".len() as u32;
+    bytes[entries[2] + 42..entries[2] + 46].copy_from_slice(&inside.to_le_bytes());
+    std::fs::write(path.join("bomb.zip"), bytes).unwrap();
+    assert!(said().contains("1.bin") && said().contains("damaged"), "{}", said());
 }
 
 /// With what it includes, and the meshes and images that are named there; as a scene of ours that refers to it, too.

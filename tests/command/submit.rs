@@ -173,6 +173,7 @@ fn numbers_and_words_in_the_jobs_of_others_are_checked() {
         ("\"parts\": 2", "\"parts\": 4294967295", "more than 1000000 parts"),
         ("\"parts\": 2", "\"frames\": [0, 4294967295], \"parts\": 2", "100000 frames"),
         ("\"scene\": \"cornell\"", "\"scene\": \"-h\"", "an option in place of a scene"),
+        ("\"parts\": 2", "\"error\": -1, \"parts\": 2", "an error target that is not above 0"),
     ] {
         assert!(text.contains(from), "{text}");
         std::fs::write(&file, text.replace(from, to)).unwrap();

@@ -188,3 +188,26 @@ fn the_light_of_every_quarter_of_the_image_stays() {
         }
     }
 }
+
+/// Names mean nothing to the other program: not the parameters and paths of Mitsuba, not the marks of either grammar.
+#[test]
+fn scenes_with_any_names_open_again() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let names = ["$(x)", "$x", "a.b", "\\\"", "<&>", "\\n#", "[", "é 球"];
+    let materials: String = names.iter().map(|name| format!("\"{name}\": diffuse(albedo: 0.6),\n")).collect();
+    let object = |name: &&str| format!("mesh(source: obj(\"m.obj\"), name: \"{name}\", material: \"{name}\"),\n");
+    let objects: String = names.iter().map(object).collect();
+    let text = format!(
+        "(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), environment: constant(1),\n\
+         materials: {{ {materials} }}, objects: [ {objects} ])"
+    );
+    let (mut world, scene) = open(written(folder.path(), &text));
+    for format in SceneFormat::ALL {
+        let path = folder.path().join(format!("out $(y) \" &.{}", format.file_extension()));
+        export(&whole_scene(&mut world, &scene), format, &path, true).unwrap();
+        let again = open(SceneSource::Foreign(path)).1;
+        assert!(again.warnings.is_empty(), "{format:?}: {:?}", again.warnings);
+        assert_eq!((again.file.objects.len(), again.file.materials.names().count()), (names.len(), names.len()));
+    }
+}

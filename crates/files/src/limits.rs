@@ -31,6 +31,13 @@ pub struct Limits {
     pub settings_bytes: u64,
 }
 
+/// Whether so many bytes of memory can be had at once: where they cannot, work that needs them is refused, since an
+/// allocation that fails ends the process.
+pub fn has_room(bytes: u64) -> bool {
+    let mut room: Vec<u8> = Vec::new();
+    usize::try_from(bytes).is_ok_and(|bytes| room.try_reserve_exact(bytes).is_ok())
+}
+
 impl Limits {
     /// The environment variable that multiplies all limits.
     pub const VARIABLE: &str = "FIRSTLIGHT_LIMITS";

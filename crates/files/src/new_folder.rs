@@ -5,6 +5,7 @@ use crate::relative::absolute;
 use crate::whole_file::{InProgress, unwritable};
 use crate::write_error::WriteError;
 use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -17,6 +18,8 @@ pub struct NewFolder {
     /// The path with all links resolved.
     target: PathBuf,
     in_progress: InProgress,
+    /// Tells other processes that this one fills it; `None` where folders cannot be locked.
+    _lock: Option<File>,
 }
 
 impl NewFolder {
@@ -31,17 +34,18 @@ impl NewFolder {
         let no_folder = |source| WriteError::NoFolder { folder: path.to_path_buf(), source };
         std::fs::create_dir_all(around).map_err(no_folder)?;
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".firstlight-").suffix(".part");
+        builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             // As the user has it for new folders: others of a cluster read it.
             builder.permissions(std::fs::Permissions::from_mode(0o777));
         }
-        let part = builder.tempdir_in(around).map_err(no_folder)?;
+        remove_left_over(around);
+        let (part, lock) = locked_part(&builder, around).map_err(no_folder)?;
         let in_progress = InProgress::of(part.path());
         in_progress.check().map_err(no_folder)?;
-        Ok(Self { part, path: path.to_path_buf(), target, in_progress })
+        Ok(Self { part, path: path.to_path_buf(), target, in_progress, _lock: lock })
     }
 
     /// Where it is until it is finished.
@@ -100,6 +104,43 @@ impl NewFolder {
             }
         }
         Ok(())
+    }
+}
+
+const PREFIX: &str = ".firstlight-";
+const SUFFIX: &str = ".part";
+
+/// Makes a temporary folder and locks it.
+fn locked_part(builder: &tempfile::Builder, around: &Path) -> io::Result<(TempDir, Option<File>)> {
+    /// Another process that begins at the same moment may take a new folder for one left over.
+    const ATTEMPTS: u32 = 16;
+    for _ in 0..ATTEMPTS {
+        let part = builder.tempdir_in(around)?;
+        match File::open(part.path()).map(|folder| (folder.try_lock(), folder)) {
+            Ok((Ok(()), folder)) if part.path().exists() => return Ok((part, Some(folder))),
+            Ok((Ok(()) | Err(TryLockError::WouldBlock), _)) => {}
+            // Not every system and disk locks folders.
+            _ => return Ok((part, None)),
+        }
+    }
+    Err(io::Error::other("other processes remove its temporary folder"))
+}
+
+/// Removes the temporary folders of processes that were killed: nobody holds their locks.
+fn remove_left_over(around: &Path) {
+    let Ok(entries) = std::fs::read_dir(around) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.as_encoded_bytes();
+        let is_part = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
+        // Links are none.
+        if is_part && entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            let lock =
+                File::open(entry.path()).and_then(|folder| folder.try_lock().map(|()| folder).map_err(io::Error::from));
+            if let Ok(_lock) = lock {
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
+        }
     }
 }
 
@@ -164,5 +205,20 @@ mod tests {
                 (vec!["job.json".into(), "parts".into()], vec!["job".into()])
             );
         }
+    }
+
+    /// What a killed process left is removed by the next one; what another one fills is not.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_next_folder_removes_what_was_left() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(root.path().join(".firstlight-killed.part/parts")).unwrap();
+        std::fs::write(root.path().join(".firstlight-killed.part/parts/film"), "").unwrap();
+        std::os::unix::fs::symlink("elsewhere", root.path().join(".firstlight-link.part")).unwrap();
+        let other = filled(&root.path().join("other"));
+        filled(&root.path().join("new")).finish(OsStr::new("job.json")).unwrap();
+        assert_eq!(names(root.path()).len(), 3);
+        other.finish(OsStr::new("job.json")).unwrap();
+        assert_eq!(names(root.path()), [".firstlight-link.part", "new", "other"]);
     }
 }

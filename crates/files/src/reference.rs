@@ -7,6 +7,7 @@
 
 use crate::printable::name;
 use crate::relative::{path_to_text, text_to_path};
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// Bytes of a name, at most: no path is longer.
@@ -120,7 +121,7 @@ impl<'a> References<'a> {
                 Component::ParentDir => depth -= 1,
                 // With `.\\` it is here, as its spelling with `/` says.
                 Component::Normal(part) if part.as_encoded_bytes().starts_with(b".\\") => {}
-                Component::Normal(part) if part.as_encoded_bytes().starts_with(b".") => return Some("a hidden file"),
+                Component::Normal(part) if is_hidden(part) => return Some("a hidden file"),
                 Component::Normal(_) => depth += 1,
                 Component::Prefix(_) | Component::RootDir => return Some(ABSOLUTE),
             }
@@ -128,23 +129,30 @@ impl<'a> References<'a> {
         None
     }
 
-    /// Refuses what leads out of the folder by a symbolic link.
+    /// Refuses what a symbolic link leads to: out of the folder, or to a hidden file.
     fn without_link(&self, base: &Path, referred: Referred, name: &str) -> Result<Referred, Outside> {
         let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { self.folder };
         // `model.glb#3` is an image inside a model.
         let full = base.join(&referred.path);
         let file = full.to_str().filter(|_| !full.exists()).and_then(|text| text.rsplit_once('#'));
         let file = file.map_or(full.as_path(), |(file, _)| Path::new(file));
-        match (file.canonicalize(), folder.canonicalize()) {
-            (Ok(real), Ok(folder)) if !real.starts_with(&folder) => {
-                Err(Outside { name_in_model: name.to_owned(), why: "a link out of the folder" })
+        let (Ok(real), Ok(folder)) = (file.canonicalize(), folder.canonicalize()) else { return Ok(referred) };
+        let refused = |why| Err(Outside { name_in_model: name.to_owned(), why });
+        match real.strip_prefix(&folder) {
+            Err(_) => refused("a link out of the folder"),
+            Ok(below) if below.components().any(|part| is_hidden(part.as_os_str())) => {
+                refused("a link to a hidden file")
             }
-            _ => Ok(referred),
+            Ok(_) => Ok(referred),
         }
     }
 }
 
 const ABSOLUTE: &str = "an absolute path";
+
+fn is_hidden(name: &OsStr) -> bool {
+    name.as_encoded_bytes().starts_with(b".")
+}
 
 /// The first of these paths that exists, where a folder that is not there may be left out (`missing/../a.png`), or what
 /// differs from the last one by case.
@@ -300,6 +308,13 @@ mod tests {
         assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));
         assert_eq!(at(".\\moved.png"), Ok("./moved.png".to_owned()));
         assert_eq!(at(".\\.moved.png"), Err("a hidden file"));
+        std::fs::create_dir(inner.join(".ssh")).unwrap();
+        std::fs::write(inner.join(".ssh/id_rsa"), "").unwrap();
+        std::os::unix::fs::symlink(".ssh/id_rsa", inner.join("mesh.bin")).unwrap();
+        std::os::unix::fs::symlink(".ssh", inner.join("ssh")).unwrap();
+        for link in ["mesh.bin", "ssh/id_rsa"] {
+            assert_eq!(at(link), Err("a link to a hidden file"), "{link}");
+        }
         for link in ["link.png", "up/secret.png", "LINK.png", "/away/link.png", "link.glb#0", "up/secret.glb#12"] {
             assert_eq!(at(link), Err("a link out of the folder"), "{link}");
         }

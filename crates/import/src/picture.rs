@@ -5,7 +5,7 @@ use crate::ktx2;
 use crate::pfm;
 use bytemuck::allocation::try_cast_vec;
 use firstlight_files::input_file::{FileKind, InputFile, ReadError};
-use firstlight_files::limits::Limits;
+use firstlight_files::limits::{Limits, has_room};
 use firstlight_render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
@@ -368,12 +368,7 @@ fn texel_bytes(color: ColorType) -> u64 {
 
 /// Whether there is room for an image and for what its decoder takes besides.
 fn check_memory(width: u32, height: u32, bytes: u64) -> Result<(), PictureError> {
-    let mut room: Vec<u8> = Vec::new();
-    let wanted = usize::try_from(bytes.saturating_mul(2));
-    match wanted.map(|bytes| room.try_reserve_exact(bytes)) {
-        Ok(Ok(())) => Ok(()),
-        _ => Err(PictureError::NoMemory { width, height }),
-    }
+    if has_room(bytes.saturating_mul(2)) { Ok(()) } else { Err(PictureError::NoMemory { width, height }) }
 }
 
 #[cfg(test)]

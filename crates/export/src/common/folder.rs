@@ -34,7 +34,10 @@ impl Folder {
     /// - `reuse`: whether files that are there may be replaced; else another name is taken.
     pub(crate) fn beside(scene: &Path, reuse: bool) -> Self {
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| path_to_text(part.as_ref())).unwrap_or_default();
-        let stem = format!("{}-{}", text(scene.file_stem()), text(scene.extension()));
+        // Other marks mean something in one of the grammars.
+        let plain = |c: char| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' };
+        let stem =
+            format!("{}-{}", text(scene.file_stem()), text(scene.extension())).chars().map(plain).collect::<String>();
         let parent = scene.parent().unwrap_or(Path::new(""));
         let mut names = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") });
         let is_free = |name: &String| reuse || !parent.join(text_to_path(name)).exists();

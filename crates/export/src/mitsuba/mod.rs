@@ -105,9 +105,10 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// An identifier of its own. In Mitsuba, a period separates objects from their parameters.
+    /// An identifier of its own. In Mitsuba, a period separates objects from their parameters, and `$` begins a parameter
+    /// of the file.
     fn id(&mut self, wanted: &str) -> String {
-        self.taken.free(&wanted.replace(['.', '\n', '\r', '\t'], "_"))
+        self.taken.free(&wanted.replace(['.', '$', '\n', '\r', '\t'], "_"))
     }
 
     fn tell(&mut self, name: &str, what: &str) {

@@ -135,7 +135,11 @@ impl StepsRecord {
         if !at.is_power_of_two() || *at < 2 || *at > mean_of {
             return Err(RecordError::Convergence);
         }
-        Ok(Steps { at: *at, values: bits.map(f32::from_bits) })
+        let values = bits.map(f32::from_bits);
+        if values.iter().any(|&squared| squared < 0.0) {
+            return Err(RecordError::Convergence);
+        }
+        Ok(Steps { at: *at, values })
     }
 }
 
@@ -411,4 +415,16 @@ fn check_ranges<T: PartialOrd>(ranges: &[(T, T)], most: T) -> Result<(), RecordE
         return Err(RecordError::Numbers);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_of_doublings_are_squares() {
+        let steps = |value: f32| StepsRecord(4, vec![value.to_bits(); Steps::KEPT]).steps(4);
+        assert!(steps(0.25).is_ok() && steps(f32::NAN).is_ok(), "unknown ones are not numbers");
+        assert_eq!(steps(-0.25).err(), Some(RecordError::Convergence));
+    }
 }
