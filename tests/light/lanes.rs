@@ -4,9 +4,9 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, HitSpace, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, CausticPlan, ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel, Geometry,
-    ImageTexture, Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot,
-    Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
+    BadSample, CausticPlan, Channel, ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel,
+    Geometry, ImageTexture, Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading,
+    Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -59,6 +59,11 @@ fn room_with(
     let smooth = procedural::icosphere(3).with_vertex_normals();
     let mut unwrapped = procedural::icosphere(2).flat();
     unwrapped.uvs = unwrapped.positions.iter().map(|p| Vec2::new(0.3 * p.x + 0.1 * p.z, 0.2 * p.y)).collect();
+    let mut colored = smooth.clone();
+    colored.uvs = colored.positions.iter().map(|p| Vec2::new(p.x + 0.2 * p.z, p.y)).collect();
+    colored.uvs2 = colored.uvs.iter().map(|uv| 1.5 * *uv + Vec2::splat(0.2)).collect();
+    colored.colors = colored.positions.iter().map(|p| (0.5 * *p + 0.5).extend(0.8)).collect();
+    colored.tangents = colored.positions.iter().map(|p| Vec3::Y.cross(*p).normalize_or_zero().extend(-1.0)).collect();
     let triangle = [Vec3::new(-2.0, 0.1, -1.0), Vec3::new(0.0, 0.3, -1.4), Vec3::new(-1.0, 2.0, -1.2)];
     let mut things = vec![
         plain(quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::Z * -6.0), 0),
@@ -72,15 +77,20 @@ fn room_with(
         plain(sphere(Vec3::new(0.0, 0.4, 0.6), 0.2), 8),
         plain(sphere(Vec3::new(1.7, 0.35, 1.4), 0.35), 11),
         (placed(smooth.clone(), scaled(Vec3::new(-0.4, 0.3, 0.5), Vec3::new(-1.9, 0.8, -0.8))), 11),
-        (placed(unwrapped, scaled(Vec3::new(0.3, 0.4, 0.3), Vec3::new(0.5, 1.4, -0.6))), 12),
+        (placed(unwrapped.clone(), scaled(Vec3::new(0.3, 0.4, 0.3), Vec3::new(0.5, 1.4, -0.6))), 12),
         (standing(placed(smooth.clone(), scaled(Vec3::splat(0.3), Vec3::new(-0.5, 1.6, 0.0)))), 13),
-        (standing(placed(smooth, scaled(Vec3::new(-0.2, 0.3, 0.2), Vec3::new(-1.3, 1.5, 0.3)))), 4),
+        (standing(placed(smooth.clone(), scaled(Vec3::new(-0.2, 0.3, 0.2), Vec3::new(-1.3, 1.5, 0.3)))), 4),
         plain(cloud(Vec3::new(-1.6, 0.1, 1.6)), 13),
         plain(cloud(Vec3::new(0.6, 0.1, 2.0)), 1),
+        plain(sphere(Vec3::new(-1.9, 0.3, 1.2), 0.3), 14),
+        (placed(unwrapped.clone(), scaled(Vec3::new(0.3, -0.4, 0.3), Vec3::new(1.9, 1.3, 0.2))), 15),
+        (standing(placed(smooth.clone(), scaled(Vec3::splat(0.35), Vec3::new(-0.3, 0.4, 2.0)))), 16),
+        (standing(placed(colored, scaled(Vec3::new(0.3, 0.3, -0.3), Vec3::new(0.4, 0.9, 1.6)))), 17),
+        plain(quad(Vec3::new(-2.4, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.6), Vec3::Y), 15),
     ];
     things.extend(lights.into_iter().map(|light| (light, 9)));
     let checker = ColorInput::Texture(0);
-    let materials = vec![
+    let mut materials = vec![
         Material::Diffuse { albedo: checker },
         diffuse(0.6),
         Material::Mirror { reflectance: ColorInput::Constant(Vec3::new(0.9, 0.95, 0.8)) },
@@ -105,6 +115,7 @@ fn room_with(
             absorption: Vec3::ZERO,
         },
     ];
+    materials.extend(layered());
     let objects = things.iter().map(|((shape, mesh), material)| {
         let is_point_light = as_points && *material == 9 && matches!(shape, Shape::Sphere { .. });
         Object { mesh: mesh.clone(), is_point_light, ..Object::plain(*material) }
@@ -118,14 +129,66 @@ fn room_with(
     };
     let texels = (0..12).map(|i| Vec3::new(0.1 + 0.06 * i as f32, 0.5, 0.9 - 0.07 * i as f32)).collect();
     let image = Arc::new(ImageTexture::from_linear(4, 3, texels));
+    let normals = (0..4).map(|i| Vec3::new(0.4 + 0.1 * (i % 2) as f32, 0.55 - 0.08 * (i / 2) as f32, 1.0)).collect();
+    let normals = Arc::new(ImageTexture::from_linear(2, 2, normals));
+    let smooth = |image: &Arc<ImageTexture>| TexturePattern::Image {
+        image: image.clone(),
+        encoding: Encoding::Auto,
+        wrap: [Wrap::Mirror, Wrap::Repeat],
+        smooth: true,
+    };
+    let colors = texture(smooth(&image), 0.9);
     let textures = vec![
         texture(TexturePattern::Checker { a: Vec3::splat(0.7), b: Vec3::new(0.1, 0.3, 0.5) }, 9.0),
         texture(TexturePattern::Image { image, encoding: Encoding::Auto, wrap: [Wrap::Repeat; 2], smooth: false }, 0.7),
+        texture(smooth(&normals), 2.0),
+        Texture { channel: Some(Channel::R), ..colors.clone() },
+        Texture { channel: Some(Channel::B), invert: true, ..colors.clone() },
+        Texture { uv_set: 1, vertex_colors: true, ..colors },
     ];
     let shading = Shading { air, ..Shading::new(materials, textures, environment) };
     let mut camera = camera(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 0.6, 0.0), 42.0);
     (camera.lens_radius, camera.focus_distance) = (0.03, 5.0);
     Prepared::new(Snapshot::new(geometry, shading, camera))
+}
+
+/// Layered materials by their layers; they use textures 1 to 5 of the room.
+fn layered() -> [Material; 4] {
+    let base = |color: ColorInput| Material::principled(color);
+    let mut plastic = base(ColorInput::Constant(Vec3::new(0.6, 0.3, 0.2)));
+    let mut mapped = base(ColorInput::Texture(1));
+    let mut rich = base(ColorInput::Texture(1));
+    let mut colored = base(ColorInput::Texture(5));
+    if let Material::Principled { metallic, roughness, specular_color, .. } = &mut plastic {
+        (*metallic, *roughness) = (ScalarInput::Constant(0.3), ScalarInput::Constant(0.0));
+        *specular_color = ColorInput::Constant(Vec3::new(1.0, 0.8, 0.6));
+    }
+    if let Material::Principled { metallic, roughness, normal_map, normal_scale, .. } = &mut mapped {
+        (*metallic, *roughness) = (ScalarInput::Texture(3), ScalarInput::Texture(4));
+        (*normal_map, *normal_scale) = (ColorInput::Texture(2), 0.8);
+    }
+    if let Material::Principled { clearcoat, clearcoat_roughness, sheen_color, anisotropy, roughness, .. } = &mut rich {
+        (*clearcoat, *clearcoat_roughness) = (ScalarInput::Texture(3), ScalarInput::Constant(0.3));
+        *sheen_color = ColorInput::Constant(Vec3::new(0.2, 0.3, 0.1));
+        (*anisotropy, *roughness) = (ScalarInput::Texture(4), ScalarInput::Constant(0.4));
+    }
+    if let Material::Principled { metallic, roughness, normal_map, clearcoat, anisotropy, .. } = &mut colored {
+        (*metallic, *roughness) = (ScalarInput::Constant(1.0), ScalarInput::Texture(3));
+        (*normal_map, *clearcoat) = (ColorInput::Texture(2), ScalarInput::Constant(0.5));
+        *anisotropy = ScalarInput::Constant(0.6);
+    }
+    [plastic, mapped, rich, colored]
+}
+
+/// The same with layers that emit as well, in places.
+fn with_emission(scene: &Prepared) -> Prepared {
+    let mut shading = (*scene.shading).clone();
+    for material in &mut shading.materials[15..17] {
+        if let Material::Principled { emission, .. } = material {
+            *emission = ColorInput::Texture(0);
+        }
+    }
+    scene.with_shading(Arc::new(shading))
 }
 
 fn rooms() -> Vec<(&'static str, Prepared)> {
@@ -170,6 +233,7 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
         ("points and a quad", room_with(vec![ball(), lamp()], true, sky.clone(), Vec3::ZERO)),
         ("many points", room_with(many(), true, Environment::Black, Vec3::splat(0.02))),
         ("a picture and a ball", room(vec![ball()], picture, Vec3::ZERO)),
+        ("layers that shine", with_emission(&room(vec![ball()], sky.clone(), fog))),
         ("meshes that shine", room(vec![shining(), small(), ball(), lamp()], Environment::Black, Vec3::ZERO)),
     ]
 }

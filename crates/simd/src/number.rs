@@ -132,6 +132,16 @@ impl<S: Simd> Real for Float<S> {
     fn equals(self, other: Self) -> Mask {
         self.s.eq(self.v, other.v)
     }
+
+    #[inline(always)]
+    fn whole(self) -> Self {
+        self.truncate().to_float()
+    }
+
+    #[inline(always)]
+    fn entry_of(self, table: &[f32]) -> Self {
+        Self::gather(table, self.truncate())
+    }
 }
 
 impl<S: Simd> Bits<S> {

@@ -62,6 +62,12 @@ pub trait Real:
     /// Whether `self == other`; false if either is NaN.
     fn equals(self, other: Self) -> Self::Mask;
 
+    /// Rounds towards zero, for numbers within the range of `i32`; the sign of zero may differ.
+    fn whole(self) -> Self;
+
+    /// The entry of a table at this index, a whole number; all lanes must be in range, or their entry is unspecified.
+    fn entry_of(self, table: &[f32]) -> Self;
+
     /// The larger of `self` and `least`; `least` for NaN.
     #[inline(always)]
     fn at_least(self, least: f32) -> Self {
@@ -170,5 +176,15 @@ impl Real for f32 {
     #[inline(always)]
     fn equals(self, other: Self) -> bool {
         self == other
+    }
+
+    #[inline(always)]
+    fn whole(self) -> Self {
+        self as i32 as f32
+    }
+
+    #[inline(always)]
+    fn entry_of(self, table: &[f32]) -> Self {
+        table[self as usize]
     }
 }

@@ -103,6 +103,14 @@ impl<R: Real> Vector3<R> {
         self * (self.x.all(1.0) / self.length())
     }
 
+    /// The vector scaled to unit length; `other` where its length is zero or not finite.
+    #[inline(always)]
+    pub fn normalize_or(self, other: Self) -> Self {
+        let per_length = self.x.all(1.0) / self.length();
+        let has_length = per_length.is_positive() & per_length.lt(per_length.all(f32::INFINITY));
+        select_vector(has_length, self * per_length, other)
+    }
+
     /// Absolute values of the coordinates.
     #[inline(always)]
     pub fn abs(self) -> Self {
@@ -119,6 +127,18 @@ impl<R: Real> Vector3<R> {
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self { x: self.x.max(other.x), y: self.y.max(other.y), z: self.z.max(other.z) }
+    }
+
+    /// Componentwise quotient.
+    #[inline(always)]
+    pub fn over(self, other: Self) -> Self {
+        Self { x: self.x / other.x, y: self.y / other.y, z: self.z / other.z }
+    }
+
+    /// Componentwise minimum.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self { x: self.x.min(other.x), y: self.y.min(other.y), z: self.z.min(other.z) }
     }
 
     /// The largest coordinate.

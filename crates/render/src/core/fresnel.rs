@@ -12,3 +12,8 @@ pub enum Fresnel {
     /// The reflectance rises to 1 at grazing angles by Schlick's approximation (Schlick 1994).
     Schlick,
 }
+
+/// Reflectance at normal incidence of a dielectric in air.
+pub(crate) fn reflectance_of(ior: f32) -> f32 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
+}

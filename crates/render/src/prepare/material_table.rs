@@ -5,10 +5,11 @@ use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::arrays::push;
+use crate::prepare::layer_table::{LAYERED_RICHLY, LayerTable};
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// Kinds by which hits are sorted: numbers of [`MaterialKind`], and [`COATED`].
+/// Kinds by which hits are sorted: numbers of [`MaterialKind`], [`COATED`], and those of layers.
 #[derive(Debug, Default)]
 pub(crate) struct Kinds {
     /// Kind per material, padded for gather operations.
@@ -21,6 +22,14 @@ pub(crate) struct Kinds {
 pub(crate) const SCHLICK: u32 = 1;
 pub(crate) const COMPENSATE: u32 = 2;
 pub(crate) const TEXTURED: u32 = 4;
+/// It is layered and has a normal map, or needs tangents for another reason.
+pub(crate) const MAPPED: u32 = 8;
+pub(crate) const TANGENTS: u32 = 16;
+pub(crate) const EMITS: u32 = 32;
+/// Its textures need more than the first texture coordinates.
+pub(crate) const MORE_THAN_UV: u32 = 64;
+/// It has layers above its base.
+pub(crate) const RICH: u32 = 128;
 
 /// The parameters of all materials of one lobe, and of the parts of those of two.
 #[derive(Debug, Default)]
@@ -36,6 +45,8 @@ pub(crate) struct MaterialTable {
     /// Rows of the parts, with their weights; the parts of a classic material have rows after those of all materials.
     pub parts: [Vec<u32>; 2],
     pub weights: [Vec<f32>; 2],
+    /// Inputs of layered materials.
+    pub layers: LayerTable,
     /// Whether some emission is textured.
     pub textured_emission: bool,
     /// Whether some surface scatters light through itself, so that light is sampled on both sides.
@@ -81,6 +92,7 @@ impl MaterialTable {
                 }
                 _ => {}
             }
+            let layered = LayerTable::kind_of(material, textures);
             let kind = match material.kind() {
                 // The SIMD code keeps all channels together.
                 MaterialKind::Glass if disperses => MaterialKind::Blend as usize,
@@ -90,6 +102,10 @@ impl MaterialTable {
                 _ if parts[0].1 > 0.0 => COATED,
                 kind => kind as usize,
             };
+            let kind = layered.unwrap_or(kind);
+            if let Some(kind) = layered {
+                table.flag_layers(material, kind, asks_for_more(id));
+            }
             table.kinds.of_material.push(kind as u32);
             table.kinds.present |= 1 << kind;
             for (k, (row, weight)) in parts.into_iter().enumerate() {
@@ -114,10 +130,24 @@ impl MaterialTable {
             kinds: Kinds { of_material: padded(table.kinds.of_material), ..table.kinds },
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
+            layers: LayerTable::build(materials, textures),
             textured_emission: materials.iter().any(is_textured_emitter),
             two_sided: materials.iter().any(Material::scatters_through),
             of_object: padded(of_object),
         }
+    }
+
+    /// Adds flags of a layered material to those of the last row.
+    fn flag_layers(&mut self, material: &Material, kind: usize, asks_for_more: bool) {
+        let flags = [
+            (material.normal_map().is_some(), MAPPED),
+            (material.asks_for_tangents(), TANGENTS),
+            (asks_for_more, MORE_THAN_UV),
+            (kind == LAYERED_RICHLY, RICH),
+            (!matches!(material, Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. }), EMITS),
+        ];
+        let last = self.flags.last_mut().expect("it has been added");
+        flags.into_iter().filter(|(is_set, _)| *is_set).for_each(|(_, flag)| *last |= flag);
     }
 
     /// Adds color, alpha and flags.

@@ -15,6 +15,7 @@ pub(crate) mod exposed;
 pub(crate) mod guide;
 pub(crate) mod instance_table;
 pub(crate) mod large_textures;
+pub(crate) mod layer_table;
 pub(crate) mod light;
 pub(crate) mod material_table;
 pub(crate) mod plan_cache;

@@ -6,6 +6,7 @@
 
 use crate::shading::ggx::{TABLE_LEAST_ALPHA, integrate_albedo};
 use crate::shading::integral_table::{Between, IntegralTable};
+use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 use std::f32::consts::TAU;
 
@@ -13,26 +14,42 @@ use std::f32::consts::TAU;
 /// angle with the microfacet normal over the returned light.
 ///
 /// - `w`: unit, in the frame of the surface, above it; `alpha`: widths along x and y, different, up to 1.
-pub(crate) fn albedo(w: Vec3, alpha: [f32; 2]) -> (f32, f32) {
-    let (narrow, wide) = (alpha[0].min(alpha[1]), alpha[0].max(alpha[1]).min(1.0));
-    let cos = w.z.clamp(1e-6, 1.0);
+#[inline(always)]
+pub(crate) fn albedo<R: Real>(w: Vector3<R>, alpha: [R; 2]) -> (R, R) {
+    let (narrow, wide) = (alpha[0].min(alpha[1]), alpha[0].max(alpha[1]).at_most(1.0));
+    let cos = w.z.at_least(1e-6).at_most(1.0);
     // The width along the azimuth of `w`.
     let (x, y) = (alpha[0] * w.x, alpha[1] * w.y);
     let across2 = w.x * w.x + w.y * w.y;
-    let along = if across2 > 0.0 { ((x * x + y * y) / across2).sqrt() } else { wide };
-    let (spread, room) = ((wide - narrow).max(f32::MIN_POSITIVE), (1.0 - narrow).max(f32::MIN_POSITIVE));
+    let along = select(across2.is_positive(), ((x * x + y * y) / across2).sqrt(), wide);
+    let spread = (wide - narrow).at_least(f32::MIN_POSITIVE);
+    let room = (cos.all(1.0) - narrow).at_least(f32::MIN_POSITIVE);
     let azimuths = Between::new((along - narrow) / spread, SIZE[1]);
-    let narrow_widths = Between::new(narrow.max(0.0).sqrt(), SIZE[2]);
+    let narrow_widths = Between::new(narrow.at_least(0.0).sqrt(), SIZE[2]);
     let wide_widths = Between::new((spread / room).sqrt(), SIZE[3]);
-    let of = |table: &[f32], at: f32| {
-        let cosines = Between::new(at, SIZE[0]);
-        wide_widths.mean(|d| {
-            narrow_widths
-                .mean(|c| azimuths.mean(|b| cosines.mean(|a| table[((d * SIZE[2] + c) * SIZE[1] + b) * SIZE[0] + a])))
-        })
-    };
-    let bent = (cos * (1.0 + BEND * along) / (cos + BEND * along)).sqrt();
-    (of(ALBEDOS.get(), bent), of(SCHLICK_MEANS.get(), cos.sqrt()))
+    let others = [azimuths, narrow_widths, wide_widths];
+    let bend = along * BEND;
+    let bent = Between::new((cos * (bend + 1.0) / (cos + bend)).sqrt(), SIZE[0]);
+    let straight = Between::new(cos.sqrt(), SIZE[0]);
+    (interpolated(ALBEDOS.get(), &bent, &others), interpolated(SCHLICK_MEANS.get(), &straight, &others))
+}
+
+/// - `others`: places in the other dimensions.
+#[inline(always)]
+fn interpolated<R: Real>(table: &[f32], cosines: &Between<R>, others: &[Between<R>; 3]) -> R {
+    let one = cosines.part.all(1.0);
+    let mut sum = one.all(0.0);
+    for corner in 0..8 {
+        let (mut row, mut weight) = (one.all(0.0), one);
+        for k in [2, 1, 0] {
+            let Between { first, part } = others[k];
+            let is_second = corner >> k & 1 != 0;
+            row = row * SIZE[k + 1] as f32 + if is_second { first + 1.0 } else { first };
+            weight = weight * if is_second { part } else { one - part };
+        }
+        sum += weight * cosines.in_row(table, row * SIZE[0] as f32);
+    }
+    sum
 }
 
 /// Computes the tables on all threads.
@@ -96,7 +113,7 @@ mod tests {
             let (a, b) = (sampler.single(2).powi(2).max(1e-3), sampler.single(3).powi(2));
             let (narrow, wide) = (a, a + (1.0 - a) * b);
             let alpha = if sampler.single(4) < 0.5 { [narrow, wide] } else { [wide, narrow] };
-            let (whole, schlick) = albedo(w, alpha);
+            let (whole, schlick) = albedo(w.into(), alpha);
             let (expected, of_schlick) = integrate_albedo(w, alpha, 12, 120, TAU);
             let off = (whole / expected - 1.0).abs();
             assert!(off < 0.05, "{w}, α {alpha:?}: {whole} for {expected}");
@@ -112,7 +129,8 @@ mod tests {
         for alpha in [0.01_f32, 0.1, 0.5, 0.9] {
             for cos in [0.05_f32, 0.3, 0.8, 1.0] {
                 let w = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-                let (found, expected) = (albedo(w, [alpha, alpha + 1e-5]).0, single_scattering_albedo(cos, alpha));
+                let (found, expected) =
+                    (albedo(w.into(), [alpha, alpha + 1e-5]).0, single_scattering_albedo(cos, alpha));
                 assert!((found / expected - 1.0).abs() < 0.01, "cos {cos}, α {alpha}: {found} for {expected}");
             }
         }

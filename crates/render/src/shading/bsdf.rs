@@ -130,7 +130,7 @@ impl Lobe<'_> {
         let (lost, alpha) = if facets.is_isotropic() {
             (ggx::lost_over_returned(normal.dot(wo), facets.alpha[0]), facets.alpha[0])
         } else {
-            let whole = SchlickAlbedo::along(seen.wo(), facets.alpha).whole();
+            let whole = SchlickAlbedo::along(seen.wo().into(), facets.alpha).whole();
             ((1.0 - whole) / whole, (0.5 * Vec2::from(facets.alpha).length_squared()).sqrt())
         };
         Some((seen, with_further_bounces(Vec3::new(at(0), at(1), at(2)).into(), lost, alpha).into()))

@@ -4,7 +4,7 @@
 //! All vectors are unit and in the shading frame, with the normal along +z.
 
 use crate::sampling::warp::uniform_disc;
-use crate::shading::integral_table::{GAUSS, IntegralTable};
+use crate::shading::integral_table::{Between, GAUSS, IntegralTable};
 use firstlight_simd::{Real, Vector3, select, select_vector};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -28,16 +28,16 @@ pub fn lambda<R: Real>(w: Vector3<R>, alpha: R) -> R {
 }
 
 /// Like [`distribution`], with a width per axis (Heitz 2014, equation 86).
-#[inline]
-pub fn anisotropic_distribution(h: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
+#[inline(always)]
+pub fn anisotropic_distribution<R: Real>(h: Vector3<R>, [ax, ay]: [R; 2]) -> R {
     let (x, y) = (h.x / ax, h.y / ay);
     let d = x * x + y * y + h.z * h.z;
-    1.0 / (PI * ax * ay * d * d)
+    d.all(1.0) / (ax * ay * d * d * PI)
 }
 
 /// Like [`lambda`], with a width per axis.
-#[inline]
-pub fn anisotropic_lambda(w: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
+#[inline(always)]
+pub fn anisotropic_lambda<R: Real>(w: Vector3<R>, [ax, ay]: [R; 2]) -> R {
     let (x, y) = (ax * w.x, ay * w.y);
     let x = (x * x + y * y) / (w.z * w.z);
     x * 0.5 / ((x + 1.0).sqrt() + 1.0)
@@ -131,18 +131,12 @@ fn stretched<R: Real>(v: Vector3<R>, [x, y]: [R; 2]) -> Vector3<R> {
 /// Returns the single-scattering albedo of a surface with reflectance 1, seen at `cos_theta`.
 ///
 /// From a table, within 5 · 10⁻⁴ of the integral for every angle and every `alpha` ≥ 10⁻⁴.
-#[inline]
-pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
-    let table = ALBEDOS.get();
-    let alpha = alpha.clamp(0.0, 1.0);
-    let cos_theta = cos_theta.clamp(1e-6, 1.0);
-    let x = (cos_theta * (1.0 + BEND * alpha) / (cos_theta + BEND * alpha)).sqrt() * (N - 1) as f32;
-    let y = alpha.sqrt() * (N - 1) as f32;
-    let (ix, iy) = ((x as usize).min(N - 2), (y as usize).min(N - 2));
-    let (fx, fy) = (x - ix as f32, y - iy as f32);
-    let at = |dx, dy| table[(iy + dy) * N + ix + dx];
-    let row = |dy| at(0, dy) + fx * (at(1, dy) - at(0, dy));
-    row(0) + fy * (row(1) - row(0))
+#[inline(always)]
+pub fn single_scattering_albedo<R: Real>(cos_theta: R, alpha: R) -> R {
+    let alpha = alpha.at_least(0.0).at_most(1.0);
+    let (cos, bend) = (cos_theta.at_least(1e-6).at_most(1.0), alpha * BEND);
+    let columns = Between::new((cos * (bend + 1.0) / (cos + bend)).sqrt(), N);
+    columns.in_rows(&Between::new(alpha.sqrt(), N), ALBEDOS.get(), N)
 }
 
 /// See [`single_scattering_albedo`].
@@ -151,10 +145,10 @@ pub(crate) static ALBEDOS: IntegralTable =
 
 /// Returns lost energy over returned energy of single scattering, for [`crate::shading::metal::Metal`]; arguments as
 /// for [`single_scattering_albedo`].
-#[inline]
-pub fn lost_over_returned(cos_theta: f32, alpha: f32) -> f32 {
+#[inline(always)]
+pub fn lost_over_returned<R: Real>(cos_theta: R, alpha: R) -> R {
     let albedo = single_scattering_albedo(cos_theta, alpha);
-    (1.0 - albedo) / albedo
+    (albedo.all(1.0) - albedo) / albedo
 }
 
 /// Entries per side of the albedo table.
@@ -178,18 +172,11 @@ fn table_alpha(row: usize) -> f32 {
 /// scattering.
 ///
 /// From a table, within 10⁻³ of the integral.
-#[inline]
-pub(crate) fn mean_schlick(cos_theta: f32, alpha: f32) -> f32 {
-    let table = SCHLICK_MEANS.get();
-    let place = |at: f32| {
-        let x = at.clamp(0.0, 1.0).sqrt() * (N_MEANS - 1) as f32;
-        let i = (x as usize).min(N_MEANS - 2);
-        (i, x - i as f32)
-    };
-    let ((ix, fx), (iy, fy)) = (place(cos_theta), place(alpha));
-    let entry = |dx, dy| table[(iy + dy) * N_MEANS + ix + dx];
-    let row = |dy| entry(0, dy) + fx * (entry(1, dy) - entry(0, dy));
-    row(0) + fy * (row(1) - row(0))
+#[inline(always)]
+pub(crate) fn mean_schlick<R: Real>(cos_theta: R, alpha: R) -> R {
+    let columns = Between::new(cos_theta.at_least(0.0).sqrt(), N_MEANS);
+    let rows = Between::new(alpha.at_least(0.0).sqrt(), N_MEANS);
+    columns.in_rows(&rows, SCHLICK_MEANS.get(), N_MEANS)
 }
 
 /// Entries per side of the table of means.

@@ -1,5 +1,6 @@
 //! Tables of integrals: computed by all threads before the first ray, or by the first ray that needs one.
 
+use firstlight_simd::Real;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -33,26 +34,47 @@ impl IntegralTable {
     }
 }
 
-/// Linear interpolation between two neighbours in a table.
+/// Linear interpolation between two neighbours in a table, at one place or sixteen.
 #[derive(Clone, Copy)]
-pub(crate) struct Between {
-    first: usize,
-    part: f32,
+pub(crate) struct Between<R = f32> {
+    /// Index of the first, a whole number.
+    pub first: R,
+    /// Weight of the second.
+    pub part: R,
+}
+
+impl<R: Real> Between<R> {
+    /// - `x`: position, limited to 0..1; `n`: number of entries, at least 2.
+    #[inline(always)]
+    pub fn new(x: R, n: usize) -> Self {
+        let x = x.at_least(0.0).at_most(1.0) * (n - 1) as f32;
+        let first = x.whole().at_most((n - 2) as f32);
+        Self { first, part: x - first }
+    }
+
+    /// Interpolates in a table that begins at an index.
+    #[inline(always)]
+    pub fn in_row(&self, table: &[f32], start: R) -> R {
+        let first = start + self.first;
+        let (a, b) = (first.entry_of(table), (first + 1.0).entry_of(table));
+        a + self.part * (b - a)
+    }
+
+    /// Interpolates in a table with `n` entries per row.
+    #[inline(always)]
+    pub fn in_rows(&self, rows: &Self, table: &[f32], n: usize) -> R {
+        let start = rows.first * n as f32;
+        let (a, b) = (self.in_row(table, start), self.in_row(table, start + n as f32));
+        a + rows.part * (b - a)
+    }
 }
 
 impl Between {
-    /// - `x`: position, limited to 0..1; `n`: number of entries, at least 2.
-    #[inline]
-    pub fn new(x: f32, n: usize) -> Self {
-        let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
-        let first = (x as usize).min(n - 2);
-        Self { first, part: x - first as f32 }
-    }
-
     /// Interpolates linearly.
     #[inline]
     pub fn mean(&self, at: impl Fn(usize) -> f32) -> f32 {
-        let (a, b) = (at(self.first), at(self.first + 1));
+        let first = self.first as usize;
+        let (a, b) = (at(first), at(first + 1));
         a + self.part * (b - a)
     }
 }

@@ -6,22 +6,21 @@ use crate::shading::anisotropic_albedo;
 use crate::shading::ggx::{TABLE_LEAST_ALPHA, mean_schlick, single_scattering_albedo};
 use crate::shading::integral_table::{Between, GAUSS, IntegralTable};
 use crate::shading::sheen;
-use glam::Vec3;
+use firstlight_simd::{Elementary, Real, Truth, Vector3, select};
 use std::f32::consts::{FRAC_PI_2, PI};
-use std::sync::OnceLock;
 
 /// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵:
 /// `f0 · facing + f90 · grazing`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SchlickAlbedo {
-    pub facing: f32,
-    pub grazing: f32,
+pub(crate) struct SchlickAlbedo<R = f32> {
+    pub facing: R,
+    pub grazing: R,
 }
 
-impl SchlickAlbedo {
+impl<R: Real> SchlickAlbedo<R> {
     /// Albedo at an angle; within 10⁻³ of the integral.
-    #[inline]
-    pub fn new(cos_theta: f32, alpha: f32) -> Self {
+    #[inline(always)]
+    pub fn new(cos_theta: R, alpha: R) -> Self {
         Self::of(single_scattering_albedo(cos_theta, alpha), mean_schlick(cos_theta, alpha))
     }
 
@@ -29,70 +28,82 @@ impl SchlickAlbedo {
     /// directions.
     ///
     /// - `w`: unit, above the surface; `alpha`: along x and y.
-    #[inline]
-    pub fn along(w: Vec3, alpha: [f32; 2]) -> Self {
-        if alpha[0] == alpha[1] {
-            return Self::new(w.z, alpha[0]);
+    #[inline(always)]
+    pub fn along(w: Vector3<R>, alpha: [R; 2]) -> Self {
+        let isotropic = alpha[0].equals(alpha[1]);
+        let even = Self::new(w.z, alpha[0]);
+        if !(!isotropic).any() {
+            return even;
         }
         let (whole, schlick) = anisotropic_albedo::albedo(w, alpha);
-        Self::of(whole, schlick)
+        even.where_true(isotropic, Self::of(whole, schlick))
     }
 
     /// - `schlick`: mean of Schlick's (1 − cos)⁵ over the returned light.
-    #[inline]
-    fn of(whole: f32, schlick: f32) -> Self {
+    #[inline(always)]
+    fn of(whole: R, schlick: R) -> Self {
         let grazing = whole * schlick;
         Self { facing: whole - grazing, grazing }
     }
 
+    #[inline(always)]
+    fn where_true(self, mask: R::Mask, other: Self) -> Self {
+        let facing = select(mask, self.facing, other.facing);
+        Self { facing, grazing: select(mask, self.grazing, other.grazing) }
+    }
+
     /// Mean over all directions, weighted by their cosine.
-    #[inline]
-    pub fn mean(alpha: [f32; 2]) -> Self {
-        if alpha[0] == alpha[1] { Self::isotropic_mean(alpha[0]) } else { Self::anisotropic_mean(alpha) }
-    }
-
-    fn isotropic_mean(alpha: f32) -> Self {
-        static TABLE: OnceLock<Vec<SchlickAlbedo>> = OnceLock::new();
-        let table = TABLE.get_or_init(|| {
-            (0..N_MEANS)
-                .map(|i| {
-                    let alpha = (i as f32 / (N_MEANS - 1) as f32).powi(2);
-                    let of = |part: fn(Self) -> f32| cosine_mean(|cos| part(Self::new(cos, alpha)));
-                    Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
-                })
-                .collect()
-        });
-        let rows = Between::new(alpha.max(0.0).sqrt(), N_MEANS);
-        let of = |part: fn(&Self) -> f32| rows.mean(|row| part(&table[row]));
-        Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
-    }
-
-    fn anisotropic_mean(alpha: [f32; 2]) -> Self {
-        static TABLE: OnceLock<Vec<SchlickAlbedo>> = OnceLock::new();
-        let table = TABLE.get_or_init(|| {
-            let at = |k: usize| k as f32 / (N_ANISOTROPIC - 1) as f32;
-            (0..N_ANISOTROPIC * N_ANISOTROPIC)
-                .map(|i| {
-                    let narrow = at(i % N_ANISOTROPIC).powi(2).max(TABLE_LEAST_ALPHA);
-                    let wide = narrow + (1.0 - narrow) * at(i / N_ANISOTROPIC).powi(2);
-                    let of = |part: fn(Self) -> f32| hemisphere_mean(|w| part(Self::along(w, [wide, narrow])));
-                    Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
-                })
-                .collect()
-        });
+    #[inline(always)]
+    pub fn mean(alpha: [R; 2]) -> Self {
+        let rows = Between::new(alpha[0].at_least(0.0).sqrt(), N_MEANS);
+        let start = alpha[0].all(0.0);
+        let [facing, grazing] = [&MEANS[0], &MEANS[1]];
+        let even = Self { facing: rows.in_row(facing.get(), start), grazing: rows.in_row(grazing.get(), start) };
+        let isotropic = alpha[0].equals(alpha[1]);
+        if !(!isotropic).any() {
+            return even;
+        }
         let (narrow, wide) = (alpha[0].min(alpha[1]), alpha[0].max(alpha[1]));
-        let columns = Between::new(narrow.max(0.0).sqrt(), N_ANISOTROPIC);
-        let rows = Between::new(((wide - narrow) / (1.0 - narrow).max(f32::MIN_POSITIVE)).sqrt(), N_ANISOTROPIC);
-        let of =
-            |part: fn(&Self) -> f32| rows.mean(|row| columns.mean(|column| part(&table[row * N_ANISOTROPIC + column])));
-        Self { facing: of(|albedo| albedo.facing), grazing: of(|albedo| albedo.grazing) }
+        let columns = Between::new(narrow.at_least(0.0).sqrt(), N_ANISOTROPIC);
+        let room = (start + 1.0 - narrow).at_least(f32::MIN_POSITIVE);
+        let rows = Between::new(((wide - narrow) / room).sqrt(), N_ANISOTROPIC);
+        let [facing, grazing] = [&ANISOTROPIC_MEANS[0], &ANISOTROPIC_MEANS[1]];
+        let facing = columns.in_rows(&rows, facing.get(), N_ANISOTROPIC);
+        let grazing = columns.in_rows(&rows, grazing.get(), N_ANISOTROPIC);
+        even.where_true(isotropic, Self { facing, grazing })
     }
 
     /// Albedo of a white layer.
-    #[inline]
-    pub fn whole(&self) -> f32 {
+    #[inline(always)]
+    pub fn whole(&self) -> R {
         self.facing + self.grazing
     }
+}
+
+/// Means by the root of the width.
+static MEANS: [IntegralTable; 2] = [
+    IntegralTable::new(N_MEANS, |i| cosine_mean(|cos| SchlickAlbedo::new(cos, mean_alpha(i)).facing)),
+    IntegralTable::new(N_MEANS, |i| cosine_mean(|cos| SchlickAlbedo::new(cos, mean_alpha(i)).grazing)),
+];
+
+fn mean_alpha(i: usize) -> f32 {
+    (i as f32 / (N_MEANS - 1) as f32).powi(2)
+}
+
+/// Means by the root of the narrow width, and by that of the difference of both.
+static ANISOTROPIC_MEANS: [IntegralTable; 2] = [
+    IntegralTable::new(N_ANISOTROPIC * N_ANISOTROPIC, |i| {
+        hemisphere_mean(|w| SchlickAlbedo::along(w, anisotropic_alpha(i)).facing)
+    }),
+    IntegralTable::new(N_ANISOTROPIC * N_ANISOTROPIC, |i| {
+        hemisphere_mean(|w| SchlickAlbedo::along(w, anisotropic_alpha(i)).grazing)
+    }),
+];
+
+fn anisotropic_alpha(i: usize) -> [f32; 2] {
+    let at = |k: usize| (k as f32 / (N_ANISOTROPIC - 1) as f32).powi(2);
+    let narrow = at(i % N_ANISOTROPIC).max(TABLE_LEAST_ALPHA);
+    [narrow + (1.0 - narrow) * at(i / N_ANISOTROPIC), narrow]
 }
 
 const N_MEANS: usize = 65;
@@ -102,15 +113,16 @@ const N_ANISOTROPIC: usize = 17;
 /// the larger albedo of both directions.
 ///
 /// - `cos_o`, `cos_i`, `cos_h`: as of [`sheen::value`]; `alpha`: width, from [`sheen::LEAST_ALPHA`] to 1.
-#[inline]
-pub(crate) fn bounded_sheen(cos_o: f32, cos_i: f32, cos_h: f32, alpha: f32) -> f32 {
-    let most = [cos_o, cos_i].map(|cos| sheen_entry(UNBOUNDED_SHEEN.get(), cos, alpha)).into_iter().fold(1.0, f32::max);
+#[inline(always)]
+pub(crate) fn bounded_sheen<R: Elementary>(cos_o: R, cos_i: R, cos_h: R, alpha: R) -> R {
+    let table = UNBOUNDED_SHEEN.get();
+    let most = sheen_entry(table, cos_o, alpha).max(sheen_entry(table, cos_i, alpha)).at_least(1.0);
     sheen::value(cos_o, cos_i, cos_h, alpha) / most
 }
 
 /// Returns the albedo of [`bounded_sheen`] at an angle.
-#[inline]
-pub(crate) fn sheen_albedo(cos_theta: f32, alpha: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn sheen_albedo<R: Real>(cos_theta: R, alpha: R) -> R {
     sheen_entry(BOUNDED_SHEEN.get(), cos_theta, alpha)
 }
 
@@ -136,11 +148,11 @@ fn sheen_alpha(entry: usize) -> f32 {
     sheen::LEAST_ALPHA + (1.0 - sheen::LEAST_ALPHA) * at * at
 }
 
-#[inline]
-fn sheen_entry(table: &[f32], cos_theta: f32, alpha: f32) -> f32 {
-    let columns = Between::new(cos_theta.max(0.0).sqrt(), N_SHEEN);
+#[inline(always)]
+fn sheen_entry<R: Real>(table: &[f32], cos_theta: R, alpha: R) -> R {
+    let columns = Between::new(cos_theta.at_least(0.0).sqrt(), N_SHEEN);
     let spread = (alpha - sheen::LEAST_ALPHA) / (1.0 - sheen::LEAST_ALPHA);
-    Between::new(spread.max(0.0).sqrt(), N_SHEEN).mean(|row| columns.mean(|column| table[row * N_SHEEN + column]))
+    columns.in_rows(&Between::new(spread.at_least(0.0).sqrt(), N_SHEEN), table, N_SHEEN)
 }
 
 const N_SHEEN: usize = 48;
@@ -150,15 +162,19 @@ pub(crate) fn cosine_mean(f: impl Fn(f32) -> f32) -> f32 {
     GAUSS.iter().map(|&(x, weight)| 2.0 * x * weight * f(x)).sum()
 }
 
+/// Two-point Gauss–Legendre rule over the azimuths of a quadrant.
+const AZIMUTHS: [f32; 2] = [0.211_324_87 * FRAC_PI_2, 0.788_675_1 * FRAC_PI_2];
+
+/// Two directions whose mean is that over the azimuths, for functions that are symmetric about x and y.
+#[inline]
+pub(crate) fn azimuths(cos: f32) -> [Vector3<f32>; 2] {
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    AZIMUTHS.map(|phi| Vector3 { x: sin * phi.cos(), y: sin * phi.sin(), z: cos })
+}
+
 /// Mean over directions, weighted by their cosine, of a function that is symmetric about x and y.
-pub(crate) fn hemisphere_mean(f: impl Fn(Vec3) -> f32) -> f32 {
-    // Two-point Gauss–Legendre rule over the azimuths of a quadrant.
-    const AZIMUTHS: [f32; 2] = [0.211_324_87 * FRAC_PI_2, 0.788_675_1 * FRAC_PI_2];
-    cosine_mean(|cos| {
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let at = |phi: f32| f(Vec3::new(sin * phi.cos(), sin * phi.sin(), cos));
-        0.5 * (at(AZIMUTHS[0]) + at(AZIMUTHS[1]))
-    })
+fn hemisphere_mean(f: impl Fn(Vector3<f32>) -> f32) -> f32 {
+    cosine_mean(|cos| azimuths(cos).into_iter().map(&f).sum::<f32>() * 0.5)
 }
 
 /// Integrates by uniform steps of the light's angles, denser at the horizon.

@@ -102,7 +102,7 @@ pub(crate) fn mean_reflectance<R: Real>(by_schlick: R::Mask, facing: Vector3<R>)
 
 /// ∫ 2 cos (facing + (1 − facing) (1 − cos)⁵) d cos.
 #[inline(always)]
-fn mean_of_schlick<R: Real>(facing: R) -> R {
+pub(crate) fn mean_of_schlick<R: Real>(facing: R) -> R {
     facing + (-facing + 1.0) * (1.0 / 21.0)
 }
 

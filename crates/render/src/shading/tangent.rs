@@ -5,6 +5,7 @@
 //! System", appendix A.3). Light below the true surface is lost, so no energy is gained.
 
 use firstlight_mesh::Mesh;
+use firstlight_simd::{Real, Truth, Vector3, frame_around, select_vector};
 use glam::{Affine3A, Vec2, Vec3};
 
 /// The tangent frame of the first texture coordinates.
@@ -57,25 +58,35 @@ impl Tangent {
     ///
     /// - `direction`: along u and v; `normal`: unit.
     pub fn along(&self, direction: Vec2, normal: Vec3) -> Vec3 {
-        let [x, y] = self.axes(normal);
+        let [x, y] = tangent_axes(self.along_u.into(), self.handedness, normal.into()).map(Vec3::from);
         direction.x * x + direction.y * y
     }
+}
 
-    /// Returns the axes along u and v, both unit and perpendicular to a normal of the front.
-    fn axes(&self, normal: Vec3) -> [Vec3; 2] {
-        let x = (self.along_u - normal.dot(self.along_u) * normal).normalize_or(normal.any_orthonormal_vector());
-        [x, normal.cross(x) * if self.handedness < 0.0 { -1.0 } else { 1.0 }]
-    }
+/// Returns the axes along u and v, both unit and perpendicular to a normal of the front.
+///
+/// - `along_u`, `handedness`: of a [`Tangent`].
+#[inline(always)]
+pub(crate) fn tangent_axes<R: Real>(along_u: Vector3<R>, handedness: R, normal: Vector3<R>) -> [Vector3<R>; 2] {
+    let x = (along_u - normal * normal.dot(along_u)).normalize_or(frame_around(normal)[1]);
+    let y = normal.cross(x);
+    [x, select_vector(handedness.is_negative(), -y, y)]
 }
 
 /// Returns the normal of a normal map, unit.
 ///
 /// - `coded`: 0..1 for −1..1 along tangent, bitangent and normal; `scale`: factor of the first two; `front`: unmapped
 ///   normal of the front, unit.
-pub(crate) fn normal_of_map(coded: Vec3, scale: f32, tangent: &Tangent, front: Vec3) -> Vec3 {
-    let [x, y] = tangent.axes(front);
-    let local = (2.0 * coded - 1.0) * Vec3::new(scale, scale, 1.0);
-    (local.x * x + local.y * y + local.z * front).normalize_or(front)
+///   `axes`: of [`tangent_axes`].
+#[inline(always)]
+pub(crate) fn normal_of_map<R: Real>(
+    coded: Vector3<R>,
+    scale: R,
+    [x, y]: [Vector3<R>; 2],
+    front: Vector3<R>,
+) -> Vector3<R> {
+    let (along, across) = ((coded.x * 2.0 - 1.0) * scale, (coded.y * 2.0 - 1.0) * scale);
+    (x * along + y * across + front * (coded.z * 2.0 - 1.0)).normalize_or(front)
 }
 
 /// Returns the normal of a surface with heights above it, unit: that of the points moved along their normals (Blinn
@@ -104,17 +115,20 @@ fn gradients([p, q]: [Vec3; 2], [a, b]: [Vec2; 2]) -> [Vec3; 2] {
 /// `surface`.
 ///
 /// - All unit; `surface` faces `wo`.
-pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
-    let mirrored = 2.0 * normal.dot(wo) * normal - wo;
+#[inline(always)]
+pub(crate) fn bent<R: Real>(normal: Vector3<R>, surface: Vector3<R>, wo: Vector3<R>) -> Vector3<R> {
+    let mirrored = normal * (normal.dot(wo) * 2.0) - wo;
     let below = mirrored.dot(surface);
-    if below >= 0.0 && normal.dot(wo) > 0.0 {
+    let is_kept = below.all(0.0).le(below) & normal.dot(wo).is_positive();
+    if !(!is_kept).any() {
         return normal;
     }
     // Moves along the normal up to the surface; for a normal that faces away from it the step is limited.
-    let rise = normal.dot(surface).max(1e-3);
+    let rise = normal.dot(surface).at_least(1e-3);
     let lifted = (mirrored - normal * (below / rise)).normalize_or(surface);
     let between = (wo + lifted).normalize_or(surface);
-    if between.dot(wo) > 0.0 { between } else { surface }
+    let found = select_vector(between.dot(wo).is_positive(), between, surface);
+    select_vector(is_kept, normal, found)
 }
 
 /// Returns a mapped normal that faces the viewer, as Mitsuba 3 has it: one that faces away is mirrored at the unmapped
@@ -208,7 +222,7 @@ mod tests {
             let sampler = Sampler::new(3, 0, 0, i);
             let wo = (cosine_hemisphere(sampler.pair(0)) + Vec3::new(0.0, 0.0, 1e-4)).normalize();
             let normal = (cosine_hemisphere(sampler.pair(2)) + Vec3::new(0.0, 0.0, 0.05)).normalize();
-            let found = bent(normal, Vec3::Z, wo);
+            let found = Vec3::from(bent(normal.into(), Vec3::Z.into(), wo.into()));
             assert!(found.is_normalized() && found.dot(wo) > 0.0, "{found} {wo}");
             let mirrored = 2.0 * found.dot(wo) * found - wo;
             assert!(mirrored.z > -1e-5, "{normal} seen along {wo}: {mirrored}");

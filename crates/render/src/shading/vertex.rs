@@ -179,7 +179,8 @@ impl Vertex {
         if !map.is_normal_map() {
             return self.interpolated_seen();
         }
-        tangent::bent(self.turned(scene, map, 1.0), self.interpolated_seen(), self.wo)
+        let turned = self.turned(scene, map, 1.0);
+        tangent::bent(turned.into(), self.interpolated_seen().into(), self.wo.into()).into()
     }
 
     /// Returns the normal of a map on the side of the viewer, not bent.
@@ -190,14 +191,19 @@ impl Vertex {
         {
             return side * tangent::normal_of_relief(scale * slope, &self.tangent, side * self.interpolated);
         }
-        let coded = map.eval(scene, self.texture_point);
-        side * tangent::normal_of_map(coded, scale, &self.tangent, side * self.interpolated)
+        let (coded, front) = (map.eval(scene, self.texture_point).into(), (side * self.interpolated).into());
+        let axes = tangent::tangent_axes(self.tangent.along_u.into(), self.tangent.handedness, front);
+        side * Vec3::from(tangent::normal_of_map(coded, scale, axes, front))
     }
 
     #[cold]
     fn with_bent_normal(self) -> Self {
-        let facing = if self.turns_over { tangent::turned_over } else { tangent::bent };
-        Self { normal: facing(self.smooth_normal, self.interpolated_seen(), self.wo), ..self }
+        let (normal, surface) = (self.smooth_normal, self.interpolated_seen());
+        let facing = match self.turns_over {
+            true => tangent::turned_over(normal, surface, self.wo),
+            false => tangent::bent(normal.into(), surface.into(), self.wo.into()).into(),
+        };
+        Self { normal: facing, ..self }
     }
 
     /// The shading normal without normal mapping.

@@ -48,7 +48,7 @@ pub(crate) struct LightHits<'a> {
 
 /// Whether [`scatter`] handles a hit on a material of this kind.
 pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
-    knows(kind) && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
+    knows(kind) && kind <= COATED && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
 }
 
 /// Connects the vertices to the lens, and continues the paths.

@@ -3,6 +3,7 @@
 pub(crate) mod batches;
 pub(crate) mod caustics_pass;
 pub(crate) mod caustics_weight;
+pub(crate) mod emission;
 pub(crate) mod record;
 pub(crate) mod resampling;
 pub(crate) mod seen;

@@ -22,6 +22,7 @@ use crate::integrators::path::first_surfaces::FirstSurfaces;
 use crate::integrators::simd::shade::KindHits;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::simd::{emitters, misses, shade};
+use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
 use crate::shading::dimensions::first_dimension;
@@ -212,15 +213,17 @@ impl PathWave {
                 shadows: &mut self.shadows,
                 shadow_thresholds: if settings.techniques.roulette { &self.shadow_thresholds } else { &[] },
                 sets: &mut self.sets,
+                radiance: &mut *radiance,
+                is_last,
             };
             match (settings.simd, kind) {
                 (Some(set), MISSES) if scene.tables.environment_sampler.is_none() => {
                     misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
                 }
                 (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
-                (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group, radiance),
+                (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group),
                 // Hits that do not emit and end their path contribute nothing.
-                (Some(_), _) if shade::knows(kind - 1) && is_last => {}
+                (Some(_), _) if shade::knows(kind - 1) && is_last && kind - 1 <= COATED => {}
                 (Some(set), _) if shade::knows(kind - 1) => shade::shade(set, kind - 1, group),
                 _ => self.shade_one_by_one(scene, depth, settings, caustics, kind, radiance),
             }

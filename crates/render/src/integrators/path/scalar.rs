@@ -5,6 +5,7 @@ use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::caustics_weight::MisBounce;
+use crate::integrators::common::emission::emitted_light;
 use crate::integrators::common::resampling::{CANDIDATES, is_resampled, worth};
 use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
 use crate::integrators::path::PathWave;
@@ -14,7 +15,7 @@ use crate::shading::dimensions::{
     DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension, resampling_dimension, shadow_roulette_dimension,
 };
 use crate::shading::guided::Guided;
-use crate::shading::lights::{LightPoint, choose_light_point, emitter_weight, light_weight};
+use crate::shading::lights::{LightPoint, choose_light_point, light_weight};
 use crate::shading::paths::Path;
 use crate::shading::principled::at::principled_at;
 use crate::shading::principled::layers::Principled;
@@ -128,12 +129,8 @@ impl PathWave {
         }
         let material = self.sorted.materials[i];
         let vertex = Vertex::new(scene, &ray, &hit, material);
-        if let Some(emission) = scene.tables.emission[material as usize]
-            && (vertex.front || emission.two_sided)
-        {
-            let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
-            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, &vertex));
-            radiance[path.slot as usize] += path.throughput * weight * vertex.emitted(scene, &emission);
+        if let Some(emission) = &scene.tables.emission[material as usize] {
+            radiance[path.slot as usize] += emitted_light(scene, techniques, caustics, &path, &hit, &vertex, emission);
         }
         if depth == settings.max_depth {
             return None;

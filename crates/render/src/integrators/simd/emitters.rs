@@ -14,12 +14,12 @@ use glam::Vec3;
 /// Requires [`crate::prepare::light::LightTable::has_lanes`] and no textured emission, see
 /// [`crate::prepare::material_table::MaterialTable`]; `dimension`, `survival`, `next` and `shadows` of the group are
 /// unused.
-pub(crate) fn shade_emitters(set: InstructionSet, group: KindHits, radiance: &mut [Vec3]) {
-    dispatch!(set, shade_emissive(group: KindHits, radiance: &mut [Vec3]));
+pub(crate) fn shade_emitters(set: InstructionSet, group: KindHits) {
+    dispatch!(set, shade_emissive(group: KindHits));
 }
 
 #[inline(always)]
-fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
+fn shade_emissive<S: Simd>(s: S, group: KindHits) {
     let KindHits { scene, techniques, caustics, paths, hits, materials, order, ref sets, .. } = group;
     let tables = &*scene.tables;
     for chunk in order.chunks(LANES) {
@@ -62,7 +62,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
         let light = light.to_arrays();
         for lane in lanes_of(mask & place.front) {
             let slot = paths.slot[indices[lane] as usize];
-            radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
+            group.radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
         }
     }
 }

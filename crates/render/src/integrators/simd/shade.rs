@@ -5,7 +5,9 @@ use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::resampling::{CANDIDATES, is_resampled};
 use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
 use crate::integrators::simd::direct::DirectLanes;
+use crate::integrators::simd::emission::add_emission;
 use crate::integrators::simd::track::BounceMisStates;
+use crate::prepare::layer_table::{LAYERED, LAYERED_RICHLY};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;
@@ -14,10 +16,11 @@ use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::scatter::{sample, surface_of};
+use crate::shading::simd::scatter::{layered_surface_of, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
+use glam::Vec3;
 
 /// Hits on one kind of material, and the outputs of their paths.
 pub(crate) struct KindHits<'a> {
@@ -40,16 +43,20 @@ pub(crate) struct KindHits<'a> {
     /// See [`DirectLanes::thresholds`].
     pub shadow_thresholds: &'a [f32],
     pub sets: &'a mut MediumSets,
+    /// By slot.
+    pub radiance: &'a mut [Vec3],
+    /// Whether paths end here.
+    pub is_last: bool,
 }
 
 /// Whether [`shade`] supports hits on materials of a kind.
 pub(crate) fn knows(kind: usize) -> bool {
-    [DIFFUSE, MIRROR, GLASS, METAL, COATED].contains(&kind)
+    [DIFFUSE, MIRROR, GLASS, METAL, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Whether light sampling contributes to hits on materials of a kind.
 pub(crate) fn scatters(kind: usize) -> bool {
-    [DIFFUSE, METAL, COATED].contains(&kind)
+    [DIFFUSE, METAL, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Shades hits on materials of one [`MaterialKind`](crate::core::material::MaterialKind).
@@ -59,7 +66,9 @@ pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
         MIRROR => dispatch!(set, shade_mirror(group: KindHits)),
         GLASS => dispatch!(set, shade_glass(group: KindHits)),
         METAL => dispatch!(set, shade_metal(group: KindHits)),
-        _ => dispatch!(set, shade_coated(group: KindHits)),
+        COATED => dispatch!(set, shade_coated(group: KindHits)),
+        // Both kinds of layers share one copy of a large function.
+        _ => dispatch!(set, shade_layered(group: KindHits)),
     }
 }
 
@@ -89,16 +98,21 @@ fn shade_coated<S: Simd>(s: S, group: KindHits) {
 }
 
 #[inline(always)]
+fn shade_layered<S: Simd>(s: S, group: KindHits) {
+    shade_kind::<S, LAYERED>(s, group);
+}
+
+#[inline(always)]
 fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
     let KindHits { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
-    let KindHits { next, shadows, shadow_thresholds, sets, .. } = group;
+    let KindHits { next, shadows, shadow_thresholds, sets, radiance, is_last, .. } = group;
     let features = &scene.tables.features;
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);
         let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
         let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
-        let place = SurfaceLanes::of(s, &at);
+        let mut place = SurfaceLanes::of(s, &at);
         let mut throughput = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);
@@ -107,7 +121,17 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
             let distance = Float::gather(&hits.t, index);
             throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
-        let surface = surface_of::<S, KIND>(s, &at, &place, sets, &media);
+        let surface = if KIND > COATED {
+            layered_surface_of(s, &at, &mut place)
+        } else {
+            surface_of::<S, KIND>(s, &at, &place, sets, &media)
+        };
+        if KIND > COATED {
+            add_emission(&at, techniques, caustics, &place, throughput, radiance);
+            if is_last {
+                continue;
+            }
+        }
         let hints = match caustics {
             Some(pass) if scatters(KIND) => {
                 HintLanes::of(s, pass.guide(), depth, &at, &place, mask & surface.non_specular)

@@ -1,15 +1,15 @@
 //! Hits sorted by kind of material, so that consecutive hits take the same branches.
 
 use crate::core::material::MaterialId;
-use crate::core::material::MaterialKind;
+use crate::prepare::layer_table::LAYERED_RICHLY;
 use crate::prepare::material_table::{Kinds, SEVERAL};
 use crate::prepare::prepared::Prepared;
 use crate::shading::vertex::material_of;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 
-/// Number of kinds of hits: misses, those of materials, and surfaces of two parts.
-pub(crate) const KINDS: usize = MaterialKind::N + 2;
+/// Number of kinds of hits: misses, and those of materials.
+pub(crate) const KINDS: usize = LAYERED_RICHLY + 2;
 
 /// The hits of a wave, sorted.
 #[derive(Default)]

@@ -1,11 +1,12 @@
 //! Parameters of a layered material at a surface point.
 
-use crate::core::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::fresnel::reflectance_of;
+use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lookups::Lookups;
 use crate::shading::principled::iridescence::ThinFilm;
-use crate::shading::principled::layers::{Inside, Principled, Transmission};
+use crate::shading::principled::layers::{BaseInputs, Inside, Principled, Transmission};
 use crate::shading::sheen;
 use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
@@ -55,36 +56,33 @@ pub(crate) fn principled_at(
     let share = |input: &ScalarInput| lookups.scalar(*input).clamp(0.0, 1.0);
     let color = |input: &ColorInput| lookups.color(*input).clamp(Vec3::ZERO, Vec3::ONE);
     let (base, metallic) = (color(base_color), share(metallic));
-    let alpha = share(roughness).powi(2);
+    let roughness = share(roughness);
     let transmitting = share(transmission);
-    let specular = share(specular);
-    let at_normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
-    let facing = (at_normal * lookups.color(*specular_color).max(Vec3::ZERO)).min(Vec3::ONE) * specular;
+    let inputs = BaseInputs {
+        color: base.into(),
+        metallic,
+        roughness,
+        specular: share(specular),
+        specular_color: (reflectance_of(*ior) * lookups.color(*specular_color).max(Vec3::ZERO)).into(),
+    };
+    let mut layers = Principled::of_base(&inputs, vertex.normal.into());
     let film_share = share(iridescence);
-    let (facing, metal) = if film_share > 0.0 {
+    if film_share > 0.0 {
         let nanometres = iridescence_min + (iridescence_max - iridescence_min) * share(iridescence_map);
         let film = ThinFilm { share: film_share, ior: *iridescence_ior, thickness: 1e-9 * nanometres };
         let cos = vertex.normal.dot(vertex.wo).clamp(0.0, 1.0);
-        (film.tint(facing, cos), film.tint(base, cos))
-    } else {
-        (facing, base)
-    };
-    let opaque = (1.0 - metallic) * (1.0 - transmitting);
+        layers.facing = film.tint(layers.facing.into(), cos).into();
+        layers.metal = film.tint(base, cos).into();
+    }
     let anisotropy = share(anisotropy);
-    let (mut widths, mut direction) = ([alpha; 2], None);
     if anisotropy > 0.0 {
         let map = color(anisotropy_map);
-        let strength = anisotropy * map.z;
-        // The lobe is wider along the direction of anisotropy (`KHR_materials_anisotropy`).
-        widths[0] = alpha + (1.0 - alpha) * strength * strength;
-        if widths[0] >= SMALLEST_ALPHA {
-            // A mirror along one direction only.
-            widths[1] = alpha.max(SMALLEST_ALPHA);
-        }
+        layers.widen(anisotropy * map.z);
         let across = Vec2::from_angle(anisotropy_rotation.to_radians()).rotate(2.0 * Vec2::new(map.x, map.y) - 1.0);
-        direction = Some(across.normalize_or(Vec2::X));
+        let along = vertex.tangent.along(across.normalize_or(Vec2::X), vertex.normal);
+        layers.tangent = Some(along.into());
     }
-    let transmission = (transmitting > 0.0 && metallic < 1.0).then(|| {
+    layers.transmission = (transmitting > 0.0 && metallic < 1.0).then(|| {
         let inside = if *thin_walled {
             Inside::Thin(sides.as_ref().map_or(MediumId::OUTSIDE, |sides| sides.here))
         } else {
@@ -95,24 +93,21 @@ pub(crate) fn principled_at(
         };
         Transmission { share: (1.0 - metallic) * transmitting, tint: base, inside, is_lit }
     });
-    let coat = share(clearcoat);
-    let is_mapped = vertex.is_mapped() || (coat > 0.0 && clearcoat_normal_map.is_normal_map());
-    let true_normal = (is_mapped && transmission.is_none()).then(|| vertex.reach_normal());
-    Some(Principled {
-        dielectric: if *thin_walled { 1.0 - metallic } else { opaque },
-        facing,
-        grazing: Vec3::splat(specular),
-        diffuse: opaque * base,
-        metallic,
-        metal,
-        alpha: widths,
-        tangent: direction.map(|direction| vertex.tangent.along(direction, vertex.normal)),
-        true_normal,
-        transmission,
-        sheen: color(sheen_color),
-        sheen_alpha: sheen::alpha_of(share(sheen_roughness)),
-        coat,
-        coat_alpha: share(clearcoat_roughness).powi(2),
-        coat_normal: if coat > 0.0 { vertex.mapped_normal(scene, *clearcoat_normal_map) } else { vertex.normal },
-    })
+    let opaque = (1.0 - metallic) * (1.0 - transmitting);
+    layers.diffuse = (opaque * base).into();
+    if !thin_walled {
+        layers.dielectric = opaque;
+    }
+    layers.sheen = color(sheen_color).into();
+    layers.sheen_alpha = sheen::alpha_of(share(sheen_roughness));
+    layers.coat = share(clearcoat);
+    layers.coat_alpha = share(clearcoat_roughness).powi(2);
+    if layers.coat > 0.0 {
+        layers.coat_normal = vertex.mapped_normal(scene, *clearcoat_normal_map).into();
+    }
+    let is_mapped = vertex.is_mapped() || (layers.coat > 0.0 && clearcoat_normal_map.is_normal_map());
+    if is_mapped && layers.transmission.is_none() {
+        layers.true_normal = Some(vertex.reach_normal().into());
+    }
+    Some(layers)
 }

@@ -14,12 +14,14 @@
 //! - Light that a rough metal or rough glass loses between microfacets is compensated, as in [`crate::shading::metal`]
 //!   and [`crate::shading::rough_glass`].
 //!
-//! Start reading at [`layers::Principled`]; [`seen`] has what depends on the view direction.
+//! Start reading at [`layers::Principled`]; [`seen`] has what depends on the view direction, for one point or sixteen,
+//! and `transmitted` the light that passes, for one.
 
 pub(crate) mod at;
 mod iridescence;
 pub(crate) mod layers;
-mod seen;
+pub(crate) mod seen;
+mod transmitted;
 mod viewed;
 
 use crate::shading::interface::Interface;
@@ -30,15 +32,11 @@ use glam::{Vec2, Vec3};
 
 impl Scatter for Principled {
     fn has_non_specular(&self) -> bool {
-        self.diffuse != Vec3::ZERO
-            || self.sheen != Vec3::ZERO
-            || (self.reflects() && !self.is_smooth())
-            || (self.has_coat() && !self.is_coat_smooth())
-            || self.is_transmission_rough()
+        self.scatters() || self.is_transmission_rough()
     }
 
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
-        Seen::new(self, wo, normal).map_or((Vec3::ZERO, 0.0), |seen| seen.eval(wi))
+        Seen::new(*self, wo.into(), normal.into()).eval_all(wi)
     }
 
     fn through(&self) -> Option<Interface> {
@@ -47,7 +45,7 @@ impl Scatter for Principled {
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        Seen::new(self, wo, normal)?.sample(u_lobe(), u)
+        Seen::new(*self, wo.into(), normal.into()).sample(u_lobe(), u)
     }
 }
 
@@ -60,6 +58,7 @@ mod tests {
     use crate::shading::interface::MediumId;
     use crate::shading::sheen;
     use crate::test_statistics::ChiSquared;
+    use firstlight_simd::{Float, InstructionSet, LANES, Simd, Vector3, dispatch};
     use rayon::prelude::*;
     use std::f64::consts::{PI, TAU};
 
@@ -69,20 +68,20 @@ mod tests {
     fn plain() -> Principled {
         Principled {
             dielectric: 1.0,
-            facing: Vec3::splat(0.04),
-            grazing: Vec3::ONE,
-            diffuse: Vec3::ONE,
+            facing: Vec3::splat(0.04).into(),
+            grazing: 1.0,
+            diffuse: Vec3::ONE.into(),
             metallic: 0.0,
-            metal: Vec3::ONE,
+            metal: Vec3::ONE.into(),
             alpha: [0.25; 2],
             tangent: None,
             true_normal: None,
             transmission: None,
-            sheen: Vec3::ZERO,
+            sheen: Vec3::ZERO.into(),
             sheen_alpha: 0.25,
             coat: 0.0,
             coat_alpha: 0.0,
-            coat_normal: Vec3::Z,
+            coat_normal: Vec3::Z.into(),
         }
     }
 
@@ -99,33 +98,39 @@ mod tests {
     }
 
     fn brushed(surface: Principled) -> Principled {
-        Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..surface }
+        Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0).into()), ..surface }
     }
 
     /// Surfaces with each layer, alone and combined, with a name.
     fn surfaces() -> Vec<(&'static str, Principled)> {
-        let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
+        let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO.into(), metallic: 1.0, ..plain() };
         let color = Vec3::new(0.8, 0.4, 0.1);
-        let true_normal = Some(Vec3::new(0.6, 0.0, 0.8));
-        let half = Principled { dielectric: 0.5, diffuse: 0.5 * color, metallic: 0.5, metal: color, ..plain() };
-        let velvet = Principled { sheen: Vec3::new(0.9, 0.5, 0.7), sheen_alpha: 0.09, ..plain() };
-        let thin = Principled { diffuse: Vec3::ZERO, ..plain() };
-        let glass = Principled { dielectric: 0.4, diffuse: 0.4 * color, ..plain() };
+        let true_normal = Some(Vec3::new(0.6, 0.0, 0.8).into());
+        let half = Principled {
+            dielectric: 0.5,
+            diffuse: (0.5 * color).into(),
+            metallic: 0.5,
+            metal: color.into(),
+            ..plain()
+        };
+        let velvet = Principled { sheen: Vec3::new(0.9, 0.5, 0.7).into(), sheen_alpha: 0.09, ..plain() };
+        let thin = Principled { diffuse: Vec3::ZERO.into(), ..plain() };
+        let glass = Principled { dielectric: 0.4, diffuse: (0.4 * color).into(), ..plain() };
         vec![
             ("dielectric", plain()),
             ("glossy dielectric", Principled { alpha: [0.06; 2], ..plain() }),
             ("rough dielectric", Principled { alpha: [1.0; 2], ..plain() }),
-            ("metal", metal.clone()),
-            ("brushed metal", brushed(metal.clone())),
+            ("metal", metal),
+            ("brushed metal", brushed(metal)),
             ("brushed plastic", brushed(plain())),
-            ("mapped metal", Principled { true_normal, ..metal.clone() }),
+            ("mapped metal", Principled { true_normal, ..metal }),
             ("mapped coated plastic", Principled { true_normal, coat: 1.0, coat_alpha: 0.2, ..plain() }),
-            ("half metal", half.clone()),
-            ("velvet", velvet.clone()),
+            ("half metal", half),
+            ("velvet", velvet),
             ("coated", Principled { coat: 1.0, coat_alpha: 0.04, ..half }),
             ("all layers", Principled { coat: 0.7, coat_alpha: 0.3, metallic: 0.2, dielectric: 0.8, ..velvet }),
             ("thin", Principled { transmission: transmission(1.0, Inside::Thin(MediumId::OUTSIDE)), ..thin }),
-            ("part glass", Principled { transmission: transmission(0.6, solid(1.0 / 1.5)), ..glass.clone() }),
+            ("part glass", Principled { transmission: transmission(0.6, solid(1.0 / 1.5)), ..glass }),
             ("part glass from within", Principled { transmission: transmission(0.6, solid(1.5)), ..glass }),
         ]
     }
@@ -242,16 +247,16 @@ mod tests {
         for roughness in [0.0f32, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0] {
             for cos in [1.0, 0.7, 0.4, 0.15, 0.05, 0.01] {
                 let alpha = [roughness * roughness; 2];
-                let metal = Principled { alpha, dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
+                let metal = Principled { alpha, dielectric: 0.0, diffuse: Vec3::ZERO.into(), metallic: 1.0, ..plain() };
                 let coat = Principled { alpha: [0.09; 2], coat: 1.0, coat_alpha: alpha[0], ..plain() };
-                let sheen = Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(roughness), ..plain() };
-                let below = Principled { alpha: [0.09; 2], ..metal.clone() };
+                let sheen = Principled { sheen: Vec3::ONE.into(), sheen_alpha: sheen::alpha_of(roughness), ..plain() };
+                let below = Principled { alpha: [0.09; 2], ..metal };
                 let white = [
                     ("dielectric", Principled { alpha, ..plain() }),
-                    ("tinted reflection", Principled { alpha, facing: Vec3::new(0.3, 0.1, 0.0), ..plain() }),
-                    ("mapped metal", Principled { true_normal: Some(Vec3::new(0.6, 0.0, 0.8)), ..metal.clone() }),
+                    ("tinted reflection", Principled { alpha, facing: Vec3::new(0.3, 0.1, 0.0).into(), ..plain() }),
+                    ("mapped metal", Principled { true_normal: Some(Vec3::new(0.6, 0.0, 0.8).into()), ..metal }),
                     ("metal", metal),
-                    ("coated metal", Principled { coat: 1.0, coat_alpha: alpha[0], ..below.clone() }),
+                    ("coated metal", Principled { coat: 1.0, coat_alpha: alpha[0], ..below }),
                     ("sheen on metal", Principled { sheen: sheen.sheen, sheen_alpha: sheen.sheen_alpha, ..below }),
                     ("coat", coat),
                     ("sheen", sheen),
@@ -283,17 +288,13 @@ mod tests {
                 0.0 => [roughness * roughness; 2],
                 _ => [narrow + (1.0 - narrow) * anisotropy * anisotropy, narrow],
             };
-            let plastic = Principled { alpha, tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..plain() };
-            let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plastic.clone() };
+            let plastic = Principled { alpha, tangent: Some(Vec3::new(0.6, 0.8, 0.0).into()), ..plain() };
+            let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO.into(), metallic: 1.0, ..plastic };
             for (base, surface) in [("metal", metal), ("plastic", plastic)] {
-                let coated = |coat_alpha| Principled { coat: 1.0, coat_alpha, ..surface.clone() };
-                let sheen = Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(0.3), ..surface.clone() };
-                let above = [
-                    ("", surface.clone()),
-                    ("coated ", coated(0.0)),
-                    ("roughly coated ", coated(0.04)),
-                    ("velvet ", sheen),
-                ];
+                let coated = |coat_alpha| Principled { coat: 1.0, coat_alpha, ..surface };
+                let sheen = Principled { sheen: Vec3::ONE.into(), sheen_alpha: sheen::alpha_of(0.3), ..surface };
+                let above =
+                    [("", surface), ("coated ", coated(0.0)), ("roughly coated ", coated(0.04)), ("velvet ", sheen)];
                 for (above, surface) in above {
                     let found = mean_furnace(&surface, 1 << 16);
                     let name = format!("{above}{base}, roughness {roughness}, anisotropy {anisotropy}: {}", found.x);
@@ -335,9 +336,8 @@ mod tests {
         (0..100_000_000_u32).into_par_iter().for_each(check_configuration);
     }
 
-    /// Surface, directions and random numbers of index `i`: all layers, with many values at the ends of their ranges.
-    fn check_configuration(i: u32) {
-        let sampler = Sampler::new(9, 1, 0, i);
+    /// A surface of random parameters: all layers, with many values at the ends of their ranges.
+    fn random_surface(sampler: &Sampler) -> Principled {
         let pick = |k: u32| sampler.single(k);
         let ends = |k: u32| match pick(k) {
             x if x < 0.2 => 0.0,
@@ -345,28 +345,35 @@ mod tests {
             x => (x - 0.2) / 0.6,
         };
         let normal = Vec3::new(pick(1) - 0.5, pick(2) - 0.5, pick(3) + 0.02).normalize();
-        let surface = Principled {
+        Principled {
             dielectric: ends(4),
-            facing: Vec3::new(ends(5), ends(6), ends(7)),
-            grazing: Vec3::splat(ends(8)),
-            diffuse: Vec3::splat(ends(9)) * (1.0 - ends(10)),
+            facing: Vec3::new(ends(5), ends(6), ends(7)).into(),
+            grazing: ends(8),
+            diffuse: (Vec3::splat(ends(9)) * (1.0 - ends(10))).into(),
             metallic: ends(10),
-            metal: Vec3::new(ends(11), ends(12), ends(13)),
+            metal: Vec3::new(ends(11), ends(12), ends(13)).into(),
             alpha: [ends(14).powi(2), if pick(15) < 0.5 { ends(14).powi(2) } else { ends(15).powi(2) }],
-            tangent: (pick(16) < 0.5).then_some(Vec3::X),
-            true_normal: (pick(35) < 0.5).then_some(normal),
+            tangent: (pick(16) < 0.5).then_some(Vec3::X.into()),
+            true_normal: (pick(35) < 0.5).then_some(normal.into()),
             transmission: (pick(17) < 0.5).then(|| Transmission {
                 share: ends(18),
                 tint: Vec3::splat(ends(19)),
                 inside: if pick(20) < 0.5 { Inside::Thin(MediumId::OUTSIDE) } else { solid(0.4 + 2.0 * pick(21)) },
                 is_lit: pick(22) < 0.5,
             }),
-            sheen: Vec3::splat(ends(23)),
+            sheen: Vec3::splat(ends(23)).into(),
             sheen_alpha: sheen::alpha_of(ends(24)),
             coat: ends(25),
             coat_alpha: ends(26).powi(2),
-            coat_normal: if pick(27) < 0.5 { normal } else { Vec3::Z },
-        };
+            coat_normal: if pick(27) < 0.5 { normal } else { Vec3::Z }.into(),
+        }
+    }
+
+    /// Surface, directions and random numbers of index `i`.
+    fn check_configuration(i: u32) {
+        let sampler = Sampler::new(9, 1, 0, i);
+        let pick = |k: u32| sampler.single(k);
+        let surface = random_surface(&sampler);
         let wo = direction((pick(28).powi(4)).max(1e-7));
         let wi = Vec3::new(pick(29) - 0.5, pick(30) - 0.5, pick(31) - 0.5).normalize_or(Vec3::Z);
         let (value, pdf) = surface.eval(wo, wi, Vec3::Z);
@@ -375,5 +382,112 @@ mod tests {
             assert!(sample.weight.is_finite() && sample.weight.min_element() >= 0.0, "{i}: {sample:?} {surface:?}");
             assert!(sample.pdf > 0.0 && sample.wi.is_normalized(), "{i}: {sample:?} {surface:?}");
         }
+    }
+
+    /// What one lane gives: value and pdf of a direction; a sampled direction with its pdf, weight and whether it is one.
+    type Outcome = [f32; 12];
+
+    fn outcome_of_one(surface: Principled, [wo, wi]: [Vec3; 2], u_lobe: f32, u: [f32; 2]) -> Outcome {
+        let seen = Seen::new(surface, wo.into(), Vec3::Z.into());
+        let (value, pdf) = seen.eval(wi.into());
+        let proposed = seen.propose(u_lobe, u);
+        let (of_proposed, density) = seen.eval(proposed.wi);
+        let found = seen.weighted(&proposed, of_proposed, density);
+        let Vector3 { x, y, z } = proposed.wi;
+        let weight = found.weight;
+        let is_one = f32::from(found.go_on);
+        [value.x, value.y, value.z, pdf, x, y, z, weight.x, weight.y, weight.z, found.pdf, is_one]
+    }
+
+    #[inline(always)]
+    fn outcomes<S: Simd>(s: S, group: &[(Principled, [Vec3; 2], f32, [f32; 2]); LANES], out: &mut [Outcome; LANES]) {
+        let number = |of: &dyn Fn(usize) -> f32| Float::load(s, &std::array::from_fn(of));
+        let vector = |of: &dyn Fn(usize) -> Vector3<f32>| Vector3 {
+            x: number(&|lane| of(lane).x),
+            y: number(&|lane| of(lane).y),
+            z: number(&|lane| of(lane).z),
+        };
+        let surface = |lane: usize| &group[lane].0;
+        let nothing = Vector3::from(Vec3::ZERO);
+        let layers = Principled {
+            dielectric: number(&|lane| surface(lane).dielectric),
+            facing: vector(&|lane| surface(lane).facing),
+            grazing: number(&|lane| surface(lane).grazing),
+            diffuse: vector(&|lane| surface(lane).diffuse),
+            metallic: number(&|lane| surface(lane).metallic),
+            metal: vector(&|lane| surface(lane).metal),
+            alpha: [number(&|lane| surface(lane).alpha[0]), number(&|lane| surface(lane).alpha[1])],
+            tangent: Some(vector(&|lane| surface(lane).tangent.unwrap_or(nothing))),
+            true_normal: Some(vector(&|lane| surface(lane).true_normal.unwrap_or(nothing))),
+            transmission: None,
+            sheen: vector(&|lane| surface(lane).sheen),
+            sheen_alpha: number(&|lane| surface(lane).sheen_alpha),
+            coat: number(&|lane| surface(lane).coat),
+            coat_alpha: number(&|lane| surface(lane).coat_alpha),
+            coat_normal: vector(&|lane| surface(lane).coat_normal),
+        };
+        let direction = |k: usize| vector(&|lane| group[lane].1[k].into());
+        let seen = Seen::new(layers, direction(0), vector(&|_| Vec3::Z.into()));
+        let (value, pdf) = seen.eval(direction(1));
+        let proposed = seen.propose(number(&|lane| group[lane].2), [0, 1].map(|k| number(&|lane| group[lane].3[k])));
+        let (of_proposed, density) = seen.eval(proposed.wi);
+        let found = seen.weighted(&proposed, of_proposed, density);
+        let (wi, weight) = (proposed.wi, found.weight);
+        let numbers = [value.x, value.y, value.z, pdf, wi.x, wi.y, wi.z, weight.x, weight.y, weight.z, found.pdf];
+        for (k, number) in numbers.into_iter().enumerate() {
+            out.iter_mut().zip(number.to_array()).for_each(|(out, number)| out[k] = number);
+        }
+        out.iter_mut().enumerate().for_each(|(lane, out)| out[11] = f32::from(found.go_on >> lane & 1 != 0));
+    }
+
+    fn outcomes_by(set: InstructionSet, group: &[(Principled, [Vec3; 2], f32, [f32; 2]); LANES]) -> [[u32; 12]; LANES] {
+        let mut out = [[0.0; 12]; LANES];
+        let to = &mut out;
+        dispatch!(
+            set,
+            outcomes(group: &[(Principled, [Vec3; 2], f32, [f32; 2]); LANES], to: &mut [Outcome; LANES])
+        );
+        // What is no number, or not used, says nothing.
+        out.map(|mut lane| {
+            if lane[11] == 0.0 {
+                lane[4..11].fill(0.0);
+            }
+            lane.map(f32::to_bits)
+        })
+    }
+
+    #[test]
+    fn each_of_sixteen_lanes_scatters_as_one_surface_does() {
+        let mut n_sampled = 0;
+        for i in 0..4000 {
+            let group = std::array::from_fn(|lane| {
+                let sampler = Sampler::new(lane as u32, 5, 0, i);
+                let surface = Principled { transmission: None, ..random_surface(&sampler) };
+                let wo = direction((sampler.single(28).powi(4)).max(1e-7));
+                let wi = crate::sampling::cosine_hemisphere(sampler.pair(29));
+                (surface, [wo, wi], sampler.single(30), sampler.pair(31).to_array())
+            });
+            let lanes = outcomes_by(InstructionSet::detect(), &group);
+            for set in InstructionSet::available().into_iter().filter(|_| i % 40 == 0) {
+                assert_eq!(outcomes_by(set, &group), lanes, "{set:?}");
+            }
+            for (lane, found) in lanes.iter().enumerate() {
+                let (surface, directions, u_lobe, u) = group[lane];
+                if i % 40 == 0 {
+                    // Whatever the other lanes are.
+                    let alone = [group[lane]; LANES];
+                    assert_eq!(outcomes_by(InstructionSet::detect(), &alone)[lane], *found, "{i}, {surface:?}");
+                }
+                let expected = outcome_of_one(surface, directions, u_lobe, u);
+                n_sampled += u32::from(expected[11] > 0.0);
+                let n = if expected[11] > 0.0 { 12 } else { 4 };
+                for (k, (found, expected)) in found.map(f32::from_bits).into_iter().zip(expected).take(n).enumerate() {
+                    // Exponents of a narrow sheen enlarge differences.
+                    let is_close = (found - expected).abs() <= 1e-3 * expected.abs() + 1e-6 || found == expected;
+                    assert!(is_close, "{i}, number {k}: {found} for {expected}, {surface:?}");
+                }
+            }
+        }
+        assert!(n_sampled > 40_000, "{n_sampled}");
     }
 }

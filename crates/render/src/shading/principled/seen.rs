@@ -1,444 +1,422 @@
-//! A layered surface seen along one direction.
+//! A layered surface seen along one direction, at one point or at sixteen: all that it reflects.
+//!
+//! Each lane gives the same bits whatever the others are. What it transmits is in [`super::transmitted`].
 
-use crate::core::color::luminance;
+use crate::core::color::luminance_of;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
-use crate::shading::dielectric::{fresnel, reflect, refract};
+use crate::shading::dielectric::reflect;
 use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_anisotropic_normal};
-use crate::shading::interface::Interface;
-use crate::shading::layer_albedo::{SchlickAlbedo, bounded_sheen, cosine_mean, hemisphere_mean, sheen_albedo};
-use crate::shading::metal::{mean_reflectance, with_further_bounces};
-use crate::shading::microfacets::Microfacets;
-use crate::shading::principled::layers::{COAT_FACING, Inside, Principled, Transmission};
-use crate::shading::rough_glass::RoughGlass;
-use crate::shading::scatter::BsdfSample;
-use firstlight_kdtree::geometry::Frame;
-use glam::{Vec2, Vec3};
+use crate::shading::integral_table::GAUSS;
+use crate::shading::layer_albedo::{SchlickAlbedo, azimuths, bounded_sheen, sheen_albedo};
+use crate::shading::metal::{mean_of_schlick, with_further_bounces};
+use crate::shading::principled::layers::{COAT_FACING, Inside, Principled};
+use firstlight_simd::{Elementary, Real, Truth, Vector3, frame_around, select, select_vector};
 
 /// Lower limit of cosines with the normal.
 const SMALLEST_COS: f32 = 1e-6;
 
-/// The technique that samples a direction.
-#[derive(Clone, Copy, PartialEq)]
-enum Technique {
-    /// Cosine-weighted, for the diffuse layer and the sheen.
-    Cosine,
-    /// Visible normals of the base.
-    Reflection,
-    /// Visible normals of the coat.
-    Coat,
-    Transmission,
-}
-
-const TECHNIQUES: [Technique; 4] = [Technique::Cosine, Technique::Reflection, Technique::Coat, Technique::Transmission];
-
 /// Values that depend on the view direction.
-pub(super) struct Seen<'a> {
-    of: &'a Principled,
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<R: Real = f32> {
+    pub(super) of: Principled<R>,
     /// Tangent, bitangent, and normal on the side of the viewer.
-    frame: Frame,
-    /// Direction to the viewer, in the frame.
-    wo: Vec3,
+    pub(super) axes: [Vector3<R>; 3],
+    /// Direction to the viewer, along the axes.
+    pub(super) wo: Vector3<R>,
+    /// Lanes that scatter at all: not those seen from behind.
+    pub(super) is_valid: R::Mask,
     /// The coat, about its own normal.
-    coat: Option<CoatSeen>,
+    coat: Option<CoatSeen<R>>,
     /// Transmittance of the sheen.
-    past_sheen: f32,
+    pub(super) past_sheen: R,
     /// Transmittance of all layers towards the viewer.
-    past_all: Vec3,
+    past_all: Vector3<R>,
     /// Mean of `past_all` over all directions.
-    mean_past_all: Vec3,
+    mean_past_all: Vector3<R>,
+    /// Albedo of the microfacets of the base.
+    pub(super) base: SchlickAlbedo<R>,
     /// Share of the light that reaches the metal.
-    above_metal: f32,
+    above_metal: R,
     /// Factor that adds further bounces between microfacets of the metal.
-    metal_gain: Vec3,
-    /// Total over single-scattering transmittance of a rough pane.
-    passed_again: Vec3,
-    pmf: [f32; 4],
+    metal_gain: Vector3<R>,
+    /// Probabilities of sampling: by the cosine, for the diffuse layer and the sheen; by visible normals of the base;
+    /// by those of the coat; transmission.
+    pub(super) pmf: [R; 4],
 }
 
-struct CoatSeen {
-    frame: Frame,
-    wo: Vec3,
+#[derive(Clone, Copy)]
+struct CoatSeen<R> {
+    axes: [Vector3<R>; 3],
+    wo: Vector3<R>,
     /// Transmittance of the coat.
-    past: f32,
+    past: R,
 }
 
-/// Evaluates GGX microfacets for two directions above them, both in the frame: half vector, value and pdf.
-fn reflection(wo: Vec3, wi: Vec3, alpha: [f32; 2]) -> (Vec3, f32, f32) {
+/// A direction before it is known how much light comes from it.
+#[derive(Clone, Copy)]
+pub(crate) struct Proposed<R: Real> {
+    /// Unit, in world space.
+    pub wi: Vector3<R>,
+    /// Lanes that have a direction.
+    pub go_on: R::Mask,
+    by_base: R::Mask,
+    by_coat: R::Mask,
+    /// Lanes that selected transmission instead, and the rest of the number that did.
+    pub(super) passes: R::Mask,
+    pub(super) rest: R,
+}
+
+/// A sampled direction of [`Proposed`].
+pub(crate) struct Reflected<R: Real> {
+    pub go_on: R::Mask,
+    /// f · cos / pdf.
+    pub weight: Vector3<R>,
+    /// Pdf per steradian; infinite if it is specular.
+    pub pdf: R,
+    /// Probability of having selected the specular layer, else 1.
+    pub probability: R,
+}
+
+/// Half vector, value and pdf of microfacets.
+pub(super) struct Facets<R> {
+    pub half: Vector3<R>,
+    pub value: R,
+    pub pdf: R,
+}
+
+/// Evaluates GGX microfacets for two directions above them, both in the frame.
+#[inline(always)]
+pub(super) fn facets<R: Real>(wo: Vector3<R>, wi: Vector3<R>, alpha: [R; 2]) -> Facets<R> {
     let half = (wo + wi).normalize();
-    let masking = 1.0 + anisotropic_lambda(wo.into(), alpha);
-    let both = masking + anisotropic_lambda(wi.into(), alpha);
-    let per_area = anisotropic_distribution(half.into(), alpha) / (4.0 * wo.z);
-    (half, per_area / both, per_area / masking)
+    let masking = anisotropic_lambda(wo, alpha) + 1.0;
+    let both = masking + anisotropic_lambda(wi, alpha);
+    let per_area = anisotropic_distribution(half, alpha) / (wo.z * 4.0);
+    Facets { half, value: per_area / both, pdf: per_area / masking }
 }
 
-fn schlick(facing: Vec3, grazing: Vec3, cos: f32) -> Vec3 {
-    facing.lerp(grazing, (1.0 - cos).clamp(0.0, 1.0).powi(5))
+#[inline(always)]
+pub(super) fn schlick<R: Real>(facing: Vector3<R>, grazing: R, cos: R) -> Vector3<R> {
+    let x = (-cos + 1.0).at_least(0.0).at_most(1.0);
+    let x2 = x * x;
+    facing + (Vector3::all(grazing) - facing) * (x2 * x2 * x)
 }
 
-fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
-    reflect(wo.into(), normal.into()).into()
+#[inline(always)]
+fn ones<R: Real>(like: R) -> Vector3<R> {
+    Vector3::all(like.all(1.0))
 }
 
-impl<'a> Seen<'a> {
-    /// Prepares a surface for a view direction; `None` if it is seen from inside and not transmissive.
+/// 1 minus a colour, at least 0.
+#[inline(always)]
+pub(super) fn rest_of<R: Real>(color: Vector3<R>) -> Vector3<R> {
+    (ones(color.x) - color).max(Vector3::all(color.x.all(0.0)))
+}
+
+impl<R: Elementary> Seen<R> {
+    /// Prepares a surface for a view direction.
     ///
-    /// - `normal`: unit; `wo`: unit, on its side, or beyond it for transmitted light.
-    pub fn new(of: &'a Principled, wo: Vec3, normal: Vec3) -> Option<Self> {
-        if normal.dot(wo) <= 0.0 {
-            return None;
+    /// - `normal`: unit; `wo`: unit, on its side: others scatter nothing.
+    #[inline(always)]
+    pub fn new(of: Principled<R>, wo: Vector3<R>, normal: Vector3<R>) -> Self {
+        let one = wo.x.all(1.0);
+        let mut axes = frame_around(normal);
+        if let Some(tangent) = of.tangent {
+            let x = (tangent - normal * normal.dot(tangent)).normalize_or(axes[0]);
+            axes = [x, normal.cross(x), normal];
         }
-        let tangent = of.tangent.map(|t| t - normal.dot(t) * normal).and_then(Vec3::try_normalize);
-        let frame = match tangent {
-            Some(x) => Frame { x, y: normal.cross(x), z: normal },
-            None => Frame::around(normal),
-        };
-        let mut local = frame.to_local(wo);
-        local.z = local.z.max(SMALLEST_COS);
-        let coat = of.has_coat().then(|| {
+        let mut local = wo.to_local(&axes);
+        local.z = local.z.at_least(SMALLEST_COS);
+        let mut coat = None;
+        if of.has_coat().any() {
             // A coat normal that faces away is replaced by that of the base.
-            let normal = if of.coat_normal.dot(wo) > 0.0 { of.coat_normal } else { normal };
-            let frame = Frame::around(normal);
-            let mut wo = frame.to_local(wo);
-            wo.z = wo.z.max(SMALLEST_COS);
-            CoatSeen { frame, wo, past: past_coat(of, wo.z) }
-        });
-        let past_coat = coat.as_ref().map_or(1.0, |coat| coat.past);
-        let past_sheen = past_sheen(of, local.z);
+            let faces = of.coat_normal.dot(wo).is_positive();
+            let axes = frame_around(select_vector(faces, of.coat_normal, normal));
+            let mut wo = wo.to_local(&axes);
+            wo.z = wo.z.at_least(SMALLEST_COS);
+            coat = Some(CoatSeen { axes, wo, past: past_coat(&of, wo.z) });
+        }
+        let past_coat = if let Some(coat) = &coat { coat.past } else { one };
+        let past_sheen = past_sheen(&of, local.z);
         let base = SchlickAlbedo::along(local, of.alpha);
         let reflected = of.dielectric_albedo(base);
-        let past_all = past_coat * past_sheen * (Vec3::ONE - reflected).max(Vec3::ZERO);
-        let is_diffuse = of.diffuse != Vec3::ZERO;
-        let mean_past_all = if is_diffuse { mean_past_all(of) } else { Vec3::ONE };
-        let metal_gain = if of.metallic > 0.0 && !of.is_smooth() { metal_gain(of, base) } else { Vec3::ONE };
         let upper = past_coat * past_sheen;
-        let metal = (of.metal * base.facing + Vec3::splat(base.grazing)) * metal_gain;
-        let transmitted = of.transmission.map_or(0.0, |transmission| match transmission.inside {
-            Inside::Solid(_) => transmission.share,
-            Inside::Thin(_) => transmission.share * luminance(transmission.tint * (Vec3::ONE - reflected)),
-        });
-        // All light that is not reflected is transmitted (as in Turquin 2019 for metals).
-        let once = Vec3::splat(base.whole()) - reflected;
-        let passed_again = (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3));
-        let sheen = luminance(of.sheen);
-        let strength = [
-            luminance(of.diffuse * past_all)
-                + if sheen > 0.0 { past_coat * sheen * sheen_albedo(local.z, of.sheen_alpha) } else { 0.0 },
-            upper * luminance(of.dielectric * reflected + of.metallic * metal),
-            1.0 - past_coat,
-            upper * transmitted,
-        ];
-        let sum: f32 = strength.iter().sum();
-        if sum.is_nan() || sum <= 0.0 {
-            return None;
+        let past_all = rest_of(reflected) * upper;
+        let mut mean_past_all = ones(one);
+        if (!of.diffuse.is_zero()).any() {
+            mean_past_all = mean_of_past_all(&of);
         }
-        let pmf = strength.map(|one| one / sum);
-        Some(Self {
+        let mut metal_gain = ones(one);
+        let is_metal = of.metallic.is_positive() & !of.is_smooth();
+        if is_metal.any() {
+            metal_gain = select_vector(is_metal, gain_of_metal(&of, base), metal_gain);
+        }
+        let metal = (of.metal * base.facing + Vector3::all(base.grazing)).times(metal_gain);
+        let transmitted = match of.transmission {
+            None => one.all(0.0),
+            Some(passed) => match passed.inside {
+                Inside::Solid(_) => one * passed.share,
+                Inside::Thin(_) => {
+                    luminance_of(Vector3::in_all(one, passed.tint).times(ones(one) - reflected)) * passed.share
+                }
+            },
+        };
+        let mut by_cosine = luminance_of(of.diffuse.times(past_all));
+        if (!of.sheen.is_zero()).any() {
+            by_cosine += past_coat * luminance_of(of.sheen) * sheen_albedo(local.z, of.sheen_alpha);
+        }
+        let by_base = upper * luminance_of(reflected * of.dielectric + metal * of.metallic);
+        let (by_coat, through) = (one - past_coat, upper * transmitted);
+        let sum = by_cosine + by_base + by_coat + through;
+        Self {
             of,
-            frame,
+            axes,
             wo: local,
+            is_valid: normal.dot(wo).is_positive() & sum.is_positive(),
             coat,
             past_sheen,
             past_all,
             mean_past_all,
+            base,
             above_metal: upper,
             metal_gain,
-            passed_again,
-            pmf,
-        })
+            pmf: [by_cosine / sum, by_base / sum, by_coat / sum, through / sum],
+        }
+    }
+
+    /// See [`Principled::scatters`].
+    #[inline(always)]
+    pub fn scatters(&self) -> R::Mask {
+        self.of.scatters() & self.is_valid
     }
 
     /// Transmittance of the coat for light from one direction to the viewer.
-    fn below_coat(&self, wi: Vec3) -> f32 {
-        let Some(coat) = &self.coat else { return 1.0 };
-        coat.past.min(past_coat(self.of, coat.frame.z.dot(wi).abs()))
+    #[inline(always)]
+    pub(super) fn below_coat(&self, wi: Vector3<R>) -> R {
+        match &self.coat {
+            Some(coat) => coat.past.min(past_coat(&self.of, coat.axes[2].dot(wi).abs())),
+            None => wi.x.all(1.0),
+        }
     }
 
-    /// f · |cos| and pdf of all non-specular layers. `wi`: unit, in world space.
-    pub fn eval(&self, wi: Vec3) -> (Vec3, f32) {
-        let Some(surface) = self.of.true_normal else { return self.eval_layers(wi) };
-        if surface.dot(wi) <= 0.0 {
-            return (Vec3::ZERO, 0.0);
-        }
-        let (straight, mirrored) = (self.eval_layers(wi), self.eval_layers(wi - 2.0 * surface.dot(wi) * surface));
-        (straight.0 + mirrored.0, straight.1 + mirrored.1)
-    }
-
-    /// [`Self::eval`] without the light that is mirrored at the true surface.
-    fn eval_layers(&self, wi: Vec3) -> (Vec3, f32) {
-        let of = self.of;
-        let local = self.frame.to_local(wi);
-        if local.z < 0.0 {
-            return match of.transmission.filter(|t| t.is_lit && of.is_transmission_rough()) {
-                Some(transmission) => self.eval_through(&transmission, wi, local),
-                None => (Vec3::ZERO, 0.0),
-            };
-        }
-        if local.z == 0.0 {
-            return (Vec3::ZERO, 0.0);
-        }
-        let below_coat = self.below_coat(wi);
-        let past_sheen_i = past_sheen(of, local.z);
-        let below = below_coat * self.past_sheen.min(past_sheen_i);
-        let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
-        if self.pmf[0] > 0.0 {
-            let cosine = cosine_hemisphere_pdf(local.z);
-            pdf += self.pmf[0] * cosine;
-            if of.diffuse != Vec3::ZERO {
-                let reflected = of.dielectric_albedo(SchlickAlbedo::along(local, of.alpha));
-                let coat = self.coat.as_ref().map_or(1.0, |coat| past_coat(of, coat.frame.z.dot(wi).abs()));
-                let past_all_i = coat * past_sheen_i * (Vec3::ONE - reflected).max(Vec3::ZERO);
-                value += of.diffuse * cosine * self.past_all * past_all_i / self.mean_past_all;
+    /// f · |cos| and pdf of all layers that are not specular and reflect. `wi`: unit, in world space.
+    #[inline(always)]
+    pub fn eval(&self, wi: Vector3<R>) -> (Vector3<R>, R) {
+        let (mut value, mut pdf) = self.eval_layers(wi);
+        if let Some(surface) = self.of.true_normal {
+            let is_mapped = !surface.is_zero();
+            let height = surface.dot(wi);
+            let mirrored = wi - surface * (height * 2.0);
+            let (zero, nothing) = (height.all(0.0), Vector3::all(height.all(0.0)));
+            let is_above = is_mapped & height.is_positive();
+            // The mirrored direction, too, may be above the mapped normal.
+            if (is_above & mirrored.dot(self.axes[2]).is_positive()).any() {
+                let (more, density) = self.eval_layers(mirrored);
+                value = select_vector(is_above, value + more, value);
+                pdf = select(is_above, pdf + density, pdf);
             }
-            if of.sheen != Vec3::ZERO {
-                let half = (self.wo + local).normalize();
-                let sheen = bounded_sheen(self.wo.z, local.z, half.z, of.sheen_alpha);
-                value += of.sheen * (below_coat * sheen * local.z);
-            }
-        }
-        if self.pmf[1] > 0.0 && !of.is_smooth() {
-            let (half, f, density) = reflection(self.wo, local, of.alpha);
-            value += self.tint(self.wo.dot(half), below) * f;
-            pdf += self.pmf[1] * density;
-        }
-        if let Some(coat) = self.coat.as_ref().filter(|_| !of.is_coat_smooth()) {
-            let local = coat.frame.to_local(wi);
-            if local.z > 0.0 {
-                let (half, f, density) = reflection(coat.wo, local, [of.coat_alpha; 2]);
-                let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.dot(half));
-                value += tint * (of.coat * f);
-                pdf += self.pmf[2] * density;
-            }
-        }
-        if let Some(transmission) = of.transmission.filter(|_| self.pmf[3] > 0.0 && of.is_transmission_rough())
-            && let Inside::Solid(interface) = transmission.inside
-        {
-            let (f, density) = self.rough_glass(interface).eval(wi);
-            value += Vec3::splat(transmission.share * below * f);
-            pdf += self.pmf[3] * density;
+            let is_lit = is_above | !is_mapped;
+            value = select_vector(is_lit, value, nothing);
+            pdf = select(is_lit, pdf, zero);
         }
         (value, pdf)
     }
 
-    fn rough_glass(&self, interface: Interface) -> RoughGlass {
-        let wo = self.frame.to_world(self.wo).normalize();
-        let facets = Microfacets::isotropic(self.of.mean_alpha().min(1.0), false);
-        RoughGlass::new(self.frame.z, wo, facets, interface, true)
-    }
-
-    /// Light from the far side, if transmission is rough.
-    fn eval_through(&self, transmission: &Transmission, wi: Vec3, local: Vec3) -> (Vec3, f32) {
-        let above = Vec3::new(local.x, local.y, -local.z);
-        let below = self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, above.z));
-        let (f, density) = match transmission.inside {
-            Inside::Solid(interface) => {
-                let (f, density) = self.rough_glass(interface).eval(wi);
-                (Vec3::splat(f), density)
+    /// [`Self::eval`] without the light that is mirrored at the true surface.
+    #[inline(always)]
+    fn eval_layers(&self, wi: Vector3<R>) -> (Vector3<R>, R) {
+        let of = &self.of;
+        let local = wi.to_local(&self.axes);
+        let above = local.z.is_positive() & self.is_valid;
+        let (zero, one) = (local.z.all(0.0), local.z.all(1.0));
+        let below_coat = self.below_coat(wi);
+        let past_sheen_i = past_sheen(of, local.z);
+        let below = below_coat * self.past_sheen.min(past_sheen_i);
+        let cosine = cosine_hemisphere_pdf(local.z);
+        let (mut value, mut pdf) = (Vector3::all(zero), self.pmf[0] * cosine);
+        if (!of.diffuse.is_zero()).any() {
+            let reflected = of.dielectric_albedo(SchlickAlbedo::along(local, of.alpha));
+            let mut past = past_sheen_i;
+            if let Some(coat) = &self.coat {
+                past = past * past_coat(of, coat.axes[2].dot(wi).abs());
             }
-            // The reflected lobe on the far side.
-            Inside::Thin(_) => {
-                let (half, f, density) = reflection(self.wo, above, self.of.alpha);
-                (f * self.passed(self.wo.dot(half)) * self.passed_again, density)
+            let past_all_i = rest_of(reflected) * past;
+            value = (of.diffuse * cosine).times(self.past_all).times(past_all_i).over(self.mean_past_all);
+        }
+        if (!of.sheen.is_zero()).any() {
+            let half = (self.wo + local).normalize();
+            let sheen = bounded_sheen(self.wo.z, local.z, half.z, of.sheen_alpha);
+            value = value + of.sheen * (below_coat * sheen * local.z);
+        }
+        let by_base = !of.is_smooth() & self.pmf[1].is_positive();
+        if by_base.any() {
+            let found = facets(self.wo, local, of.alpha);
+            let tint = self.tint(self.wo.dot(found.half), below);
+            value = select_vector(by_base, value + tint * found.value, value);
+            pdf = select(by_base, pdf + self.pmf[1] * found.pdf, pdf);
+        }
+        if let Some(coat) = &self.coat {
+            let local = wi.to_local(&coat.axes);
+            let by_coat = of.has_coat() & !of.is_coat_smooth() & local.z.is_positive();
+            if by_coat.any() {
+                let found = facets(coat.wo, local, [of.coat_alpha; 2]);
+                let tint = schlick(Vector3::all(one * COAT_FACING), one, coat.wo.dot(found.half));
+                value = select_vector(by_coat, value + tint * (of.coat * found.value), value);
+                pdf = select(by_coat, pdf + self.pmf[2] * found.pdf, pdf);
             }
-        };
-        (transmission.tint * (transmission.share * below) * f, self.pmf[3] * density)
+        }
+        (select_vector(above, value, Vector3::all(zero)), select(above, pdf, zero))
     }
 
     /// Reflectance of the base below the upper layers, at an angle with its microfacets.
     ///
     /// - `below`: transmittance of the upper layers for both directions; for metal that of the viewer counts, so that
     ///   a white one returns all light.
-    fn tint(&self, cos: f32, below: f32) -> Vec3 {
-        let of = self.of;
-        let dielectric = of.dielectric * below * schlick(of.facing, of.grazing, cos);
-        if of.metallic == 0.0 {
+    #[inline(always)]
+    fn tint(&self, cos: R, below: R) -> Vector3<R> {
+        let of = &self.of;
+        let dielectric = schlick(of.facing, of.grazing, cos) * (of.dielectric * below);
+        if !of.metallic.is_positive().any() {
             return dielectric;
         }
-        let metal = schlick(of.metal, Vec3::ONE, cos) * self.metal_gain;
-        dielectric + of.metallic * self.above_metal * metal
+        let metal = schlick(of.metal, cos.all(1.0), cos).times(self.metal_gain);
+        dielectric + metal * (of.metallic * self.above_metal)
     }
 
-    /// Transmittance of a thin pane at an angle.
-    fn passed(&self, cos: f32) -> Vec3 {
-        (Vec3::ONE - schlick(self.of.facing, self.of.grazing, cos)).max(Vec3::ZERO)
-    }
-
+    /// Proposes a direction.
+    ///
     /// - `u_lobe`: selects the technique; `u`: the direction.
-    pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let mut rest = u_lobe;
-        let chosen = (0..4)
-            .find(|&k| {
-                let here = rest < self.pmf[k];
-                if !here {
-                    rest -= self.pmf[k];
-                }
-                here
-            })
-            .or_else(|| (0..4).rev().find(|&k| self.pmf[k] > 0.0))?;
-        let pmf = self.pmf[chosen];
-        let fresh = (rest / pmf).clamp(0.0, 1.0f32.next_down());
-        match TECHNIQUES[chosen] {
-            Technique::Cosine => {
-                let local: Vec3 = cosine_hemisphere(u.to_array()).into();
-                self.reflected(local, &self.frame)
-            }
-            Technique::Reflection => self.sample_reflection(u, pmf),
-            Technique::Coat => self.sample_coat(u, pmf),
-            Technique::Transmission => self.sample_transmission(fresh, u, pmf),
+    #[inline(always)]
+    pub fn propose(&self, u_lobe: R, u: [R; 2]) -> Proposed<R> {
+        let (of, pmf) = (&self.of, &self.pmf);
+        let mut by_cosine = u_lobe.lt(pmf[0]);
+        let rest = u_lobe - pmf[0];
+        let mut by_base = !by_cosine & rest.lt(pmf[1]);
+        let rest = rest - pmf[1];
+        let mut by_coat = !by_cosine & !by_base & rest.lt(pmf[2]);
+        let rest = rest - pmf[2];
+        // What rounding leaves belongs to the last one that there is.
+        let left = !by_cosine & !by_base & !by_coat;
+        let passes = left & pmf[3].is_positive();
+        let left = left & !passes;
+        by_coat |= left & pmf[2].is_positive();
+        by_base |= left & !by_coat & pmf[1].is_positive();
+        by_cosine |= left & !by_coat & !by_base;
+        let local = cosine_hemisphere(u);
+        let mut wi = local.to_world(&self.axes);
+        let mut go_on = by_cosine & local.z.is_positive();
+        let (zero, one) = (rest.all(0.0), rest.all(1.0));
+        let up = Vector3 { x: zero, y: zero, z: one };
+        if by_base.any() {
+            let smooth = of.is_smooth();
+            let half = select_vector(smooth, up, sample_anisotropic_normal(self.wo, of.alpha, u));
+            let local = reflect(self.wo, half);
+            wi = select_vector(by_base, local.to_world(&self.axes), wi);
+            go_on |= by_base & (smooth | local.z.is_positive());
         }
+        if let Some(coat) = &self.coat
+            && by_coat.any()
+        {
+            let smooth = of.is_coat_smooth();
+            let half = select_vector(smooth, up, sample_anisotropic_normal(coat.wo, [of.coat_alpha; 2], u));
+            let local = reflect(coat.wo, half);
+            let world = local.to_world(&coat.axes);
+            wi = select_vector(by_coat, world, wi);
+            let above = local.z.is_positive() & self.axes[2].dot(world).is_positive();
+            go_on |= by_coat & (smooth | above);
+        }
+        wi = wi.normalize();
+        if let Some(surface) = of.true_normal {
+            // Mirrored at the true surface if it is below.
+            let height = surface.dot(wi);
+            wi = select_vector(height.is_negative(), wi - surface * (height * 2.0), wi);
+        }
+        let rest = (rest / pmf[3]).at_least(0.0).at_most(1.0f32.next_down());
+        Proposed { wi, go_on: go_on & self.is_valid, by_base, by_coat, passes: passes & self.is_valid, rest }
     }
 
-    /// A reflected direction, mirrored at the true surface if it is below.
-    fn above_surface(&self, wi: Vec3) -> Vec3 {
-        match self.of.true_normal {
-            Some(surface) if surface.dot(wi) < 0.0 => wi - 2.0 * surface.dot(wi) * surface,
-            _ => wi,
-        }
-    }
-
-    /// All non-specular layers could have sampled this direction: one-sample estimate over their mixture.
-    fn reflected(&self, local: Vec3, frame: &Frame) -> Option<BsdfSample> {
-        if local.z <= 0.0 {
-            return None;
-        }
-        let wi = self.above_surface(frame.to_world(local).normalize());
-        let (value, pdf) = self.eval(wi);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, probability: 1.0, through: None })
-    }
-
-    fn sample_reflection(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
-        if self.of.is_smooth() {
-            let wi = self.above_surface(self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize());
-            let below = self.below_coat(wi) * self.past_sheen;
-            let weight = self.tint(self.wo.z, below) / pmf;
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf, through: None });
-        }
-        let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
-        self.reflected(mirrored(self.wo, half), &self.frame)
-    }
-
-    fn sample_coat(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
-        let coat = self.coat.as_ref()?;
-        if self.of.is_coat_smooth() {
-            let wi = self.above_surface(coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize());
-            let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.z);
-            let weight = tint * (self.of.coat / pmf);
-            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf, through: None });
-        }
-        let half: Vec3 = sample_anisotropic_normal(coat.wo.into(), [self.of.coat_alpha; 2], u.to_array()).into();
-        let local = mirrored(coat.wo, half);
-        if local.z <= 0.0 || self.frame.z.dot(coat.frame.to_world(local)) <= 0.0 {
-            return None;
-        }
-        self.reflected(local, &coat.frame)
-    }
-
-    fn sample_transmission(&self, u_choice: f32, u: Vec2, pmf: f32) -> Option<BsdfSample> {
-        let transmission = self.of.transmission?;
-        let share = transmission.share / pmf;
-        let below = |wi: Vec3| {
-            let cos = self.frame.z.dot(wi).abs();
-            self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, cos))
-        };
-        let specular = |probability: f32, wi: Vec3, weight: Vec3, passes: bool| {
-            let through = passes.then(|| transmission.interface());
-            let weight = weight * (share * below(wi));
-            Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf * probability, through })
-        };
-        let wo = self.frame.to_world(self.wo).normalize();
-        match transmission.inside {
-            Inside::Solid(interface) if self.of.is_transmission_rough() => {
-                let found = self.rough_glass(interface).sample(u_choice, u)?;
-                if !found.passes {
-                    let (value, pdf) = self.eval(found.wi);
-                    return (pdf > 0.0).then(|| BsdfSample {
-                        wi: found.wi,
-                        weight: value / pdf,
-                        pdf,
-                        probability: 1.0,
-                        through: None,
-                    });
-                }
-                let weight = transmission.tint * (found.weight * share * below(found.wi));
-                let pdf = if transmission.is_lit { found.pdf * pmf } else { f32::INFINITY };
-                Some(BsdfSample { wi: found.wi, weight, pdf, probability: 1.0, through: Some(interface) })
+    /// Weights a proposed direction: all layers that are not specular could have sampled it, so it is a one-sample
+    /// estimate over their mixture.
+    ///
+    /// - `value`, `pdf`: of [`Self::eval`] in that direction.
+    #[inline(always)]
+    pub fn weighted(&self, proposed: &Proposed<R>, value: Vector3<R>, mut pdf: R) -> Reflected<R> {
+        let of = &self.of;
+        let by_base = proposed.by_base & of.is_smooth();
+        let by_coat = proposed.by_coat & of.is_coat_smooth();
+        let specular = by_base | by_coat;
+        let go_on = proposed.go_on & (specular | pdf.is_positive());
+        let mut weight = value * (pdf.all(1.0) / pdf);
+        let mut probability = pdf.all(1.0);
+        if specular.any() {
+            let below = self.below_coat(proposed.wi) * self.past_sheen;
+            let base = self.tint(self.wo.z, below) * (probability / self.pmf[1]);
+            weight = select_vector(by_base, base, weight);
+            probability = select(by_base, self.pmf[1], probability);
+            if let Some(coat) = &self.coat {
+                let tint = schlick(Vector3::all(pdf.all(COAT_FACING)), pdf.all(1.0), coat.wo.z);
+                weight = select_vector(by_coat, tint * (of.coat / self.pmf[2]), weight);
+                probability = select(by_coat, self.pmf[2], probability);
             }
-            Inside::Solid(interface) => {
-                let (reflectance, cos_t) = fresnel(self.wo.z.min(1.0), interface.eta);
-                if u_choice < reflectance {
-                    let wi = self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize();
-                    specular(reflectance, wi, Vec3::ONE, false)
-                } else {
-                    let wi = refract(wo.into(), self.frame.z.into(), interface.eta, cos_t).into();
-                    specular(
-                        1.0 - reflectance,
-                        wi,
-                        transmission.tint * interface.radiance_eta * interface.radiance_eta,
-                        true,
-                    )
-                }
-            }
-            Inside::Thin(_) if self.of.is_smooth() => {
-                specular(1.0, -wo, transmission.tint * self.passed(self.wo.z), true)
-            }
-            Inside::Thin(_) => {
-                let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
-                let above = mirrored(self.wo, half);
-                if above.z <= 0.0 {
-                    return None;
-                }
-                let local = Vec3::new(above.x, above.y, -above.z);
-                let wi = self.frame.to_world(local).normalize();
-                let (value, pdf) = self.eval_through(&transmission, wi, local);
-                let stated = if transmission.is_lit { pdf } else { f32::INFINITY };
-                let through = Some(transmission.interface());
-                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, probability: 1.0, through })
-            }
+            pdf = select(specular, pdf.all(f32::INFINITY), pdf);
         }
+        Reflected { go_on, weight, pdf, probability }
     }
 }
 
 /// Transmittance of the coat at an angle.
-fn past_coat(of: &Principled, cos: f32) -> f32 {
+#[inline(always)]
+fn past_coat<R: Real>(of: &Principled<R>, cos: R) -> R {
     let albedo = SchlickAlbedo::new(cos, of.coat_alpha);
-    1.0 - of.coat * (COAT_FACING * albedo.facing + albedo.grazing)
+    cos.all(1.0) - of.coat * (albedo.facing * COAT_FACING + albedo.grazing)
 }
 
 /// Transmittance of the sheen at an angle.
-fn past_sheen(of: &Principled, cos: f32) -> f32 {
-    if of.sheen == Vec3::ZERO {
-        return 1.0;
+#[inline(always)]
+pub(super) fn past_sheen<R: Real>(of: &Principled<R>, cos: R) -> R {
+    let one = cos.all(1.0);
+    let strength = of.sheen.max_element();
+    if !strength.is_positive().any() {
+        return one;
     }
-    (1.0 - of.sheen.max_element() * sheen_albedo(cos, of.sheen_alpha)).max(0.0)
+    (one - strength * sheen_albedo(cos, of.sheen_alpha)).at_least(0.0)
 }
 
 /// Factor of single scattering that adds further bounces between the microfacets of a metal.
 ///
 /// - `base`: albedo of the microfacets in the direction of the viewer.
-fn metal_gain(of: &Principled, base: SchlickAlbedo) -> Vec3 {
+#[inline(always)]
+fn gain_of_metal<R: Real>(of: &Principled<R>, base: SchlickAlbedo<R>) -> Vector3<R> {
     let [x, y] = of.alpha;
-    let alpha = if x == y { x } else { (0.5 * (x * x + y * y)).sqrt() };
+    let alpha = select(x.equals(y), x, ((x * x + y * y) * 0.5).sqrt());
     let returned = base.whole();
-    with_further_bounces(mean_reflectance(true, of.metal.into()), (1.0 - returned) / returned, alpha).into()
+    let Vector3 { x, y, z } = of.metal;
+    let mean = Vector3 { x: mean_of_schlick(x), y: mean_of_schlick(y), z: mean_of_schlick(z) };
+    with_further_bounces(mean, (returned.all(1.0) - returned) / returned, alpha)
 }
 
 /// Mean transmittance of all layers over all directions; not 0.
-fn mean_past_all(of: &Principled) -> Vec3 {
-    let least = Vec3::splat(1e-6);
-    if !of.has_coat() && of.sheen == Vec3::ZERO {
-        return (Vec3::ONE - of.dielectric_albedo(SchlickAlbedo::mean(of.alpha))).max(least);
-    }
-    let past = |w: Vec3, k: usize| {
-        let coat = if of.has_coat() { past_coat(of, w.z) } else { 1.0 };
-        let reflected = of.dielectric_albedo(SchlickAlbedo::along(w, of.alpha));
-        coat * past_sheen(of, w.z) * (1.0 - reflected[k]).max(0.0)
-    };
-    let is_isotropic = of.alpha[0] == of.alpha[1];
-    let channel = |k: usize| {
-        if is_isotropic {
-            cosine_mean(|cos| past(Vec3::new(0.0, 0.0, cos), k))
-        } else {
-            hemisphere_mean(|w| past(w, k))
+#[inline(always)]
+fn mean_of_past_all<R: Real>(of: &Principled<R>) -> Vector3<R> {
+    let one = of.coat.all(1.0);
+    let mut mean = ones(one) - of.dielectric_albedo(SchlickAlbedo::mean(of.alpha));
+    let is_layered = of.has_coat() | !of.sheen.is_zero();
+    if is_layered.any() {
+        let isotropic = of.alpha[0].equals(of.alpha[1]);
+        let mut sum = Vector3::all(one.all(0.0));
+        for &(at, weight) in &GAUSS {
+            let cos = one.all(at);
+            let mut rest = rest_of(of.dielectric_albedo(SchlickAlbedo::new(cos, of.alpha[0])));
+            if (!isotropic).any() {
+                let mut both = Vector3::all(one.all(0.0));
+                for w in azimuths(at) {
+                    let w = Vector3 { x: one.all(w.x), y: one.all(w.y), z: one.all(w.z) };
+                    both = both + rest_of(of.dielectric_albedo(SchlickAlbedo::along(w, of.alpha)));
+                }
+                rest = select_vector(isotropic, rest, both.mul_all(0.5));
+            }
+            sum = sum + rest * (past_coat(of, cos) * past_sheen(of, cos) * (2.0 * at * weight));
         }
-    };
-    Vec3::new(channel(0), channel(1), channel(2)).max(least)
+        mean = select_vector(is_layered, sum, mean);
+    }
+    mean.max(Vector3::all(one.all(1e-6)))
 }

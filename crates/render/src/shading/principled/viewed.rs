@@ -11,14 +11,14 @@ pub(crate) struct Viewed<'a> {
     layers: &'a Principled,
     wo: Vec3,
     normal: Vec3,
-    seen: Option<Seen<'a>>,
+    seen: Seen,
 }
 
 impl Principled {
     /// Scatters as the surface itself does, sooner for these two directions.
     #[inline]
     pub fn seen_along(&self, wo: Vec3, normal: Vec3) -> Viewed<'_> {
-        Viewed { layers: self, wo, normal, seen: Seen::new(self, wo, normal) }
+        Viewed { layers: self, wo, normal, seen: Seen::new(*self, wo.into(), normal.into()) }
     }
 }
 
@@ -38,7 +38,7 @@ impl Scatter for Viewed<'_> {
         if !self.is_about(wo, normal) {
             return self.layers.eval(wo, wi, normal);
         }
-        self.seen.as_ref().map_or((Vec3::ZERO, 0.0), |seen| seen.eval(wi))
+        self.seen.eval_all(wi)
     }
 
     fn through(&self) -> Option<Interface> {
@@ -49,7 +49,7 @@ impl Scatter for Viewed<'_> {
         if !self.is_about(wo, normal) {
             return self.layers.sample(wo, normal, u_lobe, u);
         }
-        self.seen.as_ref()?.sample(u_lobe(), u)
+        self.seen.sample(u_lobe(), u)
     }
 }
 
@@ -63,20 +63,20 @@ mod tests {
     fn a_viewed_surface_scatters_as_the_surface_itself() {
         let layers = Principled {
             dielectric: 0.8,
-            facing: Vec3::splat(0.04),
-            grazing: Vec3::ONE,
-            diffuse: Vec3::new(0.5, 0.3, 0.2),
+            facing: Vec3::splat(0.04).into(),
+            grazing: 1.0,
+            diffuse: Vec3::new(0.5, 0.3, 0.2).into(),
             metallic: 0.2,
-            metal: Vec3::new(0.9, 0.6, 0.3),
+            metal: Vec3::new(0.9, 0.6, 0.3).into(),
             alpha: [0.3, 0.1],
-            tangent: Some(Vec3::X),
-            true_normal: Some(Vec3::new(0.6, 0.0, 0.8)),
+            tangent: Some(Vec3::X.into()),
+            true_normal: Some(Vec3::new(0.6, 0.0, 0.8).into()),
             transmission: None,
-            sheen: Vec3::splat(0.3),
+            sheen: Vec3::splat(0.3).into(),
             sheen_alpha: sheen::alpha_of(0.5),
             coat: 0.5,
             coat_alpha: 0.04,
-            coat_normal: Vec3::Z,
+            coat_normal: Vec3::Z.into(),
         };
         let directions = |i| {
             let sampler = Sampler::new(5, 1, 0, i);

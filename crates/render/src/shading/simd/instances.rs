@@ -15,7 +15,7 @@ use glam::Vec3;
 
 /// Multiplies by a matrix per lane.
 #[inline(always)]
-fn times<S: Simd>(columns: &Columns, row: Bits<S>, v: Vector<S>) -> Vector<S> {
+pub(crate) fn times<S: Simd>(columns: &Columns, row: Bits<S>, v: Vector<S>) -> Vector<S> {
     let [x, y, z] = three!(|k| Vector::gather(&columns[k], row));
     x * v.x + y * v.y + z * v.z
 }
@@ -38,14 +38,16 @@ struct LocalPoints<S: Simd> {
 pub(crate) struct Corners<S: Simd> {
     /// Lanes whose mesh has vertex normals.
     smooth: Mask,
-    positions: [Vector<S>; 3],
+    pub positions: [Vector<S>; 3],
     normals: [[[f32; LANES]; 3]; 3],
     /// Barycentric weights.
-    weights: [Float<S>; 3],
+    pub weights: [Float<S>; 3],
+    /// Texture coordinates.
+    pub uvs: [[Float<S>; 2]; 3],
 }
 
 #[inline(always)]
-fn set_lane(arrays: &mut [[f32; LANES]; 3], lane: usize, v: Vec3) {
+pub(crate) fn set_lane(arrays: &mut [[f32; LANES]; 3], lane: usize, v: Vec3) {
     (arrays[0][lane], arrays[1][lane], arrays[2][lane]) = (v.x, v.y, v.z);
 }
 
@@ -115,15 +117,19 @@ impl<S: Simd> SurfaceLanes<S> {
             self.geometric_normal = select_vector(placed, normal, self.geometric_normal);
             self.offset = select(placed, normal.abs().dot(error), self.offset);
         }
-        let mut uv = [u, v];
+        let (zero, one) = (u.all(0.0), u.all(1.0));
+        let (mut uv, mut corner_uvs) = ([u, v], [[zero, zero], [one, zero], [zero, one]]);
         if with_uvs != 0 {
+            for (to, from) in corner_uvs.as_flattened_mut().iter_mut().zip(uvs.as_flattened()) {
+                *to = select(with_uvs, Float::load(s, from), *to);
+            }
             uv = two!(|k| {
-                let [a, b, c] = three!(|corner| Float::load(s, &uvs[corner][k]));
+                let [a, b, c] = three!(|corner| corner_uvs[corner][k]);
                 select(with_uvs, a * w + b * u + c * v, uv[k])
             });
         }
         self.uv = two!(|k| select(mask, uv[k], self.uv[k]));
-        (Corners { smooth, positions, normals, weights: [w, u, v] }, near_rim)
+        (Corners { smooth, positions, normals, weights: [w, u, v], uvs: corner_uvs }, near_rim)
     }
 
     /// Sets normals and lift for meshes with vertex normals, once the sides of the faces are known.
@@ -133,20 +139,17 @@ impl<S: Simd> SurfaceLanes<S> {
             return;
         }
         let table = &at.scene.surfaces.instances;
-        let one = Float::splat(s, 1.0);
         let normals = three!(|k| Vector::from_arrays(s, &corners.normals[k]));
         let weights = corners.weights;
         let object = normals[0] * weights[0] + normals[1] * weights[1] + normals[2] * weights[2];
-        let cofactors = times(&table.cofactors, row, object);
-        let per_length = one / cofactors.length();
-        let has_length = per_length.is_positive() & per_length.lt(one.all(f32::INFINITY));
         // A normal of length zero is replaced by that of the face, on the front.
         let front = select_vector(self.front, self.geometric_normal, -self.geometric_normal);
-        let smooth = select_vector(has_length, cofactors * per_length, front);
+        let smooth = times(&table.cofactors, row, object).normalize_or(front);
         let turned = smooth.dot(self.geometric_normal).is_negative();
         let facing = select_vector(turned, -smooth, smooth);
         let seen = facing.dot(self.wo).is_positive();
         let normal = select_vector(seen, facing, self.geometric_normal);
+        self.interpolated = select_vector(corners.smooth, facing, self.interpolated);
         let towards = three!(|k| select_vector(turned, -normals[k], normals[k]));
         let lift = times(&table.world_from_object, row, lift_of(&corners.positions, &towards, &weights));
         let lifted = corners.smooth & !lift.is_zero();

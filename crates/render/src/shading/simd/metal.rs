@@ -3,8 +3,7 @@
 use crate::prepare::material_table::{COMPENSATE, SCHLICK};
 use crate::shading::ggx;
 use crate::shading::metal::Metal;
-use crate::shading::simd::lanes::lanes_of;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around};
+use firstlight_simd::{Bits, Float, Mask, Simd, Vector, frame_around, select};
 
 /// Metal seen along `wo`.
 ///
@@ -24,10 +23,7 @@ pub(crate) fn metals<S: Simd>(
     let mut lost = Float::splat(s, 0.0);
     let compensated = mask & flags.has(COMPENSATE);
     if compensated != 0 {
-        let (cos, alphas) = (wo.z.to_array(), alpha.to_array());
-        let mut lanes = [0.0; LANES];
-        lanes_of(compensated).for_each(|i| lanes[i] = ggx::lost_over_returned(cos[i], alphas[i]));
-        lost = Float::load(s, &lanes);
+        lost = select(compensated, ggx::lost_over_returned(wo.z, alpha), lost);
     }
     Metal::new(axes, wo, alpha, reflectance, flags.has(SCHLICK), lost)
 }

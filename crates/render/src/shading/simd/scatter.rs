@@ -1,6 +1,7 @@
 //! BSDFs, sixteen at a time; see [`crate::shading::bsdf`].
 
 use crate::core::material::SMALLEST_ALPHA;
+use crate::prepare::layer_table::LAYERED;
 use crate::prepare::material_table::{COATED, TEXTURED};
 use crate::sampling::warp::cosine_hemisphere;
 use crate::sampling::{SamplerLanes, cosine_hemisphere_pdf};
@@ -9,11 +10,13 @@ use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::metal::{Metal, tint};
+use crate::shading::principled::seen::{Reflected, Seen};
 use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::coat::Coat;
 use crate::shading::simd::glass::GlassLanes;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, lanes_of};
+use crate::shading::simd::layers::{EvalLayers, layers_of};
 use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
@@ -26,6 +29,7 @@ pub(crate) struct SurfaceScatter<S: Simd> {
     pub color: Vector<S>,
     pub metal: Option<Metal<Float<S>>>,
     pub coat: Option<Coat<S>>,
+    pub layers: Option<Seen<Float<S>>>,
     pub glass: Option<GlassLanes<S>>,
     /// Lanes for which light sampling can contribute.
     pub non_specular: Mask,
@@ -50,6 +54,7 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
             color: Vector { x: zero, y: zero, z: zero },
             metal: None,
             coat: Some(coat),
+            layers: None,
             glass: None,
             non_specular,
         };
@@ -71,10 +76,26 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
         }
         let metal = metals(s, at.mask, place.normal, place.wo, alpha, color, flags);
         let non_specular = Float::splat(s, SMALLEST_ALPHA).le(alpha);
-        return SurfaceScatter { color, metal: Some(metal), coat: None, glass: None, non_specular };
+        return SurfaceScatter { color, metal: Some(metal), coat: None, layers: None, glass: None, non_specular };
     }
     let glass = (KIND == GLASS).then(|| GlassLanes::of(s, at, place.front, sets, media));
-    SurfaceScatter { color, metal: None, coat: None, glass, non_specular: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
+    let non_specular = if KIND == DIFFUSE { Mask::MAX } else { 0 };
+    SurfaceScatter { color, metal: None, coat: None, layers: None, glass, non_specular }
+}
+
+/// Like [`surface_of`] for layered materials; turns the normals of surfaces with normal maps.
+#[inline(always)]
+pub(crate) fn layered_surface_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut SurfaceLanes<S>) -> SurfaceScatter<S> {
+    let layers = layers_of(s, at, place);
+    let (non_specular, zero) = (layers.scatters(), Float::splat(s, 0.0));
+    SurfaceScatter {
+        color: Vector::all(zero),
+        metal: None,
+        coat: None,
+        layers: Some(layers),
+        glass: None,
+        non_specular,
+    }
 }
 
 /// Returns f · cos, and the pdf of sampling `wi`; zero for `wi` behind the normal.
@@ -88,6 +109,11 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
         && KIND == COATED
     {
         return coat.eval(place.normal, wi);
+    }
+    if let Some(seen) = &surface.layers
+        && KIND > COATED
+    {
+        return wi.x.s.call(EvalLayers { seen, wi });
     }
     let cos = place.normal.dot(wi);
     if let Some(metal) = &surface.metal
@@ -120,6 +146,14 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
         COATED => {
             let coat = surface.coat.as_ref().expect("a coated surface has its parts");
             coat.sample(at.mask, place, hints.u_lobe(sampler, dimension), sampler.pair(dimension + DIM_DIRECTION))
+        }
+        LAYERED => {
+            let seen = surface.layers.as_ref().expect("a layered surface has its layers");
+            let u = sampler.pair(dimension + DIM_DIRECTION);
+            let proposed = seen.propose(hints.u_lobe(sampler, dimension), u);
+            let (value, pdf) = eval::<S, KIND>(surface, place, proposed.wi);
+            let Reflected { go_on, weight, pdf, .. } = seen.weighted(&proposed, value, pdf);
+            Bounce { go_on, wi: proposed.wi, weight, pdf, transmitted: 0 }
         }
         DIFFUSE => {
             let local = cosine_hemisphere(sampler.pair(dimension + DIM_DIRECTION));

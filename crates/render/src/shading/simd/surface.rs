@@ -1,11 +1,13 @@
 //! From sixteen hits to surface interactions; see [`crate::shading::vertex::Vertex`].
 
-use crate::prepare::material_table::TEXTURED;
+use crate::core::texture::TexturePoint;
+use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
+use crate::shading::simd::tangents::TangentLanes;
 use crate::shading::tangent::Tangent;
-use crate::shading::vertex::Vertex;
+use crate::shading::vertex::{Vertex, mesh_texture_point};
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, offset_along};
 use firstlight_kdtree::{F64_ERROR, HitBatch};
 use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
@@ -18,6 +20,8 @@ pub(crate) struct SurfaceLanes<S: Simd> {
     /// Unit, on the side that the ray came from.
     pub geometric_normal: Vector<S>,
     pub normal: Vector<S>,
+    /// Shading normal before it is turned by a map and towards the viewer.
+    pub interpolated: Vector<S>,
     /// Determines whether light can reach the side of `wo`.
     pub reach_normal: Vector<S>,
     /// Origin of rays to the side of `wo`, before the offset.
@@ -27,6 +31,8 @@ pub(crate) struct SurfaceLanes<S: Simd> {
     pub front: Mask,
     pub wo: Vector<S>,
     pub uv: [Float<S>; 2],
+    /// Where some material needs tangents.
+    pub tangent: Option<TangentLanes<S>>,
 }
 
 /// A group of hits and their materials.
@@ -42,6 +48,28 @@ pub(crate) struct HitGroup<'a, S: Simd> {
 }
 
 impl<S: Simd> HitGroup<'_, S> {
+    /// Returns the vertex of hit `i` by the scalar code.
+    #[inline(never)]
+    pub fn vertex(&self, i: usize) -> Vertex {
+        let hit = self.hits.get(i).expect("a hit is being shaded");
+        Vertex::new(self.scene, &self.paths.rays.get(i), &hit, self.materials[i])
+    }
+
+    /// Returns the point of a lane for texture lookups.
+    ///
+    /// - `uv`: first texture coordinates of the lanes.
+    #[inline]
+    pub fn texture_point(&self, lane: usize, uv: &[[f32; LANES]; 2]) -> TexturePoint {
+        let i = self.indices[lane] as usize;
+        if self.scene.tables.materials.flags[self.materials[i] as usize] & MORE_THAN_UV != 0
+            && let Some(hit) = self.hits.get(i)
+            && let Some(mesh) = &self.scene.geometry.objects[hit.object as usize].mesh
+        {
+            return mesh_texture_point(mesh, &hit);
+        }
+        Vec2::new(uv[0][lane], uv[1][lane]).into()
+    }
+
     #[inline(always)]
     pub fn ray_origin(&self) -> Vector<S> {
         let rays = &self.paths.rays;
@@ -97,18 +125,26 @@ impl<S: Simd> SurfaceLanes<S> {
             ball &= !textured;
             cloud &= !textured;
         }
+        let mut with_tangents = 0;
+        if at.scene.tables.materials.layers.has_tangents {
+            let material = Bits::gather(at.materials, at.index);
+            with_tangents = at.mask & Bits::gather(&at.scene.tables.materials.flags, material).has(TANGENTS);
+            other |= with_tangents & !mesh;
+        }
         let zero = Float::splat(s, 0.0);
         let nowhere = Vector { x: zero, y: zero, z: zero };
         let mut place = Self {
             position: nowhere,
             geometric_normal: nowhere,
             normal: nowhere,
+            interpolated: nowhere,
             reach_normal: nowhere,
             lifted: nowhere,
             offset: zero,
             front: 0,
             wo,
             uv: [zero, zero],
+            tangent: None,
         };
         if flat != 0 {
             place.set_flat(table, object, [Float::gather(&hits.u, at.index), Float::gather(&hits.v, at.index)]);
@@ -135,13 +171,17 @@ impl<S: Simd> SurfaceLanes<S> {
         place.front = Float::splat(s, 0.0).le(wo.dot(place.geometric_normal));
         place.geometric_normal = select_vector(place.front, place.geometric_normal, -place.geometric_normal);
         place.normal = place.geometric_normal;
+        place.interpolated = place.geometric_normal;
         place.reach_normal = place.geometric_normal;
         place.lifted = place.position;
         if let Some(corners) = &corners {
             place.smooth_meshes(s, at, row, corners);
+            if with_tangents != 0 {
+                place.tangent = Some(place.mesh_tangents(s, at, row, corners, mesh & with_tangents));
+            }
         }
         if other != 0 {
-            place.set_others(s, at, other);
+            place.set_others(s, at, other, with_tangents);
         }
         place
     }
@@ -202,40 +242,59 @@ impl<S: Simd> SurfaceLanes<S> {
 
     /// Sets single triangles, textured spheres and points near the edge of a triangle by the scalar code.
     #[inline(always)]
-    fn set_others(&mut self, s: S, at: &HitGroup<S>, mask: Mask) {
+    fn set_others(&mut self, s: S, at: &HitGroup<S>, mask: Mask, with_tangents: Mask) {
         let mut vectors = [
             self.position.to_arrays(),
             self.geometric_normal.to_arrays(),
             self.normal.to_arrays(),
             self.reach_normal.to_arrays(),
             self.lifted.to_arrays(),
+            self.interpolated.to_arrays(),
+            [[0.0; LANES]; 3],
         ];
-        let mut scalars = [self.offset.to_array(), self.uv[0].to_array(), self.uv[1].to_array()];
+        let mut scalars = [self.offset.to_array(), self.uv[0].to_array(), self.uv[1].to_array(), [1.0; LANES]];
+        let mut is_mapped = 0;
         self.front &= !mask;
         for (lane, &i) in at.indices.iter().enumerate() {
             if mask >> lane & 1 == 0 {
                 continue;
             }
-            let vertex = vertex_at(at.scene, at.paths, at.hits, at.materials, i as usize);
+            let vertex = at.vertex(i as usize);
             let reach = vertex.reach_normal();
-            let values =
-                [vertex.position, vertex.geometric_normal, vertex.normal, reach, vertex.position + vertex.lift];
+            let values = [
+                vertex.position,
+                vertex.geometric_normal,
+                vertex.normal,
+                reach,
+                vertex.position + vertex.lift,
+                vertex.interpolated,
+                vertex.tangent.along_u,
+            ];
             for (arrays, value) in vectors.iter_mut().zip(values) {
                 (arrays[0][lane], arrays[1][lane], arrays[2][lane]) = (value.x, value.y, value.z);
             }
             scalars[0][lane] = vertex.geometric_normal.abs().dot(vertex.error);
             let uv = vertex.texture_point.uv[0];
-            (scalars[1][lane], scalars[2][lane]) = (uv.x, uv.y);
+            (scalars[1][lane], scalars[2][lane], scalars[3][lane]) = (uv.x, uv.y, vertex.tangent.handedness);
+            is_mapped |= Mask::from(vertex.is_mapped()) << lane;
             self.front |= Mask::from(vertex.front) << lane;
         }
-        let [position, geometric_normal, normal, reach_normal, lifted] = &vectors;
+        let [position, geometric_normal, normal, reach_normal, lifted, interpolated, along_u] = &vectors;
         self.position = Vector::from_arrays(s, position);
         self.geometric_normal = Vector::from_arrays(s, geometric_normal);
         self.normal = Vector::from_arrays(s, normal);
         self.reach_normal = Vector::from_arrays(s, reach_normal);
         self.lifted = Vector::from_arrays(s, lifted);
+        self.interpolated = Vector::from_arrays(s, interpolated);
         self.offset = Float::load(s, &scalars[0]);
         self.uv = [Float::load(s, &scalars[1]), Float::load(s, &scalars[2])];
+        let (along_u, handedness) = (Vector::from_arrays(s, along_u), Float::load(s, &scalars[3]));
+        let of_others = TangentLanes { along_u, handedness, is_final: mask, is_mapped };
+        if let Some(of_meshes) = &mut self.tangent {
+            *of_meshes = of_others.over(mask, of_meshes);
+        } else if with_tangents & mask != 0 {
+            self.tangent = Some(of_others);
+        }
     }
 
     #[inline(always)]
@@ -274,6 +333,11 @@ pub(crate) struct StoredPlaces {
 }
 
 impl StoredPlaces {
+    /// First texture coordinates.
+    pub fn uv(&self) -> &[[f32; LANES]; 2] {
+        &self.uv
+    }
+
     /// Returns the vertex of a lane, without the origins of rays.
     #[inline]
     pub fn vertex(&self, lane: usize) -> Vertex {
@@ -324,10 +388,4 @@ fn widened<S: Simd>(v: Vector<S>) -> [S::D; 3] {
 #[inline(always)]
 fn dot_d<S: Simd>(s: S, a: [S::D; 3], b: [S::D; 3]) -> S::D {
     s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
-}
-
-#[inline(never)]
-fn vertex_at(scene: &Prepared, paths: &PathBatch, hits: &HitBatch, materials: &[u32], i: usize) -> Vertex {
-    let hit = hits.get(i).expect("a hit is being shaded");
-    Vertex::new(scene, &paths.rays.get(i), &hit, materials[i])
 }
