@@ -213,6 +213,16 @@ pub struct Emission {
 impl Emission {
     const WHOLE: (ScalarInput, Option<f32>) = (ScalarInput::Constant(1.0), None);
 
+    /// Emitted radiance, if it is the same everywhere on the surface.
+    pub(crate) fn even_radiance(&self) -> Option<Vec3> {
+        let (ColorInput::Constant(radiance), (ScalarInput::Constant(opacity), cutoff)) = (self.radiance, self.opacity)
+        else {
+            return None;
+        };
+        let there = cutoff.map_or(opacity.clamp(0.0, 1.0), |cutoff| f32::from(opacity >= cutoff));
+        Some(self.scale * there * radiance)
+    }
+
     /// Emission of a front with constant radiance, W·m⁻²·sr⁻¹.
     pub(crate) fn even(radiance: Vec3) -> Self {
         Self { radiance: ColorInput::Constant(radiance), scale: 1.0, two_sided: false, opacity: Self::WHOLE }

@@ -1,5 +1,6 @@
 //! Sampling of the unit square in proportion to an image.
 
+use firstlight_simd::{Bits, Float, Real, Simd, Word, select};
 use glam::Vec2;
 
 /// A piecewise constant pdf over the unit square, sampled by inversion, which preserves stratification.
@@ -55,6 +56,70 @@ impl PictureDistribution {
         let (px, py) = (row[x + 1] - row[x], self.columns[y + 1] - self.columns[y]);
         px * py * (self.width * self.height) as f32
     }
+}
+
+impl PictureDistribution {
+    /// Like [`Self::sample`], for sixteen points.
+    #[inline(always)]
+    pub(crate) fn sample_lanes<S: Simd>(&self, [u, v]: [Float<S>; 2]) -> ([Float<S>; 2], Float<S>) {
+        let (width, height, len) = (self.width as u32, self.height as u32, guide_len(self.width) as u32);
+        let first = Bits::splat(u.s, 0);
+        let (y, dy, py) = invert_lanes(
+            (&self.columns, first, height + 1),
+            (&self.column_guide, first, guide_len(self.height) as u32),
+            v,
+        );
+        let (x, dx, px) = invert_lanes((&self.rows, y * (width + 1), width + 1), (&self.row_guides, y * len, len), u);
+        let point = [(x.to_float() + dx) / width as f32, (y.to_float() + dy) / height as f32];
+        (point, px * py * (self.width * self.height) as f32)
+    }
+
+    /// Like [`Self::pdf`], for sixteen points.
+    #[inline(always)]
+    pub(crate) fn pdf_lanes<S: Simd>(&self, [u, v]: [Float<S>; 2]) -> Float<S> {
+        let (width, height) = (self.width as f32, self.height as f32);
+        let x = (u * width).at_least(0.0).at_most(width - 1.0).truncate();
+        let y = (v * height).at_least(0.0).at_most(height - 1.0).truncate();
+        let at = y * (self.width as u32 + 1) + x;
+        let px = Float::gather(&self.rows, at + 1) - Float::gather(&self.rows, at);
+        let py = Float::gather(&self.columns, y + 1) - Float::gather(&self.columns, y);
+        px * py * (self.width * self.height) as f32
+    }
+}
+
+/// Like [`invert`], in sixteen lists of one table.
+///
+/// - `cumulative`, `guide`: table, start of the list of each lane, length of a list.
+#[inline(always)]
+fn invert_lanes<S: Simd>(
+    (cumulative, start, n): (&[f32], Bits<S>, u32),
+    (guide, guide_start, n_guide): (&[u32], Bits<S>, u32),
+    u: Float<S>,
+) -> (Bits<S>, Float<S>, Float<S>) {
+    let (s, n_steps) = (u.s, n_guide - 1);
+    let least = |a: Bits<S>, most: u32| Bits { s, v: s.select_u(s.lt_u(a.v, s.splat_u(most)), a.v, s.splat_u(most)) };
+    let step = (u * n_steps as f32).truncate();
+    // Rounding may lead to a neighbour.
+    let before = Bits { s, v: s.select_u(step.equals(0), step.v, (step + u32::MAX).v) };
+    let mut low = Bits::gather(guide, guide_start + before);
+    let mut high = Bits::gather(guide, guide_start + least(step + 2, n_steps));
+    loop {
+        let open = s.lt_u(low.v, high.v);
+        if open == 0 {
+            break;
+        }
+        let middle = (low + high).shift_right(1);
+        let is_below = Float::gather(cumulative, start + middle).le(u);
+        low = Bits { s, v: s.select_u(open & is_below, (middle + 1).v, low.v) };
+        high = Bits { s, v: s.select_u(open & !is_below, middle.v, high.v) };
+    }
+    let after = least(low, n - 1);
+    let after = Bits { s, v: s.select_u(after.equals(0), s.splat_u(1), after.v) };
+    let before = after + u32::MAX;
+    let (low, high) = (Float::gather(cumulative, start + before), Float::gather(cumulative, start + after));
+    let width = high - low;
+    let part = ((u - low) / width).at_least(0.0).at_most(1.0f32.next_down());
+    (before, select(width.is_positive(), part, u.all(0.5)), width)
 }
 
 /// Appends 0 and the cumulative sums scaled to end at 1 (uniform steps if all weights are zero); returns the sum.

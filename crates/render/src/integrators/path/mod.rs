@@ -190,9 +190,7 @@ impl PathWave {
             surfaces.see(scene, settings.simd, depth, &self.paths, &self.hits, &self.sorted);
         }
         let is_last = depth == settings.max_depth;
-        let emitters_have_lanes = scene.tables.lights.has_lanes()
-            && !scene.tables.materials.textured_emission
-            && scene.tables.environment_sampler.is_none();
+        let emitters_have_lanes = scene.tables.lights.has_lanes() && !scene.tables.materials.textured_emission;
         for kind in 0..KINDS {
             let order = self.sorted.of_kind(kind);
             if order.is_empty() {
@@ -217,8 +215,8 @@ impl PathWave {
                 is_last,
             };
             match (settings.simd, kind) {
-                (Some(set), MISSES) if scene.tables.environment_sampler.is_none() => {
-                    misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
+                (Some(set), MISSES) => {
+                    misses::shade_misses(set, scene, &settings.techniques, &self.paths, &self.sets, order, radiance);
                 }
                 (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group),
@@ -234,18 +232,12 @@ impl PathWave {
         if !scene.tables.features.environment {
             return;
         }
-        let always = scene.tables.environment_sampler.is_none();
         for &i in self.sorted.of_kind(MISSES) {
             let i = i as usize;
             let dir = self.paths.rays.get(i).dir;
             let mut throughput = self.paths.throughput_of(i);
             if scene.tables.features.glass {
                 throughput *= self.sets.environment_scale(self.paths.media_of(i));
-            }
-            if always {
-                // Only BSDF sampling finds it.
-                radiance[self.paths.slot[i] as usize] += throughput * scene.shading.environment.radiance(dir);
-                continue;
             }
             let path = self.paths.get(i);
             radiance[path.slot as usize] += throughput * environment_light(scene, techniques, &path, dir);

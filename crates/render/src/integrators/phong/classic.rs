@@ -93,7 +93,8 @@ impl<S: Simd> Kernel<S> for AskLight<'_, S> {
     #[inline(always)]
     fn run(self, _: S) -> Self::Output {
         let Self { scene, k, mask, position, sampler, dimension } = self;
-        scene.tables.lights.sample_each_lanes(k, mask, position, sampler, dimension)
+        let textures = &scene.shading.textures;
+        scene.tables.lights.sample_each_lanes(textures, k, mask, position, sampler, dimension)
     }
 }
 

@@ -123,7 +123,7 @@ impl PhongWave {
                 continue;
             }
             if kind == MISSES && tables.environment_sampler.is_none() {
-                misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
+                misses::shade_misses(set, scene, &settings.techniques, &self.paths, &self.sets, order, radiance);
                 continue;
             }
             if kind > MISSES && classic::knows_classic(scene, kind as u32 - 1) {

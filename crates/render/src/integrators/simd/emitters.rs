@@ -2,7 +2,7 @@
 
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::simd::shade::KindHits;
-use crate::shading::lights::bounce_weight;
+use crate::shading::lights::{bounce_weight, environment_share};
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
@@ -46,6 +46,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits) {
             let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
             let mut other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
+            other = other * (1.0 - environment_share(scene));
             if tables.materials.two_sided {
                 other = with_two_sided(other, &group, &indices, known);
             }
@@ -78,7 +79,8 @@ fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANE
             && let Some(id) = scene.tables.lights.light_of(hits.object[i], hits.prim[i], true)
         {
             let (dir, distance) = (paths.rays.get(i).dir, hits.t[i]);
-            pdfs[lane] = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);
+            let pdf = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);
+            pdfs[lane] = (1.0 - environment_share(scene)) * pdf;
         }
     }
     Float::load(pdf.s, &pdfs)

@@ -1,18 +1,20 @@
-//! Rays that leave the scene, sixteen at a time, for environments that are no images.
+//! Rays that leave the scene, sixteen at a time.
 
-use crate::core::environment::{Environment, sky_gradient};
+use crate::core::techniques::Techniques;
 use crate::prepare::prepared::Prepared;
+use crate::shading::lights::{bounce_weight, environment_share};
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::lanes_of;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
-/// Adds the radiance of the environment along the rays of `order`; see [`Environment::radiance`].
+/// Adds the radiance of the environment along the rays of `order`, with the MIS weight against light sampling.
 pub(crate) fn shade_misses(
     set: InstructionSet,
     scene: &Prepared,
+    techniques: &Techniques,
     paths: &PathBatch,
     sets: &MediumSets,
     order: &[u32],
@@ -20,32 +22,41 @@ pub(crate) fn shade_misses(
 ) {
     dispatch!(
         set,
-        misses(scene: &Prepared, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3])
+        misses(scene: &Prepared, techniques: &Techniques, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3])
     );
 }
 
 #[inline(always)]
-fn misses<S: Simd>(s: S, scene: &Prepared, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3]) {
+fn misses<S: Simd>(
+    s: S,
+    scene: &Prepared,
+    techniques: &Techniques,
+    paths: &PathBatch,
+    sets: &MediumSets,
+    order: &[u32],
+    radiance: &mut [Vec3],
+) {
+    if !scene.tables.features.environment {
+        return;
+    }
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);
         let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
-        let arriving = match &scene.shading.environment {
-            Environment::Black => return,
-            Environment::Constant(light) => Vector::splat(s, *light),
-            Environment::Gradient { zenith, horizon, ground } => {
-                let colors = [Vector::splat(s, *zenith), Vector::splat(s, *horizon), Vector::splat(s, *ground)];
-                sky_gradient(colors, Float::gather(&paths.rays.dir_y, index))
-            }
-            Environment::Image { .. } => {
-                let mut found = [[0.0; LANES]; 3];
-                for lane in lanes_of(mask) {
-                    let light = scene.shading.environment.radiance(paths.rays.get(indices[lane] as usize).dir);
-                    (found[0][lane], found[1][lane], found[2][lane]) = (light.x, light.y, light.z);
-                }
-                Vector::from_arrays(s, &found)
-            }
+        let rays = &paths.rays;
+        let dir = Vector {
+            x: Float::gather(&rays.dir_x, index),
+            y: Float::gather(&rays.dir_y, index),
+            z: Float::gather(&rays.dir_z, index),
         };
+        let mut arriving = scene.shading.environment.radiance_lanes(mask, dir);
+        if let Some(sampler) = &scene.tables.environment_sampler {
+            let pdf = Float::gather(&paths.pdf, index);
+            let other = sampler.pdf_lanes(dir) * environment_share(scene);
+            let weight = bounce_weight(techniques, pdf, other);
+            // All others could only have been found so.
+            arriving = arriving * select(pdf.lt(pdf.all(f32::INFINITY)), weight, pdf.all(1.0));
+        }
         let mut throughput = Vector::gather(&paths.throughput, index);
         if scene.tables.features.glass {
             // See [`MediumSets::environment_scale`].

@@ -1,9 +1,8 @@
-//! Light sampling for sixteen points at a time, for untextured lights.
+//! Light sampling for sixteen points at a time; only the textures of lights are read one at a time.
 //!
 //! The formulas are those of [`crate::prepare::light::shape`] and [`crate::prepare::light::selection`], and are
 //! explained there.
 
-use crate::core::material::ColorInput;
 use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
@@ -24,6 +23,7 @@ pub(crate) struct LightArrays {
     pub has_quads: bool,
     pub has_triangles: bool,
     pub has_deltas: bool,
+    pub has_varied: bool,
     pub flags: Vec<u32>,
     /// Corner, centre or first vertex.
     pub origin: [Vec<f32>; 3],
@@ -50,6 +50,8 @@ pub(crate) const POINT: u32 = 8;
 pub(crate) const DELTA: u32 = 16;
 /// With [`DELTA`]: infinitely far away.
 pub(crate) const IS_FAR: u32 = 32;
+/// Its radiance varies over its surface.
+pub(crate) const VARIED: u32 = 64;
 
 /// Light samples for sixteen points; see [`crate::prepare::light::emitter::LightSample`].
 #[derive(Clone, Copy)]
@@ -62,10 +64,12 @@ pub(crate) struct LightLanes<S: Simd> {
     pub radiance: Vector<S>,
     /// See [`crate::prepare::light::emitter::LightSample::is_far`].
     pub is_far: Mask,
+    /// Position along the edges of flat lights, 0..1.
+    pub uv: [Float<S>; 2],
 }
 
 impl LightArrays {
-    /// Returns `None` if lights must be sampled one at a time.
+    /// Returns `None` if there are none.
     pub fn build(lights: &[Light]) -> Option<Self> {
         if lights.is_empty() {
             return None;
@@ -73,8 +77,8 @@ impl LightArrays {
         let mut rows: [Vec<f32>; 20] = Default::default();
         let mut flags = Vec::new();
         for light in lights {
-            let ColorInput::Constant(radiance) = light.emission.radiance else { return None };
-            let radiance = light.emission.scale * radiance;
+            let even = light.emission.even_radiance();
+            let radiance = even.unwrap_or(Vec3::ZERO);
             let (flag, origin, u, v, normal, rest) = match &light.shape {
                 LightShape::Triangle { light, .. } => {
                     let [e1, e2] = light.edges;
@@ -98,7 +102,8 @@ impl LightArrays {
                     (flag, source.origin, nowhere, nowhere, source.axis, rest)
                 }
             };
-            flags.push(if light.is_point && flag & DELTA == 0 { flag | POINT } else { flag });
+            let point = if light.is_point && flag & DELTA == 0 { POINT } else { 0 };
+            flags.push(flag | point | if even.is_none() { VARIED } else { 0 });
             let [length_u, length_v, radius, lift] = rest;
             let vectors = [origin, u, v, normal, radiance.into()].map(|v| Vec3::from(v).to_array());
             let values = vectors.as_flattened().iter().copied();
@@ -106,7 +111,8 @@ impl LightArrays {
             rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
         }
         let has_spheres = flags.iter().any(|&flag| flag & SPHERE != 0);
-        let has_triangles = flags.contains(&TRIANGLE);
+        let has_triangles = flags.iter().any(|&flag| flag & TRIANGLE != 0);
+        let has_varied = flags.iter().any(|&flag| flag & VARIED != 0);
         let has_deltas = flags.iter().any(|&flag| flag & DELTA != 0);
         let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE | DELTA) == 0);
         let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
@@ -117,6 +123,7 @@ impl LightArrays {
             has_quads,
             has_triangles,
             has_deltas,
+            has_varied,
             flags: padded(flags),
             origin: [ox, oy, oz],
             unit_u: [ux, uy, uz],
@@ -146,22 +153,8 @@ impl LightArrays {
         let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
         let ratio = distance / radius;
         let target = offset_along(center - wi * radius, lift, -wi);
-        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi, is_far: 0 }
-    }
-
-    /// Samples points on lights and evaluates their radiance. The pdf does not include the choice of the light.
-    #[inline(always)]
-    pub fn shining<S: Simd>(
-        &self,
-        by_angle: bool,
-        id: Bits<S>,
-        mask: Mask,
-        position: Vector<S>,
-        u: [Float<S>; 2],
-    ) -> LightLanes<S> {
-        let mut lanes = self.points(by_angle, id, mask, position, u);
-        lanes.radiance = Vector::gather(&self.radiance, id);
-        if self.has_deltas { self.with_deltas(id, mask, position, lanes) } else { lanes }
+        let uv = [ratio.all(0.0); 2];
+        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi, is_far: 0, uv }
     }
 
     /// Replaces the lanes of delta lights.
@@ -194,6 +187,7 @@ impl LightArrays {
             pdf: select(deltas, scale.all(SHARPNESS), lanes.pdf),
             radiance: select_vector(deltas, lanes.radiance * scale, lanes.radiance),
             is_far: found & source.is_far,
+            uv: lanes.uv,
         }
     }
 
@@ -226,7 +220,15 @@ impl LightArrays {
         }
         let zero = u[0].all(0.0);
         let nowhere = Vector { x: zero, y: zero, z: zero };
-        let none = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere, is_far: 0 };
+        let none = LightLanes {
+            found: 0,
+            target: nowhere,
+            wi: nowhere,
+            pdf: zero,
+            radiance: nowhere,
+            is_far: 0,
+            uv: [zero; 2],
+        };
         all.unwrap_or(none)
     }
 
@@ -346,7 +348,7 @@ impl LightArrays {
         let around = n.x + n.y + n.z;
         let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
         let target = offset_along(point, lift, normal);
-        let lanes = LightLanes { found, target, wi, pdf, radiance: wi, is_far: 0 };
+        let lanes = LightLanes { found, target, wi, pdf, radiance: wi, is_far: 0, uv: [zero; 2] };
         let close = found & distance2.lt(r2 * CLOSE);
         if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
@@ -354,8 +356,8 @@ impl LightArrays {
 
 impl<S: Simd> LightLanes<S> {
     #[inline(always)]
-    fn of(FlatPoint { found, target, wi, pdf, uv: _ }: FlatPoint<Float<S>>) -> Self {
-        Self { found, target, wi, pdf, radiance: wi, is_far: 0 }
+    fn of(FlatPoint { found, target, wi, pdf, uv }: FlatPoint<Float<S>>) -> Self {
+        Self { found, target, wi, pdf, radiance: wi, is_far: 0, uv }
     }
 
     /// Selects `self` where the bit is set, otherwise `other`.
@@ -368,6 +370,7 @@ impl<S: Simd> LightLanes<S> {
             pdf: select(mask, self.pdf, other.pdf),
             radiance: other.radiance,
             is_far: self.is_far | other.is_far,
+            uv: [select(mask, self.uv[0], other.uv[0]), select(mask, self.uv[1], other.uv[1])],
         }
     }
 }

@@ -1,32 +1,70 @@
 //! Light sampling for sixteen points at a time, see [`LightTable`].
 
 use crate::core::techniques::Techniques;
+use crate::core::texture::Texture;
 use crate::prepare::light::LightTable;
-use crate::prepare::light::arrays::{DELTA, LightArrays, LightLanes, POINT};
+use crate::prepare::light::arrays::{DELTA, LightArrays, LightLanes, POINT, VARIED};
 use crate::prepare::light::selection::MAX_ESTIMATED;
 use crate::sampling::SamplerLanes;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 impl LightTable {
-    /// Like [`Self::sample`], for the lanes of `mask`; `None` if only the scalar code supports the lights.
+    /// Like [`Self::sample`], for the lanes of `mask`; `None` if there are no lights.
     ///
     /// - `u_select`: used only if [`Self::selects_apart`].
     #[inline(always)]
     pub(crate) fn sample_lanes<S: Simd>(
         &self,
+        textures: &[Texture],
         techniques: &Techniques,
         mask: Mask,
-        position: Vector<S>,
-        normal: Vector<S>,
+        [position, normal]: [Vector<S>; 2],
         u_select: Float<S>,
         mut u: [Float<S>; 2],
     ) -> Option<LightLanes<S>> {
         let wide = self.lanes.as_ref()?;
         let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
-        let mut sample = wide.shining(techniques.solid_angle, id, mask, position, u);
+        let found = wide.points(techniques.solid_angle, id, mask, position, u);
+        let mut sample = self.shining(wide, textures, id, mask, position, found);
         sample.pdf = sample.pdf * pmf;
         Some(sample)
+    }
+
+    /// Sets the radiance of points on lights, and replaces the lanes of delta lights.
+    #[inline(always)]
+    fn shining<S: Simd>(
+        &self,
+        wide: &LightArrays,
+        textures: &[Texture],
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        mut points: LightLanes<S>,
+    ) -> LightLanes<S> {
+        points.radiance = Vector::gather(&wide.radiance, id);
+        if wide.has_varied {
+            let varied = points.found & Bits::gather(&wide.flags, id).has(VARIED);
+            if varied != 0 {
+                self.set_varied(textures, id.to_array(), varied, &mut points);
+            }
+        }
+        if wide.has_deltas { wide.with_deltas(id, mask, position, points) } else { points }
+    }
+
+    /// Sets the radiance of lights that varies, one at a time.
+    #[inline(never)]
+    fn set_varied<S: Simd>(&self, textures: &[Texture], ids: [u32; LANES], mask: Mask, points: &mut LightLanes<S>) {
+        let (targets, uvs) = (points.target.to_arrays(), points.uv.map(|uv| uv.to_array()));
+        let mut radiance = points.radiance.to_arrays();
+        for lane in (0..LANES).filter(|lane| mask >> lane & 1 != 0) {
+            let light = &self.lights[ids[lane] as usize];
+            let target = Vec3::new(targets[0][lane], targets[1][lane], targets[2][lane]);
+            let normal = light.shape.normal_at(target);
+            let found = light.radiance(textures, normal, Vec2::new(uvs[0][lane], uvs[1][lane]));
+            (radiance[0][lane], radiance[1][lane], radiance[2][lane]) = (found.x, found.y, found.z);
+        }
+        points.radiance = Vector::from_arrays(points.pdf.s, &radiance);
     }
 
     /// Number of samples of [`Self::sample_each`].
@@ -39,6 +77,7 @@ impl LightTable {
     #[inline(always)]
     pub(crate) fn sample_each_lanes<S: Simd>(
         &self,
+        textures: &[Texture],
         k: u32,
         mut mask: Mask,
         position: Vector<S>,
@@ -65,7 +104,9 @@ impl LightTable {
         let as_point = mask & flags.has(POINT | DELTA);
         let by_area = mask & !as_point;
         let nowhere = Vector::splat(s, Vec3::ZERO);
-        let mut found = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere, is_far: 0 };
+        let uv = [Float::splat(s, 0.0); 2];
+        let mut found =
+            LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere, is_far: 0, uv };
         if by_area != 0 {
             found = wide.points(true, id, by_area, position, sampler.pair(dimension));
         }
@@ -73,10 +114,7 @@ impl LightTable {
         if spheres != 0 {
             found = wide.as_points(id, spheres, position).over(spheres, found);
         }
-        found.radiance = Vector::gather(&wide.radiance, id);
-        if wide.has_deltas {
-            found = wide.with_deltas(id, mask, position, found);
-        }
+        found = self.shining(wide, textures, id, mask, position, found);
         found.pdf = found.pdf * pmf;
         (found, as_point)
     }

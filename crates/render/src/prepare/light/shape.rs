@@ -131,6 +131,15 @@ impl LightShape {
         }
     }
 
+    /// Normal at a point of the surface, unit; of delta lights any.
+    pub fn normal_at(&self, point: Vec3) -> Vec3 {
+        match self {
+            Self::Sphere { center, .. } => (point - *center).normalize_or(Vec3::Z),
+            Self::Quad { normal, .. } | Self::Triangle { normal, .. } => *normal,
+            Self::Point { .. } | Self::Directional { .. } => Vec3::Z,
+        }
+    }
+
     /// Centre of a sphere or quad, some point inside of a triangle; far away for directional light.
     pub fn center(&self) -> Vec3 {
         match self {

@@ -8,9 +8,11 @@ use crate::prepare::prepared::Prepared;
 use crate::sampling::warp::{shifted, shifted_single};
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
-use crate::shading::lights::{LightPoint, choose_light_point};
+use crate::shading::lights::{LightPoint, choose_light_point, environment_share};
 use crate::shading::simd::lanes::lanes_of;
-use firstlight_simd::{Bits, Float, InstructionSet, Kernel, LANES, Mask, Simd, Vector, dispatch};
+use firstlight_simd::{
+    Bits, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector,
+};
 use glam::Vec3;
 
 /// A light sample per lane.
@@ -42,52 +44,52 @@ impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
     type Output = FoundLights<S>;
 
     #[inline(always)]
-    fn run(self, s: S) -> FoundLights<S> {
-        light_points(s, &self)
+    fn run(self, _: S) -> FoundLights<S> {
+        light_points(&self)
     }
 }
 
 #[inline(always)]
-fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
+fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
     let &LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate } = asked;
     let tables = &*scene.tables;
-    if tables.environment_sampler.is_none() {
-        let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
-        let mut u_select = u[0];
-        if tables.lights.selects_apart() {
-            u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
-        }
-        let found = tables.lights.sample_lanes(techniques, mask, position, normal, u_select, u);
-        if let Some(LightLanes { found, target, wi, pdf, radiance, is_far }) = found {
-            return FoundLights { found, infinite: is_far, target, wi, pdf, radiance };
-        }
+    let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
+    let zero = u[0].all(0.0);
+    let nowhere = Vector::all(zero);
+    let mut points = FoundLights { found: 0, infinite: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere };
+    let share = environment_share(scene);
+    let mut u_select = u[0];
+    if tables.lights.selects_apart() || share > 0.0 {
+        u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
     }
-    let (positions, normals) = (position.to_arrays(), normal.to_arrays());
-    let parts = [sampler.stream.to_array(), sampler.reversed_index.to_array(), sampler.screen.to_array()];
-    let mut arrays = [[0.0; LANES]; 10];
-    let (mut found, mut infinite) = (0, 0);
-    for lane in lanes_of(mask) {
-        let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
-        let sampler = Sampler::from_parts([parts[0][lane], parts[1][lane], parts[2][lane]]);
-        let place = [at(&positions), at(&normals)];
-        let point = choose_light_point(scene, techniques, place, &sampler, dimension, candidate);
-        if let Some((target, sample)) = point {
-            found |= 1 << lane;
-            infinite |= Mask::from(target.is_none()) << lane;
-            let values = [sample.target, sample.wi, sample.radiance];
-            let values = values.iter().flat_map(|v| v.to_array()).chain([sample.pdf]);
-            arrays.iter_mut().zip(values).for_each(|(array, value)| array[lane] = value);
-        }
+    let mut outside = 0;
+    if share > 0.0 {
+        outside = mask & u_select.lt(zero.all(share));
+        u_select = ((u_select - share) / (1.0 - share)).at_least(0.0).at_most(1.0f32.next_down());
     }
-    let [a, b, c, d, e, f, g, h, i, pdf] = arrays;
-    FoundLights {
-        found,
-        infinite,
-        target: Vector::from_arrays(s, &[a, b, c]),
-        wi: Vector::from_arrays(s, &[d, e, f]),
-        pdf: Float::load(s, &pdf),
-        radiance: Vector::from_arrays(s, &[g, h, i]),
+    let inside = mask & !outside;
+    let textures = &scene.shading.textures;
+    if inside != 0
+        && let Some(lights) = tables.lights.sample_lanes(textures, techniques, inside, [position, normal], u_select, u)
+    {
+        let LightLanes { found, target, wi, pdf, radiance, is_far, .. } = lights;
+        points = FoundLights { found, infinite: is_far, target, wi, pdf: pdf * (1.0 - share), radiance };
     }
+    if let Some(environment) = &tables.environment_sampler
+        && outside != 0
+    {
+        let (found, wi, pdf) = environment.sample_lanes(u);
+        let radiance = scene.shading.environment.radiance_lanes(outside, wi);
+        points = FoundLights {
+            found: points.found | found & outside,
+            infinite: points.infinite | outside,
+            target: select_vector(outside, wi, points.target),
+            wi: select_vector(outside, wi, points.wi),
+            pdf: select(outside, pdf * share, points.pdf),
+            radiance: select_vector(outside, radiance, points.radiance),
+        };
+    }
+    points
 }
 
 /// A place on a surface that asks for a point on a light: its position, its normal, which is zero for light on both
