@@ -1,5 +1,6 @@
 //! Errors of opening, rendering and saving.
 
+use crate::frame::PropertyError;
 use crate::render::{CameraError, NoRoom, SettingsError};
 use crate::scene::{BadValue, SceneError, WriteError};
 use thiserror::Error;
@@ -23,8 +24,11 @@ pub enum Error {
     /// There is not enough memory for an image of that size.
     #[error(transparent)]
     Memory(#[from] NoRoom),
+    /// There is no such property, or its value is out of range.
+    #[error(transparent)]
+    Property(#[from] PropertyError),
     /// The world has no camera.
-    #[error("the scene has no camera: spawn an entity with a `View`")]
+    #[error("the scene has no camera: add one")]
     NoCamera,
     /// The threads cannot be started.
     #[error("the worker threads cannot be started: {0}")]

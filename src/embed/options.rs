@@ -35,6 +35,8 @@ pub struct RenderOptions {
     allocation: Option<SampleAllocation>,
     pub(super) exposure: f32,
     pub(super) threads: Option<usize>,
+    pub(super) features: bool,
+    pub(super) denoise: bool,
     on_progress: Option<OnProgress>,
     stop: Option<StopCondition>,
 }
@@ -111,6 +113,19 @@ impl RenderOptions {
         self
     }
 
+    /// Gathers albedo, normal, depth, position, objects and materials of each pixel too:
+    /// [`Image::features`](crate::embed::Image::features).
+    pub fn features(mut self) -> Self {
+        self.features = true;
+        self
+    }
+
+    /// Denoises the image, when it is finished or stopped: [`Image::denoised`](crate::embed::Image::denoised).
+    pub fn denoise(mut self) -> Self {
+        self.denoise = true;
+        self
+    }
+
     /// Sets a callback that runs a few times per second on the thread that renders.
     pub fn on_progress(mut self, on_progress: impl Fn(&Progress) -> Flow + Send + Sync + 'static) -> Self {
         self.on_progress = Some(Box::new(on_progress));
@@ -163,7 +178,20 @@ impl RenderOptions {
 
 impl fmt::Debug for RenderOptions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { size, target, integrator, max_depth, seed, filter, allocation, exposure, threads, .. } = self;
+        let Self {
+            size,
+            target,
+            integrator,
+            max_depth,
+            seed,
+            filter,
+            allocation,
+            exposure,
+            threads,
+            features,
+            denoise,
+            ..
+        } = self;
         f.debug_struct("RenderOptions")
             .field("size", size)
             .field("target", target)
@@ -174,6 +202,8 @@ impl fmt::Debug for RenderOptions {
             .field("allocation", allocation)
             .field("exposure", exposure)
             .field("threads", threads)
+            .field("features", features)
+            .field("denoise", denoise)
             .finish_non_exhaustive()
     }
 }

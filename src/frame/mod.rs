@@ -69,7 +69,7 @@ pub use command::Command;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use core::oidn;
-pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
+pub use edit::{Edit, Id, NewThing, Property, PropertyError, set_by_name, sky_strength, textures};
 pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
 pub use recording::check_recordable;
 pub use recovery::{LeftBehind, Recovery};

@@ -42,7 +42,7 @@ use crate::scene::world::extent::{Extent, ExtentCache};
 use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::world::World;
 use glam::DVec3;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -63,6 +63,8 @@ pub struct LoadOptions<'a> {
     pub preview: bool,
     /// The previous state of the scene: files that have not changed on disk are not read again.
     pub known: Option<&'a LoadedScene>,
+    /// Images in memory by their paths in the scene, which are not read from files.
+    pub images: Option<&'a HashMap<String, Arc<ImageTexture>>>,
     /// Called with a description of each step.
     pub progress: Option<&'a (dyn Fn(LoadStage, &str) + Sync)>,
 }
@@ -186,6 +188,18 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     Ok(scene)
 }
 
+/// Like [`load`], for the text of a scene file; its trees are not built. Paths in it are relative to the working
+/// directory.
+///
+/// - `name`: for messages.
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_text(text: &str, name: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
+    let (source, documents) = (SceneSource::Scene(name.to_path_buf()), Documents::new(options.choice()));
+    resolve(&source, SceneFile::parse(text, name)?, Some(text), PathBuf::new(), options, &documents)
+}
+
 /// The scene of an image, with the camera of the image.
 fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     let failed = |error: MetadataError| SceneError::in_file(path, error);
@@ -256,6 +270,7 @@ fn resolve(
 ) -> Result<LoadedScene, SceneError> {
     let mut scene = LoadedScene::empty(source, file, folder);
     scene.choice = options.choice().clone();
+    scene.pictures = options.images.cloned().unwrap_or_default();
     if let Some(environment) = options.environment {
         scene.light_by(environment, options)?;
     }

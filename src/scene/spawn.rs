@@ -23,12 +23,24 @@ use crate::scene::world::components::{
     ColorParam, DisplaySettings, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam, SceneEnvironment,
     Shape, SurfaceMaterial, SurfaceTexture,
 };
+use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::{WithLight, put_light};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
 use std::collections::HashMap;
 use std::sync::Arc;
+
+/// The entities of parts that were added to a scene, in the order of their file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AddedParts {
+    /// Its materials, also those that were there already.
+    pub materials: Vec<Entity>,
+    /// Its objects.
+    pub objects: Vec<Entity>,
+    /// Its lights that are no objects.
+    pub lights: Vec<Entity>,
+}
 
 impl LoadedScene {
     /// Replaces the scene in `world`, if any, by this one. The seed of [`Rendering`] stays unless an opened image
@@ -37,7 +49,48 @@ impl LoadedScene {
         clear(world);
         let mut ordinals = (0..).map(Ordinal);
         let mut next = move || ordinals.next().expect("fewer entities than numbers");
+        let (entities, _) = self.spawn_parts(world, HashMap::new(), &mut next);
+        let (view, projection, lens) = camera(shown_camera(&self.file));
+        world.spawn((view, projection, lens, Name::new("camera"), next()));
+        self.put_environment(world);
+        self.put_settings(world);
+        self.animate(world, &entities);
+    }
 
+    /// Adds its materials, objects and lights to the scene in `world`, behind all that is there. A material that has the
+    /// name of one of the world is not added: that one is used.
+    pub fn add_to(&self, world: &mut World) -> AddedParts {
+        let known: HashMap<String, Entity> = world
+            .query_filtered::<(Entity, &Name), With<SurfaceMaterial>>()
+            .iter(world)
+            .map(|(entity, name)| (name.as_str().to_owned(), entity))
+            .collect();
+        let last = world.query::<&Ordinal>().iter(world).max().map_or(0, |Ordinal(last)| last + 1);
+        let mut ordinals = (last..).map(Ordinal);
+        let mut next = move || ordinals.next().expect("fewer entities than numbers");
+        let names = self.file.materials.names();
+        let known = names.filter_map(|name| Some((name, *known.get(name)?))).collect();
+        let (entities, objects) = self.spawn_parts(world, known, &mut next);
+        let materials = self.file.materials.names().map(|name| entities.materials[name]).collect();
+        AddedParts { materials, objects, lights: entities.all_lights }
+    }
+
+    /// Sets the camera of the scene in `world` to its own.
+    pub fn put_camera(&self, world: &mut World) {
+        let components = camera(&self.file.camera);
+        match SceneInputs::of(world).camera {
+            Some(old) => drop(world.entity_mut(old.entity).insert(components)),
+            None => drop(world.spawn((components, Name::new("camera")))),
+        }
+    }
+
+    /// - `materials`: those that are there already.
+    fn spawn_parts<'a>(
+        &'a self,
+        world: &mut World,
+        mut materials: HashMap<&'a str, Entity>,
+        next: &mut impl FnMut() -> Ordinal,
+    ) -> (Entities<'a>, Vec<Entity>) {
         let mut textures: HashMap<&str, Arc<SurfaceTexture>> = HashMap::new();
         let own_textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
         for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part, _)| (name.as_str(), part))) {
@@ -48,17 +101,17 @@ impl LoadedScene {
         }
 
         // Entities are created first, so that blends can refer to later materials.
-        let mut materials: HashMap<&str, Entity> = HashMap::new();
-        for (name, _) in self.file.materials.iter() {
-            materials.insert(name, world.spawn((Name::new(name.to_owned()), next())).id());
+        let added: Vec<_> = self.file.materials.iter().filter(|(name, _)| !materials.contains_key(name)).collect();
+        for (name, _) in &added {
+            materials.insert(name, world.spawn((Name::new((*name).to_owned()), next())).id());
         }
-        for (name, part) in self.file.materials.iter() {
+        for (name, part) in added {
             world.entity_mut(materials[name]).insert(material(part, &textures, &materials));
         }
 
         let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
         let mut objects: HashMap<&str, Entity> = HashMap::new();
-        let mut meshes = Vec::new();
+        let (mut all_objects, mut meshes) = (Vec::new(), Vec::new());
         for (i, object) in self.file.objects.iter().enumerate() {
             let slots = match (object.material(), &self.meshes[i]) {
                 _ if object.slot_materials().is_some() => {
@@ -79,6 +132,7 @@ impl LoadedScene {
             };
             let (shape, placement) = self.shape(i, object);
             let mut entity = world.spawn((shape, placement, MaterialSlots(slots), next()));
+            all_objects.push(entity.id());
             if let Some(name) = object.name() {
                 entity.insert(Name::new(name.to_owned()));
                 objects.insert(name, entity.id());
@@ -107,10 +161,7 @@ impl LoadedScene {
             entities.lights.extend(part.name().map(|name| (name, entity)));
             entities.all_lights.push(entity);
         }
-        let (view, projection, lens) = camera(shown_camera(&self.file));
-        world.spawn((view, projection, lens, Name::new("camera"), next()));
-        self.insert_resources(world);
-        self.animate(world, &entities);
+        (entities, all_objects)
     }
 
     /// Adds the animation of the file and sets the time that the file specifies.
@@ -136,13 +187,19 @@ impl LoadedScene {
         show_first(world, animation, &shown, part.at);
     }
 
-    fn insert_resources(&self, world: &mut World) {
+    /// Sets the environment of the scene in `world` to its own.
+    pub fn put_environment(&self, world: &mut World) {
         let file = &self.file;
         world.insert_resource(SceneEnvironment {
             light: self.environment(),
             part: file.environment.clone(),
             air: file.air.0,
         });
+    }
+
+    /// Sets size, filter, integrator, depth and display of the scene in `world` to its own.
+    pub fn put_settings(&self, world: &mut World) {
+        let file = &self.file;
         world.insert_resource(FilmSize { width: file.film.width, height: file.film.height });
         let of_world = world.get_resource::<Rendering>().map(|rendering| rendering.0).unwrap_or_default();
         let (seed, allocation) = match &self.shot {

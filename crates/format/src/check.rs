@@ -7,6 +7,7 @@ use crate::bounds::{
 };
 use crate::camera::CameraPart;
 use crate::error::suggestion;
+use crate::material_property::check_value;
 use crate::parts::{InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, TransformPart};
 use crate::placement::Placement;
 use crate::scene_file::SceneFile;
@@ -201,14 +202,8 @@ impl Check<'_> {
 
     /// Checks a number, or the channels of a colour.
     pub(crate) fn value(&mut self, path: &str, property: &Property, channels: &[f32]) {
-        let limits = property.domain.limits();
-        if !channels.iter().all(|channel| limits.contains(channel)) {
-            let value = match channels {
-                [number] => number.to_string(),
-                [r, g, b] => format!("({r}, {g}, {b})"),
-                _ => unreachable!("a value has one channel or three"),
-            };
-            self.wrong(path, format!("`{}` is {value}, but must {}", property.name, property.domain.rule()));
+        if let Err(bad) = check_value(property, channels) {
+            self.wrong(path, bad.to_string());
         }
     }
 

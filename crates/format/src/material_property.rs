@@ -2,6 +2,7 @@
 //!
 //! Names, limits and meanings are those of the table of materials, [`MaterialKind::properties`].
 
+use crate::bad_value::BadValue;
 use crate::quantity::Quantity;
 use firstlight_render::{Domain, Fresnel, MaterialKind, Param, Params, Property, ValueType};
 use glam::{DVec3, Vec3};
@@ -26,6 +27,22 @@ static NAMES: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
 /// Whether its value consists of numbers, which are not data of an image.
 fn can_be_set(property: &Property) -> bool {
     !matches!(property.domain, Domain::Map | Domain::Reference)
+}
+
+/// Checks a number, or the channels of a colour.
+///
+/// # Errors
+/// If it is not among the values that the property may have.
+pub fn check_value(property: &Property, channels: &[f32]) -> Result<(), BadValue> {
+    let limits = property.domain.limits();
+    if channels.iter().all(|channel| limits.contains(channel)) {
+        return Ok(());
+    }
+    let value = match channels {
+        [number] => number.to_string(),
+        channels => format!("({})", channels.iter().map(f32::to_string).collect::<Vec<_>>().join(", ")),
+    };
+    Err(BadValue::out_of_range(property.name, value, property.domain.rule()))
 }
 
 impl MaterialProperty {

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `mod` | the list of edits, and the system that executes the queue |
 //! | `property` | parameters of materials, lights and shapes |
+//! | `named` | the same by the names of scene files |
 //! | `sky` | colours, strength and rotation of the environment |
 //! | `texture` | textures in place of colours |
 //! | `dress` | ready materials |
@@ -19,6 +20,7 @@
 mod add;
 mod dress;
 mod keys;
+mod named;
 pub(crate) mod new_entity;
 mod place;
 mod property;
@@ -29,6 +31,7 @@ mod spot;
 mod texture;
 
 pub use add::NewThing;
+pub use named::{PropertyError, set_by_name};
 pub use property::Property;
 pub use sky::strength as sky_strength;
 pub(super) use texture::take as take_picture;

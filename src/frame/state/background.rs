@@ -118,6 +118,7 @@ impl BackgroundTasks {
                 preview: true,
                 progress: Some(&say),
                 known: known.as_deref(),
+                images: None,
                 choice: Some(&choice),
             };
             let result = guarded(|| {

@@ -104,6 +104,19 @@ impl Balls {
             center,
         }
     }
+
+    /// # Errors
+    /// If there are no spheres, or not as many radii as centres, or one is not finite or has no size.
+    pub fn check(&self) -> Result<(), String> {
+        if self.centers.is_empty() || self.centers.len() != self.radii.len() {
+            return Err(format!("there are {} centres and {} radii", self.centers.len(), self.radii.len()));
+        }
+        let is_sound = |(c, r): (&Vec3, &f32)| c.is_finite() && r.is_finite() && *r > 0.0;
+        match self.centers.iter().zip(&self.radii).position(|sphere| !is_sound(sphere)) {
+            Some(i) => Err(format!("sphere {i} needs a finite centre and a positive radius")),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The material entities of an object, one per slot of its mesh; all other shapes have one slot.

@@ -79,7 +79,7 @@ impl Trees {
                 }
             }
             Shape::Spheres(balls) => {
-                check_balls(balls)?;
+                balls.check()?;
                 let tree = SphereTree::build(&balls.centers, &balls.radii);
                 self.balls.insert(address(balls), (balls.clone(), Arc::new(tree)));
             }
@@ -209,14 +209,4 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
         return Err("the mesh needs one material slot per triangle, or none".to_owned());
     }
     Ok(())
-}
-
-fn check_balls(balls: &Balls) -> Result<(), String> {
-    if balls.centers.is_empty() || balls.centers.len() != balls.radii.len() {
-        return Err(format!("there are {} centres and {} radii", balls.centers.len(), balls.radii.len()));
-    }
-    match balls.centers.iter().zip(&balls.radii).position(|(c, r)| !(c.is_finite() && r.is_finite() && *r > 0.0)) {
-        Some(i) => Err(format!("sphere {i} needs a finite centre and a positive radius")),
-        None => Ok(()),
-    }
 }

@@ -112,6 +112,11 @@ macro_rules! materials {
                 Self::NAMES[self as usize]
             }
 
+            /// What it is, a phrase or some sentences.
+            pub fn about(self) -> &'static str {
+                match self { $(Self::$kind => concat!($($about),*).trim_ascii_start(),)* }
+            }
+
             /// The properties of materials of this kind, in the order of [`Material::params`].
             pub fn properties(self) -> &'static [Property] {
                 match self {
