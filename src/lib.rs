@@ -20,6 +20,7 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | `cli` (feature `cli`) | the program: one file per command |
 //! | `viewer` (feature `viewer`) | the window: input, overlays, presenting |
 //! | [`embed`] | [`Scene`], [`RenderOptions`], [`Image`] |
 //! | `cluster` (feature `cli`) | parts of an image on many machines: what a set of films has, job files of engines |
@@ -34,6 +35,9 @@
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
 //! | [`kdtree`], [`geometry`] | closest-hit and any-hit queries; rays, boxes, robust arithmetic |
 
+// The command line names the library as other programs do.
+extern crate self as firstlight;
+
 pub use bevy_ecs;
 pub use embed::{Error, Image, RenderOptions, Scene};
 pub use firstlight_export as export;
@@ -46,6 +50,10 @@ pub use firstlight_render::{self as render, sampling};
 pub use glam;
 
 // Hidden: used by the program, its tests and its benchmarks, not by other libraries.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+#[allow(missing_docs)]
+pub mod cli;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cluster;

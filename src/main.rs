@@ -1,7 +1,5 @@
 //! The program: see `cli`.
 
-mod cli;
-
 fn main() -> std::process::ExitCode {
-    cli::main()
+    firstlight::cli::main()
 }

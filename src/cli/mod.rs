@@ -51,6 +51,7 @@ use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
 use firstlight::scene::Limits;
+use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
@@ -153,8 +154,16 @@ impl CliCommand {
     }
 }
 
-/// Runs the command.
+/// Runs the command of this process.
 pub fn main() -> ExitCode {
+    ExitCode::from(run(std::env::args_os().collect()))
+}
+
+/// Runs a command and returns the exit status of the program; once per process.
+///
+/// - `words`: the path of the program, and its arguments.
+pub fn run(words: Vec<OsString>) -> u8 {
+    words::give(words);
     firstlight::console::tell_panics();
     if let Some(warning) = Limits::misunderstood() {
         remark(format_args!("warning: {warning}"));
@@ -178,43 +187,43 @@ pub fn main() -> ExitCode {
         },
     });
     let (messages, code) = match result {
-        Ok(()) => return ExitCode::SUCCESS,
+        Ok(()) => return 0,
         Err(Failure::Usage(message)) => (vec![message], 2),
         Err(Failure::Failed(message) | Failure::Passing(message)) => (vec![message], 1),
         Err(Failure::Problems(messages)) => (messages, 1),
         Err(Failure::Input(messages)) => (messages, 2),
         Err(Failure::Retry(message)) => {
             remark(message);
-            return ExitCode::from(failure::TRY_AGAIN);
+            return failure::TRY_AGAIN;
         }
         Err(Failure::Stopped(message)) => {
             remark(message);
-            return ExitCode::from(stop::STOPPED);
+            return stop::STOPPED;
         }
     };
     for message in messages {
         remark(format_args!("error: {message}"));
     }
-    ExitCode::from(code)
+    code
 }
 
 /// Reports what clap returned: help on standard output, or an error with status 2 and the most similar option.
-fn not_understood(error: clap::Error) -> ExitCode {
+fn not_understood(error: clap::Error) -> u8 {
     if !error.use_stderr() {
         // A help text. A closed pipe is fine; a full disk is not.
         return match error.print().and_then(|()| firstlight::console::print_bytes(&[])) {
             Err(error) if error.kind() != ErrorKind::BrokenPipe => {
                 remark(format_args!("error: cannot write the help text: {error}"));
-                ExitCode::FAILURE
+                1
             }
-            _ => ExitCode::SUCCESS,
+            _ => 0,
         };
     }
     if let Some(message) =
         words::mistyped_command(&CommandLine::command()).or_else(|| words::second_scene(&CommandLine::command()))
     {
         remark(format_args!("error: {message}"));
-        return ExitCode::from(2);
+        return 2;
     }
     // The message quotes the arguments, and a line break in them would begin a new line: they are parsed again with
     // such characters escaped, which gives the same message without line breaks.
@@ -225,7 +234,7 @@ fn not_understood(error: clap::Error) -> ExitCode {
         false => CommandLine::try_parse_from(shown).err().filter(clap::Error::use_stderr).unwrap_or(error),
     };
     remark(lines(error.render().to_string().trim_end()));
-    ExitCode::from(2)
+    2
 }
 
 /// Starts the log: warnings go to the terminal, except those of the window libraries, which report only errors;

@@ -5,6 +5,7 @@ use crate::cli::console::{Bar, inform, lines, print, remark};
 use crate::cli::failure::Failure;
 use crate::cli::number::{between, parse_positive, parse_size};
 use crate::cli::stop::Stop;
+use crate::cli::words;
 use clap::Args;
 use firstlight::cluster::engine::shell_word;
 use firstlight::frame::PictureFormat;
@@ -124,7 +125,10 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     }
     folder.keep();
 
-    write_whole(&html, page(&outcomes, &command_line(std::env::args_os().skip(1)), missing.as_deref()).as_bytes())?;
+    write_whole(
+        &html,
+        page(&outcomes, &command_line(words::given().iter().skip(1).cloned()), missing.as_deref()).as_bytes(),
+    )?;
     write_whole(&table, csv(&outcomes).as_bytes())?;
     print(lines(summary_text(&outcomes).trim_end()))?;
     print(lines(denoised_text(&outcomes).trim_end()))?;

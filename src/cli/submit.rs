@@ -184,7 +184,9 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         Ok(package) => (inside(&package.scene), package.environment.as_deref().map(inside)),
         Err(builtin) => (builtin.clone(), None),
     };
-    let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
+    // A program that a module of Python runs is no executable of its own.
+    let this = std::env::current_exe().ok().filter(|path| path.file_stem().is_some_and(|name| name == "firstlight"));
+    let this = this.and_then(|path| path.to_str().map(str::to_owned));
     let job = Job {
         format: Job::FORMAT,
         name: job_name(&title),

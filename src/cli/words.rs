@@ -5,10 +5,25 @@ use firstlight::printable;
 use firstlight::scene::{BUILTIN_SCENES, SceneSource, suggestion};
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
+use std::sync::OnceLock;
+
+/// The path of the program and its arguments.
+static GIVEN: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Sets the words of this process, once.
+pub fn give(words: Vec<OsString>) {
+    // Those of a second call are those of another command, which a process does not run.
+    let _ = GIVEN.set(words);
+}
+
+/// The path of the program and its arguments, as they were given.
+pub fn given() -> &'static [OsString] {
+    GIVEN.get().map_or(&[], Vec::as_slice)
+}
 
 /// The arguments, with global options before a command moved behind it: `--quiet render` becomes `render --quiet`.
 pub fn typed(program: &Command) -> Vec<OsString> {
-    ordered(std::env::args_os().collect(), &commands(program))
+    ordered(given().to_vec(), &commands(program))
 }
 
 /// An error message if the first argument that is not an option cannot be opened and resembles a command.

@@ -59,7 +59,7 @@ const LAYERS: [(&str, &[&str]); 28] = [
     (EMBED, &[FILES, FORMAT, SCENE, FRAME]),
     ("src/prelude", &[SCENE, FRAME, EMBED]),
     ("src/viewer", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME]),
-    // A program of its own, that sees the rest as the library `firstlight`.
+    // It sees the rest as the library `firstlight`, as other programs do.
     ("src/cli", &[]),
     ("src", &[FILES, CONSOLE, FORMAT, IMPORT, SCENE, FRAME, EMBED]),
 ];
