@@ -49,9 +49,9 @@ pub fn files(folder: &str, endings: &[&str]) -> Vec<String> {
     found
 }
 
-/// README and the book.
+/// The pages that a visitor sees first, and the book.
 pub fn pages() -> Vec<Page> {
-    let mut pages = vec![read("README.md")];
+    let mut pages: Vec<Page> = ["README.md", "CONTRIBUTING.md", "SECURITY.md"].map(read).into();
     pages.extend(files("docs", &[".md"]).iter().map(|path| read(path)));
     assert!(pages.len() > 10);
     pages

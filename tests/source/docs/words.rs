@@ -12,7 +12,7 @@ const LONG: [&str; 3] = ["docs/keys.md", "docs/measurements/", "CHANGELOG.md"];
 /// Their words are those of the table of keys in the sources.
 const GENERATED: &str = "docs/keys.md";
 
-/// README, the book, and what changed.
+/// All pages, and what changed.
 fn pages_and_changelog() -> Vec<Page> {
     let mut pages = pages();
     pages.push(read("CHANGELOG.md"));
