@@ -1,6 +1,7 @@
 //! A rendered image, as numbers or as a file.
 
 use crate::embed::Error;
+use crate::embed::threads::threads;
 use crate::files::whole_file::Replace;
 use crate::frame::{DenoiseFilter, FeatureLayers, LayeredPicture, OfflineReport, PictureFormat, PictureLayer, Print};
 use crate::render::{Denoised, Display, ErrorEstimate, Film, develop, develop_colors};
@@ -92,18 +93,21 @@ impl Image {
     /// # Errors
     /// If there is not enough memory.
     pub fn png(&self) -> Result<Vec<u8>, Error> {
-        Ok(self.print(None).bytes(PictureFormat::Png)?)
+        Ok(threads(None)?.install(|| self.print(None).bytes(PictureFormat::Png))?)
     }
 
     /// The image for a display: sRGB with exposure and tone curve applied, denoised if the options ask for it; four
     /// bytes per pixel, row by row from the top, opaque.
-    pub fn to_rgba(&self) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// If the threads cannot be started.
+    pub fn to_rgba(&self) -> Result<Vec<u8>, Error> {
         let (size, mut rgba) = ((self.width(), self.height()), Vec::new());
-        match &self.denoised {
+        threads(None)?.install(|| match &self.denoised {
             Some(denoised) => develop_colors(&denoised.color, size, &self.display, size, &mut rgba),
             None => develop(&self.film, &self.display, size.0, size.1, &mut rgba),
-        }
-        rgba
+        });
+        Ok(rgba)
     }
 
     fn print<'a>(&'a self, note: Option<&'a str>) -> Print<'a> {
@@ -119,7 +123,12 @@ impl Image {
     /// # Errors
     /// If the extension is neither of the two, or the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let (path, size) = (path.as_ref(), (self.width(), self.height()));
+        let path = path.as_ref();
+        threads(None)?.install(|| self.write(path))
+    }
+
+    fn write(&self, path: &Path) -> Result<(), Error> {
+        let size = (self.width(), self.height());
         let uneven = self.film.is_uneven();
         let samples = ImageSamples { first: self.film.first_sample(), spp: self.film.spp(), uneven };
         let mut note = self.metadata.note(path, size, samples, self.display.into());

@@ -9,8 +9,10 @@ mod error;
 mod image;
 mod options;
 mod scene;
+mod threads;
 
 pub use error::Error;
 pub use image::Image;
 pub use options::{Flow, RenderOptions};
 pub use scene::Scene;
+pub use threads::threads;

@@ -1,8 +1,9 @@
 //! A scene that a program can change and render.
 
+use crate::embed::threads::threads;
 use crate::embed::{Error, Image, RenderOptions};
 use crate::frame::{FeatureLayers, FeatureNames, check_film_source, compare, render_offline_until, set_by_name};
-use crate::render::{FEATURE_SAMPLES, Film, GuideGatherer, NoRoom, denoise_film, guide_samples, worker_threads};
+use crate::render::{FEATURE_SAMPLES, Film, GuideGatherer, NoRoom, denoise_film, guide_samples};
 use crate::scene::hit_spaces::StaticJob;
 use crate::scene::{
     Animation, Description, DisplaySettings, Extraction, FilmSize, LoadOptions, LoadedScene, MetadataDraft, Moment,
@@ -10,9 +11,8 @@ use crate::scene::{
 };
 use bevy_ecs::world::World;
 use glam::{DVec3, UVec2};
-use rayon::ThreadPool;
 use std::ffi::OsStr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A scene: an ECS world with the meshes, images and kd-trees that its entities use.
 ///
@@ -41,8 +41,6 @@ struct State {
     /// Trees of this state of the world or of an earlier one.
     trees: Trees,
     rendered: Option<Rendered>,
-    /// The threads of the last rendering, by the number that was asked for.
-    pool: Option<(usize, Arc<ThreadPool>)>,
 }
 
 /// What was rendered last, of which the next rendering keeps all that has not changed.
@@ -68,7 +66,7 @@ impl Scene {
     /// As for [`open`](Self::open).
     pub fn open_with(source: &SceneSource, options: &LoadOptions) -> Result<Self, Error> {
         check_film_source(source).map_err(SceneError::new)?;
-        let loaded = load(source, options)?;
+        let loaded = threads(None)?.install(|| load(source, options))?;
         let mut state = State { trees: loaded.trees.clone(), ..State::default() };
         loaded.spawn(&mut state.world);
         Ok(Self { state: Mutex::new(state), loaded: Some(loaded) })
@@ -124,8 +122,7 @@ impl Scene {
     pub fn render(&self, options: &RenderOptions) -> Result<Image, Error> {
         options.check()?;
         // Zero is one thread for each processor.
-        let pool = self.state().threads(options.threads.unwrap_or(0))?;
-        pool.install(|| self.work(options))
+        threads(Some(options.threads.unwrap_or(0)))?.install(|| self.work(options))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -172,16 +169,6 @@ impl Scene {
 }
 
 impl State {
-    /// The pool of so many threads; the one of the last rendering, if it has as many.
-    fn threads(&mut self, n: usize) -> Result<Arc<ThreadPool>, Error> {
-        if let Some((_, pool)) = self.pool.as_ref().filter(|(of, _)| *of == n) {
-            return Ok(pool.clone());
-        }
-        let pool = Arc::new(worker_threads().num_threads(n).build()?);
-        self.pool = Some((n, pool.clone()));
-        Ok(pool)
-    }
-
     /// Brings the snapshot up to date: what has not changed since the last rendering is kept.
     fn rebuild(&mut self) -> Result<(), Error> {
         let Self { world, trees, rendered, .. } = self;
@@ -242,6 +229,7 @@ mod tests {
     use crate::mesh::procedural::cuboid;
     use crate::scene::{MaterialSlots, Placement, Shape, SurfaceMaterial};
     use bevy_ecs::prelude::{Entity, With};
+    use std::sync::Arc;
 
     /// A built-in scene with a mesh that is no file's.
     fn scene() -> (Scene, Entity) {
