@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Every file below `src` and `crates`, without its tests, which are the last thing in a file.
+/// Every file below `src`, `crates` and `python/src`, without its tests, which are the last thing in a file.
 fn sources() -> Vec<(String, String)> {
     fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -18,6 +18,7 @@ fn sources() -> Vec<(String, String)> {
     let mut found = Vec::new();
     collect(&root.join("src"), &mut found);
     collect(&root.join("crates"), &mut found);
+    collect(&root.join("python/src"), &mut found);
     found.sort();
     let read = |path: &PathBuf| {
         let text = std::fs::read_to_string(path).unwrap();

@@ -3,6 +3,11 @@
 use crate::docs::page::{expect_none, files, read, without_code};
 use std::collections::BTreeSet;
 
+/// The files of the program and of the packages.
+fn sources() -> impl Iterator<Item = String> {
+    ["src", "crates", "python/src"].iter().flat_map(|folder| files(folder, &[".rs"]))
+}
+
 /// Words that have a better one; see the right column.
 const RETIRED: [(&str, &str); 52] = [
     ("lamp", "light"),
@@ -175,7 +180,7 @@ fn without_placeholders(text: &str) -> String {
 fn texts_of_the_program_are_in_words_of_the_field() {
     let scenes = scene_names();
     let mut problems = Vec::new();
-    for path in files("src", &[".rs"]).into_iter().chain(files("crates", &[".rs"])) {
+    for path in sources() {
         // The search for keys knows other words too.
         if path == "src/viewer/keys/words.rs" {
             continue;
@@ -201,7 +206,7 @@ fn texts_of_the_program_are_in_words_of_the_field() {
 fn doc_comments_are_in_words_of_the_field() {
     let scenes = scene_names();
     let mut problems = Vec::new();
-    for path in files("src", &[".rs"]).into_iter().chain(files("crates", &[".rs"])) {
+    for path in sources() {
         let source = read(&path).text;
         let mut in_code = false;
         for (line, text) in doc_comments(&source) {
@@ -274,7 +279,7 @@ fn parts(name: &str) -> Vec<String> {
 fn names_in_the_code_are_in_words_of_the_field() {
     let is = |part: &str, retired: &str| part == retired || part.strip_suffix('s') == Some(retired);
     let mut wrong = BTreeSet::new();
-    for path in ["src", "crates"].iter().flat_map(|folder| files(folder, &[".rs"])) {
+    for path in sources() {
         let text = read(&path).text;
         for (line, name) in names(&text) {
             for part in parts(&name) {
