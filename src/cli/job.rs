@@ -9,7 +9,7 @@ use crate::cli::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
-    FeatureLayers, FeatureNames, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until,
+    FeatureLayers, FeatureNames, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until, scene_at,
 };
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
@@ -19,7 +19,7 @@ use firstlight::render::{
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     Animation, DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft,
-    Moment, Rendering, SceneInputs, SnapshotPart, show_moment,
+    Moment, Rendering, SceneInputs, SnapshotPart,
 };
 use glam::UVec2;
 use std::path::Path;
@@ -148,17 +148,10 @@ impl RenderJob {
 
     /// Shows a moment from now on, seconds. The image does not depend on the moments before.
     pub fn set_moment(&mut self, seconds: f64) -> Result<(), Failure> {
-        show_moment(&mut self.world, seconds);
-        let inputs = SceneInputs::of(&mut self.world);
-        // Skins and morph targets have other meshes at each moment.
-        self.scene.trees.keep_used(&inputs);
-        for object in &inputs.objects {
-            self.scene
-                .trees
-                .add(&object.shape)
-                .map_err(|reason| Failure::Failed(format!("at {seconds} s: {reason}")))?;
-        }
-        self.extraction = Extraction::of_world(&mut self.world, &inputs, &self.scene.trees);
+        let mut trees = std::mem::take(&mut self.scene.trees);
+        let shown = scene_at(&mut self.world, &self.scene, &mut trees, seconds);
+        self.scene.trees = trees;
+        (self.extraction, self.draft) = shown.map_err(Failure::Failed)?;
         for problem in &self.extraction.problems {
             // Of a sequence, only the first frame with this problem.
             if !self.told.contains(problem) {
@@ -166,7 +159,6 @@ impl RenderJob {
                 self.told.push(problem.clone());
             }
         }
-        self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene));
         Ok(())
     }
 

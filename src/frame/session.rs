@@ -10,6 +10,7 @@ use crate::frame::edit::{EditQueue, edit_scene};
 use crate::frame::focus::{Focus, hold_focus};
 use crate::frame::image::feature_layers::FeatureNames;
 use crate::frame::input::{CommandQueue, ModelUp, input};
+use crate::frame::object_map::ObjectMapSource;
 use crate::frame::recording::{Recorder, record};
 use crate::frame::reload::{HotReload, reload};
 use crate::frame::saving::{SavedAs, Saving, save};
@@ -355,6 +356,11 @@ impl Session {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let scene = self.world.resource::<RenderState>().extraction.as_ref()?;
         crate::frame::state::selection::pick(scene, x, y, aspect).map(|picked| picked.entity)
+    }
+
+    /// What a map of the objects of each pixel is made of.
+    pub fn object_map(&self) -> Option<ObjectMapSource> {
+        self.world.resource::<RenderState>().extraction.as_ref().map(ObjectMapSource::of)
     }
 
     /// Memory of all trees in bytes.

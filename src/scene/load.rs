@@ -260,7 +260,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
 }
 
 /// Loads the files that the objects, textures and environment of a checked file refer to.
-fn resolve(
+pub(super) fn resolve(
     source: &SceneSource,
     file: SceneFile,
     text: Option<&str>,
@@ -623,7 +623,7 @@ impl LoadedScene {
         self.meshes.iter().flatten().find(|mesh| mesh.is_fresh()).cloned()
     }
 
-    fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
+    pub(super) fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
         // Trees are keyed by their geometry, so those of unchanged geometry are reused.
         if let Some(known) = options.known {
             self.trees = known.trees.clone();

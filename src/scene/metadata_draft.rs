@@ -5,7 +5,7 @@ use crate::files::relative::{absolute, relative_path};
 use crate::format::choice::UpAxis;
 use crate::format::parts::{DisplayPart, FilmPart};
 use crate::format::scene_file::SceneFile;
-use crate::render::SampleAllocation;
+use crate::render::{Display, SampleAllocation};
 use crate::scene::animation::edited::shown_camera;
 use crate::scene::describe::Description;
 use crate::scene::fingerprint::SceneContent;
@@ -56,6 +56,12 @@ impl MetadataDraft {
             allocation: settings.allocation,
             prints: OnceLock::new(),
         }
+    }
+
+    /// How the scene is to be displayed.
+    pub fn display(&self) -> Display {
+        let DisplayPart { exposure, tone_curve } = self.description.file.display;
+        Display { exposure_stops: exposure, tone_curve }
     }
 
     /// Computes the slow part of [`note`](Self::note) now.

@@ -12,8 +12,10 @@ pub const HEIGHT: f32 = 27.0;
 const NARROW: f32 = 360.0;
 
 /// Whether the bar is at this place of a window of this height, points.
-pub fn is_at(place: Pos2, height: f32) -> bool {
-    place.y >= height - HEIGHT
+///
+/// - `own`: height of the bar, with what is above it.
+pub fn is_at(place: Pos2, height: f32, own: f32) -> bool {
+    place.y >= height - own
 }
 
 /// The texts of the bar.
@@ -101,7 +103,7 @@ mod tests {
 
     #[test]
     fn the_bar_is_at_the_lower_edge() {
-        assert!(is_at(Pos2::new(1.0, 599.0), 600.0) && !is_at(Pos2::new(1.0, 500.0), 600.0));
-        assert!(is_at(Pos2::ZERO, 16.0), "it fills a window without room");
+        assert!(is_at(Pos2::new(1.0, 599.0), 600.0, HEIGHT) && !is_at(Pos2::new(1.0, 500.0), 600.0, HEIGHT));
+        assert!(is_at(Pos2::ZERO, 16.0, HEIGHT), "it fills a window without room");
     }
 }

@@ -1,4 +1,4 @@
-//! Choosing a file inside the window, where the desktop has no dialog.
+//! Choosing a file inside the window: to open it, where the desktop has no dialog, and to save.
 
 use crate::viewer::dialog::DialogPurpose;
 use egui::Context;
@@ -14,22 +14,29 @@ pub struct Browser {
 
 impl Browser {
     /// Opens the browser in a folder.
-    pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, screen: egui::Vec2) {
+    ///
+    /// - `name`: of the file to be saved, as a proposal.
+    pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, name: &str, screen: egui::Vec2) {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
         let size = egui::vec2(720.0, 440.0).min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));
         let extensions = purpose.extensions();
-        // Creating folders is no part of choosing a file.
         let mut dialog = FileDialog::new()
             .title(purpose.title())
             .initial_directory(folder)
             .default_size(size)
             .min_size(egui::vec2(120.0, 80.0))
             .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
-            .show_new_folder_button(false)
+            // Creating folders is no part of choosing a file to open.
+            .show_new_folder_button(purpose.saves())
+            .default_file_name(name)
             .show_left_panel(screen.x >= 560.0)
             .add_file_filter(purpose.files(), Arc::new(move |path: &Path| is_one(path, &extensions)))
             .default_file_filter(purpose.files());
-        dialog.pick_file();
+        match purpose {
+            DialogPurpose::SaveImage => dialog.save_file(),
+            DialogPurpose::SaveFrames => dialog.pick_directory(),
+            _ => dialog.pick_file(),
+        }
         self.open = Some((purpose, Box::new(dialog)));
     }
 

@@ -20,6 +20,10 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 pub enum DialogPurpose {
     Open,
     AddMesh,
+    /// The file of an image that is to be rendered.
+    SaveImage,
+    /// The folder of the frames of an animation.
+    SaveFrames,
     /// As the texture of this material's colour.
     Texture {
         id: Id,
@@ -31,6 +35,8 @@ impl DialogPurpose {
         match self {
             Self::Open => "Open a scene, a model or an image",
             Self::AddMesh => "Add a model",
+            Self::SaveImage => "Save the image as",
+            Self::SaveFrames => "The folder of the frames",
             Self::Texture { .. } => "Choose a texture image",
         }
     }
@@ -40,7 +46,8 @@ impl DialogPurpose {
         match self {
             Self::Open => "Scenes, models, saved images",
             Self::AddMesh => "Models",
-            Self::Texture { .. } => "Images",
+            Self::SaveFrames => "Folders",
+            Self::SaveImage | Self::Texture { .. } => "Images",
         }
     }
 
@@ -54,13 +61,20 @@ impl DialogPurpose {
         match self {
             Self::Open => format!("{} {} *.png *.exr", SceneFormat::patterns(), ModelFormat::patterns()),
             Self::AddMesh => ModelFormat::patterns(),
+            Self::SaveImage | Self::SaveFrames => "*.png *.jpg *.jpeg *.exr".to_owned(),
             Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }
     }
 
-    /// The command for the chosen file.
-    pub fn command(self, path: PathBuf) -> Command {
-        match self {
+    /// Whether something is to be written there.
+    pub fn saves(self) -> bool {
+        matches!(self, Self::SaveImage | Self::SaveFrames)
+    }
+
+    /// The command for the chosen file; `None` if it is written, not read.
+    pub fn command(self, path: PathBuf) -> Option<Command> {
+        Some(match self {
+            Self::SaveImage | Self::SaveFrames => return None,
             Self::Open => Command::Open { path },
             Self::AddMesh => {
                 let path = crate::scene::path_to_text(&path);
@@ -70,7 +84,7 @@ impl DialogPurpose {
                 let part = TextureSource::image(crate::scene::path_to_text(&path));
                 Command::Edit(Edit::Paint { id, part })
             }
-        }
+        })
     }
 }
 

@@ -1,7 +1,6 @@
 //! The question of the first start: whose keys and gestures the user knows.
 
 use crate::frame::Navigation;
-use crate::viewer::bar;
 use egui::{Align2, Button, Context, Label, RichText, Vec2, Window};
 
 const CHOICES: [(Navigation, &str, &str); 3] = [
@@ -16,7 +15,10 @@ pub fn show(context: &Context) -> Option<Navigation> {
     let mut open = true;
     Window::new("Which program do you know?")
         .open(&mut open)
-        .anchor(Align2::CENTER_BOTTOM, Vec2::new(0.0, -bar::HEIGHT - 12.0))
+        .anchor(
+            Align2::CENTER_BOTTOM,
+            Vec2::new(0.0, context.available_rect().bottom() - context.content_rect().bottom() - 12.0),
+        )
         .collapsible(false)
         .resizable(false)
         .show(context, |ui| {

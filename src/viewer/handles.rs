@@ -4,12 +4,13 @@ use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
 use crate::scene::Placement;
 use bevy_ecs::name::Name;
+use bevy_ecs::prelude::Entity;
 use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke};
 use glam::{DVec2, DVec3};
 
 const SELECTED: Color32 = Color32::from_rgb(255, 178, 70);
 const OTHERS: Color32 = Color32::from_rgba_premultiplied(170, 118, 46, 170);
-const AXES: [Color32; 3] =
+pub const AXES: [Color32; 3] =
     [Color32::from_rgb(235, 85, 85), Color32::from_rgb(125, 205, 85), Color32::from_rgb(85, 140, 245)];
 const MIDDLE: Color32 = Color32::from_gray(235);
 const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
@@ -17,7 +18,7 @@ const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
 /// The overlays to be drawn, computed before drawing.
 #[derive(Default)]
 pub struct Handles {
-    boxes: Vec<OwnBox>,
+    boxes: Vec<(Entity, OwnBox)>,
     gizmo: Option<(Gizmo, Projector)>,
     projector: Option<Projector>,
     hovered: Option<Handle>,
@@ -40,27 +41,31 @@ impl Handles {
     pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, size: DVec2) {
         self.boxes.clear();
         let selected = session.world().resource::<Selection>().0.clone();
-        self.boxes.extend(selected.iter().filter_map(|&entity| session.box_of(entity)));
+        self.boxes.extend(selected.iter().filter_map(|&entity| Some((entity, session.box_of(entity)?))));
         let projector = Projector::new(&session.status().rig, size);
         self.projector = Some(projector);
-        self.gizmo = None;
+        self.gizmo = mode.and_then(|mode| self.gizmo_of(session, mode));
         self.out_of_view = match (self.boxes.last(), selected.last()) {
-            (Some(own), Some(&active)) if !is_seen(own, &projector, size) => {
+            (Some((_, own)), Some(&active)) if !is_seen(own, &projector, size) => {
                 let name = session.world().get::<Name>(active).map_or("selected", |name| name.as_str());
                 Some((name.to_owned(), own.middle()))
             }
             _ => None,
         };
-        if let (Some(mode), Some(own), Some(&active)) = (mode, self.boxes.last(), selected.last()) {
-            let axes = match (mode, selected.len()) {
-                (Mode::Scale, 1) => own_axes(session.world().get::<Placement>(active)),
-                _ => DVec3::AXES,
-            };
-            self.gizmo = Gizmo::at(own.middle(), mode, axes, &projector).map(|gizmo| (gizmo, projector));
-        }
         if self.gizmo.is_none() {
             self.grabbed = None;
         }
+    }
+
+    /// Handles of a kind about the selection, as it was drawn last; `None` without one in view.
+    pub fn gizmo_of(&self, session: &Session, mode: Mode) -> Option<(Gizmo, Projector)> {
+        let (selected, (_, own)) = (&session.world().resource::<Selection>().0, self.boxes.last()?);
+        let projector = self.projector?;
+        let axes = match (mode, &selected[..]) {
+            (Mode::Scale, [only]) => own_axes(session.world().get::<Placement>(*only)),
+            _ => DVec3::AXES,
+        };
+        Gizmo::at(own.middle(), mode, axes, &projector).map(|gizmo| (gizmo, projector))
     }
 
     /// Handles a mouse press; returns whether it grabbed a handle.
@@ -133,10 +138,14 @@ impl Handles {
         painter.galley(rect.min, galley, Color32::WHITE);
     }
 
-    pub fn draw(&self, context: &Context) {
+    /// - `outlined`: what needs no box.
+    pub fn draw(&self, context: &Context, outlined: impl Fn(Entity) -> bool) {
         let Some(projector) = &self.projector else { return };
         let painter = context.layer_painter(egui::LayerId::background());
-        for (i, own) in self.boxes.iter().enumerate() {
+        for (i, (entity, own)) in self.boxes.iter().enumerate() {
+            if outlined(*entity) {
+                continue;
+            }
             let color = if i + 1 == self.boxes.len() { SELECTED } else { OTHERS };
             draw_box(&painter, own, projector, color);
         }

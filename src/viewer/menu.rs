@@ -26,7 +26,7 @@ const PARTS: [(&str, Menu); 6] = [
     ("Inspect", Menu::Inspect),
 ];
 /// Height of the longest menu, points; windows below it scroll.
-const TALL: f32 = 460.0;
+const TALL: f32 = 505.0;
 
 /// The menu of the bar; returns the command that was clicked.
 pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
@@ -130,7 +130,9 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
     match action {
         action if *action == UNDO => history.undo_label().is_some(),
         action if *action == REDO => history.redo_label().is_some(),
-        Action::Gizmo(Some(_)) | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
+        Action::Gizmo(Some(_))
+        | Action::Grab(_)
+        | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
             !session.world().resource::<Selection>().0.is_empty()
         }
         _ => true,

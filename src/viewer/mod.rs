@@ -11,15 +11,17 @@
 //! | [`keys`] | the table of keys and gestures |
 //! | `input` | translation of keys and mouse to commands, independent of the frame rate |
 //! | `panel` | every setting and figure; its results are commands |
-//! | `handles` | bounds and handles of the selection |
+//! | `handles`, `grab`, `outlines` | bounds and handles of the selection; keys that move it at once; silhouettes |
 //! | `story` | explanation of a pixel: paths and a table |
 //! | `region_tool` | the rectangle that gets all samples |
 //! | `change` | the effect of mesh simplification on the image |
 //! | `reaction` | input latency |
 //! | `help` | the list of keys |
+//! | `time_line` | the strip of an animation |
 //! | `bar`, `menu`, `palette`, `openable` | what can be clicked: buttons, menus, the list of commands, scenes and files |
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
+//! | `order`, `order_form`, `renders` | images and frames that are rendered to files beside the window |
 //! | `dialog`, `browser` | file dialogs: of the desktop, or inside the window |
 //! | `question`, `greeting` | questions before edits are lost; that of the first start |
 //! | [`display`] | detection of the display server |
@@ -31,6 +33,7 @@ mod camera_text;
 mod change;
 mod dialog;
 pub mod display;
+mod grab;
 mod greeting;
 mod handles;
 mod help;
@@ -38,6 +41,9 @@ mod input;
 pub mod keys;
 mod menu;
 mod openable;
+mod order;
+mod order_form;
+mod outlines;
 mod overlay;
 mod palette;
 mod panel;
@@ -45,9 +51,12 @@ mod presenter;
 mod question;
 mod reaction;
 mod region_tool;
+mod renders;
 mod saver;
 mod status;
 mod story;
+mod time_line;
 mod toasts;
 
-pub use app::{ViewerError, ViewerOptions, run};
+pub use app::options::{ViewerError, ViewerOptions};
+pub use app::run::run;

@@ -13,7 +13,7 @@ pub const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
 pub const TEXT: Color32 = Color32::from_gray(228);
 /// Colour of the names of keys.
 pub const KEY: Color32 = Color32::from_rgb(250, 205, 125);
-const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
+pub const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
 /// Points.
 pub const TEXT_SIZE: f32 = 13.0;
 
@@ -92,7 +92,7 @@ pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
     egui::Area::new(egui::Id::new(("legend", title, legend.is_some())))
         .order(Order::Foreground)
         .interactable(false)
-        .fixed_pos(context.content_rect().left_bottom() + Vec2::new(10.0, -34.0))
+        .fixed_pos(context.available_rect().left_bottom() + Vec2::new(10.0, -7.0))
         .pivot(Align2::LEFT_BOTTOM)
         .show(context, |ui| {
             glass().show(ui, |ui| {

@@ -1,9 +1,7 @@
 //! Saves images on separate threads, so that the window stays responsive.
 
-use crate::format::check_film_size;
 use crate::frame::{
-    DenoiseFilter, FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
-    render_offline_until,
+    DenoiseFilter, FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Waker,
 };
 use crate::render::{
     DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, guide_samples,
@@ -26,20 +24,6 @@ pub struct Kept {
     pub path: PathBuf,
     /// Whether the view changed before there was a film of full resolution.
     pub coarse: bool,
-    /// Samples per pixel that it has and was to have, if the window was closed before it had them.
-    pub cut_short: Option<(u32, u32)>,
-}
-
-/// An image that is rendered separately, larger than the window.
-pub struct Larger {
-    pub prepared: Prepared,
-    pub settings: RenderSettings,
-    pub size: (u32, u32),
-    /// Samples per pixel.
-    pub spp: u32,
-    pub threads: usize,
-    /// None for a raw image.
-    pub denoiser: Option<DenoiseFilter>,
 }
 
 /// The scene that a film shows, from which layers are gathered.
@@ -117,38 +101,6 @@ impl Saver {
         });
     }
 
-    /// Renders an image separately from the window, and saves it like [`save`](Self::save); if the window closes, the
-    /// samples so far are saved, denoised if it was to be.
-    pub fn save_larger(
-        &mut self,
-        larger: Larger,
-        draft: Option<MetadataDraft>,
-        display: Display,
-        scene: &str,
-        format: PictureFormat,
-    ) {
-        let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
-        self.spawn(move || {
-            let Larger { prepared, settings, size, spp, threads, denoiser } = larger;
-            let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
-            check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
-            // A separate pool: the window's threads belong to the visible image, and must not wait for this.
-            let pool = worker_threads().num_threads(threads).build();
-            let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
-            let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
-            let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
-            pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, &stop, |_| true));
-            if film.spp() == 0 {
-                return Err(failed(&"the window was closed before every pixel had a sample"));
-            }
-            let with = denoiser.map(|filter| DenoiseWith { prepared, settings, filter, threads });
-            let denoised = with.and_then(|with| with.denoise(&film, &AtomicBool::new(false)));
-            let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
-            let kept = print(&folder, &stem, (&film, denoised), draft, &display, size, format)?;
-            Ok(Kept { cut_short: (film.spp() < spp).then_some((film.spp(), spp)), ..kept })
-        });
-    }
-
     /// Saves the film that will come as a linear image with layers of what it shows.
     pub fn save_layers(
         &mut self,
@@ -183,7 +135,7 @@ impl Saver {
                 layers: &layers,
                 note: note.as_deref(),
             };
-            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse, cut_short: None })?)
+            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse })?)
         });
     }
 
@@ -241,7 +193,7 @@ fn print(
     }
     let denoised = denoised.map(|(colors, _)| colors);
     let print = Print { film, display, size, note: note.as_deref(), denoised };
-    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse, cut_short: None })?)
+    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
 
 /// Whether a film is coarser than the requested image, and the metadata of the image.
@@ -260,17 +212,17 @@ fn metadata_of(
     (coarse, draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into())))
 }
 
-/// Returns an unused name of a scene file in `folder` for the open scene: `NAME-0001.ron`.
-pub fn new_scene_file(folder: &Path, scene: &str) -> PathBuf {
+/// Returns an unused name of a file in `folder` for the open scene: `NAME-0001.ron`.
+pub fn new_file(folder: &Path, scene: &str, extension: &str) -> PathBuf {
     let stem = file_stem(scene);
-    let names = (1..=u32::MAX).map(|number| folder.join(format!("{stem}-{number:04}.ron")));
+    let names = (1..=u32::MAX).map(|number| folder.join(format!("{stem}-{number:04}.{extension}")));
     let mut free = names.filter(|path| !path.exists());
-    free.next().unwrap_or_else(|| folder.join(format!("{stem}.ron")))
+    free.next().unwrap_or_else(|| folder.join(format!("{stem}.{extension}")))
 }
 
 /// File stem for images of this scene: its own name without folder, extension, and the number of a file that was saved
 /// here before.
-fn file_stem(scene: &str) -> String {
+pub fn file_stem(scene: &str) -> String {
     let stem = Path::new(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let stem = without_number(&stem);
     let plain: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_ .".contains(c) { c } else { '-' }).collect();
@@ -345,9 +297,7 @@ mod tests {
             let shown = Shown { prepared, names, settings, filter: DenoiseFilter::Own, threads: 1, size: (9, 7) };
             saver.save_layers(ready(film), shown, None, Display::default(), "cornell");
             saver.threads.drain(..).for_each(|thread| thread.join().unwrap());
-            let [Ok(Kept { path, coarse: false, cut_short: None })] = &saver.finished()[..] else {
-                panic!("it cannot be saved")
-            };
+            let [Ok(Kept { path, coarse: false })] = &saver.finished()[..] else { panic!("it cannot be saved") };
             assert_eq!(PictureLayer::in_file(path).len(), n_layers, "{spp} samples");
         }
     }
@@ -383,9 +333,9 @@ mod tests {
             assert_eq!(file_stem(&format!("{name}.ron")), name);
         }
         let folder = tempfile::tempdir().unwrap();
-        let first = new_scene_file(folder.path(), "model.obj");
+        let first = new_file(folder.path(), "model.obj", "ron");
         assert_eq!(first, folder.path().join("model-0001.ron"));
         std::fs::write(&first, "").unwrap();
-        assert_eq!(new_scene_file(folder.path(), &first.to_string_lossy()), folder.path().join("model-0002.ron"));
+        assert_eq!(new_file(folder.path(), &first.to_string_lossy(), "ron"), folder.path().join("model-0002.ron"));
     }
 }

@@ -77,7 +77,7 @@ fn time_to_go(status: &Status, target: Target) -> Option<f64> {
 }
 
 /// A duration that is only estimated.
-fn about(seconds: f64) -> String {
+pub fn about(seconds: f64) -> String {
     match seconds {
         s if s < 9.5 => format!("about {:.0} s", s.max(1.0)),
         s if s < 95.0 => format!("about {:.0} s", (s / 5.0).round() * 5.0),

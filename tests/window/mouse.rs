@@ -67,7 +67,7 @@ fn title_is(program: &Program, expected: &str) {
 /// Saves the scene by the menu; returns what was written.
 fn saved(program: &Program, path: &Path) -> SceneFile {
     std::fs::remove_file(path).expect("the file of the scene");
-    choose_in_menu(program, 371);
+    choose_in_menu(program, 413);
     until("the scene to be saved", || SceneFile::parse(&std::fs::read_to_string(path).ok()?, path).ok())
 }
 
@@ -110,7 +110,7 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
     undo();
     title_is(&program, "room.ron");
     // A picture, and away.
-    choose_in_menu(&program, 329);
+    choose_in_menu(&program, 371);
     until("the picture", || desktop.folder().join("room-0001.png").is_file().then_some(()));
     open_menu(&program);
     click(&program, 1, (60, HEIGHT - 38));
@@ -129,7 +129,7 @@ fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
     seen(&program);
     open_menu(&program);
     let browser = (300, 450);
-    open(&program, 1, (60, HEIGHT - 434), browser);
+    open(&program, 1, (60, HEIGHT - 476), browser);
     until("the model to open", || {
         // Below the folder of the settings, once it has been read; and the button at the lower right.
         click(&program, 1, (230, 163));
@@ -137,18 +137,83 @@ fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
         (program.title() == "firstlight — a.obj").then_some(())
     });
     until("the browser to close", || (!is_dark(&program, browser)).then_some(()));
-    let other = (230, HEIGHT - 413);
+    let other = (230, HEIGHT - 455);
     open_menu(&program);
-    open(&program, 1, (60, HEIGHT - 413), other);
-    click(&program, 1, (260, HEIGHT - 413));
+    open(&program, 1, (60, HEIGHT - 455), other);
+    click(&program, 1, (260, HEIGHT - 455));
     title_is(&program, "room.ron");
     until("the menu to close", || (!is_dark(&program, MENU)).then_some(()));
     open_menu(&program);
-    open(&program, 1, (60, HEIGHT - 392), (230, HEIGHT - 392));
-    click(&program, 1, (260, HEIGHT - 370));
+    open(&program, 1, (60, HEIGHT - 434), (230, HEIGHT - 434));
+    click(&program, 1, (290, HEIGHT - 408));
     title_is(&program, "cornell");
     program.key("ctrl+q");
     assert!(program.ended().success());
+}
+
+/// The panel with these sections open, and no other.
+fn keep_panel(desktop: &Desktop, open: &[&str]) {
+    let sections = firstlight::viewer::keys::items().filter_map(|(item, _)| item.name.strip_prefix("Panel: "));
+    let sections: Vec<String> = sections.map(|name| format!("{name:?}: {}", open.contains(&name))).collect();
+    let text = format!("(greeted: true, panel: true, sections: {{{}}})", sections.join(", "));
+    std::fs::write(desktop.settings().join("settings.ron"), text).expect("settings");
+}
+
+#[test]
+fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
+    let Some(desktop) = Desktop::start() else { return };
+    let path = desktop.folder().join("room.ron");
+    std::fs::write(&path, ROOM.replace("environment:", "film: (width: 160, height: 120), environment:"))
+        .expect("a file");
+    keep_panel(&desktop, &["Lights", "Environment"]);
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    let ball = (370, 200);
+    let frame = (ball.0 + 4, ball.1 + 30);
+    open(&program, 3, ball, frame);
+    choose(&program, (ball.0 + 30, ball.1 + 43), frame);
+    // The lens, in the menu of the bar: depth of field, then a wider aperture.
+    for line in [131, 173] {
+        open_menu(&program);
+        open(&program, 1, (60, HEIGHT - 215), (230, HEIGHT - 131));
+        choose(&program, (275, HEIGHT - line), MENU);
+    }
+    // In the panel: an area light, which is dimmed in its row, and less light from around.
+    click(&program, 1, (585, 326));
+    title_is(&program, "*room.ron");
+    std::thread::sleep(Duration::from_millis(400));
+    program.drag(1, (668, 281), (-120, 0));
+    program.drag(1, (645, 304), (-60, 0));
+    let file = saved(&program, &path);
+    let camera = &file.camera;
+    let look_at = camera.look_at.expect("the pivot");
+    assert!((look_at.y - 1.5).abs() < 0.05 && camera.eye.z < 5.9, "the ball is framed: {camera:?}");
+    assert!(camera.f_stop.is_some() || camera.lens_radius.is_some_and(|radius| radius > 0.0), "{camera:?}");
+    let text = std::fs::read_to_string(&path).expect("the scene");
+    assert!(text.contains("quad(") && text.contains("emissive(") && !text.contains("(12"), "a dimmer light: {text}");
+    assert!(!text.contains("environment: constant(1"), "{text}");
+    // An image with little noise, while the view goes on.
+    let form = (300, 380);
+    open_menu(&program);
+    choose_form(&program, form);
+    click(&program, 1, (522, 380));
+    program.hold("w", 300);
+    let image = desktop.folder().join("room-0001.png");
+    until("the image", || image.is_file().then_some(()));
+    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (160, 120));
+    let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
+    assert_eq!((shot.camera.eye, shot.denoised.as_deref()), (camera.eye, Some("own")), "as it was seen");
+    until("its path", || (program.output() + &program.errors()).contains("room-0001.png (160 × 120, noise ").then_some(()));
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+/// Chooses "Save image …" in the open menu of the bar, and waits for its form.
+fn choose_form(program: &Program, form: (i32, i32)) {
+    click(program, 1, (60, HEIGHT - 328));
+    until("the form", || is_dark(program, form).then_some(()));
+    std::thread::sleep(Duration::from_millis(300));
 }
 
 #[test]

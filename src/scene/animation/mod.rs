@@ -126,6 +126,11 @@ impl Animation {
         !self.tracks.is_empty() || self.model.is_some()
     }
 
+    /// Whether it moves as a glTF file says.
+    pub fn has_model(&self) -> bool {
+        self.model.is_some()
+    }
+
     /// Seconds from the first frame to the end.
     pub fn length(&self) -> f64 {
         let ends = self.tracks.iter().filter_map(|track| track.curve.keys.last().map(|&(time, _)| time));

@@ -8,7 +8,8 @@ use crate::render::{Inspection, Integrator};
 use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
-use crate::viewer::saver::{DenoiseWith, Larger, Saved, Shown, new_scene_file};
+use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
+use crate::viewer::time_line::Ask;
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, panel};
 use std::path::{Path, PathBuf};
@@ -60,12 +61,34 @@ impl App {
         if asked.save_layers {
             self.save_layers(now);
         }
+        if let Some(action) = asked.action {
+            self.act(action);
+        }
+    }
+
+    /// Does what the time line asks for.
+    pub(super) fn follow_strip(&mut self, asked: Vec<Ask>, now: Instant) {
+        for ask in asked {
+            self.needs_tick = true;
+            match ask {
+                Ask::Play => self.input.toggle_play(now),
+                Ask::Act(action) => self.act(action),
+                Ask::Send(command) => {
+                    self.reaction.asked(now);
+                    self.session.send(command);
+                }
+            }
+        }
     }
 
     /// The mouse position in points, the unit of overlays.
     pub(super) fn mouse(&self) -> glam::DVec2 {
-        let scale = self.presenter.as_ref().map_or(1.0, |presenter| f64::from(presenter.pixels_per_point()));
-        glam::DVec2::from_array(self.input.cursor_place()) / scale
+        glam::DVec2::from_array(self.input.cursor_place()) / self.scale()
+    }
+
+    /// Physical pixels per point.
+    pub(super) fn scale(&self) -> f64 {
+        self.presenter.as_ref().map_or(1.0, |presenter| f64::from(presenter.pixels_per_point()))
     }
 
     pub(super) fn act(&mut self, action: Action) {
@@ -102,6 +125,7 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
+            Action::RenderTo { frames } => self.open_form(frames, now),
             Action::SaveScene { new } => self.save_scene(new),
             Action::PrintView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
@@ -143,6 +167,7 @@ impl App {
                 self.panel.gizmo = mode.filter(|_| self.panel.gizmo != mode);
                 self.announce_handles(now);
             }
+            Action::Grab(mode) => self.begin_grab(mode, now),
             Action::ToggleSpin => self.input.toggle_spin(now),
             Action::ToggleDrag => self.toggle_drag(now),
             Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),
@@ -170,6 +195,7 @@ impl App {
                 }
             }
             Action::Leave if self.input.is_captured() => self.capture_mouse(false, now),
+            Action::Leave if self.form.is_open() => self.form.close(),
             Action::Leave if self.help.open => self.help.open = false,
             Action::Leave if self.brush.is_armed() => drop(self.brush.toggle()),
             Action::Leave if self.session.world().resource::<Explaining>().story.is_some() => {
@@ -192,7 +218,7 @@ impl App {
 
     pub(super) fn scene_path(&self, new: bool) -> PathBuf {
         let known = self.session.scene_file().filter(|_| !new);
-        known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene))
+        known.unwrap_or_else(|| new_file(&self.options.folder, &self.session.status().scene, "ron"))
     }
 
     fn announce_handles(&mut self, now: Instant) {
@@ -247,10 +273,18 @@ impl App {
             Ok(true) => {}
             Ok(false) => {
                 let screen = self.presenter.as_ref().map(|presenter| presenter.egui_context().content_rect().size());
-                self.browser.open(purpose, &folder, screen.unwrap_or_default());
+                self.browser.open(purpose, &folder, "", screen.unwrap_or_default());
                 self.repaint_at = Some(now);
             }
             Err(reason) => self.toasts.add(Tone::Problem, reason, now),
+        }
+    }
+
+    /// Does what a file was chosen for.
+    pub(super) fn take_file(&mut self, purpose: DialogPurpose, path: PathBuf, now: Instant) {
+        match purpose.command(path.clone()) {
+            Some(command) => self.open(command, now),
+            None => self.form.place(purpose, path),
         }
     }
 
@@ -260,7 +294,7 @@ impl App {
             match answer {
                 Ok((purpose, path)) => {
                     self.reaction.asked(now);
-                    self.open(purpose.command(path), now);
+                    self.take_file(purpose, path, now);
                 }
                 Err(reason) => self.toasts.add(Tone::Problem, reason, now),
             }
@@ -294,21 +328,10 @@ impl App {
         let picture = self.session.picture();
         let size = (picture.width.max(1), picture.height.max(1));
         let (display, scene) = (status.display, status.scene.clone());
-        let spp = status.spp.max(1);
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
         // A PNG looks like the window; linear light is what the samples say.
         let look = self.session.world().resource::<ViewMode>().0;
         let denoiser = (!linear && look.denoising != Denoising::Raw).then_some(look.filter);
-        if self.panel.scale > 1
-            && let Some((prepared, settings)) = self.session.rendered()
-        {
-            let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
-            let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads, denoiser };
-            let news = format!("screenshot: rendering {} × {} with {spp} spp in the background", size.0, size.1);
-            self.toasts.add(Tone::News, news, Instant::now());
-            self.saver.save_larger(larger, draft, display, &scene, format);
-            return;
-        }
         let threads = self.session.status().threads;
         let denoise = denoiser
             .and_then(|filter| self.session.rendered().map(|rendered| (filter, rendered)))
@@ -336,12 +359,9 @@ impl App {
         match saved {
             Ok(kept) => {
                 let coarse = if kept.coarse { " (low resolution: the view changed too soon)" } else { "" };
-                let short = kept.cut_short.map_or_else(String::new, |(spp, wanted)| {
-                    format!(" (with {spp} of {wanted} samples per pixel, because the window was closed)")
-                });
                 // The whole path: a window has no folder that one could see.
                 let path = std::path::absolute(&kept.path).unwrap_or_else(|_| kept.path.clone());
-                let news = format!("saved {}{coarse}{short}", path.display());
+                let news = format!("saved {}{coarse}", path.display());
                 console::inform(&news);
                 // Replaces the message that saving has started.
                 self.toasts.add(Tone::News, format!("screenshot: {news}"), now);

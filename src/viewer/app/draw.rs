@@ -7,7 +7,8 @@ use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
 use crate::viewer::bar::Figures;
 use crate::viewer::menu::MenuInput;
 use crate::viewer::presenter::{PresentError, Presenter};
-use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story};
+use crate::viewer::time_line::Strip;
+use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story, time_line};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -16,6 +17,9 @@ impl App {
     /// The texts of the bar: on the left what is on the image, on the right settings and what one may do.
     pub(super) fn figures(&self) -> Figures {
         let (status, world) = (self.session.status(), self.session.world());
+        if let Some(grab) = &self.grab {
+            return Figures { left: grab.line(), right: Vec::new() };
+        }
         let mut right = status::settings(status);
         let is_selected = !world.resource::<Selection>().0.is_empty();
         let hints: &[&str] = match is_selected {
@@ -28,6 +32,7 @@ impl App {
 
     fn draw(&mut self, now: Instant) -> Result<(), PresentError> {
         let figures = self.figures();
+        self.strip = Strip::of(&self.session);
         let (Some(presenter), Some(window)) = (&mut self.presenter, &self.window) else { return Ok(()) };
         let picture = self.session.picture();
         if self.shown_picture != Some(picture.number) {
@@ -46,6 +51,10 @@ impl App {
         let size = window.inner_size();
         let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
         self.handles.update(&mut self.session, self.panel.gizmo, size);
+        let selected = self.session.world().resource::<Selection>().0.clone();
+        self.outlines.leave(self.session.status().restarts);
+        self.outlines.update(presenter.egui_context(), &selected);
+        let (outlines, grab) = (&self.outlines, &self.grab);
         let projector = Projector::new(&self.session.status().rig, size);
         let active = self.session.world().resource::<Selection>().active().filter(|_| self.here.is_open());
         let chosen_name = active.and_then(|entity| self.panel.label_of(&self.session, entity));
@@ -74,6 +83,10 @@ impl App {
         let greets = self.greeting && overlays && question.is_none() && !session.status().scene.is_empty();
         let menu_input = MenuInput { session, navigation, recent: self.memory.recent() };
         let (here, palette, browser) = (&mut self.here, &mut self.palette, &mut self.browser);
+        let (strip, playing) = (self.strip.take(), self.input.is_playing());
+        let mut on_strip = Vec::new();
+        let (form, renders, mut wish) = (&mut self.form, &self.renders, None);
+        let window_size = (session.picture().width, session.picture().height);
         let chosen_name = chosen_name.as_deref();
         let presented = presenter.present(|context| {
             if overlays {
@@ -86,12 +99,20 @@ impl App {
                         session.world().resource::<SceneBounds>().extent.radius,
                     );
                 }
-                handles.draw(context);
+                outlines.draw(context);
+                handles.draw(context, |entity| outlines.has(entity));
+                if let Some(grab) = grab {
+                    grab.draw(context);
+                }
                 brush.draw(context, session.status());
                 clicked = bar::show(context, &menu_input, panel.shown, &figures);
+                if let Some(strip) = &strip {
+                    on_strip = time_line::show(context, strip, playing);
+                }
                 if panel.shown {
                     panel::show(context, panel, session, &around, &mut asked);
                 }
+                renders.show(context, context.available_rect());
                 // Beside the panel, above the bar.
                 handles.draw_hint(context, context.available_rect());
                 let picture = session.picture();
@@ -110,6 +131,7 @@ impl App {
             if greets {
                 greeted = greeting::show(context);
             }
+            wish = form.show(context, window_size);
             file = browser.show(context);
             let found = palette.show(context, &menu_input);
             clicked = clicked.take().or(found);
@@ -143,12 +165,17 @@ impl App {
         // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.execute(asked, now);
+        self.strip = strip;
+        self.follow_strip(on_strip, now);
         if let Some(navigation) = greeted {
             self.greeting = false;
             self.set_navigation(navigation, now);
         }
         if let Some((purpose, path)) = file {
-            self.open(purpose.command(path), now);
+            self.take_file(purpose, path, now);
+        }
+        if let Some(wish) = wish {
+            self.grant(wish, now);
         }
         if let Some(action) = clicked {
             self.act(action);

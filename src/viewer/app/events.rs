@@ -39,7 +39,7 @@ impl ApplicationHandler<Wake> for App {
             self.draw_or_leave(event_loop);
             return;
         }
-        if self.help_takes(&event, now) {
+        if self.grab_takes(&event, now) || self.help_takes(&event, now) {
             self.repaint_at = Some(now);
             self.needs_tick = true;
             return;
@@ -105,7 +105,7 @@ impl ApplicationHandler<Wake> for App {
                 if self.input.is_dragging() || self.handles.is_grabbed() {
                     self.reaction.asked(now);
                 }
-                if self.brush.mouse_at(self.input.place()) {
+                if self.hover(now) | self.brush.mouse_at(self.input.place()) {
                     self.repaint_at = Some(now);
                 }
                 let (mouse, snap) = (self.mouse(), self.input.modifiers().control_key());
@@ -201,6 +201,17 @@ impl ApplicationHandler<Wake> for App {
 }
 
 impl App {
+    /// Outlines what is under the mouse; returns whether that is news.
+    fn hover(&mut self, now: Instant) -> bool {
+        let is_elsewhere = self.over_bar
+            || self.input.is_dragging()
+            || self.input.is_captured()
+            || self.handles.is_grabbed()
+            || self.brush.is_armed()
+            || self.presenter.as_ref().is_some_and(|presenter| presenter.egui_context().is_pointer_over_area());
+        self.outlines.mouse_at((!is_elsewhere && self.overlays).then(|| self.input.place()), now)
+    }
+
     /// Whether the open list of keys takes a key press, see [`Help::answer`]; called before overlays see the event.
     fn help_takes(&mut self, event: &WindowEvent, now: Instant) -> bool {
         let WindowEvent::KeyboardInput { event, is_synthetic: false, .. } = event else { return false };

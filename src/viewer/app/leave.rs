@@ -2,9 +2,10 @@
 //! offered at the next start if the window could not ask.
 
 use crate::frame::Command;
-use crate::viewer::app::{App, short_name};
+use crate::viewer::app::App;
+use crate::viewer::app::tick::short_name;
 use crate::viewer::question::{Prompt, PromptAnswer};
-use crate::viewer::saver::new_scene_file;
+use crate::viewer::saver::new_file;
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -115,7 +116,7 @@ impl App {
             // It is offered again by the next window.
             (_, PromptAnswer::Later) => {}
             (Prompt::Restore(left), PromptAnswer::Yes) => {
-                let path = new_scene_file(&self.options.folder, &left.title);
+                let path = new_file(&self.options.folder, &left.title, "ron");
                 if let Err(reason) = self.leaving.restore(left, path) {
                     self.toasts.add(Tone::Problem, reason, now);
                 }

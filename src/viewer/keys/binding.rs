@@ -102,6 +102,10 @@ pub enum Action {
     Screenshot {
         linear: bool,
     },
+    /// Shows the form to render an image to a file, or the frames of the animation.
+    RenderTo {
+        frames: bool,
+    },
     /// Saves as a scene file: the open one, or a new one.
     SaveScene {
         new: bool,
@@ -121,6 +125,8 @@ pub enum Action {
     NextGizmo,
     /// Shows these handles, or hides them if they are shown already.
     Gizmo(Option<gizmo::Mode>),
+    /// Moves, rotates or scales the selection with the mouse at once.
+    Grab(gizmo::Mode),
     /// Starts or stops the turntable.
     ToggleSpin,
     /// Toggles whether a drag looks around or orbits the pivot.

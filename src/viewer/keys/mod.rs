@@ -119,7 +119,9 @@ mod tests {
         assert!(menu(Menu::Here).any(|item| item.name == "Delete"));
         assert_eq!(shortcut(Navigation::Firstlight, &UNDO).as_deref(), Some("Ctrl+Z"));
         let handles = Action::Gizmo(Some(crate::frame::gizmo::Mode::Move));
-        assert_eq!(shortcut(Navigation::Blender, &handles).as_deref(), Some("G"));
+        assert_eq!(shortcut(Navigation::Maya, &handles).as_deref(), Some("W"));
+        let grab = Action::Grab(crate::frame::gizmo::Mode::Move);
+        assert_eq!(shortcut(Navigation::Blender, &grab).as_deref(), Some("G"));
         assert_eq!(shortcut(Navigation::Firstlight, &handles), None);
         // R, which restarts, rotates in Blender.
         assert_eq!(shortcut(Navigation::Blender, &Action::Send(Command::Restart)), None);

@@ -39,9 +39,22 @@ static BLENDER: &[KeyGroup] = &[
     KeyGroup {
         title: "Blender: edit",
         bindings: &[
-            Binding { triggers: &[text("g", Action::Gizmo(Some(gizmo::Mode::Move)))], effect: "handles: move" },
-            Binding { triggers: &[text("r", Action::Gizmo(Some(gizmo::Mode::Turn)))], effect: "handles: rotate" },
-            Binding { triggers: &[text("s", Action::Gizmo(Some(gizmo::Mode::Scale)))], effect: "handles: scale" },
+            Binding {
+                triggers: &[
+                    text("g", Action::Grab(gizmo::Mode::Move)),
+                    text("r", Action::Grab(gizmo::Mode::Turn)),
+                    text("s", Action::Grab(gizmo::Mode::Scale)),
+                ],
+                effect: "move, rotate, scale the selection with the mouse",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("then X, Y, Z"), Trigger::Mouse("or a number")],
+                effect: "lock an axis (with Shift: all but it); the amount",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Enter or click"), Trigger::Mouse("Esc or right click")],
+                effect: "keep, restore",
+            },
             Binding { triggers: &[text("x", DELETE), named(NamedKey::Delete, DELETE)], effect: "delete the selection" },
             Binding {
                 triggers: &[shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))],
@@ -153,8 +166,8 @@ mod tests {
         let modes = |navigation, keys: &str| -> Vec<Option<Action>> {
             keys.chars().map(|key| pressed(navigation, &key.to_string(), none)).collect()
         };
+        assert_eq!(modes(Navigation::Blender, "grs"), gizmo::Mode::ALL.map(|mode| Some(Action::Grab(mode))));
         let handles = gizmo::Mode::ALL.map(|mode| Some(Action::Gizmo(Some(mode))));
-        assert_eq!(modes(Navigation::Blender, "grs"), handles);
         assert_eq!(modes(Navigation::Maya, "wer"), handles);
         assert_eq!(pressed(Navigation::Blender, "X", ModifiersState::SHIFT), Some(DELETE));
         assert_eq!(pressed(Navigation::Firstlight, "x", none), Some(Action::Send(Command::Level)));

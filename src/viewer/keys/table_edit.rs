@@ -38,6 +38,14 @@ pub const EDIT: KeyGroup = KeyGroup {
             effect: "next handles: move, rotate, scale, none",
         },
         Binding {
+            triggers: &[
+                item("Move with the mouse", &[], Action::Grab(gizmo::Mode::Move)),
+                item("Rotate with the mouse", &[], Action::Grab(gizmo::Mode::Turn)),
+                item("Scale with the mouse", &[], Action::Grab(gizmo::Mode::Scale)),
+            ],
+            effect: "at once, without handles: X, Y, Z lock an axis, numbers can be typed; Enter keeps, Esc restores",
+        },
+        Binding {
             triggers: &[Trigger::Mouse("Ctrl, dragging a handle")],
             effect: "move in steps: 15 degrees, a tenth of the size",
         },

@@ -152,17 +152,28 @@ pub const FILES: KeyGroup = KeyGroup {
             triggers: &[
                 shifted(Typed::Named(NamedKey::F12), false, Action::Screenshot { linear: false }),
                 shifted(Typed::Text("k"), false, Action::Screenshot { linear: false }),
-                item("Save the image", &[Menu::File], Action::Screenshot { linear: false }),
+                item("Screenshot", &[Menu::File], Action::Screenshot { linear: false }),
             ],
-            effect: "save a screenshot as a new PNG file",
+            effect: "save the image as it is now as a new PNG file",
         },
         Binding {
             triggers: &[
                 shifted(Typed::Named(NamedKey::F12), true, Action::Screenshot { linear: true }),
                 shifted(Typed::Text("k"), true, Action::Screenshot { linear: true }),
-                item("Save linear light (EXR)", &[Menu::File], Action::Screenshot { linear: true }),
+                item("Screenshot, linear (EXR)", &[Menu::File], Action::Screenshot { linear: true }),
             ],
-            effect: "save linear light (HDR) as a new EXR file",
+            effect: "save linear light (HDR) as it is now as a new EXR file",
+        },
+        Binding {
+            triggers: &[
+                ctrl("e", Action::RenderTo { frames: false }),
+                item("Save image …", &[Menu::File], Action::RenderTo { frames: false }),
+            ],
+            effect: "render the image in any size and quality in the background, and save it",
+        },
+        Binding {
+            triggers: &[item("Render frames …", &[Menu::File], Action::RenderTo { frames: true })],
+            effect: "render the frames of the animation to a folder in the background",
         },
     ],
 };

@@ -50,7 +50,7 @@ pub const PANEL: KeyGroup = KeyGroup {
     bindings: &[
         Binding {
             triggers: &[section("Panel: Render", "Render")],
-            effect: "integrator, when to stop (error, time, samples), threads, size of saved images",
+            effect: "integrator, when to stop (error, time, samples), threads, saving",
         },
         Binding {
             triggers: &[section("Panel: Animation", "Animation")],

@@ -7,7 +7,7 @@ use crate::scene::light_of;
 use crate::scene::{ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SurfaceMaterial};
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::state::{Asked, PanelState};
-use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
+use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, short_color, strength_drag};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -69,7 +69,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     let world = session.world();
     ui.spacing_mut().interact_size.x = 30.0;
     if let Some(light) = light_of(world, entry.entity) {
-        if let Some(value) = color(ui, light.strength(), true) {
+        if let Some(value) = short_color(ui, light.strength(), true) {
             let property = LightProperty::strength_of(&light);
             asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Light(property), value });
         }
@@ -78,7 +78,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     let Some(material) = entry.material else { return };
     match SurfaceMaterial::of(world, material) {
         Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
-            if let Some(value) = color(ui, *rgb, true) {
+            if let Some(value) = short_color(ui, *rgb, true) {
                 let main = MaterialProperty::main_color(MaterialKind::Emissive).expect("it has a radiance");
                 let property = Property::Material(main);
                 asked.edit(Edit::Set { id: material.to_bits(), property, value });

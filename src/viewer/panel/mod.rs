@@ -69,7 +69,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
                 self::section(ui, title, is_open, wanted == Some(title), contents);
             };
             let [render, animation, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
-            section(ui, render, true, &mut |ui| picture::render(ui, &mut state.scale, session, around, asked));
+            section(ui, render, true, &mut |ui| picture::render(ui, session, around, asked));
             section(ui, animation, animation::can_play(session), &mut |ui| {
                 animation::time_line(ui, session, around, asked)
             });

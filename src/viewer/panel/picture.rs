@@ -3,12 +3,13 @@
 use crate::frame::{Command, DenoiseFilter, Denoising, Session, StopAt, Target, ViewMode};
 use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::Rendering;
+use crate::viewer::keys::Action;
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{number, row, row_with_hint, rows, slider, whole};
 use crate::viewer::status::tone_curve;
 use egui::Ui;
 
-pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, asked: &mut Asked) {
+pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     let status = session.status();
     rows(ui, "render", |ui| {
         row(ui, "integrator", |ui| {
@@ -107,9 +108,10 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         if ui.button("Save layers").on_hover_text(layers).clicked() {
             asked.save_layers = true;
         }
-        let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
-        ui.add(drag)
-            .on_hover_text("size of saved images relative to the window; larger ones are rendered in the background");
+        let larger = "render the image in any size and quality in the background, and save it (Ctrl+E)";
+        if ui.button("Save …").on_hover_text(larger).clicked() {
+            asked.action = Some(Action::RenderTo { frames: false });
+        }
     });
 }
 

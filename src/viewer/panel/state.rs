@@ -4,6 +4,7 @@ use crate::frame::{Command, DenoiseFilter, Edit, Navigation, Session, gizmo};
 use crate::scene::Inventory;
 use crate::viewer::change::PictureChange;
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::keys::Action;
 use crate::viewer::panel::list::ListState;
 use crate::viewer::panel::sections::SECTIONS;
 use crate::viewer::reaction::Reaction;
@@ -23,8 +24,6 @@ pub struct PanelState {
     pub change: PictureChange,
     /// Path of a file to be added.
     pub mesh_path: String,
-    /// Size of saved images, as a multiple of the window's.
-    pub scale: u32,
     /// The mouse was pressed in the panel and has not been released.
     pub pressed: bool,
     /// Lists of the scene's items, with the revision of the scene.
@@ -71,7 +70,6 @@ impl Default for PanelState {
             gizmo: None,
             change: PictureChange::default(),
             mesh_path: String::new(),
-            scale: 1,
             pressed: false,
             inventory: None,
             object_list: ListState::default(),
@@ -115,6 +113,8 @@ pub struct Asked {
     pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
     pub save_layers: bool,
+    /// A command of the table.
+    pub action: Option<Action>,
     /// The filter of denoised images, which may not be installed.
     pub filter: Option<DenoiseFilter>,
     pub toggle_brush: bool,

@@ -7,7 +7,7 @@ use crate::files::printable;
 use crate::frame::Edit;
 use crate::viewer::panel::hints::hint_of;
 use crate::viewer::panel::state::Asked;
-use egui::{RichText, Ui};
+use egui::{Color32, RichText, Ui};
 use glam::{DVec3, Vec3};
 
 /// Rows of a label and a widget, aligned throughout the panel.
@@ -65,9 +65,15 @@ pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusi
         .speed(speed)
         .range(range)
         .suffix(suffix)
-        .max_decimals(4)
+        .max_decimals(decimals(value))
         .update_while_editing(false);
     ui.add(drag).changed().then_some(new)
+}
+
+/// Decimals with which a number is shown: four digits say more than anybody sees, and all rows are equally wide.
+fn decimals(value: f64) -> usize {
+    let before = value.abs().max(1.0).log10().floor();
+    3 - (before as usize).min(3) + usize::from(value.abs() < 1.0)
 }
 
 /// Like [`number`], for integers.
@@ -87,7 +93,9 @@ pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
         ui.spacing_mut().item_spacing.x = 3.0;
         ui.spacing_mut().interact_size.x = width;
         for axis in 0..3 {
-            let drag = egui::DragValue::new(&mut new[axis]).speed(speed).max_decimals(3).update_while_editing(false);
+            let decimals = decimals(value[axis]).min(3);
+            let drag =
+                egui::DragValue::new(&mut new[axis]).speed(speed).max_decimals(decimals).update_while_editing(false);
             changed |= ui.add(drag).changed();
         }
     });
@@ -96,24 +104,34 @@ pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
 
 /// A number on a slider.
 pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, logarithmic: bool) -> Option<f64> {
-    const DECIMALS: usize = 4;
     // A slider rounds and clamps what it is given, which is no edit of the user.
-    let mut new = egui::emath::round_to_decimals(value.clamp(*range.start(), *range.end()), DECIMALS);
+    let decimals = decimals(value);
+    let mut new = egui::emath::round_to_decimals(value.clamp(*range.start(), *range.end()), decimals);
     let slider = egui::Slider::new(&mut new, range)
         .logarithmic(logarithmic)
         .update_while_editing(false)
-        .max_decimals(DECIMALS)
+        .max_decimals(decimals)
         .smart_aim(true);
     ui.add(slider).changed().then_some(new)
 }
 
 /// A linear colour. If it may be brighter than white, it is edited as a hue and a strength.
 pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
+    color_with(ui, value, bright, true)
+}
+
+/// Like [`color`], where there is no room for its code.
+pub fn short_color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
+    color_with(ui, value, bright, false)
+}
+
+fn color_with(ui: &mut Ui, value: Vec3, bright: bool, has_code: bool) -> Option<DVec3> {
     let strength = if bright { value.max_element() } else { 1.0 };
     // Black has no hue: it becomes white when its strength is raised.
     let hue = if strength > 0.0 { value / strength } else { Vec3::ONE };
     let mut rgb = hue.to_array();
-    let new_hue = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
+    let picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
+    let new_hue = if has_code { picked.or(hex_field(ui, hue)) } else { picked };
     let new_strength = if bright { strength_drag(ui, f64::from(strength), "× ", "") } else { None };
     if new_hue.is_none() && new_strength.is_none() {
         return None;
@@ -127,11 +145,40 @@ pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
     Some(new_hue.unwrap_or_else(|| hue.as_dvec3()) * strength)
 }
 
+/// The colour as `#rrggbb`, the sRGB code of paint programs; takes effect when the field loses the focus.
+fn hex_field(ui: &mut Ui, color: Vec3) -> Option<DVec3> {
+    let shown = hex_of(color);
+    let key = ui.next_auto_id().with("hex");
+    let mut text = ui.data(|data| data.get_temp::<String>(key)).unwrap_or_else(|| shown.clone());
+    let field = egui::TextEdit::singleline(&mut text).desired_width(56.0).font(egui::TextStyle::Monospace);
+    let field = ui.add(field).on_hover_text("sRGB code, such as #cc8844");
+    if field.has_focus() {
+        ui.data_mut(|data| data.insert_temp(key, text));
+        return None;
+    }
+    ui.data_mut(|data| data.remove::<String>(key));
+    // The code has fewer digits than the colour: only another code is an edit.
+    (field.lost_focus() && text != shown).then(|| of_hex(&text))?
+}
+
+fn hex_of(color: Vec3) -> String {
+    let [r, g, b, _] = Color32::from(egui::Rgba::from_rgb(color.x, color.y, color.z)).to_array();
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// The linear colour of `#rrggbb` or `#rgb`, with or without `#`.
+fn of_hex(text: &str) -> Option<DVec3> {
+    let digits = text.trim().trim_start_matches('#');
+    let color = Color32::from_hex(&format!("#{digits}")).ok().filter(|color| color.is_opaque())?;
+    let linear = egui::Rgba::from(color);
+    Some(DVec3::new(linear.r().into(), linear.g().into(), linear.b().into()))
+}
+
 /// A number of any magnitude: each step of a drag changes it by the same ratio.
 pub fn strength_drag(ui: &mut Ui, value: f64, prefix: &str, suffix: &str) -> Option<f64> {
     let mut new = value;
     let drag = egui::DragValue::new(&mut new).speed(proportional(value)).range(0.0..=1e9).prefix(prefix).suffix(suffix);
-    ui.add(drag.max_decimals(4).update_while_editing(false)).changed().then_some(new)
+    ui.add(drag.max_decimals(decimals(value)).update_while_editing(false)).changed().then_some(new)
 }
 
 /// Drag speed per pixel, proportional to the value: doubling takes about 140 pixels at any magnitude. Starts slowly
@@ -143,6 +190,24 @@ pub fn proportional(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn colours_are_written_as_in_paint_programs() {
+        assert_eq!(
+            [hex_of(Vec3::ZERO), hex_of(Vec3::ONE), hex_of(Vec3::splat(0.214))],
+            ["#000000", "#ffffff", "#7f7f7f"]
+        );
+        for code in ["#cc8844", "#0080ff", "#010203"] {
+            assert_eq!(hex_of(of_hex(code).unwrap().as_vec3()), code);
+        }
+        assert_eq!(of_hex("fff"), Some(DVec3::ONE));
+        assert_eq!([of_hex("#12345"), of_hex("red"), of_hex(""), of_hex("#11223344")], [None; 4]);
+    }
+
+    #[test]
+    fn numbers_have_about_four_digits() {
+        assert_eq!([32.9123, 6.2776, 0.134, 1234.5, 120.0, -45.25].map(decimals), [2, 3, 4, 0, 1, 2]);
+    }
 
     /// What is shown is rounded and clamped, and nobody has edited it.
     #[test]

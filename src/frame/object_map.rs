@@ -1,0 +1,189 @@
+//! Which object each pixel shows, and the outline of some of them.
+//!
+//! Traced through the pixel centres and the centre of the lens, as [`pick`](crate::frame::pick) does. Knows no window:
+//! a map is made on any thread, and gives lists of pixels.
+
+use crate::kdtree::{HitBatch, RayBatch, RayClass};
+use crate::render::Prepared;
+use crate::scene::Extraction;
+use bevy_ecs::prelude::Entity;
+use glam::{UVec2, Vec2};
+use std::collections::HashSet;
+
+/// No object.
+const NONE: u32 = u32::MAX;
+
+/// What a map is made of; shares the snapshot.
+pub struct ObjectMapSource {
+    scene: Prepared,
+    entities: Vec<Entity>,
+}
+
+/// The object of each pixel.
+#[derive(Clone, Debug)]
+pub struct ObjectMap {
+    size: UVec2,
+    /// Row by row from the top: indices of `entities`.
+    objects: Vec<u32>,
+    entities: Vec<Entity>,
+}
+
+/// Pixels with their opacities, in a rectangle of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Left and upper edge, pixels.
+    pub start: UVec2,
+    /// Width and height, pixels.
+    pub size: UVec2,
+    /// Row by row from the top: opacity of the line and of its dark rim, each 0..1.
+    pub pixels: Vec<[f32; 2]>,
+}
+
+impl ObjectMapSource {
+    pub(crate) fn of(extraction: &Extraction) -> Self {
+        Self { scene: extraction.prepared.clone(), entities: extraction.entities.clone() }
+    }
+
+    /// Traces the map, on this thread; `None` if `stop`, which is called once a row, returned true.
+    pub fn trace(self, size: UVec2, stop: &dyn Fn() -> bool) -> Option<ObjectMap> {
+        let Self { scene, entities } = self;
+        let (mut rays, mut hits) = (RayBatch::default(), HitBatch::default());
+        let mut objects = Vec::with_capacity(size.x as usize * size.y as usize);
+        for y in 0..size.y {
+            if stop() {
+                return None;
+            }
+            rays.clear();
+            for x in 0..size.x {
+                let place = UVec2::new(x, y).as_vec2() + 0.5;
+                rays.push(&scene.camera.middle_ray(place, size.as_vec2()));
+            }
+            scene.geometry.tree.closest_hits(&rays, RayClass::Coherent, &mut hits);
+            objects.extend((0..rays.len()).map(|i| hits.get(i).map_or(NONE, |hit| hit.object)));
+        }
+        Some(ObjectMap { size, objects, entities })
+    }
+}
+
+impl ObjectMap {
+    /// Pixels.
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// The object or light at a position in the image, fractions from the upper left corner.
+    pub fn at(&self, x: f64, y: f64) -> Option<Entity> {
+        let place = (Vec2::new(x as f32, y as f32) * self.size.as_vec2()).as_uvec2().min(self.size.max(UVec2::ONE) - 1);
+        let object = *self.objects.get((place.y * self.size.x + place.x) as usize)?;
+        self.entities.get(object as usize).copied()
+    }
+
+    /// The line around all pixels that show one of these; `None` if no pixel does.
+    ///
+    /// - `radius`: half of its width, pixels; its rim is a pixel wide on either side.
+    pub fn outline(&self, of: &HashSet<Entity>, radius: f32) -> Option<Outline> {
+        let meant: Vec<bool> = self.entities.iter().map(|entity| of.contains(entity)).collect();
+        let (width, height) = (self.size.x as usize, self.size.y as usize);
+        let is_in = |x: usize, y: usize| meant.get(self.objects[y * width + x] as usize).copied().unwrap_or_default();
+        let mut border = Vec::new();
+        let (mut min, mut max) = (UVec2::MAX, UVec2::ZERO);
+        for y in 0..height {
+            for x in 0..width {
+                if !is_in(x, y) {
+                    continue;
+                }
+                let place = UVec2::new(x as u32, y as u32);
+                (min, max) = (min.min(place), max.max(place));
+                // At the edge of the image there is no line: the object goes on.
+                let differs = (x > 0 && !is_in(x - 1, y))
+                    || (x + 1 < width && !is_in(x + 1, y))
+                    || (y > 0 && !is_in(x, y - 1))
+                    || (y + 1 < height && !is_in(x, y + 1));
+                if differs {
+                    border.push(place);
+                }
+            }
+        }
+        if min.x == u32::MAX {
+            return None;
+        }
+        let reach = radius.ceil() as u32 + 2;
+        let start = min.saturating_sub(UVec2::splat(reach));
+        let size = (max + reach + 1).min(self.size) - start;
+        let mut pixels = vec![[0.0_f32; 2]; size.x as usize * size.y as usize];
+        for place in border {
+            let low = place.saturating_sub(UVec2::splat(reach)).max(start);
+            let high = (place + reach + 1).min(start + size);
+            for y in low.y..high.y {
+                for x in low.x..high.x {
+                    let away = UVec2::new(x, y).as_vec2().distance(place.as_vec2());
+                    let pixel = &mut pixels[((y - start.y) * size.x + x - start.x) as usize];
+                    for (i, radius) in [radius, radius + 1.0].into_iter().enumerate() {
+                        pixel[i] = pixel[i].max((radius + 0.5 - away).clamp(0.0, 1.0));
+                    }
+                }
+            }
+        }
+        Some(Outline { start, size, pixels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_ecs::world::World;
+
+    fn map(rows: &[&str]) -> (ObjectMap, [Entity; 2]) {
+        let mut world = World::new();
+        let entities = [world.spawn_empty().id(), world.spawn_empty().id()];
+        let objects = rows.iter().flat_map(|row| row.chars()).map(|c| c.to_digit(10).unwrap_or(NONE)).collect();
+        let size = UVec2::new(rows[0].len() as u32, rows.len() as u32);
+        (ObjectMap { size, objects, entities: entities.to_vec() }, entities)
+    }
+
+    #[test]
+    fn a_place_has_the_object_of_its_pixel() {
+        let (map, [a, b]) = map(&["..0", ".11"]);
+        assert_eq!(
+            [map.at(0.1, 0.1), map.at(0.99, 0.2), map.at(0.5, 0.9), map.at(1.0, 1.0)],
+            [None, Some(a), Some(b), Some(b)]
+        );
+    }
+
+    #[test]
+    fn the_line_follows_the_border_and_not_the_edge_of_the_image() {
+        let rows = [".........", ".........", "000000...", "000000...", "000000...", "000000...", "000000..."];
+        let (map, [a, b]) = map(&rows);
+        let outline = map.outline(&HashSet::from([a]), 0.5).unwrap();
+        let line =
+            |x: u32, y: u32| outline.pixels[((y - outline.start.y) * outline.size.x + x - outline.start.x) as usize];
+        assert_eq!(line(2, 2), [1.0, 1.0], "its upper row");
+        assert_eq!(line(5, 5), [1.0, 1.0], "its right column");
+        assert_eq!(line(2, 1)[0], 0.0);
+        assert!(line(2, 1)[1] > 0.4, "the rim is beside the line");
+        assert_eq!([line(0, 5), line(2, 5)], [[0.0; 2]; 2], "not inside, nor at the edge of the image");
+        assert_eq!(map.outline(&HashSet::from([b]), 0.5), None);
+    }
+
+    #[test]
+    fn a_map_shows_what_a_pick_finds() {
+        use crate::scene::{LoadOptions, SceneInputs, SceneSource, load};
+        let loaded = load(&SceneSource::Builtin("ball".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = World::new();
+        loaded.spawn(&mut world);
+        let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
+        let size = UVec2::new(16, 12);
+        let map = ObjectMapSource::of(&extraction).trace(size, &|| false).unwrap();
+        let mut seen = HashSet::new();
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let place = (UVec2::new(x, y).as_dvec2() + 0.5) / size.as_dvec2();
+                let picked = crate::frame::pick(&extraction, place.x, place.y, 16.0 / 12.0).map(|it| it.entity);
+                assert_eq!(map.at(place.x, place.y), picked, "{x} {y}");
+                seen.extend(picked);
+            }
+        }
+        assert!(!seen.is_empty());
+        assert!(ObjectMapSource::of(&extraction).trace(size, &|| true).is_none());
+    }
+}

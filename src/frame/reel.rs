@@ -1,0 +1,105 @@
+//! The open scene at any moment of its animation, in a world of its own: frames are rendered while the session goes on.
+
+use crate::frame::core::rig::Rig;
+use crate::frame::session::Session;
+use crate::frame::state::resources::{CurrentScene, RenderState};
+use crate::scene::{
+    Animation, Description, DisplaySettings, Extraction, LoadedScene, MetadataDraft, Rendering, SceneInputs, Trees,
+    show_moment,
+};
+use bevy_ecs::prelude::World;
+use std::sync::Arc;
+
+/// What frames are made of: the scene as it is now. Taken at once, and opened on another thread.
+pub struct Reel {
+    current: Arc<LoadedScene>,
+    /// `None` for a glTF model, whose file says how it moves.
+    description: Option<Description>,
+    trees: Trees,
+    rendering: Rendering,
+    display: DisplaySettings,
+    rig: Rig,
+    fps: f64,
+}
+
+/// A reel that frames can be taken from.
+pub struct OpenReel {
+    current: Arc<LoadedScene>,
+    trees: Trees,
+    world: World,
+}
+
+impl Reel {
+    /// The scene of a session; `None` if nothing in it moves.
+    pub fn of(session: &mut Session) -> Option<Self> {
+        let world = session.world();
+        let animation = world.get_resource::<Animation>().filter(|animation| animation.moves())?;
+        let (is_model, fps) = (animation.has_model(), animation.fps);
+        let current = world.get_resource::<CurrentScene>()?.0.clone();
+        let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
+        let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
+        let description = (!is_model).then(|| session.describe());
+        Some(Self { current, description, trees, rendering, display, rig, fps })
+    }
+
+    /// Frames per second: frame i is at i / fps.
+    pub fn fps(&self) -> f64 {
+        self.fps
+    }
+
+    /// Makes its world.
+    ///
+    /// # Errors
+    /// If a file of the scene is gone.
+    pub fn open(self) -> Result<OpenReel, String> {
+        let Self { current, description, trees, rendering, display, rig, .. } = self;
+        let mut world = World::new();
+        match description {
+            Some(description) => {
+                let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
+                scene.spawn(&mut world);
+            }
+            None => current.spawn(&mut world),
+        }
+        world.insert_resource(rendering);
+        world.insert_resource(display);
+        // Where no track moves the camera, it stays where it was flown to.
+        if let Some(camera) = SceneInputs::of(&mut world).camera {
+            world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
+        }
+        Ok(OpenReel { current, trees, world })
+    }
+}
+
+impl OpenReel {
+    /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
+    ///
+    /// # Errors
+    /// If a mesh of that moment is not valid.
+    pub fn at(&mut self, seconds: f64) -> Result<(Extraction, MetadataDraft), String> {
+        scene_at(&mut self.world, &self.current, &mut self.trees, seconds)
+    }
+}
+
+/// Shows a moment of a world from now on, seconds; returns its snapshot and the metadata of its image.
+///
+/// - `loaded`: the scene that was opened into the world.
+///
+/// # Errors
+/// If a mesh of that moment is not valid.
+pub fn scene_at(
+    world: &mut World,
+    loaded: &LoadedScene,
+    trees: &mut Trees,
+    seconds: f64,
+) -> Result<(Extraction, MetadataDraft), String> {
+    show_moment(world, seconds);
+    let inputs = SceneInputs::of(world);
+    // Skins and morph targets have other meshes at each moment.
+    trees.keep_used(&inputs);
+    for object in &inputs.objects {
+        trees.add(&object.shape).map_err(|reason| format!("at {seconds} s: {reason}"))?;
+    }
+    let extraction = Extraction::of_world(world, &inputs, trees);
+    Ok((extraction, MetadataDraft::of(world, Some(loaded))))
+}

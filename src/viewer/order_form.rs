@@ -1,0 +1,299 @@
+//! The form of "Save image …" and "Render frames …": size, quality, format and place of what is to be rendered.
+
+use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Target, ViewMode};
+use crate::scene::{Animation, FilmSize};
+use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::order::Order;
+use crate::viewer::saver::{file_stem, new_file};
+use egui::{Align2, Button, ComboBox, Context, DragValue, Grid, RichText, Ui, Vec2, Window};
+use std::path::{Path, PathBuf};
+
+/// Sizes beside those of the scene and of the window.
+const SIZES: [(u32, u32); 4] = [(1920, 1080), (2560, 1440), (3840, 2160), (1080, 1080)];
+const FORMATS: [(PictureFormat, &str, &str); 3] = [
+    (PictureFormat::Png, "PNG", "as displayed, without loss"),
+    (PictureFormat::Jpeg, "JPEG", "as displayed, small"),
+    (PictureFormat::Exr, "EXR", "linear light, for other programs"),
+];
+const WIDTH: f32 = 330.0;
+
+/// What ends an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Limit {
+    Error,
+    Samples,
+    Time,
+}
+
+/// What the form asks the window for.
+pub enum Wish {
+    Begin(Order),
+    /// A place for it.
+    Choose(DialogPurpose),
+}
+
+/// The form; it remembers what was chosen last.
+pub struct OrderForm {
+    is_open: bool,
+    /// The scene that it was filled in for.
+    scene: String,
+    size: (u32, u32),
+    of_scene: (u32, u32),
+    limit: Limit,
+    /// Per cent.
+    error: f64,
+    spp: u32,
+    seconds: f64,
+    denoised: bool,
+    filter: DenoiseFilter,
+    format: PictureFormat,
+    file: PathBuf,
+    folder: PathBuf,
+    /// First and last frame; `None` for a single image.
+    frames: Option<(u32, u32)>,
+    problem: Option<String>,
+}
+
+impl Default for OrderForm {
+    fn default() -> Self {
+        Self {
+            is_open: false,
+            scene: String::new(),
+            size: SIZES[0],
+            of_scene: SIZES[0],
+            limit: Limit::Error,
+            error: 2.0,
+            spp: 64,
+            seconds: 60.0,
+            denoised: true,
+            filter: DenoiseFilter::default(),
+            format: PictureFormat::Png,
+            file: PathBuf::new(),
+            folder: PathBuf::new(),
+            frames: None,
+            problem: None,
+        }
+    }
+}
+
+impl OrderForm {
+    pub fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    pub fn close(&mut self) {
+        self.is_open = false;
+    }
+
+    /// Opens the form for the scene of the session.
+    ///
+    /// - `frames`: of its animation rather than one image; `folder`: of files that are not chosen yet.
+    ///
+    /// # Errors
+    /// If there are to be frames and nothing moves.
+    pub fn open(&mut self, session: &Session, frames: bool, folder: &Path) -> Result<(), &'static str> {
+        let world = session.world();
+        let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
+        let look = world.resource::<ViewMode>().0;
+        let scene = &session.status().scene;
+        (self.of_scene, self.filter) = ((width, height), look.filter);
+        if self.scene != *scene {
+            (self.scene, self.size, self.frames) = (scene.clone(), self.of_scene, None);
+            self.denoised = look.denoising != Denoising::Raw;
+            self.folder = folder.join(format!("{}-frames", file_stem(scene)));
+        }
+        self.frames = match frames {
+            false => None,
+            true => {
+                let animation = world.get_resource::<Animation>().filter(|animation| animation.moves());
+                let animation = animation.ok_or("nothing in this scene moves: Ctrl+K sets keys")?;
+                Some((0, animation.n_frames().saturating_sub(1)))
+            }
+        };
+        // Each time another one, so that nothing is replaced by a second click.
+        self.file = new_file(folder, scene, self.format.extension());
+        (self.is_open, self.problem) = (true, None);
+        Ok(())
+    }
+
+    /// Takes over the place that was chosen; a name with the extension of a format chooses that too.
+    pub fn place(&mut self, purpose: DialogPurpose, path: PathBuf) {
+        if purpose == DialogPurpose::SaveFrames {
+            self.folder = path;
+            return;
+        }
+        match PictureFormat::of(&path) {
+            Ok(format) => (self.file, self.format) = (path, format),
+            Err(_) => {
+                let mut name = path.file_name().unwrap_or_default().to_owned();
+                name.push(".");
+                name.push(self.format.extension());
+                self.file = path.with_file_name(name);
+            }
+        }
+    }
+
+    /// The path that is shown first in the dialog.
+    pub fn path(&self) -> &Path {
+        if self.frames.is_some() { &self.folder } else { &self.file }
+    }
+
+    fn order(&self) -> Order {
+        let mut target = Target::default();
+        match self.limit {
+            Limit::Error => target.error = Some(self.error / 100.0),
+            Limit::Samples => target.spp = Some(self.spp),
+            Limit::Time => target.seconds = Some(self.seconds),
+        }
+        Order {
+            size: self.size,
+            target,
+            denoiser: self.denoised.then_some(self.filter),
+            format: self.format,
+            path: self.path().to_owned(),
+            frames: self.frames.map(|(first, last)| first..=last),
+        }
+    }
+
+    /// Draws the form while it is open.
+    ///
+    /// - `window`: pixels of the image in the window.
+    pub fn show(&mut self, context: &Context, window: (u32, u32)) -> Option<Wish> {
+        if !self.is_open {
+            return None;
+        }
+        let (mut wish, mut open) = (None, true);
+        let title = if self.frames.is_some() { "Render frames" } else { "Save image" };
+        let width = WIDTH.min(context.content_rect().width() - 40.0).max(80.0);
+        Window::new(title)
+            .open(&mut open)
+            .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+            .collapsible(false)
+            .resizable(false)
+            .show(context, |ui| {
+                ui.set_width(width);
+                Grid::new("order").num_columns(2).spacing([14.0, 7.0]).show(ui, |ui| {
+                    self.rows(ui, window, &mut wish);
+                });
+                ui.add_space(6.0);
+                if let Some(problem) = &self.problem {
+                    ui.colored_label(crate::viewer::overlay::PROBLEM, problem);
+                }
+                // Within a row, which has a height of its own.
+                ui.horizontal(|ui| {
+                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                        let name = if self.frames.is_some() { "Render" } else { "Save" };
+                        let begin = Button::new(RichText::new(name).strong()).min_size(Vec2::new(86.0, 26.0));
+                        if ui.add(begin).on_hover_text("in the background; the window stays usable").clicked() {
+                            let order = self.order();
+                            match order.check() {
+                                Ok(()) => wish = Some(Wish::Begin(order)),
+                                Err(problem) => self.problem = Some(problem),
+                            }
+                        }
+                        if ui.add(Button::new("Cancel").min_size(Vec2::new(70.0, 26.0))).clicked() {
+                            self.is_open = false;
+                        }
+                    });
+                });
+            });
+        self.is_open &= open && !matches!(wish, Some(Wish::Begin(_)));
+        wish
+    }
+
+    fn rows(&mut self, ui: &mut Ui, window: (u32, u32), wish: &mut Option<Wish>) {
+        ui.label("size");
+        ui.horizontal(|ui| {
+            for side in [&mut self.size.0, &mut self.size.1] {
+                ui.add(DragValue::new(side).range(1..=32_768).speed(2.0).update_while_editing(false));
+            }
+            ComboBox::from_id_salt("size").selected_text("presets").width(86.0).show_ui(ui, |ui| {
+                let named = [("scene: ", self.of_scene), ("window: ", window)];
+                for (name, size) in named.into_iter().chain(SIZES.map(|size| ("", size))) {
+                    if ui.selectable_label(self.size == size, format!("{name}{} × {}", size.0, size.1)).clicked() {
+                        self.size = size;
+                    }
+                }
+            });
+        });
+        ui.end_row();
+        ui.label("until");
+        ui.horizontal(|ui| {
+            for (limit, name, about) in [
+                (Limit::Error, "noise", "until the noise of the saved image is as low as this"),
+                (Limit::Samples, "samples", "so many samples per pixel"),
+                (Limit::Time, "time", "so many seconds for each image"),
+            ] {
+                ui.selectable_value(&mut self.limit, limit, name).on_hover_text(about);
+            }
+            let value = match self.limit {
+                Limit::Error => DragValue::new(&mut self.error).range(0.01..=50.0).speed(0.02).suffix(" %"),
+                Limit::Samples => DragValue::new(&mut self.spp).range(1..=1_000_000).speed(1.0),
+                Limit::Time => DragValue::new(&mut self.seconds).range(0.1..=1e6).speed(0.5).suffix(" s"),
+            };
+            ui.add(value.update_while_editing(false));
+        });
+        ui.end_row();
+        ui.label("denoised");
+        ui.checkbox(&mut self.denoised, "").on_hover_text("filter what noise is left");
+        ui.end_row();
+        ui.label("format");
+        ui.horizontal(|ui| {
+            for (format, name, about) in FORMATS {
+                if ui.selectable_label(self.format == format, name).on_hover_text(about).clicked() {
+                    self.format = format;
+                    self.file.set_extension(format.extension());
+                }
+            }
+        });
+        ui.end_row();
+        if let Some((first, last)) = &mut self.frames {
+            ui.label("frames");
+            ui.horizontal(|ui| {
+                ui.add(DragValue::new(first).speed(0.2).update_while_editing(false));
+                ui.label("to");
+                ui.add(DragValue::new(last).speed(0.2).update_while_editing(false));
+            });
+            ui.end_row();
+        }
+        let (label, purpose) = match self.frames {
+            Some(_) => ("folder", DialogPurpose::SaveFrames),
+            None => ("file", DialogPurpose::SaveImage),
+        };
+        ui.label(label);
+        ui.horizontal(|ui| {
+            let path = self.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let full = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.button("Choose …").clicked() {
+                    *wish = Some(Wish::Choose(purpose));
+                }
+                let name = egui::Label::new(crate::files::printable::name(&name).into_owned()).truncate();
+                ui.add(name).on_hover_text(full.display().to_string());
+            });
+        });
+        ui.end_row();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_and_the_format_agree() {
+        let mut form = OrderForm::default();
+        form.place(DialogPurpose::SaveImage, PathBuf::from("/a/room.exr"));
+        assert_eq!((form.file.clone(), form.format), (PathBuf::from("/a/room.exr"), PictureFormat::Exr));
+        form.place(DialogPurpose::SaveImage, PathBuf::from("/a/room.v2"));
+        assert_eq!(form.file, Path::new("/a/room.v2.exr"));
+        assert_eq!(form.order().target.error, Some(0.02));
+        form.limit = Limit::Samples;
+        let order = form.order();
+        assert_eq!((order.target.spp, order.target.error, order.frames), (Some(64), None, None));
+        form.frames = Some((2, 9));
+        form.place(DialogPurpose::SaveFrames, PathBuf::from("/b"));
+        assert_eq!((form.order().path, form.order().frames), (PathBuf::from("/b"), Some(2..=9)));
+    }
+}
