@@ -1,6 +1,6 @@
 //! The built-in scenes: ordinary scene files, embedded in the program.
 
-/// A picture (JPEG) of each built-in scene, from left to right in the order of [`BUILTIN_SCENES`], all of one width.
+/// An image (JPEG) of each built-in scene, from left to right in the order of [`BUILTIN_SCENES`], all of one width.
 pub const SCENES_IMAGE: &[u8] = include_bytes!("../../assets/scenes/thumbnails.jpg");
 
 /// Name, description, and text of the scene file.

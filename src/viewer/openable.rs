@@ -17,7 +17,7 @@ fn open(name: &str) -> Command {
     Command::Open { path: text_to_path(name) }
 }
 
-/// The built-in scenes, a line and a picture each.
+/// The built-in scenes, a line and an image each.
 pub fn scenes(ui: &mut Ui) -> Option<Command> {
     let mut chosen = None;
     let pictures = pictures(ui.ctx());
@@ -35,14 +35,14 @@ pub fn scenes(ui: &mut Ui) -> Option<Command> {
 
 /// The pictures of the built-in scenes, uploaded when they are shown first.
 fn pictures(context: &Context) -> TextureHandle {
-    let id = Id::new("pictures of scenes");
+    let id = Id::new("images of scenes");
     if let Some(known) = context.data(|data| data.get_temp::<TextureHandle>(id)) {
         return known;
     }
     let image = image::load_from_memory(SCENES_IMAGE).map(|image| image.to_rgb8()).unwrap_or_default();
     let size = [image.width() as usize, image.height() as usize];
     let image = ColorImage::from_rgb(size, image.as_raw());
-    let pictures = context.load_texture("pictures of scenes", image, TextureOptions::LINEAR);
+    let pictures = context.load_texture("images of scenes", image, TextureOptions::LINEAR);
     context.data_mut(|data| data.insert_temp(id, pictures.clone()));
     pictures
 }

@@ -53,10 +53,7 @@ pub fn opening(context: &Context, stage: LoadStage, text: &str, seconds: u64) {
                 ui.add_space(4.0);
                 let n = LoadStage::ALL.len() as f32;
                 let done = LoadStage::ALL.iter().filter(|other| **other < stage).count() as f32;
-                let (bar, _) = ui.allocate_exact_size(Vec2::new(width, 8.0), egui::Sense::hover());
-                let part = egui::Rect::from_min_size(bar.min, Vec2::new(width * (done + 0.5) / n, 8.0));
-                ui.painter().rect_filled(bar, 3.0, Color32::from_gray(45));
-                ui.painter().rect_filled(part, 3.0, ui.visuals().selection.bg_fill);
+                progress(ui, width, (done + 0.5) / n);
                 ui.horizontal(|ui| {
                     for other in LoadStage::ALL {
                         let word = RichText::new(other.label()).size(TEXT_SIZE - 1.0);
@@ -68,6 +65,14 @@ pub fn opening(context: &Context, stage: LoadStage, text: &str, seconds: u64) {
                 });
             });
         });
+}
+
+/// A bar that is filled to this share, 0..1.
+pub fn progress(ui: &mut egui::Ui, width: f32, share: f32) {
+    let (bar, _) = ui.allocate_exact_size(Vec2::new(width, 8.0), egui::Sense::hover());
+    let part = egui::Rect::from_min_size(bar.min, Vec2::new(width * share, 8.0));
+    ui.painter().rect_filled(bar, 3.0, Color32::from_gray(45));
+    ui.painter().rect_filled(part, 3.0, ui.visuals().selection.bg_fill);
 }
 
 /// Draws messages in the upper left corner; they ignore the mouse.

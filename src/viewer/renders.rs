@@ -6,9 +6,9 @@
 use crate::frame::{Reel, Waker};
 use crate::render::{RenderSettings, worker_threads};
 use crate::viewer::order::{Advance, Order, Subject};
-use crate::viewer::overlay::{GLASS, TEXT_SIZE};
+use crate::viewer::overlay::{self, GLASS, TEXT_SIZE};
 use crate::viewer::status::percent;
-use egui::{Align2, Area, Context, CornerRadius, Frame, Margin, Order as Layer, ProgressBar, Rect, RichText};
+use egui::{Align2, Area, Context, CornerRadius, Frame, Margin, Order as Layer, Rect, RichText};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -145,7 +145,7 @@ impl Renders {
                             }
                         });
                     });
-                    ui.add(ProgressBar::new(told.share as f32).desired_height(8.0));
+                    overlay::progress(ui, ui.available_width(), told.share as f32);
                     let text = told.line(running.since.elapsed().as_secs_f64());
                     ui.label(RichText::new(text).size(TEXT_SIZE - 1.0));
                 });

@@ -41,10 +41,16 @@ fn open(program: &Program, button: u32, at: (i32, i32), menu: (i32, i32)) {
     std::thread::sleep(Duration::from_millis(300));
 }
 
-/// Clicks a line of a menu, and waits until the menu is gone.
+/// Clicks a line of a menu, and waits until the menu is gone; as a person does, again where nothing happens for seconds.
 fn choose(program: &Program, at: (i32, i32), menu: (i32, i32)) {
-    click(program, 1, at);
-    until("the menu to close", || (!is_dark(program, menu)).then_some(()));
+    let mut clicked: Option<Instant> = None;
+    until("the menu to close", || {
+        if clicked.is_none_or(|then| then.elapsed() > Duration::from_secs(5)) {
+            click(program, 1, at);
+            clicked = Some(Instant::now());
+        }
+        (!is_dark(program, menu)).then_some(())
+    });
 }
 
 /// A place in the lower left corner of the menu of the bar.
@@ -183,12 +189,12 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     click(&program, 1, (585, 326));
     title_is(&program, "*room.ron");
     std::thread::sleep(Duration::from_millis(400));
-    program.drag(1, (668, 281), (-120, 0));
+    program.drag(1, (600, 281), (-60, 0));
     program.drag(1, (645, 304), (-60, 0));
     let file = saved(&program, &path);
     let camera = &file.camera;
-    let look_at = camera.look_at.expect("the pivot");
-    assert!((look_at.y - 1.5).abs() < 0.05 && camera.eye.z < 5.9, "the ball is framed: {camera:?}");
+    let away = camera.eye.distance(glam::DVec3::new(0.0, 1.5, 0.0));
+    assert!(away < 4.0, "the ball is framed: {camera:?}");
     assert!(camera.f_stop.is_some() || camera.lens_radius.is_some_and(|radius| radius > 0.0), "{camera:?}");
     let text = std::fs::read_to_string(&path).expect("the scene");
     assert!(text.contains("quad(") && text.contains("emissive(") && !text.contains("(12"), "a dimmer light: {text}");
@@ -204,7 +210,9 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     assert_eq!(image::image_dimensions(&image).expect("a PNG"), (160, 120));
     let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
     assert_eq!((shot.camera.eye, shot.denoised.as_deref()), (camera.eye, Some("own")), "as it was seen");
-    until("its path", || (program.output() + &program.errors()).contains("room-0001.png (160 × 120, noise ").then_some(()));
+    until("its path", || {
+        (program.output() + &program.errors()).contains("room-0001.png (160 × 120, noise ").then_some(())
+    });
     program.key("ctrl+q");
     assert!(program.ended().success());
 }

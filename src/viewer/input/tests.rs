@@ -293,7 +293,7 @@ fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
         assert!(matches!(input.take(start)[..], [Command::Dolly { factor }] if factor < 1.0));
         // A letter alone selects a tool, and moves nothing.
         let (code, text) = if navigation == Navigation::Maya { (KeyCode::KeyW, "w") } else { (KeyCode::KeyS, "s") };
-        assert!(matches!(press(&mut input, code, text, true, start), Some(Action::Gizmo(Some(_)))));
+        assert!(matches!(press(&mut input, code, text, true, start), Some(Action::Gizmo(Some(_)) | Action::Grab(_))));
         press(&mut input, code, text, false, after(start, 50));
         assert_eq!(input.take(after(start, 100)), []);
         // With the right button it flies, at the speed set by the wheel, until the button is released.

@@ -154,7 +154,7 @@ pub const FILES: KeyGroup = KeyGroup {
                 shifted(Typed::Text("k"), false, Action::Screenshot { linear: false }),
                 item("Screenshot", &[Menu::File], Action::Screenshot { linear: false }),
             ],
-            effect: "save the image as it is now as a new PNG file",
+            effect: "screenshot: save the image as it is now as a new PNG file",
         },
         Binding {
             triggers: &[

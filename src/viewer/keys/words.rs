@@ -60,7 +60,7 @@ const SYNONYMS: &[(&str, &[&str])] = &[
     ("remove", &["delete"]),
     ("reset", &["restart", "initial view"]),
     ("resize", &["scale"]),
-    ("resolution", &["size of saved images"]),
+    ("resolution", &["any size"]),
     ("revert", &["undo"]),
     ("rotate", &["rotation", "pivot", "rotate"]),
     ("screenshot", &["png", "exr"]),
