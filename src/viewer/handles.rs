@@ -2,7 +2,7 @@
 
 use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
-use crate::scene::Placement;
+use crate::scene::{Placement, light_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
 use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke};
@@ -18,7 +18,8 @@ const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
 /// The overlays to be drawn, computed before drawing.
 #[derive(Default)]
 pub struct Handles {
-    boxes: Vec<(Entity, OwnBox)>,
+    /// Of the selection, in its order, and whether something without a size is to be marked.
+    boxes: Vec<(Entity, OwnBox, bool)>,
     gizmo: Option<(Gizmo, Projector)>,
     projector: Option<Projector>,
     hovered: Option<Handle>,
@@ -41,12 +42,18 @@ impl Handles {
     pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, size: DVec2) {
         self.boxes.clear();
         let selected = session.world().resource::<Selection>().0.clone();
-        self.boxes.extend(selected.iter().filter_map(|&entity| Some((entity, session.box_of(entity)?))));
+        for &entity in &selected {
+            if let Some(own) = session.box_of(entity) {
+                // The reference point of a plane is anywhere.
+                let is_point = light_of(session.world(), entity).is_some();
+                self.boxes.push((entity, own, is_point));
+            }
+        }
         let projector = Projector::new(&session.status().rig, size);
         self.projector = Some(projector);
         self.gizmo = mode.and_then(|mode| self.gizmo_of(session, mode));
         self.out_of_view = match (self.boxes.last(), selected.last()) {
-            (Some((_, own)), Some(&active)) if !is_seen(own, &projector, size) => {
+            (Some((_, own, _)), Some(&active)) if !is_seen(own, &projector, size) => {
                 let name = session.world().get::<Name>(active).map_or("selected", |name| name.as_str());
                 Some((name.to_owned(), own.middle()))
             }
@@ -59,7 +66,7 @@ impl Handles {
 
     /// Handles of a kind about the selection, as it was drawn last; `None` without one in view.
     pub fn gizmo_of(&self, session: &Session, mode: Mode) -> Option<(Gizmo, Projector)> {
-        let (selected, (_, own)) = (&session.world().resource::<Selection>().0, self.boxes.last()?);
+        let (selected, (_, own, _)) = (&session.world().resource::<Selection>().0, self.boxes.last()?);
         let projector = self.projector?;
         let axes = match (mode, &selected[..]) {
             (Mode::Scale, [only]) => own_axes(session.world().get::<Placement>(*only)),
@@ -142,8 +149,8 @@ impl Handles {
     pub fn draw(&self, context: &Context, outlined: impl Fn(Entity) -> bool) {
         let Some(projector) = &self.projector else { return };
         let painter = context.layer_painter(egui::LayerId::background());
-        for (i, (entity, own)) in self.boxes.iter().enumerate() {
-            if outlined(*entity) {
+        for (i, (entity, own, is_point)) in self.boxes.iter().enumerate() {
+            if outlined(*entity) || own.min == own.max && !is_point {
                 continue;
             }
             let color = if i + 1 == self.boxes.len() { SELECTED } else { OTHERS };
@@ -225,7 +232,7 @@ fn own_axes(placement: Option<&Placement>) -> [DVec3; 3] {
 fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color: Color32) {
     let corners = own.corners();
     if own.min == own.max {
-        // Unbounded objects, and points.
+        // A light without a size.
         if let Some(place) = projector.place(own.middle()) {
             painter.circle_stroke(pos(place), 9.0, Stroke::new(1.5, color));
         }
