@@ -39,6 +39,9 @@ pub enum RecordError {
     /// A list does not have the length that width, height and tile size require.
     #[error("its parts do not have the size that it names")]
     Size,
+    /// A sum is infinite or no number.
+    #[error("its sums are not finite")]
+    NotFinite,
     /// A tile has more samples per pixel than `u32` can count.
     #[error("it has more samples than can be counted")]
     TooManySamples,

@@ -271,6 +271,10 @@ impl Film {
         if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit || !changes_fit {
             return Err(RecordError::Size);
         }
+        // Samples that are not finite are left out of sums, see `FilmTile::bad`.
+        if !record.planes.iter().flatten().all(|number| number.is_finite()) {
+            return Err(RecordError::NotFinite);
+        }
         let mut film = Self::with_tile_size(width, height, tile_size);
         for (tile, of_tile) in film.tiles.iter_mut().zip(tiles) {
             tile.take_samples(of_tile)?;
@@ -371,15 +375,18 @@ impl FilmTile {
             let (x, y) = (local as u32 % size.x, local as u32 / size.x);
             (origin.y + y) as usize * width + (origin.x + x) as usize
         };
-        let change = |local: usize, first: usize| Vec3::from_array([0, 1, 2].map(|c| planes[first + c][at(local)]));
+        // What is not finite tells nothing of the error.
+        let number =
+            |plane: usize, local: usize| Some(planes[plane][at(local)]).filter(|x| x.is_finite()).unwrap_or(0.0);
+        let change = |local: usize, first: usize| Vec3::from_array([0, 1, 2].map(|c| number(first + c, local)));
         let n = self.n_pixels();
         if self.blocks.iter().any(|block| block.steps.at > 0) {
             let known = |local: usize| self.block_of(local).knows_half_step();
             self.half_steps = (0..n).map(|i| if known(i) { change(i, 0) } else { Vec3::NAN }).collect();
-            self.last = (0..n).map(|local| planes[OF_LIGHT - 1][at(local)]).collect();
+            self.last = (0..n).map(|local| number(OF_LIGHT - 1, local)).collect();
         }
         if self.light.steps.at > 0 {
-            self.light.last = (0..n).map(|local| planes[N_CHANGE_PLANES - 1][at(local)]).collect();
+            self.light.last = (0..n).map(|local| number(N_CHANGE_PLANES - 1, local)).collect();
         }
         if self.light.knows_half_step() {
             self.light.half_steps = (0..n).map(|local| change(local, OF_LIGHT)).collect();
@@ -426,5 +433,15 @@ mod tests {
         let steps = |value: f32| StepsRecord(4, vec![value.to_bits(); Steps::KEPT]).steps(4);
         assert!(steps(0.25).is_ok() && steps(f32::NAN).is_ok(), "unknown ones are not numbers");
         assert_eq!(steps(-0.25).err(), Some(RecordError::Convergence));
+    }
+
+    #[test]
+    fn sums_are_numbers() {
+        let mut record = Film::new(4, 4).to_record();
+        assert!(Film::from_record(&record).is_ok());
+        for wrong in [f64::NAN, f64::INFINITY] {
+            record.planes[2][5] = wrong;
+            assert_eq!(Film::from_record(&record).err(), Some(RecordError::NotFinite));
+        }
     }
 }

@@ -15,10 +15,14 @@ struct Bin {
 }
 
 impl AliasTable {
-    /// Creates a table for finite, non-negative weights. If all are zero, every index is equally likely.
+    /// Creates a table for non-negative weights. If all are zero, every index is equally likely; those that are beyond all
+    /// numbers, or none, count as the largest.
     pub fn new(weights: &[f64]) -> Self {
         let n = weights.len();
-        debug_assert!(weights.iter().all(|w| w.is_finite() && *w >= 0.0));
+        debug_assert!(weights.iter().all(|w| !(*w < 0.0)));
+        // Of such, the sum is a number too.
+        let most = f64::MAX / (2.0 * n.max(1) as f64);
+        let weights: Vec<f64> = weights.iter().map(|w| w.min(most)).collect();
         let sum: f64 = weights.iter().sum();
         let pmf: Vec<f64> = weights.iter().map(|w| if sum > 0.0 { w / sum } else { 1.0 / n as f64 }).collect();
         let mut bins: Vec<_> =
@@ -102,6 +106,12 @@ mod tests {
             let expected = w / sum * f64::from(n);
             assert!((f64::from(counts[i]) - expected).abs() < 4.0, "index {i}: {} for {expected}", counts[i]);
         }
+    }
+
+    #[test]
+    fn weights_beyond_all_numbers_are_the_largest() {
+        let table = AliasTable::new(&[1.0, f64::INFINITY, f64::NAN, 0.0]);
+        assert_eq!([0, 1, 2, 3].map(|index| table.pmf(index)), [0.0, 0.5, 0.5, 0.0]);
     }
 
     #[test]
