@@ -180,12 +180,13 @@ fn layered() -> [Material; 4] {
     [plastic, mapped, rich, colored]
 }
 
-/// The same with layers that emit as well, in places.
+/// The same with layers that emit as well: in places, and where half of the surface is.
 fn with_emission(scene: &Prepared) -> Prepared {
     let mut shading = (*scene.shading).clone();
-    for material in &mut shading.materials[15..17] {
-        if let Material::Principled { emission, .. } = material {
-            *emission = ColorInput::Texture(0);
+    let lights = [(ColorInput::Texture(0), 1.0), (ColorInput::Constant(Vec3::new(2.0, 1.0, 1.5)), 0.5)];
+    for (material, (light, share)) in shading.materials[15..17].iter_mut().zip(lights) {
+        if let Material::Principled { emission, opacity, .. } = material {
+            (*emission, *opacity) = (light, ScalarInput::Constant(share));
         }
     }
     scene.with_shading(Arc::new(shading))

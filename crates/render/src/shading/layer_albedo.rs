@@ -7,7 +7,7 @@ use crate::shading::ggx::{TABLE_LEAST_ALPHA, mean_schlick, single_scattering_alb
 use crate::shading::integral_table::{Between, GAUSS, IntegralTable};
 use crate::shading::sheen;
 use firstlight_simd::{Elementary, Real, Truth, Vector3, select};
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 /// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵:
 /// `f0 · facing + f90 · grazing`.
@@ -162,14 +162,15 @@ pub(crate) fn cosine_mean(f: impl Fn(f32) -> f32) -> f32 {
     GAUSS.iter().map(|&(x, weight)| 2.0 * x * weight * f(x)).sum()
 }
 
-/// Two-point Gauss–Legendre rule over the azimuths of a quadrant.
-const AZIMUTHS: [f32; 2] = [0.211_324_87 * FRAC_PI_2, 0.788_675_1 * FRAC_PI_2];
+/// Cosine and sine of the azimuths of the two-point Gauss–Legendre rule over a quadrant, as numbers: what a compiler
+/// computes may differ in the last bit from what a library does.
+const AZIMUTHS: [[f32; 2]; 2] = [[0.945_409_2, 0.325_885_6], [0.325_885_6, 0.945_409_2]];
 
 /// Two directions whose mean is that over the azimuths, for functions that are symmetric about x and y.
-#[inline]
+#[inline(always)]
 pub(crate) fn azimuths(cos: f32) -> [Vector3<f32>; 2] {
     let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    AZIMUTHS.map(|phi| Vector3 { x: sin * phi.cos(), y: sin * phi.sin(), z: cos })
+    AZIMUTHS.map(|[x, y]| Vector3 { x: sin * x, y: sin * y, z: cos })
 }
 
 /// Mean over directions, weighted by their cosine, of a function that is symmetric about x and y.

@@ -417,8 +417,14 @@ mod tests {
             metallic: number(&|lane| surface(lane).metallic),
             metal: vector(&|lane| surface(lane).metal),
             alpha: [number(&|lane| surface(lane).alpha[0]), number(&|lane| surface(lane).alpha[1])],
-            tangent: Some(vector(&|lane| surface(lane).tangent.unwrap_or(nothing))),
-            true_normal: Some(vector(&|lane| surface(lane).true_normal.unwrap_or(nothing))),
+            tangent: group
+                .iter()
+                .any(|(of, ..)| of.tangent.is_some())
+                .then(|| vector(&|lane| surface(lane).tangent.unwrap_or(nothing))),
+            true_normal: group
+                .iter()
+                .any(|(of, ..)| of.true_normal.is_some())
+                .then(|| vector(&|lane| surface(lane).true_normal.unwrap_or(nothing))),
             transmission: None,
             sheen: vector(&|lane| surface(lane).sheen),
             sheen_alpha: number(&|lane| surface(lane).sheen_alpha),

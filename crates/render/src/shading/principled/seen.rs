@@ -121,8 +121,11 @@ impl<R: Elementary> Seen<R> {
         let one = wo.x.all(1.0);
         let mut axes = frame_around(normal);
         if let Some(tangent) = of.tangent {
+            // As without tangents where there is none.
+            let has_one = !tangent.is_zero();
             let x = (tangent - normal * normal.dot(tangent)).normalize_or(axes[0]);
-            axes = [x, normal.cross(x), normal];
+            let y = normal.cross(x);
+            axes = [select_vector(has_one, x, axes[0]), select_vector(has_one, y, axes[1]), normal];
         }
         let mut local = wo.to_local(&axes);
         local.z = local.z.at_least(SMALLEST_COS);
