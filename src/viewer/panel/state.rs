@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// State of the panel.
+#[derive(Default)]
 pub struct PanelState {
     pub shown: bool,
     /// Which sections are open, as far as they have been shown.
@@ -58,26 +59,6 @@ impl PanelState {
     pub fn label_of(&mut self, session: &Session, entity: Entity) -> Option<String> {
         let inventory = self.inventory(session);
         inventory.objects.iter().find(|entry| entry.entity == entity).map(|entry| entry.label.clone())
-    }
-}
-
-impl Default for PanelState {
-    fn default() -> Self {
-        Self {
-            shown: false,
-            open: BTreeMap::new(),
-            section: None,
-            gizmo: None,
-            change: PictureChange::default(),
-            mesh_path: String::new(),
-            pressed: false,
-            inventory: None,
-            object_list: ListState::default(),
-            material_list: ListState::default(),
-            light_list: ListState::default(),
-            spheres: None,
-            material: None,
-        }
     }
 }
 
