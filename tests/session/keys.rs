@@ -3,7 +3,7 @@
 use crate::driver::{Drive, of_material};
 use firstlight::frame::{Command, Edit, MessageKind, Property, Session, SessionOptions, Target, render_offline};
 use firstlight::render::Film;
-use firstlight::scene::animation::{Interpolation, KeyValue, LightProperty, Shutter};
+use firstlight::scene::animation::{Interpolation, KeyValue, LightProperty, ObjectProperty, Shutter};
 use firstlight::scene::{Animation, Extraction, LoadOptions, Moment, Rendering, SceneInputs, SceneSource, load};
 use glam::DVec3;
 use std::path::Path;
@@ -219,4 +219,25 @@ fn keys_that_no_file_could_hold_are_refused() {
     driver.edit([KEY]);
     let said = driver.said(MessageKind::Warning);
     assert!(said.contains("animations of its own") && driver.animation().is_none(), "{said}");
+}
+
+#[test]
+fn edits_that_no_file_could_hold_change_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open(folder.path(), "s.ron", STILL);
+    let before = driver.inputs().objects[0].clone();
+    let id = before.entity.to_bits();
+    let far = 1e13 * DVec3::X;
+    driver.edit([
+        Edit::Select { id, add: false },
+        Edit::Move { by: far },
+        Edit::Scale { factors: DVec3::splat(1e-200) },
+    ]);
+    driver.edit([Edit::Set { id, property: Property::Object(ObjectProperty::Translate), value: far }]);
+    let said = driver.said(MessageKind::Warning);
+    assert!(said.contains("move by at most 1e12 m"), "{said}");
+    driver.edit([Edit::Set { id, property: Property::SphereRadius, value: far }]);
+    let said = driver.said(MessageKind::Warning);
+    assert!(said.contains("must lie between 1e-12 and 1e12 m"), "{said}");
+    assert!(driver.inputs().objects[0] == before);
 }

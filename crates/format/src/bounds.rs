@@ -72,7 +72,11 @@ pub(crate) fn check_point(field: &'static str, point: DVec3) -> Result<(), BadVa
     if good { Ok(()) } else { Err(BadValue::out_of_range(field, triple(point), coordinate_rule())) }
 }
 
-pub(crate) fn check_size(field: &'static str, size: f64) -> Result<(), BadValue> {
+/// Checks a length, metres.
+///
+/// # Errors
+/// If it is outside of what can be rendered.
+pub fn check_size(field: &'static str, size: f64) -> Result<(), BadValue> {
     if is_size(size) { Ok(()) } else { Err(BadValue::out_of_range(field, number(size), size_rule())) }
 }
 

@@ -414,19 +414,12 @@ impl Check<'_> {
             return None;
         }
         let placement = Placement::from_part(part);
-        let affine = placement.affine();
-        let determinant = affine.matrix3.determinant();
-        if !affine.is_finite() || affine.translation.abs().max_element() > bounds::MAX_COORDINATE {
-            self.wrong(
-                path,
-                format!("the transform must be finite and move by at most {:e} m", bounds::MAX_COORDINATE),
-            );
-            None
-        } else if !(bounds::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant.abs()) {
-            self.wrong(path, "the transform flattens the object: no scale may be 0");
-            None
-        } else {
-            Some(placement)
+        match placement.check() {
+            Ok(()) => Some(placement),
+            Err(why) => {
+                self.wrong(path, why);
+                None
+            }
         }
     }
 

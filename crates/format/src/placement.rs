@@ -1,5 +1,6 @@
 //! Transforms of objects from object space to the world, in `f64`.
 
+use crate::bounds::{MAX_COORDINATE, MIN_SIZE};
 use crate::parts::{ScalePart, TransformPart};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -37,6 +38,22 @@ impl Placement {
     /// At a point, without rotation or scale.
     pub fn at(translation: DVec3) -> Self {
         Self { translation, linear: Linear::default() }
+    }
+
+    /// Checks whether a scene file may have it.
+    ///
+    /// # Errors
+    /// If it is not finite, is too far away, or flattens what it places: a sentence without a full stop.
+    pub fn check(&self) -> Result<(), String> {
+        let affine = self.affine();
+        let determinant = affine.matrix3.determinant();
+        if !affine.is_finite() || affine.translation.abs().max_element() > MAX_COORDINATE {
+            return Err(format!("the transform must be finite and move by at most {MAX_COORDINATE:e} m"));
+        }
+        if !(MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant.abs()) {
+            return Err("the transform flattens the object: no scale may be 0".to_owned());
+        }
+        Ok(())
     }
 
     /// The placement that a transform in a scene file describes.

@@ -42,8 +42,8 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let change = change(own_box.map_or(last.translation, |own| own.middle()));
     for (entity, placement) in before {
         let changed = changed(&placement, &change, evenly);
-        // Compared first: a mutable borrow alone would mark a change.
-        if changed.affine().is_finite() && world.get::<Placement>(entity) != Some(&changed) {
+        // Compared first: a mutable borrow alone would mark a change. What no scene file could have stays as it was.
+        if changed.check().is_ok() && world.get::<Placement>(entity) != Some(&changed) {
             world.entity_mut(entity).insert(changed);
         }
     }

@@ -1,6 +1,7 @@
 //! Sets properties of materials, lights and shapes; those of the environment are in [`crate::frame::edit::sky`], those of the animation in
 //! [`crate::frame::edit::keys`].
 
+use crate::format::bounds::check_size;
 use crate::frame::edit::property::Property;
 use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
@@ -31,15 +32,15 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             if property == ObjectProperty::Scale && !(value.min_element() > 0.0) {
                 return Err("scale factors must be above 0".to_owned());
             }
-            set_if_different(world, entity, property.set(old, value));
+            let placement = property.set(old, value);
+            placement.check()?;
+            set_if_different(world, entity, placement);
         }
         Property::SphereRadius => {
             if !matches!(world.get::<Shape>(entity), Some(Shape::Sphere { .. })) {
                 return Err(wrong());
             }
-            if !(value.x > 0.0) {
-                return Err("a radius must be above 0".to_owned());
-            }
+            check_size("radius", value.x).map_err(|error| error.to_string())?;
             set_if_different(world, entity, Shape::Sphere { radius: value.x });
         }
         Property::Light(property) => {

@@ -136,7 +136,8 @@ impl StepsRecord {
             return Err(RecordError::Convergence);
         }
         let values = bits.map(f32::from_bits);
-        if values.iter().any(|&squared| squared < 0.0) {
+        // Those that are not known are no numbers.
+        if values.iter().any(|&squared| squared < 0.0 || squared.is_infinite()) {
             return Err(RecordError::Convergence);
         }
         Ok(Steps { at: *at, values })
@@ -383,10 +384,10 @@ impl FilmTile {
         if self.blocks.iter().any(|block| block.steps.at > 0) {
             let known = |local: usize| self.block_of(local).knows_half_step();
             self.half_steps = (0..n).map(|i| if known(i) { change(i, 0) } else { Vec3::NAN }).collect();
-            self.last = (0..n).map(|local| number(OF_LIGHT - 1, local)).collect();
+            self.last = (0..n).map(|local| number(OF_LIGHT - 1, local).max(0.0)).collect();
         }
         if self.light.steps.at > 0 {
-            self.light.last = (0..n).map(|local| number(N_CHANGE_PLANES - 1, local)).collect();
+            self.light.last = (0..n).map(|local| number(N_CHANGE_PLANES - 1, local).max(0.0)).collect();
         }
         if self.light.knows_half_step() {
             self.light.half_steps = (0..n).map(|local| change(local, OF_LIGHT)).collect();
@@ -432,7 +433,9 @@ mod tests {
     fn changes_of_doublings_are_squares() {
         let steps = |value: f32| StepsRecord(4, vec![value.to_bits(); Steps::KEPT]).steps(4);
         assert!(steps(0.25).is_ok() && steps(f32::NAN).is_ok(), "unknown ones are not numbers");
-        assert_eq!(steps(-0.25).err(), Some(RecordError::Convergence));
+        for wrong in [-0.25, f32::INFINITY] {
+            assert_eq!(steps(wrong).err(), Some(RecordError::Convergence));
+        }
     }
 
     #[test]
