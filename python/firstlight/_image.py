@@ -39,14 +39,20 @@ def wanted_layers(layers: Union[bool, str, List[str], None]) -> List[str]:
     return wanted
 
 
+def array_of(native: Any, data: Any, kind: Any, channels: int) -> np.ndarray:
+    """Bytes of an image as an array."""
+    shape = (native.height, native.width) + ((channels,) if channels > 1 else ())
+    return np.frombuffer(data, dtype=kind).reshape(shape)
+
+
 class Layers(Mapping[str, np.ndarray]):
     """The layers of an image by name, each an array; made when they are first asked for."""
 
-    def __init__(self, image: "Image", names: List[str]) -> None:
-        self._image = image
+    def __init__(self, native: Any, names: List[str]) -> None:
+        # Not the image, which has this: a circle would keep its memory until Python looks for circles.
+        self._native = native
         # The error is known from two samples per pixel on.
-        known = {name for name in names if name != "error" or image.error is not None}
-        self._names = [name for name in names if name in known]
+        self._names = [name for name in names if name != "error" or native.error is not None]
         self._arrays: Dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -54,7 +60,7 @@ class Layers(Mapping[str, np.ndarray]):
             raise KeyError(name)
         if name not in self._arrays:
             channels, kind = LAYERS[name]
-            self._arrays[name] = self._image._array(self._image._native.layer(name), kind, channels)
+            self._arrays[name] = array_of(self._native, self._native.layer(name), kind, channels)
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -85,11 +91,10 @@ class Image:
         #: Objects that could not be rendered, each with the reason.
         self.warnings: List[str] = native.warnings
         #: Layers by name: albedo, normal, position, depth, coverage, object, material, error, samples.
-        self.layers = Layers(self, layers)
+        self.layers = Layers(native, layers)
 
     def _array(self, data: Any, kind: Any, channels: int) -> np.ndarray:
-        shape = (self.height, self.width) + ((channels,) if channels > 1 else ())
-        return np.frombuffer(data, dtype=kind).reshape(shape)
+        return array_of(self._native, data, kind, channels)
 
     def numpy(self) -> np.ndarray:
         """Mean radiance, linear Rec. 709, not clamped: `float32`, height × width × 3. Not denoised."""
