@@ -382,12 +382,16 @@ impl Session {
             && saved
             && explained
             && self.world.resource::<BackgroundTasks>().is_idle()
+            && self.world.resource::<RenderState>().unsettled_since.is_none()
     }
 
     /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.
     ///
-    /// Everything in the background calls the waker, so only queued commands need a frame.
+    /// Everything in the background calls the waker, so only queued commands need a frame, and meshes that have come to
+    /// rest.
     pub fn next_wake(&self, now: Duration) -> Option<Duration> {
-        (!self.world.resource::<CommandQueue>().0.is_empty()).then_some(now)
+        let commands = (!self.world.resource::<CommandQueue>().0.is_empty()).then_some(now);
+        let sharing = self.world.resource::<RenderState>().next_sharing();
+        commands.into_iter().chain(sharing).min()
     }
 }

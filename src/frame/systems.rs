@@ -155,7 +155,7 @@ pub fn rebuild(
         }
         if rebuilt {
             trees.keep_used(inputs);
-            *unsettled_since = Some(clock.0);
+            *unsettled_since = waits_for_rest(inputs, trees, origin).then_some(clock.0);
             around.extent = extents.extent(inputs);
             around.corners = extents.corners(inputs);
             for problem in extraction.iter().flat_map(|extraction| &extraction.problems) {
@@ -173,12 +173,15 @@ pub fn rebuild(
         extraction.expose(animation, seconds, inputs, trees);
     }
     if std::mem::take(&mut shown.better_trees)
-        && let RenderState { inputs, extraction: Some(extraction), trees, generation, .. } = &mut *shown
+        && let RenderState { inputs, extraction: Some(extraction), trees, generation, unsettled_since, .. } =
+            &mut *shown
     {
         // The same hits, found faster: no sample is lost, and no restart is reported, unless a large mesh has come to rest.
         // After a restart it comes with the job.
         if !extraction.take_trees(inputs, trees) {
             changes.add(Level::Restart, "meshes came to rest");
+            // Where one has got a tree of its own meanwhile, it is still to be shared.
+            *unsettled_since = waits_for_rest(inputs, trees, extraction.origin).then_some(clock.0);
         }
         extraction.expose(animation, seconds, inputs, trees);
         if !changes.restarts() {
@@ -223,10 +226,24 @@ fn prepare_moves(shown: &mut RenderState, selected: &[Entity], beside: &Backgrou
     }
 }
 
+/// After so much time without a change, meshes share trees.
+const REST: Duration = Duration::from_millis(250);
+
+impl RenderState {
+    /// When meshes are to share trees, if they are not about to be moved on.
+    pub(crate) fn next_sharing(&self) -> Option<Duration> {
+        self.unsettled_since.filter(|_| !self.builds_statics).map(|since| since + REST)
+    }
+}
+
+/// Whether meshes are going to share trees once nothing has moved for a while.
+fn waits_for_rest(inputs: &SceneInputs, trees: &Trees, origin: DVec3) -> bool {
+    StaticJob::next(inputs, trees, origin).is_some()
+}
+
 /// Starts building trees that meshes share, once nothing has moved for a while.
 fn share_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer, now: Duration) {
-    const REST: Duration = Duration::from_millis(250);
-    let rests = shown.trees.has_preview_statics || shown.unsettled_since.is_some_and(|since| now >= since + REST);
+    let rests = shown.trees.has_preview_statics || shown.next_sharing().is_some_and(|then| now >= then);
     if shown.builds_statics || !rests {
         return;
     }

@@ -209,7 +209,9 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     until("the image", || image.is_file().then_some(()));
     assert_eq!(image::image_dimensions(&image).expect("a PNG"), (160, 120));
     let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
-    assert_eq!((shot.camera.eye, shot.denoised.as_deref()), (camera.eye, Some("own")), "as it was seen");
+    // The camera may still have glided a little; flying goes much farther.
+    let moved = shot.camera.eye.distance(camera.eye);
+    assert!(moved < 0.01 && shot.denoised.as_deref() == Some("own"), "as it was seen: {moved} m");
     until("its path", || {
         (program.output() + &program.errors()).contains("room-0001.png (160 × 120, noise ").then_some(())
     });
