@@ -72,7 +72,7 @@ mod tests {
             loaded.spawn(&mut world);
             let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
             let settings = world.resource::<Rendering>().0;
-            let pool = worker_threads().num_threads(2).stack_size(8 << 20).build().expect("two threads");
+            let pool = worker_threads().num_threads(2).stack_size(16 << 20).build().expect("two threads");
             let target = Target { spp: Some(2), ..Target::default() };
             let mut film = Film::new(40, 32);
             pool.install(|| render_offline(&extraction.prepared, &settings, &mut film, target, |_| true));
