@@ -13,7 +13,9 @@ use glam::Vec3;
 use std::path::Path;
 
 fn open(source: SceneSource) -> (World, LoadedScene) {
-    let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    // With trees that are built several times as fast.
+    let options = LoadOptions { preview: true, ..LoadOptions::default() };
+    let scene = load(&source, &options).unwrap_or_else(|error| panic!("{error}"));
     let mut world = World::new();
     scene.spawn(&mut world);
     (world, scene)
