@@ -18,6 +18,7 @@ mod known_meshes;
 mod library;
 mod load;
 mod load_meshes;
+mod load_pictures;
 mod load_stage;
 mod loaded;
 mod metadata_draft;
