@@ -1,7 +1,7 @@
 //! The best linear function of the features in one window, and its error.
 
 use crate::denoise::moments::{
-    Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product,
+    Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SCATTER, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product,
 };
 use crate::denoise::noise::significant_part;
 use crate::denoise::parallel::{Stop, each};
@@ -15,6 +15,10 @@ const LEAST_MISFIT: f32 = 1e-4;
 /// Share of the squared distance from the mean features by which misfit grows: it is not noise, and much of it comes from
 /// places with features like those of the pixel.
 const MISFIT_BY_DISTANCE: f32 = 0.1;
+
+/// Mean square of the difference of a squared residual and its variance, over the squared variance: each of both scatters
+/// by 2 of it if the noise is normal.
+const SCATTER_OF_EXCESS: f32 = 4.0;
 
 /// Light as a linear function of the features, by ridge regression in a window.
 #[derive(Clone, Copy, Debug, Zeroable)]
@@ -193,14 +197,16 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES], significance: f32) -> Fit {
     // Share of the noise that is left in the residuals.
     let left = (1.0 - freedom * inverse_count).max(0.1);
     let noise = sums[VARIANCE] * inverse_weight;
-    // Both are means over the degrees of freedom that are left.
-    let deviation = (residual + noise * left) / (sums[COUNT] - freedom).max(2.0).sqrt();
+    // Both are means over the degrees of freedom that are left, of squared residuals and variances that scatter as much as
+    // those of single samples: where few of these are bright, much more than normal noise would.
+    let scatter = (SCATTER_OF_EXCESS * sums[SCATTER] * inverse_weight).sqrt();
+    let deviation = significance * scatter / (sums[COUNT] - freedom).max(2.0).sqrt();
     Fit {
         mean,
         precision,
         light,
         slope,
-        misfit: significant_part((residual - noise * left).max(0.0), significance * deviation),
+        misfit: significant_part((residual - noise * left).max(0.0), deviation),
         noise,
         unbias: 1.0 / left,
         inverse_count,

@@ -16,7 +16,7 @@ pub(super) const X: usize = 4;
 pub(super) const Y: usize = 5;
 
 /// Layout of [`Sums`]: weights, features, products of features, light per channel, its products with features, squares
-/// of light, variances, and the number of pixels. All but the last are weighted.
+/// of light, variances, their squares, and the number of pixels. All but the last are weighted.
 pub(super) const WEIGHT: usize = 0;
 pub(super) const FEATURE: usize = 1;
 const PRODUCT: usize = FEATURE + N_FEATURES;
@@ -24,7 +24,8 @@ pub(super) const LIGHT: usize = PRODUCT + N_FEATURES * (N_FEATURES + 1) / 2;
 pub(super) const MIXED: usize = LIGHT + 3;
 pub(super) const SQUARE: usize = MIXED + 3 * N_FEATURES;
 pub(super) const VARIANCE: usize = SQUARE + 1;
-pub(super) const COUNT: usize = VARIANCE + 1;
+pub(super) const SCATTER: usize = VARIANCE + 1;
+pub(super) const COUNT: usize = SCATTER + 1;
 const N_SUMS: usize = COUNT + 1;
 
 /// The sums of one block or window.
@@ -130,6 +131,7 @@ fn add_pixel(sums: &mut Sums, samples: &Samples, pixel: usize, x: f32, y: f32) {
     sums[WEIGHT] += weight;
     sums[COUNT] += 1.0;
     sums[VARIANCE] += weight * samples.variance[pixel];
+    sums[SCATTER] += weight * samples.variance[pixel] * samples.variance[pixel];
     sums[SQUARE] += weight * light.length_squared();
     for c in 0..3 {
         sums[LIGHT + c] += weight * light[c];

@@ -1,6 +1,5 @@
 //! The noise of the raw image, and how much of it a filter passes on.
 
-use crate::denoise::blur::{RADIUS, n_averaged};
 use crate::denoise::input::DenoiseInput;
 use crate::denoise::parallel::{Stop, each};
 use crate::sampling::hash_u32;
@@ -14,6 +13,12 @@ pub(super) struct Noise {
     pub at_emitters: Vec<bool>,
     /// What fireflies have more of than usual samples, radiance of each pixel; see [`crate::denoise::limit`].
     pub excess: Vec<Vec3>,
+    /// Variance without that, relative to `variance`.
+    pub usual: Vec<f32>,
+    /// Variance that independent samples would have, relative to `variance`, at least 1. What samples that are spread
+    /// evenly gain is known for the whole image only, and within a factor of two: where grains must not pass for detail,
+    /// nothing is gained.
+    pub independent: f32,
 }
 
 /// A filtered image.
@@ -22,23 +27,12 @@ pub(super) struct FilteredNoise {
     pub color: Vec<Vec3>,
     /// Covariance of raw and filtered value, per channel: the part of the noise that is common to both; noisy.
     pub covariance: Vec<Vec3>,
-    /// What the filter's own model cannot explain of its input, squared, per channel: a sign of bias.
+    /// What the filter's own model cannot explain of its input, squared, per channel: a sign of bias; 0 if it has none.
     pub misfit: Vec<Vec3>,
 }
 
-/// Standard deviations by which the squared difference must exceed its expectation to be taken for bias. With less, grains
-/// of noise would remain wherever it is large at random.
-const SIGNIFICANCE: f32 = 3.0;
-
-/// Returns what is likely to be the squared bias of the filter.
-///
-/// - `difference`: of raw and filtered value, squared, local mean; `variance`: of the raw value; `own`: covariance of both.
-pub(super) fn squared_bias(difference: f32, variance: f32, own: f32) -> f32 {
-    let excess = (difference - variance + own).max(0.0);
-    // Without bias it is a mean of products of the errors of both halves.
-    let deviation = (difference + variance) / n_averaged(RADIUS).sqrt();
-    significant_part(excess, SIGNIFICANCE * deviation)
-}
+/// Standard deviation of the variance of the whole image, relative to it: how well the halves of the samples tell it.
+pub(super) const VARIANCE_UNCERTAINTY: f32 = 0.2;
 
 /// Returns the part of an excess that is hardly random: nearly all of it far above its standard deviation, next to nothing
 /// far below.
@@ -50,10 +44,12 @@ pub(super) fn significant_part(excess: f32, deviation: f32) -> f32 {
 /// Size of the probe's change of the image, relative to its noise: small enough for a filter to be nearly linear in it.
 const PROBE: f32 = 0.25;
 
-/// Misfit of a filter about which nothing is known, relative to the variance of its result.
-const MISFIT_PER_VARIANCE: f32 = 1.2;
-
 impl Noise {
+    /// Variance of a pixel without what fireflies have more of, per channel.
+    pub fn usual(&self, pixel: usize) -> Vec3 {
+        self.usual[pixel] * self.variance[pixel]
+    }
+
     /// Applies a filter about which nothing is known; `None` if it fails or `stop` returned true.
     ///
     /// How much noise it passes on is measured by a second image, changed by a multiple of the actual noise: the mean
@@ -77,8 +73,6 @@ impl Noise {
         let changed = each(n, stop, |i| input.color[i] + PROBE * noise(i))?;
         let of_changed = filter(&changed)?;
         let covariance: Vec<Vec3> = each(n, stop, |i| (of_changed[i] - color[i]) * noise(i) / PROBE)?;
-        // Good filters let bias and variance grow alike.
-        let misfit = each(n, stop, |i| MISFIT_PER_VARIANCE * covariance[i])?;
-        Some(FilteredNoise { color, covariance, misfit })
+        Some(FilteredNoise { color, covariance, misfit: vec![Vec3::ZERO; n] })
     }
 }

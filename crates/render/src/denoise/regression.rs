@@ -9,7 +9,7 @@
 //! windows dominate where light is smooth, small ones at the edges of shadows, and windows that an edge does not cross
 //! dominate over those that it does.
 
-use crate::denoise::blur::blur;
+use crate::denoise::blur::{Pooled, blur};
 use crate::denoise::fit::Fits;
 use crate::denoise::input::DenoiseInput;
 use crate::denoise::limit::limit;
@@ -30,10 +30,21 @@ pub(super) struct Candidate {
     pub misfit: f32,
 }
 
-/// Both candidates of each pixel, and the noise of the raw image.
+impl Candidate {
+    /// - `share`: of the other one.
+    fn mixed(&self, other: &Self, share: f32) -> Self {
+        let mix = |own: f32, other: f32| own + (other - own) * share;
+        let color = self.color.lerp(other.color, share);
+        Self { color, own: mix(self.own, other.own), misfit: mix(self.misfit, other.misfit) }
+    }
+}
+
+/// Candidates of each pixel: from windows of all sizes, from those that are small, and from the smallest only.
+pub(super) type Candidates = [Candidate; 3];
+
+/// The candidates of all pixels, and the noise of the raw image.
 pub(super) struct Regression {
-    /// From windows of all sizes, and from small windows only.
-    pub candidates: Vec<[Candidate; 2]>,
+    pub candidates: Vec<Candidates>,
     pub noise: Noise,
 }
 
@@ -42,6 +53,8 @@ const N_LEVELS: u32 = 5;
 /// Standard deviations by which residuals must exceed the noise to be taken for misfit, if the noise is known apart from
 /// them.
 const SIGNIFICANCE: f32 = 3.0;
+/// How many times as much as by noise alone candidates must differ for that of the smaller windows to be taken.
+const LEAST_DIFFERENCE: f32 = 2.5;
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
@@ -97,6 +110,8 @@ impl RegressionStart {
         let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
         let mut samples = samples(input, &albedo, &at_emitters, stop)?;
         let excess = limit(input, &albedo, &at_emitters, &mut samples, stop)?;
+        let independent = input.half_steps.map_or(1.0, |halves| halves.calibration.min(1.0).max(1e-3).recip());
+        samples.variance.iter_mut().for_each(|variance| *variance *= independent);
         let mut blocks = Blocks::finest(&samples, stop)?;
         let variance = match input.half_steps {
             Some(halves) => each(n, stop, |i| halves.variance(i))?,
@@ -107,7 +122,11 @@ impl RegressionStart {
                 each(n, stop, |i| samples.variance[i] / 3.0 * albedo[i] * albedo[i])?
             }
         };
-        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess } })
+        let usual = each(n, stop, |i| {
+            let all = (variance[i] / (albedo[i] * albedo[i])).element_sum();
+            (samples.variance[i] / (independent * all).max(1e-30)).min(1.0)
+        })?;
+        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess, usual, independent } })
     }
 }
 
@@ -173,6 +192,7 @@ fn residuals(samples: &Samples, fits: &Fits, stop: Stop) -> Option<Vec<f32>> {
 }
 
 /// The weighted mean over windows at one pixel.
+#[derive(Clone, Copy)]
 struct Predicted {
     /// Light over albedo.
     light: Vec3,
@@ -181,19 +201,15 @@ struct Predicted {
     misfit: f32,
 }
 
-/// Returns the mean over all windows that contain a pixel, and over the small ones.
+/// Returns the means over the windows that contain a pixel: over all, over small ones, and over the smallest.
 ///
-/// - `n_small`: number of window sizes that count as small.
+/// - `n_small`: number of window sizes that count as the smallest; the small ones are of one size more.
 #[inline(always)]
-fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize) -> [Predicted; 2] {
+fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize) -> [Predicted; 3] {
     let pixel = y * samples.width + x;
     let features: &[f32; N_FEATURES] = &samples.features[pixel];
     let (mut light, mut own, mut misfit, mut total) = (Vec3::ZERO, 0.0, 0.0, 0.0);
-    let mean = |light: Vec3, own: f32, misfit: f32, total: f32| {
-        let total = total.max(1e-30);
-        Predicted { light: light / total, own: own / total, misfit: misfit / total }
-    };
-    let mut small = mean(light, own, misfit, total);
+    let mut found = [Predicted { light, own, misfit }; 3];
     for fits in levels {
         fits.around(x, y, features, |fit, features, nearness| {
             let prediction = fit.predict(features);
@@ -204,55 +220,51 @@ fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize)
             misfit += weight * fit.misfit;
             total += weight;
         });
-        if fits.level <= n_small {
-            small = mean(light, own, misfit, total);
-        }
+        let by = total.max(1e-30).recip();
+        // The smaller ones keep what they have once the windows are larger.
+        let n = if fits.level <= n_small {
+            3
+        } else if fits.level == n_small + 1 {
+            2
+        } else {
+            1
+        };
+        found[..n].fill(Predicted { light: light * by, own: own * by, misfit: misfit * by });
     }
-    [mean(light, own, misfit, total), small]
+    found
 }
 
-/// Blends both candidates per pixel, with weights that favour the smaller estimated risk (SURE, Stein 1981: the risk of
-/// a filter follows from its squared distance from its input, the variance, and the weight of a pixel's own value;
-/// it needs no reference). `None` if `stop` returned true.
+/// Goes from windows of all sizes to smaller ones where these differ by more than the noise that they have more of: there
+/// the larger ones miss something. Compared with each other, both have so little noise that a difference tells more
+/// than that of either from the raw image, above all where few samples are bright. `None` if `stop` returned true.
 pub(super) fn pick(
     input: &DenoiseInput,
-    candidates: &[[Candidate; 2]],
+    candidates: &[Candidates],
     of_raw: &Noise,
     stop: Stop,
 ) -> Option<FilteredNoise> {
     let n = input.n_pixels();
     let level = |i: usize| (candidates[i][0].color * candidates[i][0].color + 0.01).recip();
-    let smooth = |of: &(dyn Fn(usize) -> f32 + Sync)| blur(&each(n, stop, of)?, input.width, input.height, 1, stop);
-    let risk = |which: usize| {
-        let of_pixel = |i: usize| {
-            let (of, variance) = (candidates[i][which], of_raw.variance[i]);
-            let off = of.color - input.color[i];
-            level(i).dot(off * off - (1.0 - 2.0 * of.own) * variance)
+    let pooled = Pooled::of(input, &of_raw.at_emitters, stop)?;
+    let mut picked: Vec<Candidate> = each(n, stop, |i| candidates[i][0])?;
+    for k in 1..candidates[0].len() {
+        let smaller = |i: usize| &candidates[i][k];
+        let off = |i: usize| smaller(i).color - picked[i].color;
+        let difference = pooled.narrow(&|i| level(i).dot(off(i) * off(i)), stop)?;
+        let more = |i: usize| (smaller(i).own - picked[i].own).max(0.0) * level(i).dot(of_raw.usual(i));
+        let noise = pooled.mean(&more, stop)?;
+        let share = |i: usize| {
+            let by_noise = LEAST_DIFFERENCE * of_raw.independent * noise[i];
+            let ratio = (difference[i].max(0.0) / by_noise.max(1e-30)).min(1e9);
+            1.0 / (1.0 + ratio.powi(4))
         };
-        smooth(&of_pixel)
-    };
-    let noise = smooth(&|i| level(i).dot(of_raw.variance[i]))?;
-    let (of_all, of_small) = (risk(0)?, risk(1)?);
-    let share = |i: usize| {
-        let [a, b] = [of_all[i], of_small[i]].map(|risk| (risk.max(0.02 * noise[i]) + 1e-9).powi(2));
-        b / (a + b)
-    };
-    let share = smooth(&share)?;
-    let own = |i: usize| {
-        let [all, small] = candidates[i].map(|of| of.own);
-        small + (all - small) * share[i]
-    };
-    let misfit = |i: usize| {
-        let ([all, small], albedo) = (candidates[i].map(|of| of.misfit), input.guides.albedo[i]);
-        (small + (all - small) * share[i]) / 3.0 * albedo * albedo
-    };
-    let color = |i: usize| {
-        let [all, small] = candidates[i].map(|of| of.color);
-        small.lerp(all, share[i])
-    };
+        let share = blur(&each(n, stop, share)?, input.width, input.height, 1, stop)?;
+        picked = each(n, stop, |i| smaller(i).mixed(&picked[i], share[i]))?;
+    }
+    let albedo = &input.guides.albedo;
     Some(FilteredNoise {
-        color: each(n, stop, color)?,
-        covariance: each(n, stop, |i| own(i) * of_raw.variance[i])?,
-        misfit: each(n, stop, misfit)?,
+        color: each(n, stop, |i| picked[i].color)?,
+        covariance: each(n, stop, |i| picked[i].own * of_raw.usual(i))?,
+        misfit: each(n, stop, |i| picked[i].misfit / 3.0 * albedo[i] * albedo[i])?,
     })
 }

@@ -7,71 +7,40 @@
 //!
 //! - The variance of the filtered value follows from its covariance with the raw value. For a projection they are equal;
 //!   a mean of projections over several windows has less.
-//! - Its squared bias is what differs from the raw value by more than noise can, and a part of the misfit of the windows
-//!   and of the variance, even if too small to be seen: windows are weighted by expected squared error, and where that
-//!   is least, bias and variance are of the same size.
+//! - Its squared bias is what differs from the raw value by more than noise can; and even if that is too small to be seen,
+//!   it is as large as the misfit of the windows and the variance: windows are weighted by expected squared error, and
+//!   where that is least, bias and variance are of the same size.
 //! - The variance of the raw value is averaged over a wide neighbourhood, and larger where it is mixed with the filtered
 //!   one: the narrow neighbourhood has decided the shares, which are raw where its variance is too small at random.
 
-use crate::denoise::blur::{Apart, RADIUS};
+use crate::denoise::comparison::Comparison;
 use crate::denoise::input::DenoiseInput;
-use crate::denoise::noise::{FilteredNoise, Noise, squared_bias};
-use crate::denoise::parallel::{Stop, each};
-use glam::Vec3;
+use crate::denoise::noise::VARIANCE_UNCERTAINTY;
 use rayon::prelude::*;
 
-/// Radius in pixels of the two box filters that average the variance of the raw image.
-const WIDE_RADIUS: usize = 6;
 /// Variance of the filtered value over its covariance with the raw one.
 const OWN_VARIANCE: f32 = 0.85;
-/// Squared bias that is too small to be seen, relative to the covariance and to the misfit.
-const LEAST_BIAS: f32 = 0.15;
-const MISFIT_BIAS: f32 = 0.35;
 /// How much the variance of the raw value is too small where the filtered share is large, relative to both.
 const AT_RANDOM: f32 = 1.5;
-/// Level of pixels that show an emitter in part: their own value less this multiple of the step.
-const EMITTER_STEPS: f32 = 0.5;
 
-/// Standard deviations of parts of the estimate, relative to their mean: of the squared bias, of the error of a tile, and
-/// of the variance of the raw image.
+/// Standard deviations of parts of the estimate, relative to their mean: of the squared bias, and of a tile.
 const BIAS_UNCERTAINTY: f64 = 0.5;
 const TILE_UNCERTAINTY: f64 = 0.5;
-const VARIANCE_UNCERTAINTY: f64 = 0.2;
 /// Side in pixels of the tiles whose errors are independent.
 const TILE: usize = 32;
 
-/// Estimated root of relMSE of the combined image, and the bounds of its interval; `None` if `stop` returned true.
+/// Estimated root of relMSE of the combined image, and the bounds of its interval.
 ///
 /// - `share`: filtered share of each pixel.
-pub(super) fn error_of(
-    input: &DenoiseInput,
-    noise: &Noise,
-    filtered: &FilteredNoise,
-    share: &[f32],
-    stop: Stop,
-) -> Option<(f64, [f64; 2])> {
+pub(super) fn error_of(input: &DenoiseInput, of: &Comparison, share: &[f32]) -> (f64, [f64; 2]) {
     let n = input.n_pixels();
-    let weight: Vec<Vec3> = each(n, stop, |i| one_over_level(input, noise, filtered, i))?;
-    let of_radius = |radius| Apart::of(input, &noise.at_emitters, radius, stop);
-    let (narrow, wide) = (of_radius(RADIUS)?, of_radius(WIDE_RADIUS)?);
-    let smooth = |apart: &Apart, of: &(dyn Fn(usize) -> Vec3 + Sync)| {
-        apart.smooth(&each(n, stop, |i| weight[i].dot(of(i)))?, stop)
-    };
-    let variance = smooth(&narrow, &|i| noise.variance[i])?;
-    let wide_variance = smooth(&wide, &|i| noise.variance[i])?;
-    let own = smooth(&narrow, &|i| filtered.covariance[i])?;
-    let misfit = smooth(&narrow, &|i| filtered.misfit[i])?;
-    let difference = smooth(&narrow, &|i| {
-        let off = input.color[i] - filtered.color[i];
-        off * off
-    })?;
     // Risk and squared bias.
     let of_pixel = |i: usize| {
         let (s, rest) = (share[i], 1.0 - share[i]);
-        let own = own[i].max(0.0);
-        let unseen = LEAST_BIAS * own + MISFIT_BIAS * misfit[i].max(0.0);
-        let bias = s * s * (squared_bias(difference[i], variance[i], own) + unseen);
-        let of_raw = rest * rest * (1.0 + AT_RANDOM * s) * wide_variance[i];
+        let own = of.covariance[i].max(0.0);
+        let unseen = own + of.misfit[i].max(0.0);
+        let bias = s * s * (of.bias[i] + unseen);
+        let of_raw = rest * rest * (1.0 + AT_RANDOM * s) * of.variance[i];
         let risk = of_raw + (2.0 * rest + OWN_VARIANCE * s) * s * own + bias;
         (f64::from(risk), f64::from(bias))
     };
@@ -94,21 +63,6 @@ pub(super) fn error_of(
     // On the logarithm, where a sum of positive terms is closer to symmetric.
     let of_tiles = of_tiles.iter().map(|risk| risk * risk).sum::<f64>().sqrt() * TILE_UNCERTAINTY;
     let relative = of_tiles.hypot(of_bias * BIAS_UNCERTAINTY) / sum.max(1e-30);
-    let factor = (0.5 * 1.96 * relative.hypot(VARIANCE_UNCERTAINTY)).exp();
-    Some((error, [error / factor, error * factor]))
-}
-
-/// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its
-/// samples if that is brighter. A single bright sample is in one half only. Relative to a filtered image that blurs
-/// lights, their noise would dominate the error of the whole image.
-fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &FilteredNoise, i: usize) -> Vec3 {
-    let darker_half = match input.half_steps {
-        // The filter has no information about pixels that show a light in part.
-        Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.spread(i),
-        Some(halves) => input.color[i] - halves.spread(i),
-        None if noise.at_emitters[i] => input.color[i],
-        None => Vec3::ZERO,
-    };
-    let level = filtered.color[i].max(darker_half);
-    (level * level + 0.01).recip()
+    let factor = (0.5 * 1.96 * relative.hypot(f64::from(VARIANCE_UNCERTAINTY))).exp();
+    (error, [error / factor, error * factor])
 }

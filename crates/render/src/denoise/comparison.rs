@@ -1,0 +1,80 @@
+//! What raw and filtered image show of each other.
+//!
+//! Squared difference and variance are as uncertain as single samples, and where few of these are bright, both are made by
+//! them: so what exceeds the variance, with fireflies and without, counts as bias as far as its mean over a neighbourhood
+//! is far above the deviation that such a mean has. Else grains of noise would remain wherever it is large at random:
+//! without samples that show a bias, blur is better.
+
+use crate::denoise::blur::{Pooled, RADIUS, n_averaged};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::noise::{FilteredNoise, Noise, VARIANCE_UNCERTAINTY};
+use crate::denoise::parallel::{Stop, each};
+use glam::Vec3;
+
+/// Standard deviations by which the squared difference must exceed its expectation to be taken for bias.
+const SIGNIFICANCE: f32 = 3.0;
+
+/// Mean square of what the squared difference exceeds the variance by, over that of the variance, for normal noise.
+const SQUARE_OF_EXCESS: f32 = 4.0 / 3.0;
+/// Level of pixels that show an emitter in part: their own value less this multiple of the step.
+const EMITTER_STEPS: f32 = 0.5;
+
+/// What is known of raw and filtered image around each pixel: local means, relative to its squared level, sums over
+/// channels.
+pub(super) struct Comparison {
+    /// What filtering takes off the variance.
+    pub gain: Vec<f32>,
+    /// Variance of the raw value.
+    pub variance: Vec<f32>,
+    /// Covariance of raw and filtered value.
+    pub covariance: Vec<f32>,
+    /// Misfit of the filter.
+    pub misfit: Vec<f32>,
+    /// What is likely to be the squared bias of the filter.
+    pub bias: Vec<f32>,
+}
+
+impl Comparison {
+    /// `None` if `stop` returned true.
+    pub fn of(input: &DenoiseInput, noise: &Noise, filtered: &FilteredNoise, stop: Stop) -> Option<Self> {
+        let n = input.n_pixels();
+        let weight: Vec<Vec3> = each(n, stop, |i| one_over_level(input, noise, filtered, i))?;
+        let pooled = Pooled::of(input, &noise.at_emitters, stop)?;
+        let narrow = |of: &(dyn Fn(usize) -> f32 + Sync)| pooled.narrow(of, stop);
+        let beyond = |off: Vec3, variance: Vec3, i: usize| weight[i].dot(off * off - variance + filtered.covariance[i]);
+        let of_all = narrow(&|i| beyond(filtered.color[i] - input.color[i], noise.variance[i], i))?;
+        let of_usual = narrow(&|i| beyond(filtered.color[i] - input.color[i] + noise.excess[i], noise.usual(i), i))?;
+        let squares = pooled.mean(&|i| weight[i].dot(noise.usual(i)).powi(2), stop)?;
+        let variance = pooled.wide(&|i| weight[i].dot(noise.variance[i]), stop)?;
+        let bias = each(n, stop, |i| {
+            let excess = of_all[i].min(of_usual[i]).max(0.0);
+            // Both squared difference and variance have one degree of freedom per channel.
+            let square = SQUARE_OF_EXCESS * squares[i].max(0.0);
+            let deviation = SIGNIFICANCE * (square / n_averaged(RADIUS)).sqrt();
+            let ratio = excess / deviation.hypot(VARIANCE_UNCERTAINTY * variance[i]).max(1e-30);
+            excess - excess / (1.0 + ratio.powi(4))
+        })?;
+        Some(Self {
+            gain: pooled.mean(&|i| weight[i].dot(noise.variance[i] - filtered.covariance[i]), stop)?,
+            covariance: narrow(&|i| weight[i].dot(filtered.covariance[i]))?,
+            misfit: narrow(&|i| weight[i].dot(filtered.misfit[i]))?,
+            variance,
+            bias,
+        })
+    }
+}
+
+/// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its
+/// samples if that is brighter. A single bright sample is in one half only. Relative to a filtered image that blurs
+/// lights, their noise would dominate the error of the whole image.
+fn one_over_level(input: &DenoiseInput, noise: &Noise, filtered: &FilteredNoise, i: usize) -> Vec3 {
+    let darker_half = match input.half_steps {
+        // The filter has no information about pixels that show a light in part.
+        Some(halves) if noise.at_emitters[i] => input.color[i] - EMITTER_STEPS * halves.spread(i),
+        Some(halves) => input.color[i] - halves.spread(i),
+        None if noise.at_emitters[i] => input.color[i],
+        None => Vec3::ZERO,
+    };
+    let level = filtered.color[i].max(darker_half);
+    (level * level + 0.01).recip()
+}
