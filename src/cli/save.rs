@@ -18,7 +18,8 @@ pub struct SaveArgs {
     /// meshes and images in a folder beside it.
     #[arg(short, long, value_name = "OUT.ron|.pbrt|.xml")]
     output: PathBuf,
-    /// Replace an existing scene file, whose comments and layout are lost.
+    /// Replace an existing scene file, whose comments and layout are lost. The folder of a scene of pbrt or Mitsuba
+    /// stays; the new one has another name.
     #[arg(long)]
     overwrite: bool,
 }
@@ -42,9 +43,11 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     if let Some(format) = format {
-        let warnings = export(&whole_scene(&mut world, &scene), format, &args.output, args.overwrite)?;
-        tell(&warnings);
-        inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced())));
+        let exported = export(&whole_scene(&mut world, &scene), format, &args.output, args.overwrite)?;
+        tell(&exported.warnings);
+        let folder = exported.folder.map(|folder| format!(", its meshes and images in {}", folder.display()));
+        let folder = folder.unwrap_or_default();
+        inform(format_args!("{}: scene saved{folder}{}", args.output.display(), replaced(files.replaced())));
         return Ok(());
     }
     let description = Description::of(&mut world, Some(&scene));

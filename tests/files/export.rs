@@ -27,7 +27,7 @@ fn there_and_back(from: SceneSource, format: SceneFormat, folder: &Path) -> (Wor
     let path = folder.join(format!("out.{}", format.file_extension()));
     let told = export(&whole_scene(&mut world, &scene), format, &path, true).unwrap();
     let (world, scene) = open(SceneSource::Foreign(path));
-    (world, scene, told.iter().map(|warning| warning.to_string()).collect())
+    (world, scene, told.warnings.iter().map(|warning| warning.to_string()).collect())
 }
 
 fn written(folder: &Path, text: &str) -> SceneSource {
@@ -211,5 +211,59 @@ fn scenes_with_any_names_open_again() {
         let again = open(SceneSource::Foreign(path)).1;
         assert!(again.warnings.is_empty(), "{format:?}: {:?}", again.warnings);
         assert_eq!((again.file.objects.len(), again.file.materials.names().count()), (names.len(), names.len()));
+    }
+}
+
+/// What is in the folder that a scene would get may be a link to anything, or what the scene is read from.
+#[test]
+fn nothing_beside_a_scene_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for beside in ["out-xml", "out-pbrt"] {
+        std::fs::create_dir(at(beside)).unwrap();
+        std::fs::write(at(&format!("{beside}/chair.obj")), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        std::fs::write(at(&format!("{beside}/table.ply")), "mine").unwrap();
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(at("away"), at(&format!("{beside}-2"))).unwrap();
+            std::os::unix::fs::symlink(at("notes"), at(&format!("{beside}/chair.ply"))).unwrap();
+        }
+    }
+    std::fs::write(at("notes"), "mine").unwrap();
+    let (mut world, scene) = open(written(
+        folder.path(),
+        "(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), environment: constant(1), materials: { \"m\": diffuse(albedo: 0.5) },
+          objects: [ mesh(name: \"chair\", source: obj(\"out-xml/chair.obj\"), material: \"m\"),
+                     mesh(name: \"table\", source: obj(\"out-pbrt/chair.obj\"), material: \"m\") ])",
+    ));
+    let whole = whole_scene(&mut world, &scene);
+    for format in SceneFormat::ALL {
+        let path = at(&format!("out.{}", format.file_extension()));
+        let mut names = Vec::new();
+        for _ in 0..2 {
+            let exported = export(&whole, format, &path, true).unwrap();
+            names.push(exported.folder.unwrap().file_name().unwrap().to_str().unwrap().to_owned());
+            assert!(open(SceneSource::Foreign(path.clone())).1.warnings.is_empty());
+        }
+        let numbers = if cfg!(unix) { ["3", "4"] } else { ["2", "3"] };
+        assert_eq!(names, numbers.map(|n| format!("out-{}-{n}", format.file_extension())));
+    }
+    for untouched in ["notes", "out-xml/table.ply", "out-pbrt/table.ply"] {
+        assert_eq!(std::fs::read(at(untouched)).unwrap(), b"mine", "{untouched}");
+    }
+    assert!(at("out-xml/chair.obj").exists() && !at("away").exists());
+}
+
+#[test]
+fn a_scene_that_cannot_be_written_leaves_no_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut world, scene) = open(SceneSource::Builtin("models".into()));
+    let whole = whole_scene(&mut world, &scene);
+    for format in SceneFormat::ALL {
+        let path = folder.path().join(format!("out.{}", format.file_extension()));
+        std::fs::create_dir(&path).unwrap();
+        assert!(export(&whole, format, &path, true).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        std::fs::remove_dir(&path).unwrap();
     }
 }

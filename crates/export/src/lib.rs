@@ -17,20 +17,29 @@ use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::{write_new, write_whole};
 use firstlight_files::write_error::WriteError;
 use firstlight_format::scene_format::SceneFormat;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Writes a scene in the format of another renderer, with a folder of meshes and images beside it. Returns what it
-/// cannot say.
+/// What was written.
+#[derive(Debug)]
+pub struct Exported {
+    /// The folder of meshes and images, if there are any.
+    pub folder: Option<PathBuf>,
+    /// What the format cannot say.
+    pub warnings: Warnings,
+}
+
+/// Writes a scene in the format of another renderer, with a new folder of meshes and images beside it. The scene is
+/// written last, so that whatever happens it and its files belong together.
 ///
-/// - `overwrite`: whether an existing scene of this name is replaced, with the files that it has of the same names.
+/// - `overwrite`: whether an existing scene of this name is replaced. The folder that it had stays.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: bool) -> Result<Warnings, WriteError> {
+pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: bool) -> Result<Exported, WriteError> {
     if !overwrite && path.exists() {
         return Err(WriteError::Exists(path.to_path_buf()));
     }
-    let mut folder = Folder::beside(path, overwrite);
+    let mut folder = Folder::beside(path);
     let mut warnings = scene.losses.clone();
     let text = match format {
         SceneFormat::Pbrt => {
@@ -39,10 +48,11 @@ pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: b
         }
         SceneFormat::Mitsuba => mitsuba::text(scene, &mut folder, &mut warnings)?,
     };
-    if overwrite {
-        write_whole(path, text.as_bytes())?
-    } else {
-        write_new(path, text.as_bytes())?
-    }
-    Ok(warnings)
+    let folder = folder.finish()?;
+    let write = if overwrite { write_whole } else { write_new };
+    write(path, text.as_bytes()).inspect_err(|_| {
+        // Nothing names its files.
+        folder.iter().for_each(|folder| drop(std::fs::remove_dir_all(folder)));
+    })?;
+    Ok(Exported { folder, warnings })
 }

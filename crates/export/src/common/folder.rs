@@ -5,21 +5,24 @@ use crate::common::ply;
 use crate::common::scene::WholeScene;
 use crate::common::surface::Use;
 use firstlight_files::input_file::{FileKind, InputFile};
+use firstlight_files::new_folder::NewFolder;
 use firstlight_files::relative::{path_to_text, text_to_path};
-use firstlight_files::whole_file::{Replace, WholeFile, unwritable};
+use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
 use firstlight_format::names::Names;
 use firstlight_mesh::Mesh;
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A folder that gets its files one by one; each is written whole.
+/// A new folder that gets its files one by one, and its name when the scene is complete. No file of another one is ever
+/// replaced: an older folder may have what the scene is read from.
 pub(crate) struct Folder {
     path: PathBuf,
     /// Its name, as the scene says it.
     name: String,
+    /// `None` before its first file.
+    new: Option<NewFolder>,
     taken: Names,
     meshes: HashMap<MeshKey, String>,
     pictures: HashMap<String, Picture>,
@@ -29,10 +32,8 @@ pub(crate) struct Folder {
 pub(crate) type MeshKey = (usize, Option<u16>, bool);
 
 impl Folder {
-    /// The folder of a scene, named after it: `kitchen-xml` of `kitchen.xml`. It is made with its first file.
-    ///
-    /// - `reuse`: whether files that are there may be replaced; else another name is taken.
-    pub(crate) fn beside(scene: &Path, reuse: bool) -> Self {
+    /// The folder of a scene, named after it: `kitchen-xml` of `kitchen.xml`, or `kitchen-xml-2` if there is one.
+    pub(crate) fn beside(scene: &Path) -> Self {
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| path_to_text(part.as_ref())).unwrap_or_default();
         // Other marks mean something in one of the grammars.
         let plain = |c: char| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' };
@@ -40,10 +41,21 @@ impl Folder {
             format!("{}-{}", text(scene.file_stem()), text(scene.extension())).chars().map(plain).collect::<String>();
         let parent = scene.parent().unwrap_or(Path::new(""));
         let mut names = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") });
-        let is_free = |name: &String| reuse || !parent.join(text_to_path(name)).exists();
+        // A link that leads nowhere is there, too.
+        let is_free = |name: &String| parent.join(text_to_path(name)).symlink_metadata().is_err();
         let name = names.find(is_free).expect("numbers do not end");
         let path = parent.join(text_to_path(&name));
-        Self { path, name, taken: Names::default(), meshes: HashMap::new(), pictures: HashMap::new() }
+        Self { path, name, new: None, taken: Names::default(), meshes: HashMap::new(), pictures: HashMap::new() }
+    }
+
+    /// Gives the folder its name; returns its path, if it has files.
+    ///
+    /// # Errors
+    /// If there is something of this name by now.
+    pub(crate) fn finish(self) -> Result<Option<PathBuf>, WriteError> {
+        let Some(new) = self.new else { return Ok(None) };
+        new.finish("".as_ref())?;
+        Ok(Some(self.path))
     }
 
     /// A file of these bytes; returns its path as the scene says it.
@@ -54,10 +66,12 @@ impl Folder {
         // A number follows a space, which no other name has.
         let name = self.taken.free(&stem.to_lowercase()).replace(' ', ".");
         let file = format!("{name}.{extension}");
-        let path = self.path.join(&file);
-        let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;
-        out.write_all(bytes).map_err(|error| unwritable(&path, error))?;
-        out.finish()?;
+        let new = match &mut self.new {
+            Some(new) => new,
+            none => none.insert(NewFolder::begin(&self.path)?),
+        };
+        let path = new.part().join(&file);
+        std::fs::write(&path, bytes).map_err(|error| new.error(unwritable(&path, error)))?;
         Ok(format!("{}/{file}", self.name))
     }
 
