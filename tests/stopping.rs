@@ -3,7 +3,13 @@
 
 use firstlight::scene::file::SceneFile;
 use std::fmt::Write;
-use std::time::{Duration, Instant};
+#[cfg(unix)]
+use std::path::Path;
+#[cfg(unix)]
+use std::sync::atomic::{AtomicUsize, Ordering};
+#[cfg(unix)]
+use std::time::Duration;
+use std::time::Instant;
 
 const CAMERA: &str = "camera: (eye: (0, 0, 300), look_at: (0, 0, 0)), film: (width: 32, height: 32)";
 
@@ -41,9 +47,7 @@ fn sheet(side: u32) -> String {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_a_command_at_once_whatever_it_is_doing() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("many.ron"), many_objects(100)).unwrap();
-    std::fs::write(folder.path().join("sheet.obj"), sheet(1000)).unwrap();
+    let (many, sheet) = (many_objects(100), sheet(1000));
     let cases = [
         ("render many.ron -o out.png --spp 1", &[0.2, 1.0, 2.5, 5.0][..]),
         ("info many.ron", &[0.5, 3.0]),
@@ -55,39 +59,58 @@ fn ctrl_c_ends_a_command_at_once_whatever_it_is_doing() {
         ("info --tree sheet.obj", &[3.0]),
         ("stability", &[1.0]),
     ];
-    let mut stopped = 0;
-    for (line, delays) in cases {
-        for &delay in delays {
-            let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("firstlight"))
-                .current_dir(folder.path())
-                .args(line.split(' '))
-                .stdout(std::process::Stdio::null())
-                .stderr(std::process::Stdio::piped())
-                .spawn()
-                .unwrap();
-            std::thread::sleep(Duration::from_secs_f64(delay));
-            let pressed = Instant::now();
-            // A command that is done already has obeyed.
-            let _ = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-            let status = child.wait().unwrap();
-            let seconds = pressed.elapsed().as_secs_f64();
-            let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
-            eprintln!("{line}: after {delay} s, ended {seconds:.3} s later: {status}");
-            assert!(seconds < 2.0, "{line}, after {delay} s: {seconds} s\n{said}");
-            if status.code() == Some(130) {
-                assert!(said.contains("stopped"), "{line}, after {delay} s: {said}");
-                stopped += 1;
-            } else {
-                assert!(status.success(), "{line}, after {delay} s: {status}\n{said}");
-            }
-            // Files are whole or not there.
-            for entry in std::fs::read_dir(folder.path()).unwrap() {
-                let name = entry.unwrap().file_name().into_string().unwrap();
-                assert!(!name.contains(".part"), "{line}, after {delay} s: {name} is left");
-            }
+    let (next, stopped) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    // Most of it is waiting.
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                let folder = tempfile::tempdir().unwrap();
+                std::fs::write(folder.path().join("many.ron"), &many).unwrap();
+                std::fs::write(folder.path().join("sheet.obj"), &sheet).unwrap();
+                while let Some((line, delays)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    for &delay in *delays {
+                        let is_stopped = is_stopped(folder.path(), line, delay);
+                        stopped.fetch_add(usize::from(is_stopped), Ordering::Relaxed);
+                    }
+                }
+            });
         }
-    }
+    });
+    let stopped = stopped.into_inner();
     assert!(stopped >= 12, "only {stopped} were stopped: the files are too small for this machine");
+}
+
+/// Whether a command was interrupted when it had run so many seconds, at once and without a trace, or had ended.
+#[cfg(unix)]
+fn is_stopped(folder: &Path, line: &str, delay: f64) -> bool {
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("firstlight"))
+        .current_dir(folder)
+        .args(line.split(' '))
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs_f64(delay));
+    let pressed = Instant::now();
+    // A command that is done already has obeyed.
+    let _ = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let status = child.wait().unwrap();
+    let seconds = pressed.elapsed().as_secs_f64();
+    let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
+    eprintln!("{line}: after {delay} s, ended {seconds:.3} s later: {status}");
+    assert!(seconds < 2.0, "{line}, after {delay} s: {seconds} s\n{said}");
+    let is_stopped = status.code() == Some(130);
+    if is_stopped {
+        assert!(said.contains("stopped"), "{line}, after {delay} s: {said}");
+    } else {
+        assert!(status.success(), "{line}, after {delay} s: {status}\n{said}");
+    }
+    // Files are whole or not there.
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        assert!(!name.contains(".part"), "{line}, after {delay} s: {name} is left");
+    }
+    is_stopped
 }
 
 /// Seconds to read a scene with so many materials and as many objects that misspell them.

@@ -296,12 +296,18 @@ impl Session {
     }
 
     /// Where the open scene is saved: the last saved file, or else the scene file that was opened. None for a scene of an
-    /// archive, whose files may be deleted at any time.
+    /// archive, whose files may be deleted at any time, and for that of an image, which may name any scene file of the
+    /// user's as its own.
     pub fn scene_file(&self) -> Option<PathBuf> {
         let saved = self.world.resource::<SavedAs>().path.clone();
-        saved.or_else(|| match &self.world.get_resource::<CurrentScene>()?.0.source {
-            SceneSource::Scene(path) => Some(path.clone()).filter(|path| unpacked_folder(path).is_none()),
-            _ => None,
+        saved.or_else(|| {
+            let scene = &self.world.get_resource::<CurrentScene>()?.0;
+            match &scene.source {
+                SceneSource::Scene(path) if scene.shot.is_none() && unpacked_folder(path).is_none() => {
+                    Some(path.clone())
+                }
+                _ => None,
+            }
         })
     }
 

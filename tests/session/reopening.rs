@@ -207,12 +207,8 @@ fn check(driver: &mut Driver, folder: &Path, round: usize) -> Result<(), Box<dyn
     driver.settle();
     let live = driver.session.describe().file;
     let film = driver.session.film_snapshot().ok_or("there is no film")?;
-    let display = driver.session.status().display;
     let picture = folder.join("picture.exr");
-    let samples = ImageSamples { first: 0, spp: film.spp(), uneven: film.is_uneven() };
-    let note = driver.session.shot_draft().note(&picture, SIZE, samples, display.into());
-    let print = Print { film: &film, display: &display, size: SIZE, note: Some(&note), denoised: None };
-    print.write(&picture, Replace::Anything)?;
+    save_image(driver, &film, &picture)?;
     for source in [SceneSource::Scene(scene), SceneSource::Picture(picture.clone())] {
         let title = source.title();
         let scene = opened(&source)?;
@@ -245,6 +241,15 @@ fn check(driver: &mut Driver, folder: &Path, round: usize) -> Result<(), Box<dyn
         }
     }
     Ok(())
+}
+
+/// The image that the session shows, with its scene.
+fn save_image(driver: &mut Driver, film: &Film, path: &Path) -> Result<(), Box<dyn Error>> {
+    let display = driver.session.status().display;
+    let samples = ImageSamples { first: 0, spp: film.spp(), uneven: film.is_uneven() };
+    let note = driver.session.shot_draft().note(path, SIZE, samples, display.into());
+    let print = Print { film, display: &display, size: SIZE, note: Some(&note), denoised: None };
+    Ok(print.write(path, Replace::Anything)?)
 }
 
 fn rounds() -> usize {
@@ -310,4 +315,23 @@ fn a_scene_that_is_read_again_equals_one_that_is_opened() {
         assert!(live == file, "round {round}:{}", difference(&file, &live));
         assert!(driver.session.film_snapshot().unwrap().means() == film.means(), "round {round}: another image");
     }
+}
+
+/// An image of strangers may name any scene file as its own.
+#[test]
+fn what_an_image_names_as_its_scene_is_not_where_it_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::small(write_room(folder.path()));
+    driver.settle();
+    assert_eq!(driver.session.scene_file(), Some(folder.path().join("room.ron")));
+    let film = driver.session.film_snapshot().unwrap();
+    let picture = folder.path().join("picture.exr");
+    save_image(&mut driver, &film, &picture).unwrap();
+    let mut driver = Driver::small(SceneSource::Picture(picture));
+    driver.settle();
+    assert_eq!(driver.session.scene_file(), None);
+    let new = folder.path().join("new.ron");
+    driver.session.send(Command::SaveScene { path: new.clone() });
+    driver.run_until(|session| !session.is_saving());
+    assert_eq!(driver.session.scene_file(), Some(new));
 }
