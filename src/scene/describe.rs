@@ -10,7 +10,9 @@ use crate::format::camera::camera_part;
 use crate::format::film_size::FilmSize;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::names::Names;
-use crate::format::parts::{DisplayPart, FilmPart, InFile, MaterialPart, ObjectPart, RadiiPart, TransformPart};
+use crate::format::parts::{
+    DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, TransformPart,
+};
 use crate::format::placement::Placement;
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -30,6 +32,7 @@ use crate::scene::world::components::{
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use crate::scene::world::inputs::SceneInputs;
+use crate::scene::world::lights::LightTexture;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
@@ -87,8 +90,13 @@ impl Description {
         let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default().0;
         let lights = inputs.lights.iter().map(|light| {
             let name = moved.name(light.entity).cloned().or_else(|| light.name.clone());
-            light.light.to_part(name, &light.placement)
+            let mut part = light.light.to_part(name, &light.placement);
+            if let (LightPart::Spot { texture, .. }, Some(LightTexture(image))) = (&mut part, &light.texture) {
+                *texture = Some(writer.texture_name(image));
+            }
+            part
         });
+        let lights = lights.collect();
         let (view, projection, lens) =
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
@@ -108,7 +116,7 @@ impl Description {
             textures: writer.textures(),
             materials,
             objects: parts,
-            lights: lights.collect(),
+            lights,
             animation: animation_part,
         };
         let folder = loaded.map(|loaded| loaded.folder.clone()).unwrap_or_default();

@@ -10,13 +10,14 @@ use crate::format::view::{Lens, Projection, View};
 use crate::kdtree::{self, HitSpace};
 use crate::mesh::Mesh;
 use crate::render::{
-    self, Camera, ColorInput, Cone, DeltaLight, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object,
-    Prepared, ScalarInput, Shading, Snapshot, TextureId,
+    self, Camera, ColorInput, Cone, DeltaLight, Geometry, InSnapshot, LightImage, MAX_LOBES, MapParams, MaterialId,
+    Object, Prepared, ScalarInput, Shading, Snapshot, TextureId, TexturePattern,
 };
 use crate::scene::animation::Animation;
 use crate::scene::hit_spaces::{about, hit_spaces, sound_affine};
 use crate::scene::world::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
 use crate::scene::world::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
+use crate::scene::world::lights::LightTexture;
 use crate::scene::world::trees::{Trees, address};
 use bevy_ecs::prelude::Entity;
 use glam::{DVec3, Mat3, Vec3};
@@ -116,7 +117,7 @@ impl Extraction {
                 problems.push(format!("{} {} is ignored: {bad}", light.light.name(), light.entity));
                 continue;
             }
-            if delta_light(light, origin).is_some() {
+            if light.light.radius() == 0.0 {
                 delta_lights.push(light.entity);
                 continue;
             }
@@ -375,12 +376,13 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds, origin: DVec3) -> S
         });
     }
     let (environment, air) = (inputs.environment.light.clone(), inputs.environment.air);
-    let delta_lights = inputs.lights.iter().filter_map(|light| delta_light(light, origin)).collect();
+    let delta_lights = inputs.lights.iter().filter_map(|light| delta_light(light, origin, &mut textures)).collect();
     Shading { air, delta_lights, ..Shading::new(materials, textures.textures, environment) }
 }
 
 /// A delta light relative to `origin`; `None` for lights with a radius and for invalid ones.
-fn delta_light(LightInput { light, placement, .. }: &LightInput, origin: DVec3) -> Option<DeltaLight> {
+fn delta_light(input: &LightInput, origin: DVec3, textures: &mut TextureTable) -> Option<DeltaLight> {
+    let LightInput { light, placement, .. } = input;
     light.check(placement).ok()?;
     let position = (placement.translation - origin).as_vec3();
     Some(match light {
@@ -390,7 +392,21 @@ fn delta_light(LightInput { light, placement, .. }: &LightInput, origin: DVec3) 
             let axis = light.direction(placement)?.as_vec3().normalize();
             let [inner, outer] = [spot.inner_angle_deg, spot.outer_angle_deg].map(f64::to_radians);
             let cone = Cone::new(axis, inner, outer, spot.falloff);
-            DeltaLight::Spot { position, intensity: spot.intensity, cone }
+            let texture = input.texture.as_ref().map(|LightTexture(texture)| texture);
+            let image = (texture.is_some() || spot.image.is_shaped()).then(|| {
+                let aspect = match texture.map(|texture| &texture.texture.pattern) {
+                    Some(TexturePattern::Image { image, .. }) => f64::from(image.width) / f64::from(image.height),
+                    _ => 1.0,
+                };
+                let [right, up] = spot.image.axes(placement, axis.as_dvec3().normalize()).map(|it| it.as_vec3());
+                LightImage {
+                    texture: texture.map(|texture| textures.id(texture)),
+                    axes: [right, up, axis],
+                    half: spot.image.half(spot.outer_angle_deg, aspect).as_vec2(),
+                    even: spot.image.even,
+                }
+            });
+            DeltaLight::Spot { position, intensity: spot.intensity, cone, image }
         }
         LightKind::Directional(directional) => DeltaLight::Directional {
             direction: light.direction(placement)?.as_vec3().normalize(),

@@ -122,6 +122,7 @@ impl SceneContent {
                 add(texture);
             }
         }
+        inputs.lights.iter().filter_map(|light| light.texture.as_ref()).for_each(|texture| add(&texture.0));
         if let Environment::Image { image, .. } = &inputs.environment.light {
             pictures.push(image.clone());
         }

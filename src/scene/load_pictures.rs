@@ -6,6 +6,7 @@ use crate::files::relative::text_to_path;
 use crate::files::stamp::{Stamp, stamp};
 use crate::format::error::SceneError;
 use crate::format::material_textures::without_lost_textures;
+use crate::format::parts::LightPart;
 use crate::format::sources::{EnvironmentSource, TextureSource};
 use crate::import::documents::Documents;
 use crate::import::gltf::images::part_of_model;
@@ -112,6 +113,11 @@ impl LoadedScene {
         let names: HashSet<&str> = file.textures.names().collect();
         for (_, part) in &mut file.materials.0 {
             *part = without_lost_textures(part, |name| names.contains(name));
+        }
+        for light in &mut file.lights {
+            if let LightPart::Spot { texture, .. } = light {
+                *texture = texture.take().filter(|name| names.contains(name.as_str()));
+            }
         }
     }
 }

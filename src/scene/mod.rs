@@ -55,7 +55,7 @@ pub use crate::format::camera::camera_part;
 pub use crate::format::choice::{ModelChoice, UpAxis};
 pub use crate::format::error::{Problem, SceneError, suggestion};
 pub use crate::format::film_size::FilmSize;
-pub use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
+pub use crate::format::light::{DirectionalLight, ImageFrame, LightKind, PointLight, SpotLight};
 pub use crate::format::material_property::MaterialProperty;
 pub use crate::format::paths::each_path;
 pub use crate::format::placement::{Linear, Placement};
@@ -75,7 +75,7 @@ pub use crate::scene::world::components::{
 pub use crate::scene::world::extent::{Extent, ExtentCache};
 pub use crate::scene::world::inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use crate::scene::world::inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
-pub use crate::scene::world::lights::{WithLight, light_of, put_light};
+pub use crate::scene::world::lights::{LightTexture, WithLight, light_of, put_light};
 pub use crate::scene::world::material_value::material_value;
 pub use crate::scene::world::trees::Trees;
 pub use animation::{Animation, Moment, camera_follows, show_moment};

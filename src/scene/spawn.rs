@@ -5,7 +5,7 @@ use crate::format::camera::{camera, unit};
 use crate::format::film_size::FilmSize;
 use crate::format::light::LightKind;
 use crate::format::material_textures::without_lost_textures;
-use crate::format::parts::{InFile, MaterialPart, ObjectPart};
+use crate::format::parts::{InFile, LightPart, MaterialPart, ObjectPart};
 use crate::format::placement::Placement;
 use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::format::units::radians;
@@ -24,7 +24,7 @@ use crate::scene::world::components::{
     Shape, SurfaceMaterial, SurfaceTexture,
 };
 use crate::scene::world::inputs::SceneInputs;
-use crate::scene::world::lights::{WithLight, put_light};
+use crate::scene::world::lights::{LightTexture, WithLight, put_light};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
@@ -155,6 +155,11 @@ impl LoadedScene {
             let mut entity = world.spawn((placement, next()));
             if let Some(name) = part.name() {
                 entity.insert(Name::new(name.to_owned()));
+            }
+            if let LightPart::Spot { texture: Some(name), .. } = part
+                && let Some(texture) = textures.get(name.as_str())
+            {
+                entity.insert(LightTexture(texture.clone()));
             }
             let entity = entity.id();
             put_light(world, entity, light);

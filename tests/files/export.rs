@@ -191,6 +191,39 @@ fn the_light_of_every_quarter_of_the_image_stays() {
     }
 }
 
+/// Images of lights that the formats have: a projector and a spot of Mitsuba, a projector of pbrt.
+#[test]
+fn projected_images_stay_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    // Another colour in each corner.
+    let slide = image::RgbImage::from_fn(4, 2, |x, y| image::Rgb([60 * x as u8, 200 * y as u8, 90]));
+    slide.save(folder.path().join("slide.png")).unwrap();
+    for (format, light) in [
+        (SceneFormat::Mitsuba, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60, even: true"),
+        (SceneFormat::Mitsuba, "outer_angle: 35, inner_angle: 10, falloff: linear"),
+        (SceneFormat::Pbrt, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60"),
+    ] {
+        let text = format!(
+            "(camera: (eye: (0, 4, 4), look_at: (0, 0, 0)), film: (width: 64, height: 48), max_depth: 2,
+              textures: {{\"slide\": image(file: \"slide.png\", smooth: false)}},
+              materials: {{\"floor\": diffuse(albedo: 0.8)}},
+              objects: [quad(corner: (-3, 0, 3), edge_u: (6, 0, 0), edge_v: (0, 0, -6), material: \"floor\")],
+              lights: [spot(position: (0.5, 3, 0), direction: (-0.2, -1, 0), up: (1, 0, -2), intensity: 20,
+                            texture: \"slide\", {light})])"
+        );
+        let from = written(folder.path(), &text);
+        let (mut world, scene) = open(from.clone());
+        let wanted = quarters(&mut world, &scene);
+        let (mut world, scene, told) = there_and_back(from, format, folder.path());
+        let found = quarters(&mut world, &scene);
+        for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
+            let ratio = *found / *wanted;
+            assert!((ratio - 1.0).abs().max_element() < 0.02, "{format:?} {light}, quarter {k}: {ratio}");
+        }
+        assert_eq!((told, scene.warnings.len()), (Vec::new(), 0), "{light}");
+    }
+}
+
 /// Names mean nothing to the other program: not the parameters and paths of Mitsuba, not the marks of either grammar.
 #[test]
 fn scenes_with_any_names_open_again() {

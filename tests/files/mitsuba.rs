@@ -381,6 +381,17 @@ fn environments_are_turned_and_spots_keep_their_angles() {
     };
     assert_eq!((*inner_angle, *outer_angle, *direction), (40.0, 40.0, DVec3::NEG_Y));
     assert!(matches!(scene.file.environment, EnvironmentSource::Constant(_)));
+    let scene = opened(
+        r#"<shape type="sphere"/><emitter type="projector"><float name="fov" value="90"/><float name="scale" value="2"/>
+            <transform name="to_world"><lookat origin="0 3 0" target="0 0 0" up="0 0 1"/></transform></emitter>"#,
+    );
+    let LightPart::Spot { intensity, up, image_width, image_height, even: true, direction, .. } = &scene.file.lights[0]
+    else {
+        panic!("{:?}", scene.file.lights)
+    };
+    assert!((intensity.0.x - std::f32::consts::TAU).abs() < 1e-5 && told(&scene).is_empty(), "{intensity:?}");
+    assert!((*image_width - 90.0).abs() < 1e-9 && (*image_height - 90.0).abs() < 1e-9);
+    assert_eq!((*direction, *up), (DVec3::NEG_Y, DVec3::Z));
     let folder = tempfile::tempdir().unwrap();
     image::Rgb32FImage::from_pixel(4, 2, image::Rgb([1.0, 1.0, 1.0])).save(folder.path().join("e.exr")).unwrap();
     let body = r#"<scene version="3.0.0"><emitter type="envmap"><string name="filename" value="e.exr"/>

@@ -351,6 +351,30 @@ fn lights_have_the_units_of_pbrt() {
 }
 
 #[test]
+fn a_projection_is_a_spot_with_an_image() {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbImage::from_pixel(4, 2, image::Rgb([255, 255, 255])).save(folder.path().join("slide.png")).unwrap();
+    let light = "LightSource \"projection\" \"string filename\" \"slide.png\" \"float fov\" 90 \"float power\" 100";
+    let text = format!("LookAt 0 0 -5  0 0 0  0 1 0\nCamera \"perspective\"\nWorldBegin\n{light}\n{SQUARE}");
+    let path = folder.path().join("a.pbrt");
+    std::fs::write(&path, text).unwrap();
+    let scene = load(&SceneSource::Foreign(path), &LoadOptions::default()).unwrap();
+    assert_eq!(told(&scene), Vec::<String>::new());
+    let [LightPart::Spot { texture: Some(name), image_width, image_height, intensity, even: false, .. }] =
+        &scene.file.lights[..]
+    else {
+        panic!("{:?}", scene.file.lights)
+    };
+    assert!(scene.file.textures.get(name).is_some());
+    // The field of view is that of the shorter side.
+    assert!((image_height - 90.0).abs() < 1e-9 && (image_width - 2.0 * 2_f64.atan().to_degrees()).abs() < 1e-9);
+    // The mean of cos³ over the pixels times the area of the image, 8.
+    let cubed = |x: f64, y: f64| (1.0 + x * x + y * y).powf(-1.5);
+    let flux = 8.0 * 0.5 * (cubed(0.5, 0.5) + cubed(1.5, 0.5));
+    assert!((f64::from(intensity.0.x) / (100.0 / flux) - 1.0).abs() < 1e-5, "{intensity:?} for {}", 100.0 / flux);
+}
+
+#[test]
 fn roughness_textures_and_metals_become_those_of_ours() {
     let scene = with(&format!(
         "LightSource \"point\"\nTexture \"checks\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"float vdelta\" 0.5 \"rgb tex1\" [1 0 0]\n\

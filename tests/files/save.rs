@@ -2,15 +2,16 @@
 
 use bevy_ecs::prelude::World;
 use firstlight::frame::{Target, render_offline};
-use firstlight::render::{Falloff, Film};
+use firstlight::render::{Falloff, Film, Texture, TexturePattern};
 use firstlight::scene::{
-    BUILTIN_SCENES, Description, DirectionalLight, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene,
-    Material, Placement, PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, SpotLight,
-    SurfaceMaterial, View, load, save_scene,
+    BUILTIN_SCENES, Description, DirectionalLight, DisplaySettings, Extraction, ImageFrame, Lens, LightInput,
+    LightTexture, LoadOptions, LoadedScene, Material, Placement, PointLight, Projection, Rendering, Rgb, SceneInputs,
+    SceneSource, Shape, SpotLight, SurfaceMaterial, SurfaceTexture, TextureSource, View, load, save_scene,
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use proptest::prelude::*;
 use std::path::Path;
+use std::sync::Arc;
 
 fn open(source: SceneSource) -> (World, LoadedScene) {
     let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
@@ -42,7 +43,9 @@ fn assert_same(a: &mut World, b: &mut World, what: &str) {
             (x, y) => assert_eq!(x, y, "{what}"),
         }
     }
-    let lights = |inputs: &SceneInputs| inputs.lights.iter().map(|l| (l.light, l.placement)).collect::<Vec<_>>();
+    let slide = |light: &LightInput| light.texture.as_ref().map(|LightTexture(texture)| texture.part.clone());
+    let lights =
+        |inputs: &SceneInputs| inputs.lights.iter().map(|l| (l.light, l.placement, slide(l))).collect::<Vec<_>>();
     assert_eq!(lights(&before), lights(&after), "{what}");
     let camera = |inputs: &SceneInputs| inputs.camera.map(|c| (c.view, c.projection, c.lens));
     assert_eq!(camera(&before), camera(&after), "{what}");
@@ -134,8 +137,17 @@ proptest! {
         let [inner_angle_deg, outer_angle_deg] = [0.4 * vfov, 0.5 * vfov];
         for placement in [place, Placement::at(eye)] {
             let falloff = Falloff::Linear;
-            let spot = SpotLight { intensity: irradiance, direction, inner_angle_deg, outer_angle_deg, falloff };
-            world.spawn((spot, placement));
+            let image = ImageFrame { up: eye, width_deg: 0.3 * vfov, height_deg: 0.0, even: placement != place };
+            let spot = SpotLight { intensity: irradiance, direction, inner_angle_deg, outer_angle_deg, falloff, image };
+            let spot = world.spawn((spot, placement)).id();
+            if placement == place {
+                let (a, b) = (Rgb(Vec3::X), Rgb(Vec3::splat(intensity)));
+                let (squares, offset) = (DVec2::splat(3.0), DVec2::X);
+                let part = TextureSource::Checker { a, b, squares, offset, rotate: 5.0 };
+                let texture = Texture::new(TexturePattern::Checker { a: a.0, b: b.0 });
+                let slide = SurfaceTexture { name: "slide".to_owned(), part, texture };
+                world.entity_mut(spot).insert(LightTexture(Arc::new(slide)));
+            }
             world.spawn((DirectionalLight { irradiance, direction }, placement));
         }
         world.spawn((PointLight { intensity: irradiance, radius: 0.0 }, Placement::at(up)));

@@ -3,10 +3,10 @@
 use crate::common::*;
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Cone, DeltaLight, Environment, Falloff, Film, Fresnel, Integrator, Material, Prepared, RenderSettings,
-    ScalarInput, Shading, Techniques, advance,
+    ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel, ImageTexture, Integrator, LightImage,
+    Material, Prepared, RenderSettings, ScalarInput, Shading, Techniques, Texture, TexturePattern, Wrap, advance,
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn point(position: Vec3, intensity: f32) -> DeltaLight {
 fn spot(position: Vec3, towards: Vec3, intensity: f32, inner_deg: f64, outer_deg: f64) -> DeltaLight {
     let cone =
         Cone::new((towards - position).normalize(), inner_deg.to_radians(), outer_deg.to_radians(), Falloff::Quadratic);
-    DeltaLight::Spot { position, intensity: Vec3::splat(intensity), cone }
+    DeltaLight::Spot { position, intensity: Vec3::splat(intensity), cone, image: None }
 }
 
 fn directional(direction: Vec3, irradiance: f32) -> DeltaLight {
@@ -42,7 +42,8 @@ fn matte(albedo: f32) -> Material {
 fn seen(shapes: &[(Shape, u32)], materials: &[Material], light: &DeltaLight, target: Vec3, air: f32) -> [f32; 4] {
     let eye = camera(target + Vec3::new(0.6, 0.8, 0.0), target, 1e-3);
     let scene = scene(shapes.to_vec(), materials.to_vec(), Environment::Black, eye);
-    let shading = Shading { air: Vec3::splat(air), delta_lights: vec![*light], ..(*scene.shading).clone() };
+    let (air, delta_lights, textures) = (Vec3::splat(air), vec![*light], vec![slide()]);
+    let shading = Shading { air, delta_lights, textures, ..(*scene.shading).clone() };
     let scene = scene.with_shading(Arc::new(shading));
     let usual = RenderSettings { max_depth: 2, ..RenderSettings::default() };
     let one_by_one = RenderSettings { simd: None, ..usual };
@@ -54,6 +55,52 @@ fn seen(shapes: &[(Shape, u32)], materials: &[Material], light: &DeltaLight, tar
         .collect::<Vec<_>>()
         .try_into()
         .unwrap()
+}
+
+/// Two columns and two rows of texels with sharp edges.
+fn slide() -> Texture {
+    let image = ImageTexture::from_linear(2, 2, [1.0, 2.0, 3.0, 4.0].map(Vec3::splat).to_vec());
+    let (encoding, wrap) = (Encoding::Auto, [Wrap::Repeat; 2]);
+    Texture::new(TexturePattern::Image { image: Arc::new(image), encoding, wrap, smooth: false })
+}
+
+#[test]
+fn a_spot_projects_its_image_upright() {
+    let floor = [(plane(Vec3::ZERO, Vec3::Y), 0)];
+    let height = 2.0;
+    // It shines down, with −Z upwards in the image, so that +X is to the right. The image covers 6 m × 4 m of the floor.
+    let axes = [Vec3::X, Vec3::NEG_Z, Vec3::NEG_Y];
+    let cone = Cone::new(Vec3::NEG_Y, 1.5, 1.5, Falloff::Quadratic);
+    let light = |even, texture| DeltaLight::Spot {
+        position: Vec3::new(0.0, height, 0.0),
+        intensity: Vec3::splat(7.0),
+        cone,
+        image: Some(LightImage { texture, axes, half: Vec2::new(1.5, 1.0), even }),
+    };
+    for (materials, n_models) in [([diffuse(0.5)], 1), ([matte(0.5)], 2)] {
+        for (x, z, texel) in [
+            (-0.1, -0.1, 1.0),
+            (2.9, -1.9, 2.0),
+            (-2.9, 1.9, 3.0),
+            (0.2, 1.3, 4.0),
+            (3.1, 0.0, 0.0),
+            (0.0, 2.1, 0.0),
+            (-4.0, -4.0, 0.0),
+        ] {
+            let target = Vec3::new(x, 0.0, z);
+            let distance2 = x * x + z * z + height * height;
+            let cos = height / distance2.sqrt();
+            for even in [false, true] {
+                let falloff = if even { cos.powi(-3) } else { 1.0 };
+                let expected = 7.0 * falloff * 0.5 / PI * cos / distance2;
+                let what = format!("{x} {z} {even}");
+                let found = seen(&floor, &materials, &light(even, Some(0)), target, 0.0);
+                assert_close(&found[..2 * n_models], texel * expected, &what);
+                let found = seen(&floor, &materials, &light(even, None), target, 0.0);
+                assert_close(&found[..2 * n_models], if texel > 0.0 { expected } else { 0.0 }, &what);
+            }
+        }
+    }
 }
 
 #[track_caller]

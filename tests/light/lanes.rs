@@ -5,8 +5,8 @@ use firstlight::kdtree::{BuildPreset, HitSpace, InstructionSet, MeshTree, Shape,
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
     BadSample, CausticPlan, Channel, ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel,
-    Geometry, ImageTexture, Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading,
-    Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
+    Geometry, ImageTexture, Integrator, LightImage, Material, Object, PixelFilter, Prepared, RenderSettings,
+    ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -207,6 +207,9 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
     let small = || placed(procedural::icosphere(3), scaled(Vec3::splat(0.15), Vec3::new(1.2, 2.4, 1.0)));
     let sky = Environment::Gradient { zenith: Vec3::new(0.2, 0.4, 0.9), horizon: Vec3::ONE, ground: Vec3::splat(0.1) };
     let cone = Cone::new(Vec3::new(0.3, -1.0, 0.1).normalize(), 0.3, 0.7, Falloff::Smooth);
+    let right = cone.axis.any_orthonormal_vector();
+    let axes = [right, right.cross(cone.axis), cone.axis];
+    let image = LightImage { texture: None, axes, half: Vec2::new(0.4, 0.6), even: true };
     let without_size = |n: usize| -> Vec<DeltaLight> {
         (0..n)
             .map(|i| {
@@ -214,7 +217,7 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
                 let intensity = Vec3::new(1.0, 0.8, 0.6) * (1.0 + (i % 4) as f32);
                 match i % 3 {
                     0 => DeltaLight::Point { position, intensity },
-                    1 => DeltaLight::Spot { position, intensity, cone },
+                    1 => DeltaLight::Spot { position, intensity, cone, image: (i % 2 == 0).then_some(image) },
                     _ => DeltaLight::Directional { direction: -position.normalize(), irradiance: 0.1 * intensity },
                 }
             })

@@ -109,6 +109,14 @@ pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue>
     Ok(())
 }
 
+/// Checks an angle that the image of a light fills; degrees, 0 if it follows from others.
+pub(crate) fn check_image_angle(field: &'static str, degrees: f64) -> Result<(), BadValue> {
+    if degrees == 0.0 || (1e-6..180.0).contains(&degrees) {
+        return Ok(());
+    }
+    Err(BadValue::out_of_range(field, number(degrees), "be 0, or lie between 0.000001 and 180 degrees (180 excluded)"))
+}
+
 /// Checks a time of an animation; seconds.
 pub fn check_moment(field: &'static str, seconds: f64) -> Result<(), BadValue> {
     if (0.0..=MOST_SECONDS).contains(&seconds) {

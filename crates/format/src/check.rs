@@ -2,8 +2,8 @@
 
 use crate::bounds;
 use crate::bounds::{
-    check_cone, check_film_size, check_light_radius, check_max_depth, coordinate_rule, is_coordinate, is_size, number,
-    size_rule, triple,
+    check_cone, check_film_size, check_image_angle, check_light_radius, check_max_depth, coordinate_rule,
+    is_coordinate, is_size, number, size_rule, triple,
 };
 use crate::camera::CameraPart;
 use crate::error::suggestion;
@@ -251,12 +251,33 @@ impl Check<'_> {
                     self.wrong(&format!("{path}/radius"), bad);
                 }
             }
-            LightPart::Spot { position, direction, intensity, inner_angle, outer_angle, transform, .. } => {
+            LightPart::Spot {
+                position,
+                direction,
+                intensity,
+                inner_angle,
+                outer_angle,
+                texture,
+                up,
+                image_width,
+                image_height,
+                transform,
+                ..
+            } => {
                 self.point(&format!("{path}/position"), *position);
                 self.direction(&format!("{path}/direction"), "`direction`", *direction);
                 self.light(&format!("{path}/intensity"), *intensity);
                 if let Err(bad) = check_cone(*inner_angle, *outer_angle) {
                     self.wrong(&format!("{path}/{}", bad.field()), bad);
+                }
+                if let Some(texture) = texture {
+                    self.texture_name(&format!("{path}/texture"), texture);
+                }
+                self.direction(&format!("{path}/up"), "`up`", *up);
+                for (name, angle) in [("image_width", *image_width), ("image_height", *image_height)] {
+                    if let Err(bad) = check_image_angle(name, angle) {
+                        self.wrong(&format!("{path}/{name}"), bad);
+                    }
                 }
                 self.transform(&format!("{path}/transform"), transform);
             }

@@ -1,13 +1,13 @@
 //! Lights that are not objects: conversion between scene file and world, and validation.
 
 use crate::bad_value::BadValue;
-use crate::bounds::{check_cone, check_light, check_light_radius};
+use crate::bounds::{check_cone, check_image_angle, check_light, check_light_radius};
 use crate::parts::{LightPart, TransformPart};
 use crate::placement::Placement;
 use crate::value::Rgb;
 use crate::view::unit_direction;
 use firstlight_render::Falloff;
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Emits uniformly in all directions; rendered as an emissive sphere, or as a point if its radius is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,57 @@ pub struct SpotLight {
     pub outer_angle_deg: f64,
     /// How the intensity falls off between the two.
     pub falloff: Falloff,
+    /// How it projects an image.
+    pub image: ImageFrame,
+}
+
+/// How a spot light projects the image of its texture; without one, the image is white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageFrame {
+    /// Upwards in the image, in object space. Any length but 0; any direction if the light shines along it.
+    pub up: DVec3,
+    /// Degrees, below 180, that the image fills horizontally. 0: by the height and the proportions of the image, or if
+    /// both are 0, the image is a square around the cone.
+    pub width_deg: f64,
+    /// The same vertically.
+    pub height_deg: f64,
+    /// Whether a wall that faces the light is lit evenly: the intensity is over cos³ of the angle from the axis.
+    pub even: bool,
+}
+
+impl Default for ImageFrame {
+    fn default() -> Self {
+        Self { up: DVec3::Y, width_deg: 0.0, height_deg: 0.0, even: false }
+    }
+}
+
+impl ImageFrame {
+    /// Whether it matters without a texture.
+    pub fn is_shaped(&self) -> bool {
+        self.even || self.width_deg > 0.0 || self.height_deg > 0.0
+    }
+
+    /// Tangents of half the angles that the image fills, horizontally and vertically.
+    ///
+    /// - `outer_angle_deg`: of the cone; `aspect`: width over height of the image.
+    pub fn half(&self, outer_angle_deg: f64, aspect: f64) -> DVec2 {
+        let tangent = |degrees: f64| (0.5 * degrees.to_radians()).tan();
+        let (width, height) = (tangent(self.width_deg), tangent(self.height_deg));
+        match (width > 0.0, height > 0.0) {
+            (true, true) => DVec2::new(width, height),
+            (true, false) => DVec2::new(width, width / aspect),
+            (false, true) => DVec2::new(height * aspect, height),
+            (false, false) => DVec2::splat(tangent(2.0 * outer_angle_deg)),
+        }
+    }
+
+    /// Unit vectors in the world to the right and upwards in the image, as seen from a light that shines along
+    /// `direction`, which is unit.
+    pub fn axes(&self, placement: &Placement, direction: DVec3) -> [DVec3; 2] {
+        let up = placement.affine().transform_vector3(self.up);
+        let right = direction.cross(up).try_normalize().unwrap_or_else(|| direction.any_orthonormal_vector());
+        [right, right.cross(direction)]
+    }
 }
 
 /// Emits parallel light from infinitely far away; rays cannot hit it. Like the light of the environment, it is not
@@ -89,10 +140,11 @@ impl LightKind {
         !matches!(self, Self::Directional(_))
     }
 
-    /// Inner and outer angle of its cone, degrees, and the falloff between them; `None` if it has no cone.
-    pub fn cone(&self) -> Option<(f64, f64, Falloff)> {
+    /// Inner and outer angle of its cone, degrees, the falloff between them, and how it projects an image; `None` if it
+    /// has no cone.
+    pub fn cone(&self) -> Option<(f64, f64, Falloff, ImageFrame)> {
         match self {
-            Self::Spot(light) => Some((light.inner_angle_deg, light.outer_angle_deg, light.falloff)),
+            Self::Spot(light) => Some((light.inner_angle_deg, light.outer_angle_deg, light.falloff, light.image)),
             Self::Point(_) | Self::Directional(_) => None,
         }
     }
@@ -144,6 +196,8 @@ impl LightKind {
             Self::Spot(light) => {
                 check_light("intensity", light.intensity)?;
                 check_cone(light.inner_angle_deg, light.outer_angle_deg)?;
+                check_image_angle("image_width", light.image.width_deg)?;
+                check_image_angle("image_height", light.image.height_deg)?;
             }
             Self::Directional(light) => check_light("irradiance", light.irradiance)?,
         }
@@ -163,7 +217,18 @@ impl LightKind {
                 (Self::Point(PointLight { intensity: intensity.0, radius: *radius }), Placement::at(*position))
             }
             LightPart::Spot {
-                position, direction, intensity, inner_angle, outer_angle, falloff, transform, ..
+                position,
+                direction,
+                intensity,
+                inner_angle,
+                outer_angle,
+                falloff,
+                up,
+                image_width,
+                image_height,
+                even,
+                transform,
+                ..
             } => {
                 let light = SpotLight {
                     intensity: intensity.0,
@@ -171,6 +236,7 @@ impl LightKind {
                     inner_angle_deg: *inner_angle,
                     outer_angle_deg: *outer_angle,
                     falloff: *falloff,
+                    image: ImageFrame { up: *up, width_deg: *image_width, height_deg: *image_height, even: *even },
                 };
                 let placement = Placement::from_part(transform);
                 let translation = placement.affine().transform_point3(*position);
@@ -183,7 +249,7 @@ impl LightKind {
         }
     }
 
-    /// The light as in a scene file.
+    /// The light as in a scene file, without its texture.
     pub fn to_part(self, name: Option<String>, placement: &Placement) -> LightPart {
         // Lights with a position need no transform if they are not rotated.
         let (position, transform) = match *placement == Placement::at(placement.translation) {
@@ -194,7 +260,7 @@ impl LightKind {
             Self::Point(PointLight { intensity, radius }) => {
                 LightPart::Point { name, position: placement.translation, intensity: Rgb(intensity), radius }
             }
-            Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg, falloff }) => {
+            Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg, falloff, image }) => {
                 LightPart::Spot {
                     name,
                     position,
@@ -203,6 +269,11 @@ impl LightKind {
                     inner_angle: inner_angle_deg,
                     outer_angle: outer_angle_deg,
                     falloff,
+                    texture: None,
+                    up: image.up,
+                    image_width: image.width_deg,
+                    image_height: image.height_deg,
+                    even: image.even,
                     transform,
                 }
             }

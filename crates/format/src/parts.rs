@@ -325,6 +325,22 @@ pub enum LightPart {
         /// How it falls off between the two.
         #[serde(default, skip_serializing_if = "is_default")]
         falloff: Falloff,
+        /// The texture whose image it projects.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        texture: Option<String>,
+        /// Upwards in the image; any length except 0. Any direction if the light shines along it.
+        #[serde(default = "default_up", skip_serializing_if = "is_up")]
+        up: DVec3,
+        /// Angle in degrees, below 180, that the image fills horizontally. With 0 it follows from the height and the
+        /// proportions of the image; if both are 0 the image is a square around the cone.
+        #[serde(default, skip_serializing_if = "is_default")]
+        image_width: f64,
+        /// The same vertically.
+        #[serde(default, skip_serializing_if = "is_default")]
+        image_height: f64,
+        /// Whether a wall that faces the light is lit evenly, as by a projector.
+        #[serde(default, skip_serializing_if = "is_default")]
+        even: bool,
         /// Object to world; scaling does not affect the intensity.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
@@ -376,6 +392,10 @@ fn default_outer_angle() -> f64 {
 
 fn default_up() -> DVec3 {
     DVec3::Y
+}
+
+fn is_up(value: &DVec3) -> bool {
+    *value == DVec3::Y
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

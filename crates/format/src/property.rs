@@ -133,6 +133,10 @@ properties! {
         InnerAngle = "inner_angle": Number, "inner angle", [0.0, 90.0], "°";
         /// from the axis of the cone, beyond which there is no light
         OuterAngle = "outer_angle": Number, "outer angle", [0.1, 90.0], "°";
+        /// angle that the image fills horizontally; 0: by its height, or the cone
+        ImageWidth = "image_width": Number, "image width", [0.0, 179.0], "°";
+        /// angle that the image fills vertically; 0: by its width, or the cone
+        ImageHeight = "image_height": Number, "image height", [0.0, 179.0], "°";
     }
 }
 
@@ -212,6 +216,8 @@ impl LightProperty {
             (Self::Radius, LightKind::Point(light)) => DVec3::splat(light.radius),
             (Self::InnerAngle, LightKind::Spot(light)) => DVec3::splat(light.inner_angle_deg),
             (Self::OuterAngle, LightKind::Spot(light)) => DVec3::splat(light.outer_angle_deg),
+            (Self::ImageWidth, LightKind::Spot(light)) => DVec3::splat(light.image.width_deg),
+            (Self::ImageHeight, LightKind::Spot(light)) => DVec3::splat(light.image.height_deg),
             _ => return None,
         })
     }
@@ -231,6 +237,8 @@ impl LightProperty {
             (Self::Radius, LightKind::Point(light)) => light.radius = value.x,
             (Self::InnerAngle, LightKind::Spot(light)) => light.inner_angle_deg = value.x,
             (Self::OuterAngle, LightKind::Spot(light)) => light.outer_angle_deg = value.x,
+            (Self::ImageWidth, LightKind::Spot(light)) => light.image.width_deg = value.x,
+            (Self::ImageHeight, LightKind::Spot(light)) => light.image.height_deg = value.x,
             _ => return None,
         }
         Some(())
@@ -252,7 +260,7 @@ impl LightProperty {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::{DirectionalLight, PointLight, SpotLight};
+    use crate::light::{DirectionalLight, ImageFrame, PointLight, SpotLight};
     use firstlight_render::Falloff;
     use glam::Vec3;
 
@@ -267,6 +275,7 @@ mod tests {
                 inner_angle_deg: 10.0,
                 outer_angle_deg: 20.0,
                 falloff: Falloff::Quadratic,
+                image: ImageFrame::default(),
             }),
             LightKind::Directional(DirectionalLight { direction: DVec3::X, irradiance: Vec3::ONE }),
         ];

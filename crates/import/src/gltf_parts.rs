@@ -49,6 +49,11 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
             inner_angle: inner.to_degrees(),
             outer_angle: outer.to_degrees(),
             falloff: Falloff::Quadratic,
+            texture: None,
+            up: DVec3::Y,
+            image_width: 0.0,
+            image_height: 0.0,
+            even: false,
             transform: TransformPart::default(),
         },
         GltfLightKind::Directional => {

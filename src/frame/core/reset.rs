@@ -219,7 +219,7 @@ fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut
     }
     if old.light.name() != new.light.name() {
         changes.add(level, format!("kind of {label}"));
-    } else if old.light.cone() != new.light.cone() {
+    } else if (old.light.cone(), &old.texture) != (new.light.cone(), &new.texture) {
         changes.add(Level::Shading, format!("cone of {label}"));
     }
     // Invalid lights are reported when everything is rebuilt.

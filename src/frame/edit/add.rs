@@ -12,8 +12,8 @@ use crate::render::Falloff;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
-    ColorParam, DirectionalLight, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
-    PointLight, Shape, SpotLight, SurfaceMaterial,
+    ColorParam, DirectionalLight, GREY, ImageFrame, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource,
+    Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -104,6 +104,7 @@ pub fn add(world: &mut World, new: &NewThing) {
                 inner_angle_deg: 20.0,
                 outer_angle_deg: 30.0,
                 falloff: Falloff::Quadratic,
+                image: ImageFrame::default(),
             };
             let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
             spawn(world, "spot light", (light, Placement::at(place + above)))

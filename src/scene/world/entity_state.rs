@@ -7,6 +7,7 @@ use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::world::components::{MaterialSlots, MeshOrigin, Ordinal, Shape, SurfaceMaterial};
+use crate::scene::world::lights::LightTexture;
 use bevy_ecs::component::Mutable;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, Component, Entity, Or, Query, RemovedComponents, World};
@@ -104,6 +105,8 @@ components! {
     spot_light: SpotLight,
     /// A light that is no object.
     directional_light: DirectionalLight,
+    /// The image that a light projects.
+    light_texture: LightTexture,
     /// Where its mesh is from.
     origin: MeshOrigin,
     /// Its rank in the scene file.

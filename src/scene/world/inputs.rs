@@ -5,7 +5,7 @@ use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::world::components::{Material, MaterialSlots, Ordinal, SceneEnvironment, Shape, SurfaceMaterial};
-use crate::scene::world::lights::{LightParts, WithLight};
+use crate::scene::world::lights::{LightParts, LightTexture, WithLight};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Query, Res, World};
 use bevy_ecs::system::{SystemParam, SystemState};
@@ -61,6 +61,8 @@ pub struct LightInput {
     pub name: Option<String>,
     /// Kind and parameters.
     pub light: LightKind,
+    /// The image that it projects.
+    pub texture: Option<LightTexture>,
     /// Its position and orientation in the world.
     pub placement: Placement,
 }
@@ -88,6 +90,8 @@ impl CameraInput {
     }
 }
 
+type LightOfInput = (LightParts, Option<&'static LightTexture>, &'static Placement);
+
 type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 
 /// Read access to all data that the image depends on.
@@ -95,7 +99,7 @@ type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 pub struct SceneQueries<'w, 's> {
     objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
     materials: Query<'w, 's, Ranked<'static, &'static SurfaceMaterial>>,
-    lights: Query<'w, 's, Ranked<'static, (LightParts, &'static Placement)>, WithLight>,
+    lights: Query<'w, 's, Ranked<'static, LightOfInput>, WithLight>,
     cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
     environment: Option<Res<'w, SceneEnvironment>>,
 }
@@ -120,10 +124,11 @@ impl SceneQueries<'_, '_> {
                 material: material.0.clone(),
             }),
             objects,
-            lights: in_order(self.lights.iter(), |entity, name, (parts, placement)| LightInput {
+            lights: in_order(self.lights.iter(), |entity, name, (parts, texture, placement)| LightInput {
                 entity,
                 name: text(name),
                 light: LightKind::first(parts).expect("the query asks for one of them"),
+                texture: texture.cloned(),
                 placement: *placement,
             }),
             camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(

@@ -1,11 +1,24 @@
 //! Lights that are not objects: a component for each kind; of several on one entity the first counts.
 
 use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
-use bevy_ecs::prelude::{Entity, Or, With, World};
+use crate::scene::world::components::SurfaceTexture;
+use bevy_ecs::prelude::{Component, Entity, Or, With, World};
+use std::sync::Arc;
 
 /// The components of a light, in a query.
 pub(crate) type LightParts =
     (Option<&'static PointLight>, Option<&'static SpotLight>, Option<&'static DirectionalLight>);
+
+/// The image that a spot light projects.
+#[derive(Component, Clone, Debug)]
+pub struct LightTexture(pub Arc<SurfaceTexture>);
+
+impl PartialEq for LightTexture {
+    /// Textures are equal if they are the same allocation.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
 
 /// Matches lights that are not objects.
 pub type WithLight = Or<(With<PointLight>, With<SpotLight>, With<DirectionalLight>)>;

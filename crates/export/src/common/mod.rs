@@ -6,5 +6,6 @@ pub(crate) mod number;
 pub(crate) mod objects;
 pub(crate) mod picture;
 pub(crate) mod ply;
+pub(crate) mod projected;
 pub mod scene;
 pub(crate) mod surface;

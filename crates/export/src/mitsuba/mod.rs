@@ -11,20 +11,22 @@ use crate::common::folder::Folder;
 use crate::common::number::number;
 use crate::common::objects::{Geometry, Placed, placed, radiance_of};
 use crate::common::picture::exr;
+use crate::common::projected::Projected;
 use crate::common::scene::WholeScene;
-use crate::common::surface::Surface;
+use crate::common::surface::{Color, Surface};
 use crate::mitsuba::xml::Xml;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
-use firstlight_format::light::LightKind;
+use firstlight_format::light::{ImageFrame, LightKind};
 use firstlight_format::names::Names;
 use firstlight_format::parts::LightPart;
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
-use firstlight_render::Environment;
+use firstlight_render::{Environment, Falloff};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashMap;
+use std::f32::consts::PI;
 use std::path::Path;
 
 /// Image files that Mitsuba reads.
@@ -69,7 +71,7 @@ impl Writer<'_> {
         self.view();
         self.environment()?;
         for light in &self.scene.file.lights {
-            self.light(light);
+            self.light(light)?;
         }
         for name in names {
             let id = self.id(&name);
@@ -169,7 +171,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    fn light(&mut self, light: &LightPart) {
+    fn light(&mut self, light: &LightPart) -> Result<(), WriteError> {
         let (kind, placement) = LightKind::from_part(light);
         let direction = kind.direction(&placement);
         let name = light.name().unwrap_or("light");
@@ -184,7 +186,10 @@ impl Writer<'_> {
             self.xml.rgb("radiance", radiance);
             self.xml.close();
             self.xml.close();
-            return;
+            return Ok(());
+        }
+        if let Some(projected) = Projected::of(self.scene, light) {
+            return self.projector(name, &projected);
         }
         match (kind, direction) {
             (LightKind::Point(light), _) => {
@@ -194,7 +199,7 @@ impl Writer<'_> {
                 self.xml.close();
             }
             (LightKind::Spot(light), Some(direction)) => {
-                if light.inner_angle_deg < light.outer_angle_deg {
+                if light.falloff != Falloff::Linear && light.inner_angle_deg < light.outer_angle_deg {
                     self.tell(name, "the edge of its cone falls off as Mitsuba has it, by angles");
                 }
                 self.xml.open("emitter", &[("type", "spot")]);
@@ -214,6 +219,51 @@ impl Writer<'_> {
             }
             _ => self.tell(name, "a light without a direction is left out"),
         }
+        Ok(())
+    }
+
+    /// A spot with a texture, if that is what it is; else a projector.
+    fn projector(&mut self, name: &str, projected: &Projected) -> Result<(), WriteError> {
+        let light = &projected.light;
+        if let (Some(texture), ImageFrame { width_deg: 0.0, height_deg: 0.0, even: false, .. }) =
+            (&projected.texture, light.image)
+        {
+            if light.falloff != Falloff::Linear && light.inner_angle_deg < light.outer_angle_deg {
+                self.tell(name, "the edge of its cone falls off as Mitsuba has it, by angles");
+            }
+            self.xml.open("emitter", &[("type", "spot")]);
+            self.xml.transform("to_world", &projected.world(1.0, 1.0));
+            self.xml.rgb("intensity", light.intensity);
+            self.color("texture", &Color::Texture(texture.clone()))?;
+            self.xml.float("cutoff_angle", light.outer_angle_deg);
+            self.xml.float("beam_width", light.inner_angle_deg);
+            self.xml.close();
+            return Ok(());
+        }
+        if projected.is_cut() {
+            self.tell(name, "the cone that cuts its image is left out");
+        }
+        if !light.image.even {
+            self.tell(name, "its image is brighter off the middle, so that a wall that faces it is lit evenly");
+        }
+        self.xml.open("emitter", &[("type", "projector")]);
+        // Its image runs against its axes, and has the proportions of its pixels.
+        let squeezed = projected.half.y * projected.aspect / projected.half.x;
+        self.xml.transform("to_world", &projected.world(-1.0, -squeezed));
+        self.xml.float("fov", 2.0 * projected.half.x.atan().to_degrees());
+        match &projected.texture {
+            None => self.xml.rgb("irradiance", light.intensity / PI),
+            Some(texture) => {
+                let scale = light.intensity.max_element();
+                if light.intensity != Vec3::splat(scale) {
+                    self.tell(name, "the colour that tints its image is left out");
+                }
+                self.xml.float("scale", scale / PI);
+                self.color("irradiance", &Color::Texture(texture.clone()))?;
+            }
+        }
+        self.xml.close();
+        Ok(())
     }
 
     fn environment(&mut self) -> Result<(), WriteError> {

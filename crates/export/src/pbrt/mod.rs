@@ -10,6 +10,7 @@ use crate::common::environment::square_image;
 use crate::common::folder::Folder;
 use crate::common::objects::{Geometry, Placed, placed, radiance_of};
 use crate::common::picture::exr;
+use crate::common::projected::Projected;
 use crate::common::scene::WholeScene;
 use crate::common::surface::{Color, Scalar, Surface, Use};
 use crate::pbrt::text::{List, Text, quoted};
@@ -21,8 +22,8 @@ use firstlight_format::light::LightKind;
 use firstlight_format::names::Names;
 use firstlight_format::parts::LightPart;
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
-use firstlight_render::Environment;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use firstlight_render::{Environment, Falloff};
+use glam::{DAffine3, DMat3, DVec3, Mat2, Vec2, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -82,7 +83,7 @@ impl Writer<'_> {
         let all = placed(self.scene, emits, self.warnings);
         self.environment()?;
         for light in &self.scene.file.lights {
-            self.light(light);
+            self.light(light)?;
         }
         for name in names {
             let surface = self.surfaces[&name].clone();
@@ -188,7 +189,7 @@ impl Writer<'_> {
         Ok(List::default().string("filename", &picture.file))
     }
 
-    fn light(&mut self, light: &LightPart) {
+    fn light(&mut self, light: &LightPart) -> Result<(), WriteError> {
         let (kind, placement) = LightKind::from_part(light);
         let direction = kind.direction(&placement);
         let name = light.name().unwrap_or("light");
@@ -199,7 +200,12 @@ impl Writer<'_> {
             self.text.transform(&DAffine3::from_translation(center));
             self.text.directive("Shape", &["sphere"], List::default().float("radius", radius));
             self.text.end("AttributeEnd");
-            return;
+            return Ok(());
+        }
+        match Projected::of(self.scene, light) {
+            Some(Projected { texture: None, .. }) => self.tell(name, "the frame of its white image is left out"),
+            Some(projected) => return self.projection(name, &projected),
+            None => {}
         }
         let from = placement.translation;
         match (kind, direction) {
@@ -208,7 +214,7 @@ impl Writer<'_> {
                 self.text.directive("LightSource", &["point"], list);
             }
             (LightKind::Spot(light), Some(direction)) => {
-                if light.inner_angle_deg < light.outer_angle_deg {
+                if light.falloff != Falloff::Smooth && light.inner_angle_deg < light.outer_angle_deg {
                     self.tell(name, "the edge of its cone falls off as pbrt has it");
                 }
                 let list = List::default().rgb("I", light.intensity).points("from", &[from]);
@@ -223,6 +229,37 @@ impl Writer<'_> {
             }
             _ => self.tell(name, "a light without a direction is left out"),
         }
+        Ok(())
+    }
+
+    fn projection(&mut self, name: &str, projected: &Projected) -> Result<(), WriteError> {
+        let Some(texture) = &projected.texture else { return Ok(()) };
+        let light = &projected.light;
+        if projected.is_cut() {
+            self.tell(name, "the cone that cuts its image is left out");
+        }
+        if light.image.even {
+            self.tell(name, "its image is darker off the middle, by its cosine cubed");
+        }
+        let image = &self.scene.textures[&texture.name].texture;
+        if (image.uv_matrix, image.uv_offset) != (Mat2::IDENTITY, Vec2::ZERO) {
+            self.tell(name, "the transform of its texture is left out");
+        }
+        let scale = light.intensity.max_element();
+        if light.intensity != Vec3::splat(scale) {
+            self.tell(name, "the colour that tints its image is left out");
+        }
+        let picture = self.folder.picture(self.scene, texture, false, &FORMATS)?;
+        // Its image has the proportions of its pixels, and the field of view is that of the shorter side.
+        let squeezed = projected.half.y * projected.aspect / projected.half.x;
+        let half = if projected.aspect > 1.0 { projected.half.x / projected.aspect } else { projected.half.x };
+        self.text.begin("AttributeBegin");
+        self.text.transform(&projected.world(1.0, squeezed));
+        let list = List::default().string("filename", &picture.file).float("scale", scale);
+        let list = list.float("fov", 2.0 * half.atan().to_degrees());
+        self.text.directive("LightSource", &["projection"], list);
+        self.text.end("AttributeEnd");
+        Ok(())
     }
 
     fn environment(&mut self) -> Result<(), WriteError> {

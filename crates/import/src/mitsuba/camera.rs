@@ -82,7 +82,7 @@ impl Converter<'_> {
     }
 
     /// Degrees.
-    fn horizontal_field(&mut self, node: Node, aspect: f64) -> Result<f64, SceneError> {
+    pub(crate) fn horizontal_field(&mut self, node: Node, aspect: f64) -> Result<f64, SceneError> {
         let tangent = |degrees: f64| (0.5 * degrees.to_radians()).tan();
         let diagonal = |tangent: f64| tangent / (1.0 + 1.0 / (aspect * aspect)).sqrt();
         let half = match node.float("fov")? {

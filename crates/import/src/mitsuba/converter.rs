@@ -7,7 +7,7 @@ use firstlight_files::warnings::Warnings;
 use firstlight_format::names::Names;
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
-use glam::DMat4;
+use glam::{DMat2, DMat4, DVec2};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -17,6 +17,26 @@ pub(crate) enum Reads {
     Color,
     /// One number. A checkerboard then has its colours exchanged, in Mitsuba as here.
     Number,
+    /// A colour at (1 − u, v).
+    Mirrored,
+    /// A colour at (u, 1 − v).
+    UpsideDown,
+    /// A colour at (1 − u, 1 − v).
+    Turned,
+}
+
+impl Reads {
+    /// The coordinates at which it reads: factors of u and v, and a shift.
+    pub(crate) fn coordinates(self) -> (DMat2, DVec2) {
+        let (u, v) = match self {
+            Self::Color | Self::Number => (1.0, 1.0),
+            Self::Mirrored => (-1.0, 1.0),
+            Self::UpsideDown => (1.0, -1.0),
+            Self::Turned => (-1.0, -1.0),
+        };
+        let signs = DVec2::new(u, v);
+        (DMat2::from_diagonal(signs), 0.5 * (DVec2::ONE - signs))
+    }
 }
 
 /// A BSDF in our words.

@@ -1,16 +1,18 @@
 //! Emitters that are no shapes: environment, points, spots, directions.
 
-use crate::mitsuba::converter::Converter;
+use crate::mitsuba::converter::{Converter, Reads};
 use crate::mitsuba::graph::Node;
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
+use crate::model::projection::{aspect_of, image_of, projection, stretched};
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
-use firstlight_format::value::Rgb;
+use firstlight_format::value::{ColorValue, Rgb};
 use firstlight_render::Falloff;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
+use std::f32::consts::PI;
 
 impl Converter<'_> {
     /// Adds an emitter to the scene.
@@ -40,14 +42,24 @@ impl Converter<'_> {
                 let matrix = self.world * node.transform("to_world")?;
                 let outer = node.float_or("cutoff_angle", 20.0)?;
                 let inner = node.float_or("beam_width", 0.75 * outer)?;
-                if node.child("texture")?.is_some() {
-                    self.tell(node, "the texture of a spot light is not modelled: it is white");
-                }
                 let direction = matrix.transform_vector3(DVec3::Z);
                 if !(outer > 0.0 && inner >= 0.0) || direction.try_normalize().is_none() {
                     return Err(node.error("a spot light needs a direction, and a cutoff_angle above 0"));
                 }
-                let intensity = Rgb(self.constant_color(node, "intensity", 1.0, Use::Emission)?);
+                let mut intensity = self.constant_color(node, "intensity", 1.0, Use::Emission)?;
+                // Its u increases along X, to the left, and its v along Y.
+                let reads = if is_mirrored(&matrix) { Reads::Color } else { Reads::Mirrored };
+                let texture = match node.child("texture")? {
+                    Some(texture) => self.texture(texture, Use::Factor, reads)?,
+                    None => ColorValue::grey(1.0),
+                };
+                let texture = match texture {
+                    ColorValue::Rgb(rgb) => {
+                        intensity *= rgb;
+                        None
+                    }
+                    ColorValue::Texture(texture) => Some(texture),
+                };
                 let (position, transform) = (matrix.transform_point3(DVec3::ZERO), TransformPart::default());
                 let outer_angle = outer.clamp(1e-3, 90.0);
                 let inner_angle = inner.clamp(0.0, outer_angle);
@@ -55,13 +67,19 @@ impl Converter<'_> {
                     name,
                     position,
                     direction,
-                    intensity,
+                    intensity: Rgb(intensity),
                     inner_angle,
                     outer_angle,
                     falloff: Falloff::Linear,
+                    texture,
+                    up: up_of(&matrix),
+                    image_width: 0.0,
+                    image_height: 0.0,
+                    even: false,
                     transform,
                 });
             }
+            "projector" => self.projector(node, name)?,
             "directional" => {
                 let matrix = self.world * node.transform("to_world")?;
                 let direction = match node.vector("direction")? {
@@ -81,6 +99,39 @@ impl Converter<'_> {
                 node.skip();
             }
         }
+        Ok(())
+    }
+
+    fn projector(&mut self, node: Node, name: Option<String>) -> Result<(), SceneError> {
+        let matrix = self.world * node.transform("to_world")?;
+        let direction = matrix.transform_vector3(DVec3::Z);
+        if direction.try_normalize().is_none() {
+            return Err(node.error("a projector needs a direction"));
+        }
+        // Its u increases against X, to the right, and its v against Y.
+        let reads = if is_mirrored(&matrix) { Reads::Turned } else { Reads::UpsideDown };
+        let irradiance = match (node.value("irradiance"), node.child("irradiance")?) {
+            (None, Some(texture)) => self.texture(texture, Use::Emission, reads)?,
+            _ => ColorValue::Rgb(self.constant_color(node, "irradiance", 1.0, Use::Emission)?),
+        };
+        let scale = PI * node.float_or("scale", 1.0)?.max(0.0) as f32;
+        let (intensity, texture, aspect) = match irradiance {
+            ColorValue::Rgb(rgb) => (rgb * scale, None, 1.0),
+            ColorValue::Texture(texture) => {
+                let image = self.file.textures.get(&texture).and_then(|source| image_of(self.folder, source));
+                (Vec3::splat(scale), Some(texture), image.as_ref().map_or(1.0, aspect_of))
+            }
+        };
+        let half = (0.5 * self.horizontal_field(node, aspect)?.to_radians()).tan();
+        let mut light = projection(stretched(&DMat3::from_mat4(matrix), [half, half / aspect]));
+        if let LightPart::Spot {
+            name: a, position: b, direction: c, intensity: d, texture: e, up: f, even: g, ..
+        } = &mut light
+        {
+            (*a, *b, *c, *d) = (name, matrix.transform_point3(DVec3::ZERO), direction, Rgb(intensity));
+            (*e, *f, *g) = (texture, up_of(&matrix), true);
+        }
+        self.file.lights.push(light);
         Ok(())
     }
 
@@ -104,4 +155,13 @@ impl Converter<'_> {
         }
         Ok(())
     }
+}
+
+fn is_mirrored(matrix: &DMat4) -> bool {
+    matrix.determinant() < 0.0
+}
+
+/// The direction of +Y; any if it has no length.
+fn up_of(matrix: &DMat4) -> DVec3 {
+    matrix.transform_vector3(DVec3::Y).try_normalize().unwrap_or(DVec3::Y)
 }

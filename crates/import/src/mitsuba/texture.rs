@@ -91,7 +91,7 @@ impl Converter<'_> {
         }
         let mut read_attribute = None;
         let source = match node.plugin() {
-            "bitmap" => match self.bitmap(node)? {
+            "bitmap" => match self.bitmap(node, reads)? {
                 Some(image) => image,
                 None => return Ok(ColorValue::grey(0.5)),
             },
@@ -173,7 +173,7 @@ impl Converter<'_> {
     }
 
     /// `None` for an image that must not be read, which is told.
-    fn bitmap(&mut self, node: Node) -> Result<Option<TextureSource>, SceneError> {
+    fn bitmap(&mut self, node: Node, reads: Reads) -> Result<Option<TextureSource>, SceneError> {
         let name = node.text("filename")?.ok_or_else(|| node.error("a bitmap needs a `filename`"))?;
         node.ignore(&["format", "accel", "max_anisotropy", "gamma", "cache", "channel"]);
         let file = match find_file(&self.references, &self.graph.folders, name) {
@@ -199,7 +199,7 @@ impl Converter<'_> {
         };
         let smooth = node.text("filter_type")? != Some("nearest");
         let encoding = if node.boolean_or("raw", false)? { Encoding::Linear } else { Encoding::Auto };
-        let (matrix, offset) = self.uv_transform(node)?;
+        let (matrix, offset) = self.uv_transform(node, reads)?;
         // Over the middle of the image: its top is at v = 1.
         let flip = DMat2::from_diagonal(DVec2::new(1.0, -1.0));
         let placed = Placed::of(flip * matrix, DVec2::new(offset.x, 1.0 - offset.y));
@@ -233,7 +233,7 @@ impl Converter<'_> {
         if reads == Reads::Number {
             std::mem::swap(&mut a, &mut b);
         }
-        let (matrix, offset) = self.uv_transform(node)?;
+        let (matrix, offset) = self.uv_transform(node, reads)?;
         // Its squares have sides of 1/2.
         let placed = Placed::of(2.0 * matrix, 2.0 * offset).filter(|placed| placed.stretch == DVec2::ONE);
         let Placed { repeat: squares, offset, rotate, .. } = placed.unwrap_or_else(|| {
@@ -243,10 +243,11 @@ impl Converter<'_> {
         Ok(TextureSource::Checker { a, b, squares, offset, rotate })
     }
 
-    fn uv_transform(&self, node: Node) -> Result<(DMat2, DVec2), SceneError> {
+    fn uv_transform(&self, node: Node, reads: Reads) -> Result<(DMat2, DVec2), SceneError> {
         let m = node.transform("to_uv")?;
         let matrix = DMat2::from_cols(m.x_axis.truncate().truncate(), m.y_axis.truncate().truncate());
-        Ok((matrix, m.w_axis.truncate().truncate()))
+        let (signs, shift) = reads.coordinates();
+        Ok((matrix * signs, m.w_axis.truncate().truncate() + matrix * shift))
     }
 }
 

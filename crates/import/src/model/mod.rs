@@ -9,4 +9,5 @@ pub(crate) mod material;
 pub(crate) mod number;
 pub mod placing;
 pub(crate) mod polygon;
+pub(crate) mod projection;
 pub(crate) mod texture_map;

@@ -469,12 +469,19 @@ impl<'a> Builder<'a> {
         let world = DAffine3::from_mat3(self.world) * *ctm;
         let name = format!("{} {}", cut(kind), self.lights.len() + 1);
         let mut told = Vec::new();
-        let made = light(kind, params, &world, name, |name| self.named_file(name), &mut |what| told.push(what));
+        let file = |name: &str| self.named_file(name);
+        let made = light(kind, params, &world, name, self.folder, file, &mut |what| told.push(what));
         told.extend(params.complaints());
         told.into_iter().for_each(|what| self.tell(what));
         match made {
             Light::Nothing => {}
             Light::Part(part) => self.lights.push(part),
+            Light::Projector(mut part, source) => {
+                if let LightPart::Spot { texture, .. } = &mut part {
+                    *texture = Some(self.texture_name("slide", source));
+                }
+                self.lights.push(part);
+            }
             Light::Environment(environment) => {
                 self.environment = match (&self.environment, environment) {
                     (EnvironmentSource::Black, new) => new,

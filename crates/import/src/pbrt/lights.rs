@@ -1,18 +1,22 @@
 //! The lights of pbrt that are no shapes.
 
+use crate::model::projection::{aspect_of, image_of, projection, stretched};
 use crate::pbrt::params::Params;
 use crate::pbrt::spectrum::UnknownSpectrum;
 use firstlight_files::printable;
 use firstlight_format::parts::{LightPart, TransformPart};
-use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
+use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource, TextureSource};
 use firstlight_format::value::Rgb;
-use firstlight_render::Falloff;
-use glam::{DAffine3, DMat3, DVec3};
+use firstlight_render::{Falloff, ImageTexture};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// What a light becomes.
 pub(crate) enum Light {
     Part(LightPart),
+    /// With the texture that it projects, whose name it lacks.
+    Projector(LightPart, TextureSource),
     Environment(EnvironmentSource),
     Nothing,
 }
@@ -34,13 +38,14 @@ fn rgb(color: DVec3) -> Rgb {
 
 /// A light.
 ///
-/// - `world`: from its space to our world; `file`: the path of an image in the scene file for its name in pbrt's, `None`
-///   if it must not be read; `tell`: called with what is not shown.
+/// - `world`: from its space to our world; `folder`: of the scene; `file`: the path of an image in the scene file for its
+///   name in pbrt's, `None` if it must not be read; `tell`: called with what is not shown.
 pub(crate) fn light(
     kind: &str,
     params: &Params,
     world: &DAffine3,
     name: String,
+    folder: &Path,
     file: impl Fn(&str) -> Option<String>,
     tell: &mut impl FnMut(String),
 ) -> Light {
@@ -72,6 +77,11 @@ pub(crate) fn light(
                 inner_angle: inner,
                 outer_angle: outer,
                 falloff: Falloff::Smooth,
+                texture: None,
+                up: DVec3::Y,
+                image_width: 0.0,
+                image_height: 0.0,
+                even: false,
                 transform,
             })
         }
@@ -106,11 +116,57 @@ pub(crate) fn light(
                 axes: Some([rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.to_array())),
             })
         }
+        "projection" => {
+            let Some(direction) = world.transform_vector3(DVec3::Z).try_normalize() else { return nowhere(tell) };
+            let Some(file) = params.string("filename").and_then(file) else {
+                tell("a `projection` light without an image is left out".to_owned());
+                return Light::Nothing;
+            };
+            let mut source = TextureSource::image(file);
+            if let TextureSource::Image { stretch, offset, smooth, .. } = &mut source {
+                *smooth = false;
+                // Its u increases along X, which is to the left in a right-handed frame.
+                if world.matrix3.determinant() > 0.0 {
+                    (*stretch, *offset) = (DVec2::new(-1.0, 1.0), DVec2::X);
+                }
+            }
+            let image = image_of(folder, &source);
+            let aspect = image.as_ref().map_or(1.0, aspect_of);
+            // The field of view is that of the shorter side.
+            let half = (0.5 * params.number("fov").unwrap_or(90.0).to_radians()).tan().clamp(1e-6, 1e6);
+            let tangents = if aspect > 1.0 { [half * aspect, half] } else { [half, half / aspect] };
+            let tangents = stretched(&world.matrix3, tangents);
+            let power =
+                positive("power").map_or(1.0, |power| power / image.map_or(1.0, |image| flux(&image, tangents)));
+            let mut light = projection(tangents);
+            if let LightPart::Spot { name: a, position: b, direction: c, intensity: d, up: e, .. } = &mut light {
+                let up = world.transform_vector3(DVec3::Y).try_normalize().unwrap_or(DVec3::Y);
+                (*a, *b, *c) = (name, world.transform_point3(DVec3::ZERO), direction);
+                (*d, *e) = (rgb(DVec3::splat(scale * power)), up);
+            }
+            Light::Projector(light, source)
+        }
         other => {
             tell(format!("lights of the kind `{}` are not modelled", printable::name(other)));
             Light::Nothing
         }
     }
+}
+
+/// Flux of an image as intensity, weighted by Rec. 709 luminance.
+///
+/// - `tangents`: of half the angles that it fills.
+fn flux(image: &ImageTexture, tangents: [f64; 2]) -> f64 {
+    let size = DVec2::new(image.width.into(), image.height.into());
+    let sum: f64 = (0..image.len())
+        .map(|i| {
+            let at = DVec2::new((i as u32 % image.width).into(), (i as u32 / image.width).into());
+            let on_wall = (2.0 * (at + 0.5) / size - 1.0) * DVec2::from(tangents);
+            let cos = (1.0 + on_wall.length_squared()).sqrt().recip();
+            image.linear(i).as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722)) * cos.powi(3)
+        })
+        .sum();
+    4.0 * tangents[0] * tangents[1] * sum / image.len() as f64
 }
 
 fn nowhere(tell: &mut impl FnMut(String)) -> Light {

@@ -1,7 +1,8 @@
 //! Delta lights: point, spot and directional lights. No ray ever hits one.
 
+use crate::core::texture::TextureId;
 use firstlight_simd::{Elementary, Truth, select};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// A light that emits from a single point or in a single direction.
@@ -22,6 +23,8 @@ pub enum DeltaLight {
         intensity: Vec3,
         /// The cone.
         cone: Cone,
+        /// The image that it projects.
+        image: Option<LightImage>,
     },
     /// From infinitely far away.
     Directional {
@@ -59,6 +62,31 @@ pub struct Cone {
     pub slope: f32,
     /// From `outer` inwards.
     pub falloff: Falloff,
+}
+
+/// An image that a spot light projects: it multiplies the intensity, and nothing shines beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightImage {
+    /// The image, over texture coordinates from 0 to 1; `None`: white.
+    pub texture: Option<TextureId>,
+    /// Unit vectors to the right and upwards in the image, as seen from the light, and along its middle; orthonormal.
+    pub axes: [Vec3; 3],
+    /// Tangents of half the angles that it fills, horizontally and vertically; above 0.
+    pub half: Vec2,
+    /// Whether a wall that faces the light is lit evenly, so that the intensity is over cos³ of the angle from the axis.
+    pub even: bool,
+}
+
+impl LightImage {
+    /// Texture coordinates in a unit direction, and the factor of the intensity there; `None` beside the image.
+    #[inline]
+    pub fn at(&self, dir: Vec3) -> Option<(Vec2, f32)> {
+        let [right, up, axis] = self.axes;
+        let cos = dir.dot(axis);
+        let uv = 0.5 + 0.5 * Vec2::new(dir.dot(right), dir.dot(up)) / (cos * self.half);
+        let is_inside = cos > 0.0 && uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all();
+        is_inside.then(|| (uv, if self.even { cos.powi(-3) } else { 1.0 }))
+    }
 }
 
 impl Falloff {
@@ -136,21 +164,19 @@ impl DeltaLight {
         }
     }
 
+    /// The image that it projects.
+    pub fn image(&self) -> Option<LightImage> {
+        match *self {
+            Self::Spot { image, .. } => image,
+            Self::Point { .. } | Self::Directional { .. } => None,
+        }
+    }
+
     /// Radiant intensity, W·sr⁻¹, or for a directional light its irradiance, W·m⁻².
     pub fn strength(&self) -> Vec3 {
         match *self {
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
             Self::Directional { irradiance, .. } => irradiance,
-        }
-    }
-
-    /// Radiant intensity in a unit direction, W·sr⁻¹; for a directional light, its irradiance.
-    #[inline]
-    pub fn towards(&self, dir: Vec3) -> Vec3 {
-        match self {
-            Self::Point { intensity, .. } => *intensity,
-            Self::Spot { intensity, cone, .. } => cone.falloff(dir) * *intensity,
-            Self::Directional { irradiance, .. } => *irradiance,
         }
     }
 }

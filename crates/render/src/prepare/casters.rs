@@ -166,7 +166,8 @@ impl CasterTable {
         let light = lights.light(light_id);
         let Caster { center, radius } = self.casters[caster as usize];
         if light.shape.delta().is_some() {
-            let line = delta_lines::sample(light, &self.outside, center, radius, sampler.pair(DIM_DIRECTION))?;
+            let u = sampler.pair(DIM_DIRECTION);
+            let line = delta_lines::sample(light, textures, &self.outside, (center, radius), u)?;
             let DeltaLine { ray, density, strength: radiance, is_far } = line;
             let density = density * self.pairs.pmf(self.casters.len(), light_id, caster);
             let is_real = density > 0.0 && density.is_finite();

@@ -4,6 +4,7 @@
 //! a spot light if it is narrower; for a directional light the origin is sampled uniformly over the disc of the
 //! projected sphere. Pdfs are per steradian and per square metre: no camera path could find such a line.
 
+use crate::core::texture::Texture;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_disc};
@@ -35,9 +36,16 @@ pub(crate) struct DeltaLine {
 
 /// Samples a line; `None` if the light emits nothing in its direction.
 ///
-/// - `center`, `radius`: bounding sphere of the caster, metres, possibly infinite;
+/// - `center`, `radius`: bounding sphere of the caster, metres, possibly infinite.
 /// - `u`: two independent uniform numbers in `[0, 1)`.
-pub(crate) fn sample(light: &Light, outside: &OutsideSample, center: Vec3, radius: f32, u: Vec2) -> Option<DeltaLine> {
+pub(crate) fn sample(
+    light: &Light,
+    textures: &[Texture],
+    outside: &OutsideSample,
+    (center, radius): (Vec3, f32),
+    u: Vec2,
+) -> Option<DeltaLine> {
+    let strength = |dir| light.radiance(textures, dir, Vec2::ZERO);
     match light.shape {
         LightShape::Point { position, cone } => {
             let (mut axis, mut one_minus_cos_max) = (Vec3::Z, 2.0);
@@ -54,7 +62,7 @@ pub(crate) fn sample(light: &Light, outside: &OutsideSample, center: Vec3, radiu
             }
             let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
             let dir = Frame::around(axis).to_world(local).normalize();
-            let strength = cone.map_or(1.0, |cone| cone.falloff(dir)) * light.strength();
+            let strength = cone.map_or(1.0, |cone| cone.falloff(dir)) * strength(dir);
             // There may be a surface at the position of the light.
             let origin = robust::offset_ray_origin(position, robust::gamma(6) * position.abs(), dir, dir);
             let density = cone_pdf(one_minus_cos_max);
@@ -68,7 +76,7 @@ pub(crate) fn sample(light: &Light, outside: &OutsideSample, center: Vec3, radiu
                 return None;
             }
             let density = FRAC_1_PI / (radius * radius);
-            Some(DeltaLine { ray: Ray::new(origin, -to_light), density, strength: light.strength(), is_far: true })
+            Some(DeltaLine { ray: Ray::new(origin, -to_light), density, strength: strength(-to_light), is_far: true })
         }
         _ => None,
     }

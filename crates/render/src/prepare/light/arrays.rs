@@ -77,8 +77,9 @@ impl LightArrays {
         let mut rows: [Vec<f32>; 20] = Default::default();
         let mut flags = Vec::new();
         for light in lights {
-            let even = light.emission.even_radiance();
-            let radiance = even.unwrap_or(Vec3::ZERO);
+            let even = light.even_radiance();
+            // What varies is a factor.
+            let radiance = even.unwrap_or(Vec3::ONE);
             let (flag, origin, u, v, normal, rest) = match &light.shape {
                 LightShape::Triangle { light, .. } => {
                     let [e1, e2] = light.edges;

@@ -1,12 +1,13 @@
 //! A light, and its samples from a point.
 
 use crate::core::color::luminance;
-use crate::core::delta_light::{DeltaLight, Origin};
+use crate::core::delta_light::{DeltaLight, LightImage, Origin};
 use crate::core::material::{ColorInput, ScalarInput};
 use crate::core::material_queries::Emission;
 use crate::core::techniques::Techniques;
 use crate::core::texture::{Texture, TexturePoint};
 use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
+use crate::prepare::light::mean_light::MeanLight;
 use crate::prepare::light::shape::{LightPoint, LightShape, sphere_uv};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
@@ -24,6 +25,8 @@ pub(crate) struct Light {
     /// Texture coordinates at the vertices of a triangle, if its emission is textured; for a quad at the corner and at
     /// the ends of its edges, if they differ from its surface coordinates.
     pub corners: Option<Box<[TexturePoint; 3]>>,
+    /// The image that a delta light projects.
+    pub image: Option<Box<LightImage>>,
 }
 
 /// A point on a light seen from a shading point.
@@ -52,12 +55,18 @@ impl Light {
         pmf: f32,
     ) -> Option<LightSample> {
         if let Some(source) = self.shape.delta() {
-            return self.delta_sample(&source, position, pmf);
+            return self.delta_sample(textures, &source, position, pmf);
         }
         self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
-    /// Emitted radiance at the point with this normal and these surface coordinates, W·m⁻²·sr⁻¹.
+    /// Emitted radiance, if it is the same everywhere on the surface and in all directions.
+    pub fn even_radiance(&self) -> Option<Vec3> {
+        self.emission.even_radiance().filter(|_| self.image.is_none())
+    }
+
+    /// Emitted radiance at the point with this normal and these surface coordinates, W·m⁻²·sr⁻¹. Of a delta light the
+    /// strength in the direction `normal`, without its cone.
     #[inline]
     pub fn radiance(&self, textures: &[Texture], normal: Vec3, uv: Vec2) -> Vec3 {
         let point = || match (&self.shape, &self.turned) {
@@ -68,6 +77,9 @@ impl Light {
                 None => uv.into(),
             },
         };
+        if let Some(image) = &self.image {
+            return self.projected(image, textures, normal);
+        }
         let radiance = match self.emission.radiance {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
@@ -94,15 +106,28 @@ impl Light {
     }
 
     /// Samples a delta light, whose emission is its intensity or its irradiance.
-    fn delta_sample(&self, source: &DeltaSource<f32>, position: Vec3, pmf: f32) -> Option<LightSample> {
+    fn delta_sample(
+        &self,
+        textures: &[Texture],
+        source: &DeltaSource<f32>,
+        position: Vec3,
+        pmf: f32,
+    ) -> Option<LightSample> {
         let DeltaSample { found, target, wi, scale } = source.seen_from(true, position.into());
-        let radiance = self.strength() * scale;
+        let radiance = scale * self.radiance(textures, -Vec3::from(wi), Vec2::ZERO);
         let (pdf, is_far) = (pmf * SHARPNESS, source.is_far);
         found.then(|| LightSample { target: target.into(), wi: wi.into(), pdf, radiance, is_far })
     }
 
+    /// Intensity of a delta light with an image in a unit direction, W·sr⁻¹, without its cone.
+    fn projected(&self, image: &LightImage, textures: &[Texture], dir: Vec3) -> Vec3 {
+        let Some((uv, factor)) = image.at(dir) else { return Vec3::ZERO };
+        let color = image.texture.map_or(Vec3::ONE, |texture| textures[texture as usize].eval(uv));
+        factor * self.strength() * color
+    }
+
     /// Strength of a delta light: radiant intensity on the axis, W·sr⁻¹, or irradiance, W·m⁻².
-    pub fn strength(&self) -> Vec3 {
+    fn strength(&self) -> Vec3 {
         match self.emission.radiance {
             ColorInput::Constant(strength) => strength,
             ColorInput::Texture(_) => Vec3::ZERO,
@@ -112,14 +137,16 @@ impl Light {
     /// Creates a delta light.
     ///
     /// - `reach`: radius of the scene, metres.
-    pub fn without_size(light: &DeltaLight, reach: f32) -> Self {
+    pub(super) fn without_size(light: &DeltaLight, reach: f32, means: &mut MeanLight) -> Self {
         let shape = match light.origin() {
             Origin::At(position, cone) => LightShape::Point { position, cone },
             Origin::Far(direction) => LightShape::Directional { to_light: -direction, reach },
         };
         let strength = light.strength();
         let emission = Emission::even(strength);
-        let mean_radiance = luminance(strength);
-        Self { shape, emission, mean_radiance, is_point: true, turned: None, corners: None }
+        let image = light.image();
+        let mean = image.and_then(|image| image.texture).map_or(1.0, |texture| means.of(texture, None));
+        let mean_radiance = mean * luminance(strength);
+        Self { shape, emission, mean_radiance, is_point: true, turned: None, corners: None, image: image.map(Box::new) }
     }
 }

@@ -70,7 +70,7 @@ impl LightTable {
             })
             .collect();
         let reach = reach_of(geometry);
-        lights.extend(delta_lights.iter().map(|light| Light::without_size(light, reach)));
+        lights.extend(delta_lights.iter().map(|light| Light::without_size(light, reach, &mut means)));
         let selection = LightSelection::build(&lights);
         let lanes = LightArrays::build(&lights);
         Self { lights, by_object, selection, lanes }

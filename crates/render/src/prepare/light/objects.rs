@@ -160,7 +160,7 @@ impl Adder<'_, '_> {
                 ColorInput::Texture(id) => self.means.of(id, corners.as_deref()),
             };
         let (is_point, turned) = (self.object.is_point_light, self.object.turned);
-        self.lights.push(Light { shape, emission, mean_radiance, is_point, turned, corners });
+        self.lights.push(Light { shape, emission, mean_radiance, is_point, turned, corners, image: None });
         self.lights.len() as u32 - 1
     }
 }

@@ -43,26 +43,33 @@ impl LightTable {
         mut points: LightLanes<S>,
     ) -> LightLanes<S> {
         points.radiance = Vector::gather(&wide.radiance, id);
+        if wide.has_deltas {
+            points = wide.with_deltas(id, mask, position, points);
+        }
         if wide.has_varied {
             let varied = points.found & Bits::gather(&wide.flags, id).has(VARIED);
             if varied != 0 {
-                self.set_varied(textures, id.to_array(), varied, &mut points);
+                self.vary(textures, id.to_array(), varied, &mut points);
             }
         }
-        if wide.has_deltas { wide.with_deltas(id, mask, position, points) } else { points }
+        points
     }
 
-    /// Sets the radiance of lights that varies, one at a time.
+    /// Multiplies by the radiance of lights that varies, one at a time.
     #[inline(never)]
-    fn set_varied<S: Simd>(&self, textures: &[Texture], ids: [u32; LANES], mask: Mask, points: &mut LightLanes<S>) {
-        let (targets, uvs) = (points.target.to_arrays(), points.uv.map(|uv| uv.to_array()));
+    fn vary<S: Simd>(&self, textures: &[Texture], ids: [u32; LANES], mask: Mask, points: &mut LightLanes<S>) {
+        let [targets, directions] = [points.target, points.wi].map(|vector| vector.to_arrays());
+        let uvs = points.uv.map(|uv| uv.to_array());
         let mut radiance = points.radiance.to_arrays();
         for lane in (0..LANES).filter(|lane| mask >> lane & 1 != 0) {
             let light = &self.lights[ids[lane] as usize];
-            let target = Vec3::new(targets[0][lane], targets[1][lane], targets[2][lane]);
-            let normal = light.shape.normal_at(target);
+            let at = |vectors: &[[f32; LANES]; 3]| Vec3::new(vectors[0][lane], vectors[1][lane], vectors[2][lane]);
+            let normal = match light.image {
+                Some(_) => -at(&directions),
+                None => light.shape.normal_at(at(&targets)),
+            };
             let found = light.radiance(textures, normal, Vec2::new(uvs[0][lane], uvs[1][lane]));
-            (radiance[0][lane], radiance[1][lane], radiance[2][lane]) = (found.x, found.y, found.z);
+            radiance.iter_mut().zip(found.to_array()).for_each(|(channel, factor)| channel[lane] *= factor);
         }
         points.radiance = Vector::from_arrays(points.pdf.s, &radiance);
     }
