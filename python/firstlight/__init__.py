@@ -11,7 +11,7 @@ from . import materials
 from ._errors import Error, InputError, MemoryError
 from ._firstlight import __version__
 from ._image import Image, Layers
-from ._parts import Camera, Environment, Material, Texture, checker, environment, gradient, texture, vertex_colors
+from ._parts import Camera, Environment, Material, Texture, checker, clear_sky, environment, gradient, texture, vertex_colors
 from ._scene import Instances, Object, Scene, builtin_scenes, open, render_many
 from .materials import *  # noqa: F403
 
@@ -31,6 +31,7 @@ __all__ = [
     "__version__",
     "builtin_scenes",
     "checker",
+    "clear_sky",
     "environment",
     "gradient",
     "open",

@@ -143,6 +143,11 @@ def gradient(zenith: Any, horizon: Any, ground: Any) -> Environment:
     return Environment(struct("gradient", {"zenith": zenith, "horizon": horizon, "ground": ground}))
 
 
+def clear_sky(**fields: Any) -> Environment:
+    """A clear sky with the sun: `elevation`, `azimuth`, `turbidity`, `ground`, …, as in scene files."""
+    return Environment(struct("sky", fields))
+
+
 def environment(image: Any, **fields: Any) -> Environment:
     """An equirectangular image as environment.
 

@@ -15,8 +15,8 @@ use firstlight::scene::animation::Shutter;
 use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Animation, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Projection,
-    Rendering, SceneInputs, SceneSource, Severity, Shape, Warning, Warnings,
+    self, Animation, EnvironmentSource, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput,
+    Projection, Rendering, SceneEnvironment, SceneInputs, SceneSource, Severity, Shape, Warning, Warnings,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -130,7 +130,7 @@ impl SceneReport<'_> {
             }
         }
         row("lights", lights);
-        row("environment", environment(&shading.environment));
+        row("environment", environment(&self.inputs.environment));
         let lens = if self.lens().enabled { self.aperture() } else { "pinhole".to_owned() };
         row("camera", format!("{lens}, {}", self.projection()));
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
@@ -195,7 +195,7 @@ impl SceneReport<'_> {
             "materials": self.materials(),
             "textures": shading.textures.len(),
             "emissive_objects": self.emitters(),
-            "environment": environment(&shading.environment),
+            "environment": environment(&self.inputs.environment),
             "lens_radius": if lens.enabled { lens.radius } else { 0.0 },
             "width": film.width,
             "height": film.height,
@@ -421,8 +421,11 @@ fn kind_of_shape(shape: &Shape) -> &'static str {
     }
 }
 
-fn environment(environment: &Environment) -> String {
-    match environment {
+fn environment(environment: &SceneEnvironment) -> String {
+    if let EnvironmentSource::Sky { elevation, azimuth, turbidity, .. } = &environment.part {
+        return format!("clear sky, sun at {elevation}°, azimuth {azimuth}°, turbidity {turbidity}");
+    }
+    match &environment.light {
         Environment::Black => "black".to_owned(),
         Environment::Constant(radiance) => format!("constant {radiance}"),
         Environment::Gradient { .. } => "gradient sky".to_owned(),

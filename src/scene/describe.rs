@@ -329,6 +329,16 @@ impl<'a> Writer<'a> {
                 let (file, scale) = (file.clone(), Rgb(*scale));
                 EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
             }
+            (Environment::Image { scale, rotation, .. }, part @ EnvironmentSource::Sky { .. }) => {
+                let mut part = part.clone();
+                if let EnvironmentSource::Sky { azimuth, scale: factor, .. } = &mut part {
+                    *factor = Rgb(*scale);
+                    if -radians(*azimuth) != *rotation {
+                        *azimuth = -f64::from(*rotation).to_degrees();
+                    }
+                }
+                part
+            }
             (Environment::Image { .. }, _) => {
                 self.losses.push("the image around the scene came from no file and is left out".to_owned());
                 EnvironmentSource::Black

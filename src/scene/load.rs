@@ -22,6 +22,7 @@ use crate::import::documents::Documents;
 use crate::import::environment_image::equirectangular;
 use crate::import::gltf_scene;
 use crate::import::meshes::{LoadedMesh, load_mesh};
+use crate::import::sky::clear_sky;
 use crate::render::ImageTexture;
 use crate::scene::animation::edited::show_time;
 use crate::scene::builtin::{BUILTIN_SCENES, builtin_text};
@@ -391,6 +392,11 @@ pub(super) fn resolve(
         && let Some(image) = scene.pictures.get(file)
     {
         scene.environment_image = Some(Arc::new(equirectangular(image, *layout, *axes)));
+    }
+    if matches!(scene.file.environment, EnvironmentSource::Sky { .. }) {
+        let known = options.known.filter(|known| known.file.environment == scene.file.environment);
+        let known = known.and_then(|known| known.environment_image.clone());
+        scene.environment_image = known.or_else(|| clear_sky(&scene.file.environment).map(Arc::new));
     }
     scene.add_mesh_pictures(options, documents);
     let mut of_materials = Warnings::default();

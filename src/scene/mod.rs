@@ -94,6 +94,6 @@ pub use read_files::ReadFiles;
 pub use save::{SavedScene, save_scene};
 pub use source::SceneSource;
 pub use spawn::AddedParts;
-pub(crate) use spawn::texture_of;
+pub(crate) use spawn::{sky_light, texture_of};
 pub use thousands::thousands;
 pub use whole::whole_scene;

@@ -234,6 +234,9 @@ impl LoadedScene {
                 Some(image) => Environment::Image { image: image.clone(), scale: scale.0, rotation: radians(*rotate) },
                 None => Environment::Black,
             },
+            part @ EnvironmentSource::Sky { .. } => {
+                self.environment_image.clone().map_or(Environment::Black, |image| sky_light(part, image))
+            }
         }
     }
 
@@ -306,6 +309,17 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
             Texture { channel: *channel, tint: tint.0, vertex_colors: true, ..Texture::new(TexturePattern::White) }
         }
     })
+}
+
+/// The environment of a clear sky; `image`: [`clear_sky`](crate::import::sky::clear_sky).
+pub fn sky_light(part: &EnvironmentSource, image: Arc<ImageTexture>) -> Environment {
+    match part {
+        // The sun is above the middle of the image, and turning is counter-clockwise.
+        EnvironmentSource::Sky { azimuth, scale, .. } => {
+            Environment::Image { image, scale: scale.0, rotation: -radians(*azimuth) }
+        }
+        _ => Environment::Black,
+    }
 }
 
 /// Removes all entities of the current scene.

@@ -190,6 +190,18 @@ fn values_out_of_range_are_named_with_what_is_expected() {
             "`inner_angle` is -1, but must",
         ),
         (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, image_width: 180)]"]),
+            "`image_width` is 180, but must be 0, or lie between",
+        ),
+        (with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, up: (0, 0, 0))]"]), "`up` is (0, 0, 0), but must"),
+        (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, texture: \"slide\")]"]),
+            "texture `slide` is not defined",
+        ),
+        (with(&["environment: sky(elevation: -1)"]), "`elevation` is -1, but must lie between 0 and 90"),
+        (with(&["environment: sky(turbidity: inf)"]), "`turbidity` is inf, but must lie between 1 and 10"),
+        (with(&["environment: sky(ground: 2)"]), "`ground` is an albedo: its channels must lie between 0 and 1"),
+        (
             with(&["lights: [spot(direction: (0, 1, 0), intensity: -1)]"]),
             "(-1, -1, -1) must be finite and not negative",
         ),

@@ -2,6 +2,7 @@
 
 use bevy_ecs::prelude::World;
 use firstlight::export::export;
+use firstlight::format::property::SkyProperty;
 use firstlight::format::scene_format::SceneFormat;
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::Film;
@@ -221,6 +222,43 @@ fn projected_images_stay_where_they_are() {
             assert!((ratio - 1.0).abs().max_element() < 0.02, "{format:?} {light}, quarter {k}: {ratio}");
         }
         assert_eq!((told, scene.warnings.len()), (Vec::new(), 0), "{light}");
+    }
+}
+
+#[test]
+fn a_clear_sky_stays_one_or_becomes_an_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |below: bool| {
+        format!(
+            "(camera: (eye: (0, 1, 4), look_at: (0, 0.5, 0)), film: (width: 64, height: 48), max_depth: 2,
+              environment: sky(elevation: 40, azimuth: 60, turbidity: 4, ground: (0.1, 0.2, 0.3), sun: 0.5,
+                               sun_size: 2, below: {below}, scale: 2),
+              materials: {{\"white\": diffuse(albedo: 0.8)}},
+              objects: [quad(corner: (-3, 0, 3), edge_u: (6, 0, 0), edge_v: (0, 0, -6), material: \"white\"),
+                        sphere(center: (0, 0.7, 0), radius: 0.6, material: \"white\")])"
+        )
+    };
+    let from = written(folder.path(), &scene(false));
+    let (_, again, told) = there_and_back(from.clone(), SceneFormat::Mitsuba, folder.path());
+    assert!(told.is_empty(), "{told:?}");
+    let sky = open(from).1.file.environment;
+    for property in SkyProperty::ALL {
+        let [wanted, found] = [&sky, &again.file.environment].map(|sky| property.get(sky).unwrap());
+        // Factors of all come back as those of sun and sky.
+        let wanted = if matches!(property, SkyProperty::Sun | SkyProperty::Sky) { 2.0 * wanted } else { wanted };
+        assert!((found - wanted).abs() < 1e-6, "{property:?}: {found} for {wanted}");
+    }
+    // pbrt has no such sky, and that of Mitsuba is black below.
+    let from = written(folder.path(), &scene(true));
+    let (mut world, loaded) = open(from.clone());
+    let wanted = quarters(&mut world, &loaded);
+    for format in SceneFormat::ALL {
+        let (mut world, scene, _) = there_and_back(from.clone(), format, folder.path());
+        let found = quarters(&mut world, &scene);
+        for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
+            let ratio = *found / *wanted;
+            assert!((ratio - 1.0).abs().max_element() < 0.03, "{format:?}, quarter {k}: {ratio}");
+        }
     }
 }
 

@@ -229,8 +229,8 @@ fn what_is_not_modelled_is_told_with_its_name_and_the_rest_opens() {
         <shape type="sphere"><bsdf type="measured" id="silk"><string name="filename" value="a"/></bsdf></shape>
         <shape type="linearcurve" id="strand"/>
         <shape type="obj"><string name="filename" value="gone.obj"/></shape>
-        <emitter type="projector" id="beamer"/>
-        <emitter type="sunsky" id="noon"/>"#,
+        <emitter type="volprim" id="cloud"/>
+        <emitter type="timed_sunsky" id="noon"/>"#,
     );
     let told = told(&scene).join("\n");
     for part in [
@@ -238,8 +238,8 @@ fn what_is_not_modelled_is_told_with_its_name_and_the_rest_opens() {
         "`silk`: BSDFs of type measured",
         "media are not modelled",
         "`strand`: shapes of type linearcurve",
-        "`beamer`: emitters of type projector",
-        "`noon`: emitters of type sunsky",
+        "`cloud`: emitters of type volprim",
+        "`noon`: emitters of type timed_sunsky",
         "`gone.obj`: no such file",
     ] {
         assert!(told.contains(part), "{part}: {told}");
@@ -365,6 +365,47 @@ fn instances_share_a_mesh_and_mirrored_cameras_turn_the_scene() {
     assert_eq!((matrix[0][0], matrix[0][3]), (-1.0, -3.0));
     assert_eq!(scene.file.camera.eye, DVec3::new(0.0, 0.0, 5.0));
     assert!(told(&scene).is_empty(), "{:?}", told(&scene));
+}
+
+#[test]
+fn the_sun_stands_where_mitsuba_has_it() {
+    // Directions of Mitsuba 3.9.1, with the zenith at +Z; turned so that it is at +Y.
+    for (parameters, direction) in [
+        ("", DVec3::new(0.0513854, 0.691748, 0.720308)),
+        (
+            r#"<float name="latitude" value="48"/><float name="longitude" value="9"/><float name="timezone" value="1"/>
+            <integer name="year" value="2024"/><integer name="month" value="3"/><integer name="day" value="20"/>
+            <float name="hour" value="9"/><float name="minute" value="30"/>"#,
+            DVec3::new(0.521715, -0.711402, 0.470873),
+        ),
+        (r#"<vector name="sun_direction" x="0" y="-1" z="1"/>"#, DVec3::new(0.0, -1.0, 1.0).normalize()),
+    ] {
+        let scene = opened(&format!(
+            r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/></shape>
+            <emitter type="sunsky">{parameters}<float name="turbidity" value="5"/></emitter>"#
+        ));
+        let EnvironmentSource::Sky { elevation, azimuth, turbidity: 5.0, below: false, .. } = scene.file.environment
+        else {
+            panic!("{:?}", scene.file.environment)
+        };
+        let (sin, cos) = elevation.to_radians().sin_cos();
+        let found = DVec3::new(cos * azimuth.to_radians().sin(), sin, -cos * azimuth.to_radians().cos());
+        let expected = DVec3::new(direction.x, direction.z, -direction.y);
+        // Mitsuba computes in single precision: the days since 2000 alone take most of it.
+        assert!((found - expected).length() < 3e-3, "{found} for {expected}");
+        let ObjectPart::Sphere { center, .. } = &scene.file.objects[0] else { panic!() };
+        assert!((*center - DVec3::new(1.0, 3.0, -2.0)).length() < 1e-9, "{center}");
+    }
+    // A scene that is upright already stays as it is.
+    let scene = opened(
+        r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/></shape>
+        <emitter type="sunsky"><vector name="sun_direction" x="1" y="1" z="0"/>
+            <transform name="to_world"><rotate x="1" angle="-90"/></transform></emitter>"#,
+    );
+    let EnvironmentSource::Sky { elevation, azimuth, .. } = scene.file.environment else { panic!() };
+    assert!((elevation - 45.0).abs() < 1e-9 && (azimuth - 90.0).abs() < 1e-9, "{elevation} {azimuth}");
+    let ObjectPart::Sphere { center, .. } = &scene.file.objects[0] else { panic!() };
+    assert!((*center - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-9, "{center}");
 }
 
 #[test]

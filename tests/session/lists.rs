@@ -2,10 +2,14 @@
 
 use crate::driver::of_material;
 use bevy_ecs::entity::Entity;
+use firstlight::format::property::SkyProperty;
 use firstlight::frame::{Command, Edit, History, Property, Selection, Session, SessionOptions, Target, sky_strength};
 use firstlight::render::Environment;
-use firstlight::scene::{ColorParam, Inventory, Material, SceneSource, SurfaceMaterial};
+use firstlight::scene::{
+    ColorParam, EnvironmentSource, Inventory, Material, SceneEnvironment, SceneSource, SurfaceMaterial,
+};
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const SCENE: &str = r#"(
@@ -164,4 +168,35 @@ fn the_sky_is_made_stronger_in_proportion() {
     assert!(refused.contains("SkyRotation"), "{refused}");
     driver.edit(Edit::Undo);
     assert_eq!(sky_strength(&sky(&driver)), 0.8);
+}
+
+#[test]
+fn any_environment_becomes_a_clear_sky() {
+    let mut driver = Driver::open();
+    let sky = |driver: &Driver| driver.session.inputs().environment.clone();
+    let mut set = |driver: &mut Driver, property, value| {
+        let property = Property::ClearSky(property);
+        driver.edit(Edit::Set { id: 0, property, value: DVec3::splat(value) });
+        sky(driver)
+    };
+    let image = |sky: &SceneEnvironment| match &sky.light {
+        Environment::Image { image, rotation, .. } => (image.clone(), *rotation),
+        other => panic!("{other:?}"),
+    };
+    let first = set(&mut driver, SkyProperty::Elevation, 20.0);
+    assert_eq!(SkyProperty::Elevation.get(&first.part), Some(20.0));
+    let turned = set(&mut driver, SkyProperty::Azimuth, 90.0);
+    assert!(Arc::ptr_eq(&image(&first).0, &image(&turned).0), "it is the same image");
+    assert_eq!(image(&turned).1, -std::f32::consts::FRAC_PI_2);
+    // Within what it may be.
+    let hazy = set(&mut driver, SkyProperty::Turbidity, 99.0);
+    assert_eq!(SkyProperty::Turbidity.get(&hazy.part), Some(10.0));
+    assert!(!Arc::ptr_eq(&image(&turned).0, &image(&hazy).0));
+    driver.edit(Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(2.0) });
+    let EnvironmentSource::Sky { scale, azimuth: 90.0, .. } = sky(&driver).part else { panic!() };
+    assert_eq!(scale.0, Vec3::splat(2.0));
+    for _ in 0..4 {
+        driver.edit(Edit::Undo);
+    }
+    assert!(matches!(sky(&driver).light, Environment::Gradient { .. }));
 }

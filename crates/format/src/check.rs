@@ -1,5 +1,6 @@
 //! Checks the values of a scene file before anything is built from them.
 
+use crate::bad_value::BadValue;
 use crate::bounds;
 use crate::bounds::{
     check_cone, check_film_size, check_image_angle, check_light_radius, check_max_depth, coordinate_rule,
@@ -10,6 +11,7 @@ use crate::error::suggestion;
 use crate::material_property::check_value;
 use crate::parts::{InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, TransformPart};
 use crate::placement::Placement;
+use crate::property::{PropertyInfo, SkyProperty};
 use crate::scene_file::SceneFile;
 use crate::sources::BUILTIN_NAMES;
 use crate::sources::{EnvironmentSource, MeshSource, TextureSource};
@@ -119,6 +121,19 @@ impl Check<'_> {
                 }
                 self.light("environment/scale", *scale);
                 self.finite("environment/rotate", *rotate);
+            }
+            sky @ EnvironmentSource::Sky { ground, scale, .. } => {
+                for (property, value) in SkyProperty::ALL.iter().filter_map(|it| Some((it, it.get(sky)?))) {
+                    let PropertyInfo { name, range: [least, most], .. } = *property.info();
+                    if !(least..=most).contains(&value) {
+                        let rule = format!("lie between {} and {}", number(least), number(most));
+                        self.wrong(&format!("environment/{name}"), BadValue::out_of_range(name, number(value), rule));
+                    }
+                }
+                if !(ground.0.min_element() >= 0.0 && ground.0.max_element() <= 1.0) {
+                    self.wrong("environment/ground", "`ground` is an albedo: its channels must lie between 0 and 1");
+                }
+                self.light("environment/scale", *scale);
             }
         }
     }

@@ -1,5 +1,5 @@
 //! The properties that can be animated: of camera, objects and lights, by their names in scene files, and how each is
-//! read and set. Those of materials are in their table, see
+//! read and set; and the numbers of a clear sky. Those of materials are in their table, see
 //! [`MaterialProperty`](crate::material_property::MaterialProperty).
 
 use crate::camera::CameraPart;
@@ -7,6 +7,7 @@ use crate::light::LightKind;
 use crate::numbers::short_color;
 use crate::placement::{Linear, Placement};
 use crate::quantity::Quantity;
+use crate::sources::EnvironmentSource;
 use crate::view::{Lens, Projection, View};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -137,6 +138,44 @@ properties! {
         ImageWidth = "image_width": Number, "image width", [0.0, 179.0], "°";
         /// angle that the image fills vertically; 0: by its width, or the cone
         ImageHeight = "image_height": Number, "image height", [0.0, 179.0], "°";
+    }
+}
+
+properties! {
+    /// Number of a clear sky; it cannot be animated.
+    SkyProperty {
+        /// height of the sun above the horizon
+        Elevation = "elevation": Number, "sun elevation", [0.0, 90.0], "°";
+        /// direction of the sun, from −Z clockwise as seen from above
+        Azimuth = "azimuth": Number, "sun azimuth", [-360.0, 360.0], "°";
+        /// haze: 1 is pure air, 10 is hazy
+        Turbidity = "turbidity": Number, "turbidity", [1.0, 10.0], "";
+        /// factor of the light of the sun
+        Sun = "sun": Number, "sun", [0.0, 1e6], "";
+        /// factor of the light of the sky without the sun
+        Sky = "sky": Number, "sky", [0.0, 1e6], "";
+        /// angle that the sun fills; it gives the same light
+        SunSize = "sun_size": Number, "sun size", [0.1, 20.0], "°";
+    }
+}
+
+impl SkyProperty {
+    /// The value of an environment; `None` if it is no clear sky.
+    pub fn get(self, sky: &EnvironmentSource) -> Option<f64> {
+        self.place(&mut sky.clone()).copied()
+    }
+
+    /// The value of an environment, to be changed; `None` if it is no clear sky.
+    pub fn place(self, sky: &mut EnvironmentSource) -> Option<&mut f64> {
+        let EnvironmentSource::Sky { elevation, azimuth, turbidity, sun, sky, sun_size, .. } = sky else { return None };
+        Some(match self {
+            Self::Elevation => elevation,
+            Self::Azimuth => azimuth,
+            Self::Turbidity => turbidity,
+            Self::Sun => sun,
+            Self::Sky => sky,
+            Self::SunSize => sun_size,
+        })
     }
 }
 

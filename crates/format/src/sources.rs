@@ -56,6 +56,36 @@ pub enum EnvironmentSource {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         axes: Option<[[f64; 3]; 3]>,
     },
+    /// A clear sky with the sun, above a ground.
+    Sky {
+        /// Height of the sun above the horizon, 0 to 90 degrees.
+        #[serde(default = "usual_elevation")]
+        elevation: f64,
+        /// Direction of the sun: degrees from −Z, clockwise as seen from above.
+        #[serde(default, skip_serializing_if = "is_default")]
+        azimuth: f64,
+        /// Haze: 1 is pure air, 10 is hazy.
+        #[serde(default = "usual_turbidity")]
+        turbidity: f64,
+        /// Albedo of the ground, which brightens the sky.
+        #[serde(default = "usual_ground")]
+        ground: Rgb,
+        /// Factor of the light of the sun.
+        #[serde(default = "one", skip_serializing_if = "is_one")]
+        sun: f64,
+        /// Factor of the light of the sky without the sun.
+        #[serde(default = "one", skip_serializing_if = "is_one")]
+        sky: f64,
+        /// Angle that the sun fills, degrees; it gives the same light.
+        #[serde(default = "usual_sun_size", skip_serializing_if = "is_usual_sun_size")]
+        sun_size: f64,
+        /// Whether the lit ground is seen below the horizon; otherwise that is black.
+        #[serde(default = "yes", skip_serializing_if = "is_yes")]
+        below: bool,
+        /// Factor of all of it.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        scale: Rgb,
+    },
 }
 
 /// Which direction each texel of an environment image stands for.
@@ -152,6 +182,21 @@ pub enum TextureSource {
 }
 
 impl EnvironmentSource {
+    /// A clear sky with usual values.
+    pub fn clear_sky() -> Self {
+        Self::Sky {
+            elevation: usual_elevation(),
+            azimuth: 0.0,
+            turbidity: usual_turbidity(),
+            ground: usual_ground(),
+            sun: 1.0,
+            sky: 1.0,
+            sun_size: usual_sun_size(),
+            below: true,
+            scale: white(),
+        }
+    }
+
     /// An upright equirectangular image.
     pub fn image(file: String) -> Self {
         Self::Image { file, scale: white(), rotate: 0.0, layout: EnvironmentLayout::default(), axes: None }
@@ -311,6 +356,39 @@ fn white() -> Rgb {
 
 fn is_white(value: &Rgb) -> bool {
     *value == white()
+}
+
+fn usual_elevation() -> f64 {
+    45.0
+}
+
+fn usual_turbidity() -> f64 {
+    3.0
+}
+
+fn usual_ground() -> Rgb {
+    Rgb(Vec3::splat(0.3))
+}
+
+/// As in Mitsuba 3.
+fn usual_sun_size() -> f64 {
+    0.5358
+}
+
+fn is_usual_sun_size(value: &f64) -> bool {
+    *value == usual_sun_size()
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+fn is_yes(value: &bool) -> bool {
+    *value
 }
 
 fn one_by_one() -> DVec2 {

@@ -26,6 +26,7 @@ pub(crate) mod pfm;
 pub mod picture;
 pub mod ply;
 pub(crate) mod read_scene;
+pub mod sky;
 pub mod stl;
 pub mod up_axis;
 

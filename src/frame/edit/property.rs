@@ -1,5 +1,6 @@
 //! Properties that can be set one at a time.
 
+use crate::format::property::SkyProperty;
 use crate::scene::MaterialProperty;
 use crate::scene::animation::{LightProperty, ObjectProperty};
 use serde::{Deserialize, Serialize};
@@ -21,13 +22,15 @@ pub enum Property {
     Zenith,
     /// Radiance of a gradient at the horizon.
     Horizon,
-    /// Radiance of a gradient below the horizon.
+    /// Radiance of a gradient below the horizon; of a clear sky, the albedo of the ground.
     Ground,
     /// The brightest channel of the environment's colours, or the factor of its image; the proportions of all channels
     /// are kept.
     SkyStrength,
     /// Rotation of an environment image, degrees about +Y.
     SkyRotation,
+    /// A number of a clear sky, which any other environment becomes by it.
+    ClearSky(SkyProperty),
     /// Exposure time of the animation as a fraction of the duration of a frame, 0..1; 0 for no motion blur.
     Shutter,
     /// Duration of the animation in seconds; 0: up to the last key.
@@ -39,8 +42,8 @@ pub enum Property {
 impl Property {
     /// Whether it belongs to the environment, which is no entity.
     pub(super) fn is_of_sky(self) -> bool {
-        use Property::{Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
-        matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation)
+        use Property::{ClearSky, Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
+        matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation | ClearSky(_))
     }
 
     /// Whether it belongs to the animation, which is no entity.

@@ -1,11 +1,14 @@
 //! Environment: its colours, their common strength, and the rotation of its image.
 
+use crate::format::property::SkyProperty;
 use crate::format::units::radians;
 use crate::frame::edit::property::Property;
+use crate::import::sky::clear_sky;
 use crate::render::Environment;
-use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment};
+use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment, sky_light};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// The brightest channel of the environment's colours, or the factor of its image.
 pub fn strength(light: &Environment) -> f32 {
@@ -20,6 +23,9 @@ pub fn strength(light: &Environment) -> f32 {
 /// Sets one property of the environment.
 pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), String> {
     let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
+    if is_clear(&sky) && property == Property::Ground || matches!(property, Property::ClearSky(_)) {
+        return set_clear(world, sky, property, value);
+    }
     let light = match property {
         Property::SkyStrength => with_strength(&sky.light, (value.x as f32).max(0.0)),
         Property::SkyRotation => turned(&sky.light, radians(value.x)),
@@ -32,6 +38,37 @@ pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), St
         world.insert_resource(changed);
     }
     Ok(())
+}
+
+/// Sets a property of a clear sky.
+fn set_clear(world: &mut World, sky: SceneEnvironment, property: Property, value: DVec3) -> Result<(), String> {
+    let mut part = match &sky.part {
+        clear @ EnvironmentSource::Sky { .. } => clear.clone(),
+        _ => EnvironmentSource::clear_sky(),
+    };
+    match (property, &mut part) {
+        (Property::ClearSky(property), part) => {
+            let [least, most] = property.info().range;
+            property.place(part).into_iter().for_each(|place| *place = value.x.clamp(least, most));
+        }
+        (_, EnvironmentSource::Sky { ground, .. }) => *ground = Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3()),
+        _ => {}
+    }
+    if part == sky.part {
+        return Ok(());
+    }
+    let image = match &sky.light {
+        Environment::Image { image, .. } if property == Property::ClearSky(SkyProperty::Azimuth) && is_clear(&sky) => {
+            image.clone()
+        }
+        _ => Arc::new(clear_sky(&part).ok_or("there is no such sky")?),
+    };
+    world.insert_resource(SceneEnvironment { light: sky_light(&part, image), part, air: sky.air });
+    Ok(())
+}
+
+fn is_clear(sky: &SceneEnvironment) -> bool {
+    matches!(sky.part, EnvironmentSource::Sky { .. })
 }
 
 fn with_color(sky: &Environment, property: Property, value: Vec3) -> Option<Environment> {
@@ -84,6 +121,12 @@ fn part_of(light: &Environment, old: &EnvironmentSource, angle_deg: Option<f64>)
             let (file, scale, rotate) = (file.clone(), Rgb(*scale), angle_deg.unwrap_or(*rotate));
             EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
         }
-        (Environment::Image { .. }, old) => old.clone(),
+        (Environment::Image { scale, .. }, old) => {
+            let mut part = old.clone();
+            if let EnvironmentSource::Sky { azimuth, scale: factor, .. } = &mut part {
+                (*factor, *azimuth) = (Rgb(*scale), angle_deg.map_or(*azimuth, |angle| -angle));
+            }
+            part
+        }
     }
 }

@@ -1,11 +1,15 @@
 //! The list of everything that emits light, and the environment.
 
+use crate::format::property::SkyProperty;
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::{Environment, MaterialKind};
 use crate::scene::animation::LightProperty;
 use crate::scene::light_of;
-use crate::scene::{ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SurfaceMaterial};
+use crate::scene::{
+    ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SceneEnvironment, SurfaceMaterial,
+};
 use crate::viewer::panel::list::{Listed, Which, list};
+use crate::viewer::panel::selected::property_row;
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, short_color, strength_drag};
 use bevy_ecs::prelude::Entity;
@@ -40,7 +44,8 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
             }
         });
     });
-    let light = &session.inputs().environment.light;
+    let environment = &session.inputs().environment;
+    let light = &environment.light;
     rows(ui, "environment strength", |ui| {
         let hint = "radiance of the brightest colour, or scale factor of the image";
         row_with_hint(ui, "environment", hint, |ui| {
@@ -48,7 +53,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
                 if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "× ", "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
                 }
-                ui.label(RichText::new(kind_of_sky(light)).size(11.0).weak());
+                ui.label(RichText::new(kind_of_sky(environment)).size(11.0).weak());
             })
         });
     });
@@ -91,8 +96,9 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     }
 }
 
-fn kind_of_sky(light: &Environment) -> &'static str {
-    match light {
+fn kind_of_sky(environment: &SceneEnvironment) -> &'static str {
+    match &environment.light {
+        _ if matches!(environment.part, EnvironmentSource::Sky { .. }) => "clear sky",
         Environment::Black => "black",
         Environment::Constant(_) => "constant",
         Environment::Gradient { .. } => "gradient",
@@ -126,6 +132,13 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             one_color(ui, asked, "ground", *ground, Property::Ground);
         }
         Environment::Image { scale, rotation, .. } => {
+            if let EnvironmentSource::Sky { ground, .. } = &environment.part {
+                for property in SkyProperty::ALL {
+                    let value = property.get(&environment.part).map(DVec3::splat);
+                    property_row(ui, 0, Property::ClearSky(*property), property.info(), value, asked);
+                }
+                return one_color(ui, asked, "ground", ground.0, Property::Ground);
+            }
             let (file, angle_deg) = match &environment.part {
                 EnvironmentSource::Image { file, rotate, .. } => (file.as_str(), *rotate),
                 _ => ("?", f64::from(rotation.to_degrees())),
@@ -143,4 +156,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             });
         }
     });
+    if !matches!(environment.part, EnvironmentSource::Sky { .. }) && ui.button("clear sky").clicked() {
+        set_sky(asked, Property::ClearSky(SkyProperty::Elevation), DVec3::splat(45.0));
+    }
 }

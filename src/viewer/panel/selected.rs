@@ -73,10 +73,10 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
     }
 }
 
-/// The row of a property of an object or a light.
+/// The row of a property of an object, a light or the sky.
 ///
 /// - `value`: `None` for a rotation or a scale that a matrix defines.
-fn property_row(
+pub fn property_row(
     ui: &mut Ui,
     id: u64,
     property: Property,

@@ -27,6 +27,7 @@ use firstlight_render::{Environment, Falloff};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::PI;
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 /// Image files that Mitsuba reads.
@@ -267,6 +268,25 @@ impl Writer<'_> {
     }
 
     fn environment(&mut self) -> Result<(), WriteError> {
+        // Below its horizon, the sky of Mitsuba is black.
+        if let EnvironmentSource::Sky { elevation, azimuth, turbidity, ground, sun, sky, sun_size, below: false, scale } =
+            &self.scene.file.environment
+            && scale.0 == Vec3::splat(scale.0.x)
+        {
+            let ((sin, cos), (sin_azimuth, cos_azimuth)) =
+                (elevation.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
+            self.xml.open("emitter", &[("type", "sunsky")]);
+            self.xml.vector("vector", "sun_direction", DVec3::new(cos * sin_azimuth, sin, -cos * cos_azimuth));
+            self.xml.float("turbidity", *turbidity);
+            self.xml.rgb("albedo", ground.0);
+            self.xml.float("sun_scale", sun * f64::from(scale.0.x));
+            self.xml.float("sky_scale", sky * f64::from(scale.0.x));
+            self.xml.float("sun_aperture", *sun_size);
+            // Its zenith is +Z.
+            self.xml.transform("to_world", &DAffine3::from_rotation_x(-FRAC_PI_2));
+            self.xml.close();
+            return Ok(());
+        }
         match &self.scene.environment {
             Environment::Black => return Ok(()),
             Environment::Constant(radiance) => {

@@ -29,6 +29,7 @@ impl Converter<'_> {
                 self.file.environment = EnvironmentSource::Constant(Rgb(radiance));
             }
             "envmap" => self.environment_image(node)?,
+            "sunsky" | "sky" | "sun" => self.clear_sky(node)?,
             "point" => {
                 let matrix = self.world * node.transform("to_world")?;
                 let position = match node.vector("position")? {

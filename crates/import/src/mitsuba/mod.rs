@@ -18,6 +18,7 @@ pub(crate) mod scene;
 pub(crate) mod serialized;
 pub(crate) mod shape;
 pub(crate) mod spectrum;
+mod sunsky;
 pub(crate) mod texture;
 pub(crate) mod transform;
 pub(crate) mod words;

@@ -8,6 +8,7 @@ use crate::mitsuba::converter::Converter;
 use crate::mitsuba::graph::{Graph, Node};
 use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::serialized::UnpackedBytes;
+use crate::mitsuba::sunsky::{SKIES, upright};
 use crate::mitsuba::transform::orthonormal;
 use crate::model::placing::corners_of;
 use firstlight_files::printable;
@@ -141,10 +142,14 @@ impl<'a> Converter<'a> {
             }
             return Ok(());
         }
+        let is_sky = |emitter: &&Node| SKIES.iter().any(|(plugin, _)| *plugin == emitter.plugin());
+        if let Some(sky) = emitters.iter().find(is_sky) {
+            self.world = upright(*sky)?;
+        }
         let Some(sensor) = sensor else { return Ok(()) };
         let m = Self::sensor_to_world(sensor)?;
         if m.determinant() < 0.0 {
-            self.world = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+            self.world = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * self.world;
         }
         Ok(())
     }

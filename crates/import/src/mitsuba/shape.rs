@@ -17,7 +17,7 @@ use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{MeshShading, MeshSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Material;
-use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 /// Objects of a scene; instances of instances multiply.
 const MAX_OBJECTS: usize = 1 << 20;
@@ -313,27 +313,30 @@ impl Converter<'_> {
             return Ok(surface);
         }
         let radiance = self.color(emitter, "radiance", 1.0, Use::Emission)?;
-        let emits = Material::Emissive { radiance: radiance.clone() };
-        let albedo = match &surface.part {
-            Material::Diffuse { albedo: ColorValue::Rgb(albedo) } => Some(*albedo),
-            _ => None,
-        };
-        Ok(match (albedo, radiance) {
-            (Some(albedo), _) if albedo.max_element() <= 0.0 => Surface { part: emits, two_sided: false },
-            (Some(albedo), ColorValue::Rgb(radiance)) => {
-                // Shares of a blend, undone by factors of its parts.
-                let weight = 1.0 - albedo.max_element().max(0.5);
-                let weight = if weight > 0.0 { weight } else { 1e-3 };
-                let reflects = Material::Diffuse { albedo: ColorValue::Rgb((albedo / (1.0 - weight)).min(Vec3::ONE)) };
-                let emits = Material::Emissive { radiance: ColorValue::Rgb(radiance / weight) };
-                let [a, b] = [reflects, emits].map(|part| self.add_material(emitter, part));
-                Surface { part: Material::blend(ScalarValue::Number(weight), a, b), two_sided: false }
+        let part = match surface.part {
+            Material::Diffuse { albedo: ColorValue::Rgb(albedo) } if albedo.max_element() <= 0.0 => {
+                Material::Emissive { radiance }
+            }
+            // Without the reflection of a dielectric, its base is diffuse.
+            Material::Diffuse { albedo } => {
+                let mut part = Material::principled(albedo);
+                if let Material::Principled { specular, roughness, emission, .. } = &mut part {
+                    (*specular, *roughness, *emission) = (0.0.into(), 1.0.into(), radiance);
+                }
+                part
+            }
+            mut part @ Material::Principled { .. } => {
+                if let Material::Principled { emission, .. } = &mut part {
+                    *emission = radiance;
+                }
+                part
             }
             _ => {
                 self.tell(emitter, "what a light of this kind reflects is not modelled: it only emits");
-                Surface { part: emits, two_sided: false }
+                Material::Emissive { radiance }
             }
-        })
+        };
+        Ok(Surface { part, two_sided: false })
     }
 
     /// Adds the mesh attributes that a material and its parts read.
