@@ -423,7 +423,7 @@ fn environments_are_turned_and_spots_keep_their_angles() {
     assert_eq!((*inner_angle, *outer_angle, *direction), (40.0, 40.0, DVec3::NEG_Y));
     assert!(matches!(scene.file.environment, EnvironmentSource::Constant(_)));
     let scene = opened(
-        r#"<shape type="sphere"/><emitter type="projector"><float name="fov" value="90"/><float name="scale" value="2"/>
+        r#"<sensor type="perspective"/><shape type="sphere"/><emitter type="projector"><float name="fov" value="90"/><float name="scale" value="2"/>
             <transform name="to_world"><lookat origin="0 3 0" target="0 0 0" up="0 0 1"/></transform></emitter>"#,
     );
     let LightPart::Spot { intensity, up, image_width, image_height, even: true, direction, .. } = &scene.file.lights[0]

@@ -263,7 +263,7 @@ fn errors_name_the_file_the_line_and_the_column() {
         ("WorldBegin\nInclude \"c.pbrt\"", "c.pbrt:1:1: files include one another more than 32 deep"),
         ("Include \"d.pbrt\"", "has no `WorldBegin`"),
         ("WorldBegin", "has no shape that can be shown"),
-        ("WorldBegin\nShape \"curve\"", "curves are not modelled"),
+        ("WorldBegin\nShape \"curve\"", "make no curve of degree 3"),
     ] {
         let (_folder, path) =
             folder(&[("a.pbrt", text), ("b.pbrt", "\nNonsense"), ("c.pbrt", "Include \"c.pbrt\""), ("d.pbrt", "")]);
@@ -286,7 +286,7 @@ fn what_is_not_shown_is_told_once_and_the_rest_is_shown() {
     let told = told(&scene);
     for expected in [
         "medium `fog` scatters light",
-        "`curve 2` is left out: curves are not modelled",
+        "`curve 2` is left out: 0 points `P` make no curve of degree 3",
         "none.ply: cannot be read: no such file; `none` is left out",
         "gone.ply: cannot be read: no such file; `gone` is left out",
         "none.png: cannot be read: no such file; the texture is omitted",
@@ -348,6 +348,39 @@ fn lights_have_the_units_of_pbrt() {
     let EnvironmentSource::Constant(Rgb(sky)) = scene.file.environment else { panic!("{:?}", scene.file.environment) };
     let luminance = sky.dot(Vec3::new(0.2126, 0.7152, 0.0722));
     assert!((luminance - (3.0 / std::f32::consts::PI + 0.5)).abs() < 2e-3, "{sky}");
+}
+
+#[test]
+fn neighbouring_curves_of_one_material_are_one_mesh() {
+    let curve =
+        |x: f64| format!("Shape \"curve\" \"point3 P\" [{x} 0 0 {x} 1 0 {x} 2 0 {x} 3 0] \"float width\" 0.1\n");
+    let world = format!(
+        "{}{}Material \"diffuse\" \"rgb reflectance\" [1 0 0]\n{SQUARE}{}{}Translate 1 0 0\n{}\
+         LightSource \"point\"\nMaterial \"hair\"\n{}",
+        curve(0.0),
+        curve(1.0),
+        curve(2.0),
+        curve(3.0),
+        curve(4.0),
+        curve(5.0)
+    );
+    let scene = with(&world);
+    let told = told(&scene);
+    assert!(told.len() == 1 && told[0].contains("hair"), "{told:?}");
+    let shapes = scene.file.objects.iter().map(|object| match object {
+        ObjectPart::Mesh { source: MeshSource::Part { shape, .. }, .. } => *shape,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(shapes.collect::<Vec<_>>(), [0, 2, 3, 5, 6]);
+    // One curve has 8 steps of four sides.
+    let mut world = World::new();
+    scene.spawn(&mut world);
+    let objects = SceneInputs::of(&mut world).objects;
+    let triangles = objects.iter().map(|object| match &object.shape {
+        firstlight::scene::Shape::Mesh(mesh) => mesh.triangles.len(),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(triangles.collect::<Vec<_>>(), [128, 2, 128, 64, 64]);
 }
 
 #[test]

@@ -174,7 +174,7 @@ fn the_sky_is_made_stronger_in_proportion() {
 fn any_environment_becomes_a_clear_sky() {
     let mut driver = Driver::open();
     let sky = |driver: &Driver| driver.session.inputs().environment.clone();
-    let mut set = |driver: &mut Driver, property, value| {
+    let set = |driver: &mut Driver, property, value| {
         let property = Property::ClearSky(property);
         driver.edit(Edit::Set { id: 0, property, value: DVec3::splat(value) });
         sky(driver)

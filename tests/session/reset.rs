@@ -6,8 +6,8 @@ use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOp
 use firstlight::mesh::procedural;
 use firstlight::render::{Environment, Falloff, Integrator, ToneCurve};
 use firstlight::scene::{
-    Balls, ColorParam, DirectionalLight, GREY, Lens, Linear, Material, MaterialSlots, Placement, PointLight,
-    Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
+    Balls, ColorParam, DirectionalLight, GREY, ImageFrame, Lens, Linear, Material, MaterialSlots, Placement,
+    PointLight, Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -130,6 +130,7 @@ fn each_component_has_its_level() {
         inner_angle_deg: 1.0,
         outer_angle_deg: 2.0,
         falloff: Falloff::Quadratic,
+        image: ImageFrame::default(),
     };
     let spot = stage.light_of(cone, up);
     let sun = stage.light_of(DirectionalLight { irradiance: Vec3::ONE, direction: DVec3::Z }, up);
@@ -138,6 +139,9 @@ fn each_component_has_its_level() {
         assert!(stage.cause().ends_with(" moved"), "{}", stage.cause());
     }
     assert_eq!(stage.set(sun, |placement: &mut Placement| placement.translation.y = 2.0), [], "it shines everywhere");
+    // About its own axis, which turns the image that it projects.
+    let rolled = Linear::Turned { rotation_deg: DVec3::new(0.0, 0.0, 90.0), scale: DVec3::ONE };
+    assert_eq!(stage.set(spot, |placement: &mut Placement| placement.linear = rolled), [Shading]);
     let turned = Linear::Turned { rotation_deg: DVec3::new(30.0, 0.0, 0.0), scale: DVec3::ONE };
     assert_eq!(stage.set(point, |placement: &mut Placement| placement.linear = turned), []);
     for light in [spot, sun] {
@@ -147,6 +151,7 @@ fn each_component_has_its_level() {
     assert_eq!(stage.set(spot, |light: &mut SpotLight| light.intensity = Vec3::splat(2.0)), [Shading]);
     assert!(stage.cause().starts_with("power of spot light "), "{}", stage.cause());
     assert_eq!(stage.set(spot, |light: &mut SpotLight| light.outer_angle_deg = 3.0), [Shading]);
+    assert_eq!(stage.set(spot, |light: &mut SpotLight| light.image.width_deg = 3.0), [Shading]);
     assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.irradiance = Vec3::splat(2.0)), [Shading]);
     assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.direction = DVec3::X), [Shading]);
     assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.direction = DVec3::ZERO), [Shading, TopTree]);

@@ -186,6 +186,14 @@ impl LightKind {
         unit_direction(placement.affine().transform_vector3(own))
     }
 
+    /// Upwards in the image that a spot light projects, in the world; `None` for other lights.
+    pub fn image_up(&self, placement: &Placement) -> Option<DVec3> {
+        match self {
+            Self::Spot(light) => Some(placement.affine().transform_vector3(light.image.up)),
+            Self::Point(_) | Self::Directional(_) => None,
+        }
+    }
+
     /// # Errors
     /// If a parameter is out of range, or the direction is degenerate.
     pub fn check(&self, placement: &Placement) -> Result<(), BadValue> {

@@ -10,8 +10,8 @@ use firstlight_format::error::SceneError;
 use firstlight_format::scene_format::SceneFormat;
 use std::path::Path;
 
-/// Reads a scene of another renderer with the files that it includes; meshes and images in files of their own are not
-/// read.
+/// Reads a scene of another renderer with the files that it includes; meshes in files of their own are not read, nor
+/// images but those of lights.
 ///
 /// # Errors
 /// If the text is not of its format, or names a file that it must not; with file, line and column.

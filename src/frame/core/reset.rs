@@ -206,7 +206,7 @@ fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut
     let level = if is_sphere(old) || is_sphere(new) { Level::TopTree } else { Level::Shading };
     let place = |light: &LightInput| {
         let position = light.light.has_position().then_some(light.placement.translation);
-        (position, light.light.direction(&light.placement))
+        (position, light.light.direction(&light.placement), light.light.image_up(&light.placement))
     };
     if place(old) != place(new) {
         changes.add(level, format!("{label} moved"));

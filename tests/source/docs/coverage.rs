@@ -71,6 +71,7 @@ fn every_word_of_the_scene_file_is_described() {
         "scene-principled",
         "scene-glass",
         "scene-objects",
+        "scene-sky",
         "scene-animation",
     ]
     .map(|name| read(&format!("docs/{name}.md")).text)

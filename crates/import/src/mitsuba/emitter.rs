@@ -119,7 +119,8 @@ impl Converter<'_> {
         let (intensity, texture, aspect) = match irradiance {
             ColorValue::Rgb(rgb) => (rgb * scale, None, 1.0),
             ColorValue::Texture(texture) => {
-                let image = self.file.textures.get(&texture).and_then(|source| image_of(self.folder, source));
+                let image =
+                    self.file.textures.get(&texture).and_then(|source| image_of(self.image, self.folder, source));
                 (Vec3::splat(scale), Some(texture), image.as_ref().map_or(1.0, aspect_of))
             }
         };

@@ -44,7 +44,7 @@ pub(crate) fn read_scene(path: &Path, options: &ForeignOptions) -> Result<Foreig
     let name = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
     let references = References::of(path, options.allow_outside);
     let Converted { file, parts, part_files, warnings: of_parts } =
-        Converter::new(&graph, references, folder, name, &options.defines).convert()?;
+        Converter::new(&graph, references, folder, name, options).convert()?;
     warnings.append(&of_parts);
     let of_text = graph.files.iter().map(|file| (file.path.clone(), file.stamp));
     let mut known = HashSet::new();

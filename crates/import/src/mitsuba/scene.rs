@@ -10,6 +10,7 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::serialized::UnpackedBytes;
 use crate::mitsuba::sunsky::{SKIES, upright};
 use crate::mitsuba::transform::orthonormal;
+use crate::model::foreign::ForeignOptions;
 use crate::model::placing::corners_of;
 use firstlight_files::printable;
 use firstlight_files::reference::References;
@@ -46,7 +47,7 @@ impl<'a> Converter<'a> {
         references: References<'a>,
         folder: &'a Path,
         file_name: String,
-        defines: &'a [(String, String)],
+        options: &'a ForeignOptions,
     ) -> Self {
         let file = SceneFile::new(CameraPart::looking_at(DVec3::ZERO, DVec3::Z));
         Self {
@@ -56,7 +57,8 @@ impl<'a> Converter<'a> {
             warnings: Warnings::default(),
             references,
             folder,
-            defines,
+            defines: &options.defines,
+            image: options.image,
             file_name,
             textures: HashMap::new(),
             texture_depth: 0,

@@ -1,6 +1,6 @@
 //! Lights that project an image through a frustum, in the scenes of other renderers.
 
-use crate::picture::read_picture;
+use crate::model::foreign::ReadImage;
 use firstlight_files::relative::text_to_path;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::TextureSource;
@@ -12,9 +12,9 @@ use std::path::Path;
 /// The image of a texture; `None` if it cannot be read, which is told when it is loaded.
 ///
 /// - `folder`: of the scene.
-pub(crate) fn image_of(folder: &Path, source: &TextureSource) -> Option<ImageTexture> {
+pub(crate) fn image_of(read: ReadImage, folder: &Path, source: &TextureSource) -> Option<ImageTexture> {
     let TextureSource::Image { file, .. } = source else { return None };
-    read_picture(&folder.join(text_to_path(file))).ok().map(|(image, _)| image)
+    read(&folder.join(text_to_path(file)))
 }
 
 /// Width over height.

@@ -1,8 +1,10 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
-use crate::model::foreign::cut;
+use crate::model::foreign::{ForeignOptions, ReadImage, cut};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::model::placing::{is_placement, transform};
+use crate::model::projection::image_of;
+use crate::pbrt::curves::Strands;
 use crate::pbrt::lights::{Light, color, light};
 use crate::pbrt::params::{Param, Params};
 use crate::pbrt::shapes::{is_whole_sphere, mesh_of, oriented};
@@ -36,7 +38,7 @@ const SCENE_BYTES_PER_BYTE_MADE: u64 = 4;
 
 /// What a shape is made of.
 #[derive(Clone, Debug)]
-enum Geometry {
+pub(super) enum Geometry {
     /// A whole sphere about the origin; its number, for a mesh of it where it is stretched or has a texture.
     Sphere {
         radius: f64,
@@ -50,11 +52,11 @@ enum Geometry {
 
 /// A shape with its material, in the space of a world or of an object definition.
 #[derive(Clone, Debug)]
-struct Item {
-    name: String,
-    geometry: Geometry,
-    material: String,
-    local: DAffine3,
+pub(super) struct Item {
+    pub name: String,
+    pub geometry: Geometry,
+    pub material: String,
+    pub local: DAffine3,
 }
 
 /// Why a scene cannot be read on.
@@ -65,6 +67,7 @@ pub(crate) struct Builder<'a> {
     pub(super) folder: &'a Path,
     pub(super) references: References<'a>,
     pub(super) allow_outside: bool,
+    image: ReadImage,
     /// From the world of the file to ours.
     pub world: DMat3,
     pub warnings: Warnings,
@@ -101,6 +104,7 @@ pub(crate) struct Builder<'a> {
     pub(super) ply: HashMap<(PathBuf, bool), Result<Arc<Mesh>, String>>,
     /// Bytes of meshes that may still be made of formulas: a few letters can ask for many triangles.
     pub(super) bytes_left: u64,
+    pub(super) strands: Strands,
     pub(super) n_shapes: u32,
     /// Shapes that were placed, also those that cannot be shown.
     n_placed: usize,
@@ -109,13 +113,15 @@ pub(crate) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(crate) fn new(path: &'a Path, allow_outside: bool) -> Self {
+    pub(crate) fn new(path: &'a Path, options: &ForeignOptions) -> Self {
+        let allow_outside = options.allow_outside;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self {
             path,
             folder,
             references: References::of(path, allow_outside),
             allow_outside,
+            image: options.image,
             world: DMat3::IDENTITY,
             warnings: Warnings::default(),
             textures: Textures::default(),
@@ -141,6 +147,7 @@ impl<'a> Builder<'a> {
             with_normals: HashMap::new(),
             ply: HashMap::new(),
             bytes_left: Limits::of_this_process().scene_bytes / SCENE_BYTES_PER_BYTE_MADE,
+            strands: Strands::default(),
             n_shapes: 0,
             n_placed: 0,
             n_described: 0,
@@ -183,6 +190,12 @@ impl<'a> Builder<'a> {
         *self.with_normals.entry(path.to_owned()).or_insert_with(|| has_normals(path))
     }
 
+    /// The mesh of a shape of the scene, by its number.
+    pub(super) fn shape_source(&self, shape: u32) -> MeshSource {
+        let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+        MeshSource::Part { file, shape, defines: Vec::new() }
+    }
+
     /// The mesh of a shape that is no file; see [`mesh_of`].
     fn made(&mut self, kind: &str, params: &Params, is_reversed: bool) -> Result<Arc<Mesh>, String> {
         let is_written = kind == "trianglemesh";
@@ -202,12 +215,14 @@ impl<'a> Builder<'a> {
             return Err("an object definition inside of another one");
         }
         self.open = Some((cut(name).to_owned(), Vec::new()));
+        self.strands.part();
         Ok(())
     }
 
     pub(crate) fn end_object(&mut self) -> Result<(), &'static str> {
         let (name, items) = self.open.take().ok_or("there is no object definition to end")?;
         self.definitions.insert(name, items);
+        self.strands.part();
         Ok(())
     }
 
@@ -230,6 +245,9 @@ impl<'a> Builder<'a> {
     pub(crate) fn shape(&mut self, kind: &str, params: &Params, state: &State) -> Result<(), TooMany> {
         let number = self.n_shapes;
         self.n_shapes = self.n_shapes.saturating_add(1);
+        if kind == "curve" {
+            return self.curve(params, state, number);
+        }
         let file_name = params.string("filename").filter(|_| kind == "plymesh");
         let stem = file_name.and_then(|name| Path::new(name).file_stem()).map(|stem| path_to_text(stem.as_ref()));
         let name = cut(&stem.unwrap_or_else(|| format!("{kind} {}", u64::from(number) + 1))).to_owned();
@@ -262,7 +280,11 @@ impl<'a> Builder<'a> {
         }
         let light = area_light.map(|light| self.radiance(&light, &geometry, state, params, kind, &name));
         let Some(material) = self.surface(state, opacity, light, &name) else { return Ok(()) };
-        let item = Item { name, geometry, material, local: state.ctm };
+        self.add_item(Item { name, geometry, material, local: state.ctm })
+    }
+
+    /// Adds an item to the scene, or to the object definition that is open.
+    pub(super) fn add_item(&mut self, item: Item) -> Result<(), TooMany> {
         match &mut self.open {
             Some((_, items)) => {
                 if items.len() >= MAX_OBJECTS {
@@ -285,12 +307,8 @@ impl<'a> Builder<'a> {
         number: u32,
         file_name: Option<&str>,
     ) -> Result<Geometry, String> {
-        let part = || {
-            let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-            MeshSource::Part { file, shape: number, defines: Vec::new() }
-        };
         if kind == "sphere" && is_whole_sphere(params) {
-            let source = part();
+            let source = self.shape_source(number);
             let radius = params.number("radius").unwrap_or(1.0);
             // The front of our spheres is outside.
             if !state.is_reversed {
@@ -301,12 +319,12 @@ impl<'a> Builder<'a> {
             return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
         }
         if kind != "plymesh" {
-            let source = part();
+            let source = self.shape_source(number);
             let mesh = self.made(kind, params, state.is_reversed)?;
             self.parts.insert(number, mesh);
             return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
         }
-        let source = part();
+        let source = self.shape_source(number);
         let name = file_name.ok_or("it has no `filename`")?;
         let file = self.file(name).ok_or_else(|| "its file must not be read".to_owned())?;
         let path = self.folder.join(text_to_path(&file));
@@ -451,8 +469,7 @@ impl<'a> Builder<'a> {
                             }
                         }
                     }
-                    let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-                    mesh(MeshSource::Part { file, shape: *shape, defines: Vec::new() }, MeshShading::Auto)
+                    mesh(self.shape_source(*shape), MeshShading::Auto)
                 }
             },
         };
@@ -470,7 +487,8 @@ impl<'a> Builder<'a> {
         let name = format!("{} {}", cut(kind), self.lights.len() + 1);
         let mut told = Vec::new();
         let file = |name: &str| self.named_file(name);
-        let made = light(kind, params, &world, name, self.folder, file, &mut |what| told.push(what));
+        let image = |source: &TextureSource| image_of(self.image, self.folder, source);
+        let made = light(kind, params, &world, name, image, file, &mut |what| told.push(what));
         told.extend(params.complaints());
         told.into_iter().for_each(|what| self.tell(what));
         match made {

@@ -1,6 +1,6 @@
 //! The directives of a scene and of the files that it includes.
 
-use crate::model::foreign::cut;
+use crate::model::foreign::{ForeignOptions, cut};
 use crate::pbrt::build::{Builder, TooMany};
 use crate::pbrt::cursor::{Cursor, SourceText};
 use crate::pbrt::params::Param;
@@ -101,17 +101,17 @@ pub(crate) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    pub(crate) fn new(path: &'a Path, allow_outside: bool) -> Self {
+    pub(crate) fn new(path: &'a Path, options: &ForeignOptions) -> Self {
         Self {
             path,
             folder: path.parent().unwrap_or(Path::new("")),
-            allow_outside,
+            allow_outside: options.allow_outside,
             state: State::default(),
             stack: Vec::new(),
             systems: HashMap::new(),
             before_world: ViewOptions::default(),
             view: None,
-            builder: Builder::new(path, allow_outside),
+            builder: Builder::new(path, options),
             files: Vec::new(),
             known_files: HashSet::new(),
             n_includes: 0,

@@ -1,6 +1,6 @@
 //! The lights of pbrt that are no shapes.
 
-use crate::model::projection::{aspect_of, image_of, projection, stretched};
+use crate::model::projection::{aspect_of, projection, stretched};
 use crate::pbrt::params::Params;
 use crate::pbrt::spectrum::UnknownSpectrum;
 use firstlight_files::printable;
@@ -10,7 +10,6 @@ use firstlight_format::value::Rgb;
 use firstlight_render::{Falloff, ImageTexture};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
-use std::path::Path;
 
 /// What a light becomes.
 pub(crate) enum Light {
@@ -38,14 +37,14 @@ fn rgb(color: DVec3) -> Rgb {
 
 /// A light.
 ///
-/// - `world`: from its space to our world; `folder`: of the scene; `file`: the path of an image in the scene file for its
+/// - `world`: from its space to our world; `image_of`: the image of a texture; `file`: the path of an image in the scene file for its
 ///   name in pbrt's, `None` if it must not be read; `tell`: called with what is not shown.
 pub(crate) fn light(
     kind: &str,
     params: &Params,
     world: &DAffine3,
     name: String,
-    folder: &Path,
+    image_of: impl Fn(&TextureSource) -> Option<ImageTexture>,
     file: impl Fn(&str) -> Option<String>,
     tell: &mut impl FnMut(String),
 ) -> Light {
@@ -130,7 +129,7 @@ pub(crate) fn light(
                     (*stretch, *offset) = (DVec2::new(-1.0, 1.0), DVec2::X);
                 }
             }
-            let image = image_of(folder, &source);
+            let image = image_of(&source);
             let aspect = image.as_ref().map_or(1.0, aspect_of);
             // The field of view is that of the shorter side.
             let half = (0.5 * params.number("fov").unwrap_or(90.0).to_radians()).tan().clamp(1e-6, 1e6);

@@ -9,6 +9,7 @@
 
 mod build;
 mod cursor;
+mod curves;
 mod directives;
 mod lights;
 mod materials;
@@ -17,6 +18,7 @@ mod params;
 mod shapes;
 mod spectrum;
 mod state;
+mod strands;
 mod subdivision;
 mod surfaces;
 mod textures;
@@ -36,9 +38,10 @@ use std::path::Path;
 /// # Errors
 /// If the text is not of the format, or includes what it must not; with file, line and column.
 pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene, SceneError> {
-    let mut reader = Reader::new(path, options.allow_outside);
+    let mut reader = Reader::new(path, options);
     reader.read()?;
     let (view, mut builder, mut files) = reader.finish()?;
+    builder.finish_strands();
     builder.check_any()?;
     builder.keep_used_materials();
     files.extend(builder.files);

@@ -25,7 +25,7 @@ pub(crate) fn is_whole_sphere(params: &Params) -> bool {
 
 /// The triangles of a shape, or why there are none.
 ///
-/// - `kind`: other than `plymesh`; `path`: of the scene, for messages.
+/// - `kind`: other than `plymesh` and `curve`; `path`: of the scene, for messages.
 pub(crate) fn mesh_of(
     kind: &str,
     params: &Params,
@@ -40,13 +40,18 @@ pub(crate) fn mesh_of(
         "sphere" => sphere(params)?,
         "disk" => disk(params)?,
         "cylinder" => cylinder(params)?,
-        "curve" => return Err("curves are not modelled".to_owned()),
         other => return Err(format!("shapes of the kind `{}` are not modelled", printable::name(other))),
     };
     meshed(indexed, is_reversed, path, warnings)
 }
 
-fn meshed(mut indexed: Indexed, is_reversed: bool, path: &Path, warnings: &mut Warnings) -> Result<Mesh, String> {
+/// The checked mesh of a shape.
+pub(crate) fn meshed(
+    mut indexed: Indexed,
+    is_reversed: bool,
+    path: &Path,
+    warnings: &mut Warnings,
+) -> Result<Mesh, String> {
     if indexed.positions.iter().any(|point| !point.is_finite()) {
         return Err("it has vertices that are not finite".to_owned());
     }
@@ -346,7 +351,6 @@ mod tests {
             let error = mesh("trianglemesh", list, false).unwrap_err();
             assert!(error.contains(told), "{error}");
         }
-        assert!(mesh("curve", &[], false).unwrap_err().contains("curves"));
         assert!(mesh("disk", &[("innerradius", &[1.0])], false).is_err());
     }
 }
