@@ -66,7 +66,7 @@ pub(crate) fn tube(params: &Params) -> Result<Indexed, String> {
     };
     // Segments share an end, or all points but one.
     let step = if is_spline { 1 } else { order };
-    if points.len() <= order || (points.len() - 1 - order) % step != 0 {
+    if points.len() <= order || !(points.len() - 1 - order).is_multiple_of(step) {
         return Err(format!("{} points `P` make no curve of degree {order}", points.len()));
     }
     let n_segments = (points.len() - 1 - order) / step + 1;

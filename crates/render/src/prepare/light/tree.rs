@@ -180,7 +180,15 @@ mod tests {
                     _ => LightShape::Directional { to_light: (u + v).normalize(), reach: 8.0 },
                 };
                 let emission = Emission::even(Vec3::splat(radiance));
-                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corners: None }
+                Light {
+                    shape,
+                    emission,
+                    mean_radiance: radiance,
+                    is_point: false,
+                    turned: None,
+                    corners: None,
+                    image: None,
+                }
             })
             .collect()
     }

@@ -307,7 +307,7 @@ mod tests {
                 let shape = LightShape::triangle([at(i), at(i) + at(i + 1).normalize(), at(i) + Vec3::Z]);
                 let mean_radiance = 1.0 + (i % 5) as f32;
                 let emission = Emission::even(Vec3::splat(mean_radiance));
-                Light { shape, emission, mean_radiance, is_point: false, turned: None, corners: None }
+                Light { shape, emission, mean_radiance, is_point: false, turned: None, corners: None, image: None }
             })
             .collect();
         let on_threads =
