@@ -4,7 +4,7 @@
 //! diffuse surface in full sun then has a radiance of about 0.5.
 //!
 //! Sky: Hošek and Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", by the crate `hw-skymodel`.
-//! Sun: [`sun_irradiance`].
+//! Sun: a fit to Hošek and Wilkie 2013, see `sun_irradiance`.
 
 use firstlight_format::sources::EnvironmentSource;
 use firstlight_render::ImageTexture;
