@@ -85,9 +85,14 @@ fn room_with(
         plain(sphere(Vec3::new(-1.9, 0.3, 1.2), 0.3), 14),
         (placed(unwrapped.clone(), scaled(Vec3::new(0.3, -0.4, 0.3), Vec3::new(1.9, 1.3, 0.2))), 15),
         (standing(placed(smooth.clone(), scaled(Vec3::splat(0.35), Vec3::new(-0.3, 0.4, 2.0)))), 16),
-        (standing(placed(colored, scaled(Vec3::new(0.3, 0.3, -0.3), Vec3::new(0.4, 0.9, 1.6)))), 17),
+        (standing(placed(colored.clone(), scaled(Vec3::new(0.3, 0.3, -0.3), Vec3::new(0.4, 0.9, 1.6)))), 17),
         plain(quad(Vec3::new(-2.4, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.6), Vec3::Y), 15),
     ];
+    for (i, material) in (18..18 + shiny().len() as u32).enumerate() {
+        let (x, mesh) = (0.6 * i as f32 - 2.1, if i % 2 == 0 { &unwrapped } else { &colored });
+        things.push((placed(mesh.clone(), scaled(Vec3::splat(0.28), Vec3::new(x, 2.0, 0.6))), material));
+        things.push(plain(sphere(Vec3::new(x, 0.2, 2.4), 0.2), material));
+    }
     things.extend(lights.into_iter().map(|light| (light, 9)));
     let checker = ColorInput::Texture(0);
     let mut materials = vec![
@@ -116,6 +121,7 @@ fn room_with(
         },
     ];
     materials.extend(layered());
+    materials.extend(shiny());
     let objects = things.iter().map(|((shape, mesh), material)| {
         let is_point_light = as_points && *material == 9 && matches!(shape, Shape::Sphere { .. });
         Object { mesh: mesh.clone(), is_point_light, ..Object::plain(*material) }
@@ -178,6 +184,45 @@ fn layered() -> [Material; 4] {
         *anisotropy = ScalarInput::Constant(0.6);
     }
     [plastic, mapped, rich, colored]
+}
+
+/// Plastics, conductors, a leaf and a plastic with holes; they use textures 1 and 3 to 5 of the room.
+fn shiny() -> [Material; 10] {
+    let plastic = |diffuse, alpha, beckmann, nonlinear| Material::Plastic {
+        diffuse,
+        alpha,
+        ior: if nonlinear { 1.5 } else { 1.9 },
+        specular: ScalarInput::Constant(0.8),
+        nonlinear,
+        beckmann,
+    };
+    let gold = |[alpha, alpha_v]: [ScalarInput; 2], beckmann, reflectance, compensate| Material::Conductor {
+        alpha,
+        alpha_v,
+        beckmann,
+        eta: Vec3::new(0.143, 0.375, 1.442),
+        k: Vec3::new(3.983, 2.386, 1.603),
+        reflectance,
+        compensate,
+    };
+    let [none, narrow, wide] = [0.0, 0.1, 0.3].map(ScalarInput::Constant);
+    let white = ColorInput::Constant(Vec3::ONE);
+    let mut with_holes = Material::blend(ScalarInput::Constant(0.0), 19, 19);
+    if let Material::Blend { opacity, .. } = &mut with_holes {
+        *opacity = ScalarInput::Texture(4);
+    }
+    [
+        plastic(ColorInput::Texture(1), none, false, true),
+        plastic(ColorInput::Texture(5), ScalarInput::Texture(3), false, false),
+        plastic(ColorInput::Constant(Vec3::new(0.7, 0.3, 0.1)), wide, true, true),
+        plastic(ColorInput::Constant(Vec3::new(0.1, 0.3, 0.7)), narrow, false, true),
+        gold([wide, none], false, white, false),
+        gold([wide, narrow], false, ColorInput::Texture(5), true),
+        gold([none, none], false, ColorInput::Texture(1), false),
+        gold([ScalarInput::Texture(3), narrow], true, white, false),
+        Material::Translucent { reflectance: ColorInput::Texture(1), transmittance: ColorInput::Texture(5) },
+        with_holes,
+    ]
 }
 
 /// The same with layers that emit as well: in places, and where half of the surface is.

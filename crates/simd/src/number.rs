@@ -142,6 +142,16 @@ impl<S: Simd> Real for Float<S> {
     fn entry_of(self, table: &[f32]) -> Self {
         Self::gather(table, self.truncate())
     }
+
+    #[inline(always)]
+    fn each<const N: usize>(mask: Mask, of: [Self; N], f: impl Fn([f32; N]) -> f32) -> Self {
+        let (mut arrays, mut found) = ([[0.0; LANES]; N], [0.0; LANES]);
+        arrays.iter_mut().zip(&of).for_each(|(array, number)| number.store(array));
+        for (lane, found) in found.iter_mut().enumerate().filter(|(lane, _)| mask >> lane & 1 != 0) {
+            *found = f(arrays.map(|array| array[lane]));
+        }
+        Self::load(of[0].s, &found)
+    }
 }
 
 impl<S: Simd> Bits<S> {

@@ -4,11 +4,19 @@
 //! the scalar code, which is the reference of tests for the SIMD code.
 
 use super::simd::Mask;
+use std::fmt::Debug;
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
 /// Result of a comparison: a `bool`, or one bit per lane.
 pub trait Truth:
-    Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> + BitAndAssign + BitOrAssign
+    Copy
+    + Debug
+    + PartialEq
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + Not<Output = Self>
+    + BitAndAssign
+    + BitOrAssign
 {
     /// Whether it is true in any lane.
     fn any(self) -> bool;
@@ -67,6 +75,9 @@ pub trait Real:
 
     /// The entry of a table at this index, a whole number; all lanes must be in range, or their entry is unspecified.
     fn entry_of(self, table: &[f32]) -> Self;
+
+    /// Applies a function to each lane of the mask, for what has no formula for sixteen; other lanes are 0.
+    fn each<const N: usize>(mask: Self::Mask, of: [Self; N], f: impl Fn([f32; N]) -> f32) -> Self;
 
     /// The larger of `self` and `least`; `least` for NaN.
     #[inline(always)]
@@ -186,5 +197,10 @@ impl Real for f32 {
     #[inline(always)]
     fn entry_of(self, table: &[f32]) -> Self {
         table[self as usize]
+    }
+
+    #[inline(always)]
+    fn each<const N: usize>(mask: bool, of: [Self; N], f: impl Fn([f32; N]) -> f32) -> Self {
+        if mask { f(of) } else { 0.0 }
     }
 }

@@ -243,23 +243,23 @@ impl InstructionSet {
     }
 }
 
-/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set. Panics if the processor does not support
-/// it: any caller can name a set, also in `RenderSettings::simd`.
+/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set; `::<_, CONSTANT>` may follow the kernel.
+/// Panics if the processor does not support the set: any caller can name one, also in `RenderSettings::simd`.
 #[macro_export]
 macro_rules! dispatch {
-    ($set:expr, $kernel:ident ( $($name:ident : $kind:ty),* $(,)? )) => {{
+    ($set:expr, $kernel:ident $(::<_, $constant:ident>)? ( $($name:ident : $kind:ty),* $(,)? )) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn avx512($($name: $kind),*) {
             // SAFETY: this function has these instructions enabled, and its caller guarantees that the processor has
             // them.
-            $kernel(unsafe { $crate::Avx512::new() }, $($name),*)
+            $kernel$(::<_, $constant>)?(unsafe { $crate::Avx512::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn avx2($($name: $kind),*) {
             // SAFETY: as above.
-            $kernel(unsafe { $crate::Avx2::new() }, $($name),*)
+            $kernel$(::<_, $constant>)?(unsafe { $crate::Avx2::new() }, $($name),*)
         }
         let set: $crate::InstructionSet = $set;
         assert!(set.is_available(), "this processor does not have {set:?}");
@@ -270,7 +270,7 @@ macro_rules! dispatch {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             $crate::InstructionSet::Avx2 => unsafe { avx2($($name),*) },
-            _ => $kernel($crate::Portable, $($name),*),
+            _ => $kernel$(::<_, $constant>)?($crate::Portable, $($name),*),
         }
     }};
 }

@@ -79,6 +79,24 @@ impl Material {
         }
     }
 
+    /// The material that scatters: of a blend that adds nothing but holes to one opaque part, that part.
+    pub(crate) fn scattering<'a>(&'a self, materials: &'a [Self]) -> &'a Self {
+        match self {
+            Self::Blend { weight: ScalarInput::Constant(weight), a, b, by_side: false, .. }
+                if !(0.0 < *weight && *weight < 1.0) && self.normal_map().is_none() =>
+            {
+                let part = &materials[if *weight < 1.0 { *a } else { *b } as usize];
+                let is_plain = match part {
+                    Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => true,
+                    Self::Conductor { .. } | Self::Translucent { .. } => !part.asks_for_tangents(),
+                    _ => false,
+                };
+                if is_plain { part } else { self }
+            }
+            _ => self,
+        }
+    }
+
     /// Where its surfaces are, unless they are everywhere.
     pub(crate) fn cutout(&self) -> Option<Cutout> {
         let (opacity, cutoff, has_back) = match self {

@@ -1,4 +1,4 @@
-//! Inputs of layered materials, as a table for SIMD.
+//! Inputs of layered and translucent materials, metals and plastics, as a table for SIMD.
 
 use crate::core::fresnel::reflectance_of;
 use crate::core::material::{ColorInput, Material, MaterialId, MaterialKind, ScalarInput};
@@ -13,7 +13,22 @@ pub(crate) const LAYERED_RICHLY: usize = LAYERED + 1;
 
 /// Places of inputs in a row; colours have three.
 pub(crate) mod input {
+    /// Albedo or reflectance of all materials.
     pub const COLOR: usize = 0;
+
+    /// Width of metals and plastics, and that of metals along v.
+    pub const ALPHA: usize = 3;
+    pub const ALPHA_V: usize = 4;
+    /// Of conductors.
+    pub const ETA: usize = 6;
+    pub const K: usize = 10;
+    /// Of plastics, whose coat has a strength too.
+    pub const IOR: usize = 9;
+
+    /// Of translucent materials.
+    pub const TRANSMITTANCE: usize = 3;
+
+    /// From here on of layers.
     pub const METALLIC: usize = 3;
     pub const ROUGHNESS: usize = 4;
     pub const SPECULAR: usize = 5;
@@ -43,6 +58,8 @@ pub(crate) struct LayerTable {
     pub textured: Vec<Box<[TexturedInput]>>,
     /// Whether some material has tangents.
     pub has_tangents: bool,
+    /// Whether some metal is a conductor.
+    pub has_conductors: bool,
 }
 
 /// An input with a texture.
@@ -57,8 +74,14 @@ pub(crate) struct TexturedInput {
 }
 
 impl LayerTable {
-    /// Returns the kind of a material by the layers that it can have; `None` if it is shaded one hit at a time.
+    /// Returns the kind of a material whose inputs are those of a row, a layered one's by the layers that it can have;
+    /// `None` for all others.
     pub fn kind_of(material: &Material, textures: &[Texture]) -> Option<usize> {
+        match material {
+            Material::Metal { .. } | Material::Conductor { .. } => return Some(MaterialKind::Metal as usize),
+            Material::Plastic { .. } | Material::Translucent { .. } => return Some(material.kind() as usize),
+            _ => {}
+        }
         let Material::Principled {
             transmission,
             iridescence,
@@ -83,10 +106,11 @@ impl LayerTable {
 
     pub fn build(materials: &[Material], textures: &[Texture]) -> Self {
         let mut table = Self::default();
-        for material in materials {
+        for material in materials.iter().map(|material| material.scattering(materials)) {
             let mut row = Row { values: [0.0; input::N], textured: Vec::new() };
             row.fill(material);
             table.has_tangents |= Self::kind_of(material, textures).is_some() && material.asks_for_tangents();
+            table.has_conductors |= matches!(material, Material::Conductor { .. });
             table.constants.extend(row.values);
             table.textured.push(row.sorted(textures));
         }
@@ -106,6 +130,34 @@ struct Row {
 
 impl Row {
     fn fill(&mut self, material: &Material) {
+        match material {
+            Material::Metal { alpha, reflectance, .. } => {
+                self.color(input::COLOR, reflectance);
+                self.scalar(input::ALPHA, alpha);
+                self.values[input::K..][..3].fill(1.0);
+            }
+            Material::Conductor { alpha, alpha_v, eta, k, reflectance, .. } => {
+                self.color(input::COLOR, reflectance);
+                self.scalar(input::ALPHA, alpha);
+                self.scalar(input::ALPHA_V, alpha_v);
+                self.color(input::ETA, &ColorInput::Constant(*eta));
+                self.color(input::K, &ColorInput::Constant(*k));
+            }
+            Material::Plastic { diffuse, alpha, ior, specular, .. } => {
+                self.color(input::COLOR, diffuse);
+                self.scalar(input::ALPHA, alpha);
+                self.scalar(input::SPECULAR, specular);
+                self.values[input::IOR] = *ior;
+            }
+            Material::Translucent { reflectance, transmittance } => {
+                self.color(input::COLOR, reflectance);
+                self.color(input::TRANSMITTANCE, transmittance);
+            }
+            _ => self.fill_layers(material),
+        }
+    }
+
+    fn fill_layers(&mut self, material: &Material) {
         let Material::Principled {
             base_color,
             metallic,

@@ -9,7 +9,7 @@ use crate::prepare::layer_table::{LAYERED_RICHLY, LayerTable};
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// Kinds by which hits are sorted: numbers of [`MaterialKind`], [`COATED`], and those of layers.
+/// Kinds by which hits are sorted: numbers of [`MaterialKind`], [`COATED`], and those of layers. Conductors are metals.
 #[derive(Debug, Default)]
 pub(crate) struct Kinds {
     /// Kind per material, padded for gather operations.
@@ -30,6 +30,9 @@ pub(crate) const EMITS: u32 = 32;
 pub(crate) const MORE_THAN_UV: u32 = 64;
 /// It has layers above its base.
 pub(crate) const RICH: u32 = 128;
+pub(crate) const BECKMANN: u32 = 256;
+/// The base of a plastic colours light at every bounce.
+pub(crate) const NONLINEAR: u32 = 512;
 
 /// The parameters of all materials of one lobe, and of the parts of those of two.
 #[derive(Debug, Default)]
@@ -66,7 +69,7 @@ impl MaterialTable {
         let disperses = materials.iter().any(Material::disperses);
         let mut table = Self::default();
         let mut parts_of_classics = Vec::new();
-        for (id, material) in (0..).zip(materials) {
+        for (id, material) in (0..).zip(materials.iter().map(|material| material.scattering(materials))) {
             table.add(material, materials);
             let mut parts = [(0, 0.0); 2];
             match material {
@@ -92,7 +95,7 @@ impl MaterialTable {
                 }
                 _ => {}
             }
-            let layered = LayerTable::kind_of(material, textures);
+            let with_inputs = LayerTable::kind_of(material, textures);
             let kind = match material.kind() {
                 // The SIMD code keeps all channels together.
                 MaterialKind::Glass if disperses => MaterialKind::Blend as usize,
@@ -102,8 +105,8 @@ impl MaterialTable {
                 _ if parts[0].1 > 0.0 => COATED,
                 kind => kind as usize,
             };
-            let kind = layered.unwrap_or(kind);
-            if let Some(kind) = layered {
+            let kind = with_inputs.unwrap_or(kind);
+            if let Some(kind) = with_inputs {
                 table.flag_layers(material, kind, asks_for_more(id));
             }
             table.kinds.of_material.push(kind as u32);
@@ -137,14 +140,14 @@ impl MaterialTable {
         }
     }
 
-    /// Adds flags of a layered material to those of the last row.
+    /// Adds flags of a material of the table of inputs to those of the last row.
     fn flag_layers(&mut self, material: &Material, kind: usize, asks_for_more: bool) {
         let flags = [
             (material.normal_map().is_some(), MAPPED),
             (material.asks_for_tangents(), TANGENTS),
             (asks_for_more, MORE_THAN_UV),
             (kind == LAYERED_RICHLY, RICH),
-            (!matches!(material, Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. }), EMITS),
+            (matches!(material, Material::Principled { emission, .. } if *emission != BLACK), EMITS),
         ];
         let last = self.flags.last_mut().expect("it has been added");
         flags.into_iter().filter(|(is_set, _)| *is_set).for_each(|(_, flag)| *last |= flag);
@@ -162,9 +165,21 @@ impl MaterialTable {
             _ => (ColorInput::Constant(Vec3::ONE), 0.0),
         };
         let mut flags = if material.is_textured(materials) { TEXTURED } else { 0 };
-        if let Material::Metal { fresnel, compensate, .. } = material {
-            flags |= if *fresnel == Fresnel::Schlick { SCHLICK } else { 0 };
-            flags |= if *compensate { COMPENSATE } else { 0 };
+        let mut set = |flag, is_set: bool| flags |= if is_set { flag } else { 0 };
+        match material {
+            Material::Metal { fresnel, compensate, .. } => {
+                set(SCHLICK, *fresnel == Fresnel::Schlick);
+                set(COMPENSATE, *compensate);
+            }
+            Material::Conductor { beckmann, compensate, .. } => {
+                set(BECKMANN, *beckmann);
+                set(COMPENSATE, *compensate);
+            }
+            Material::Plastic { beckmann, nonlinear, .. } => {
+                set(BECKMANN, *beckmann);
+                set(NONLINEAR, *nonlinear);
+            }
+            _ => {}
         }
         push(&mut self.color, if let ColorInput::Constant(color) = color { color } else { Vec3::ZERO });
         self.inputs.push(color);
@@ -176,6 +191,8 @@ impl MaterialTable {
 fn is_textured_emitter(material: &Material) -> bool {
     matches!(material, Material::Emissive { radiance: ColorInput::Texture(_) })
 }
+
+const BLACK: ColorInput = ColorInput::Constant(Vec3::ZERO);
 
 /// Returns `None` for a material that cannot be a part of a [`COATED`] one.
 fn kind_of_part(material: &Material) -> Option<usize> {

@@ -9,6 +9,7 @@ pub(crate) mod bodies;
 pub(crate) mod bound;
 pub(crate) mod casters;
 pub(crate) mod classic_table;
+pub(crate) mod coat_table;
 pub(crate) mod contacts;
 pub(crate) mod delta_lines;
 pub(crate) mod exposed;

@@ -10,6 +10,7 @@ use crate::prepare::bodies::{Bodies, Boundary};
 use crate::prepare::bound::radiance_bound;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
+use crate::prepare::coat_table::CoatTable;
 use crate::prepare::contacts::{ContactScene, Contacts, ContactsBefore};
 use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
@@ -22,7 +23,7 @@ use glam::Vec3;
 use std::fmt;
 use std::ops::Deref;
 use std::panic::{RefUnwindSafe, UnwindSafe};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// A scene ready for rendering: a [`Snapshot`], to which it dereferences, and its tables, which are shared like its
 /// parts.
@@ -84,8 +85,7 @@ pub(crate) struct Tables {
     pub(crate) cutouts: Vec<Option<Cutout>>,
     /// Per material: whether it needs tangents.
     pub(crate) with_tangents: Vec<bool>,
-    /// Per material: what the coat of a plastic transmits, built when first needed; see `shading/coat.rs`.
-    pub(crate) coats: Vec<OnceLock<Vec<f32>>>,
+    pub(crate) coats: CoatTable,
     /// Emission per material.
     pub(crate) emission: Vec<Option<Emission>>,
     pub(crate) lights: LightTable,
@@ -257,7 +257,7 @@ impl Tables {
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             large_textures: LargeTextures::build(materials, textures),
             cutouts: materials.iter().map(Material::cutout).collect(),
-            coats: vec![OnceLock::new(); materials.len()],
+            coats: CoatTable::build(materials),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())
                 .then(|| radiance_bound(environment, &emission, materials))

@@ -1,20 +1,16 @@
 //! BSDFs of single lobes.
 
 use crate::core::color::luminance;
-use crate::core::material::{Fresnel, SMALLEST_ALPHA};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
-use crate::shading::conductor::conductor;
 use crate::shading::dielectric::{fresnel, reflect, refract};
-use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
-use crate::shading::layer_albedo::{SchlickAlbedo, cosine_mean};
-use crate::shading::metal::{Metal, schlick, with_further_bounces};
-use crate::shading::microfacets::{Microfacets, SeenMicrofacets};
+use crate::shading::metal::Metal;
+use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::Plastic;
 use crate::shading::rough_glass::{RoughGlass, RoughGlassSample};
 use crate::shading::scatter::{BsdfSample, Scatter};
+use crate::shading::translucent::Translucent;
 use firstlight_kdtree::geometry::Frame;
-use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
 
 /// A lobe, with all of its parameters evaluated at a point.
@@ -26,29 +22,10 @@ pub(crate) enum Lobe<'a> {
     Mirror {
         reflectance: Vec3,
     },
-    Metal {
-        alpha: f32,
-        reflectance: Vec3,
-        fresnel: Fresnel,
-        compensate: bool,
-    },
-    Conductor {
-        facets: Microfacets,
-        /// Direction of the first width, in world space; any of isotropic ones.
-        tangent: Vec3,
-        eta: Vec3,
-        k: Vec3,
-        reflectance: Vec3,
-        compensate: bool,
-    },
+    Metal(Metal),
     Plastic(Plastic<'a>),
-    /// Lambert on both sides; the sum of both shares is at most 1.
-    Translucent {
-        reflectance: Vec3,
-        transmittance: Vec3,
-        /// Media on both sides.
-        here: MediumId,
-    },
+    /// With the media on both sides.
+    Translucent(Translucent, MediumId),
     /// A pane without thickness.
     ThinGlass {
         ior: f32,
@@ -75,10 +52,10 @@ impl Lobe<'_> {
     pub fn albedo(&self) -> Vec3 {
         match *self {
             Self::Diffuse { albedo } => albedo,
-            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => reflectance,
-            Self::Conductor { .. } => self.angular_tint(1.0),
-            Self::Plastic(plastic) => plastic.albedo(),
-            Self::Translucent { reflectance, transmittance, .. } => reflectance + transmittance,
+            Self::Mirror { reflectance } => reflectance,
+            Self::Metal(metal) => metal.tint.at(1.0).into(),
+            Self::Plastic(plastic) => plastic.albedo().into(),
+            Self::Translucent(translucent, _) => translucent.albedo().into(),
             Self::ThinGlass { transmittance, .. } => transmittance,
             Self::Glass(_) | Self::RoughGlass { .. } => Vec3::ONE,
         }
@@ -94,46 +71,7 @@ impl Lobe<'_> {
 
     /// Whether [`Scatter::through`] leads into the medium of the path itself, as it does for all such parts of a blend.
     pub fn is_thin(&self) -> bool {
-        matches!(self, Self::Translucent { .. })
-    }
-
-    /// The microfacets of rough metal that faces the viewer; `None` for all others.
-    #[inline]
-    fn rough_metal(&self, wo: Vec3, normal: Vec3) -> Option<Metal<f32>> {
-        let metal = match *self {
-            Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
-                metal_at(normal, wo, alpha, reflectance, fresnel, compensate)
-            }
-            _ => return None,
-        };
-        metal.facing().then_some(metal)
-    }
-
-    /// Reflectance of a conductor at an angle with its microfacets; white for all others.
-    #[inline]
-    fn angular_tint(&self, cos: f32) -> Vec3 {
-        match *self {
-            Self::Conductor { eta, k, reflectance, .. } => reflectance * conductor(cos, eta, k),
-            _ => Vec3::ONE,
-        }
-    }
-
-    /// The microfacets of a rough conductor that faces the viewer, and the factor that adds further bounces between
-    /// them; `None` for all others.
-    fn rough_conductor(&self, wo: Vec3, normal: Vec3) -> Option<(SeenMicrofacets, Vec3)> {
-        let Self::Conductor { facets, tangent, eta, k, compensate, .. } = *self else { return None };
-        let seen = SeenMicrofacets::new(facets, normal, tangent, wo).filter(|_| !facets.is_smooth())?;
-        if !compensate || facets.beckmann {
-            return Some((seen, Vec3::ONE));
-        }
-        let at = |k_of: usize| cosine_mean(|cos| conductor(cos, eta, k)[k_of]);
-        let (lost, alpha) = if facets.is_isotropic() {
-            (ggx::lost_over_returned(normal.dot(wo), facets.alpha[0]), facets.alpha[0])
-        } else {
-            let whole = SchlickAlbedo::along(seen.wo().into(), facets.alpha).whole();
-            ((1.0 - whole) / whole, (0.5 * Vec2::from(facets.alpha).length_squared()).sqrt())
-        };
-        Some((seen, with_further_bounces(Vec3::new(at(0), at(1), at(2)).into(), lost, alpha).into()))
+        matches!(self, Self::Translucent(..))
     }
 }
 
@@ -141,10 +79,9 @@ impl Scatter for Lobe<'_> {
     #[inline]
     fn has_non_specular(&self) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent { .. } => true,
-            Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,
-            Self::Conductor { facets, .. } => !facets.is_smooth(),
-            Self::Plastic(plastic) => plastic.has_non_specular(),
+            Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent(..) => true,
+            Self::Metal(metal) => !metal.facets.is_smooth(),
+            Self::Plastic(plastic) => plastic.non_specular(),
             Self::Mirror { .. } | Self::Glass(_) | Self::ThinGlass { .. } => false,
         }
     }
@@ -158,43 +95,30 @@ impl Scatter for Lobe<'_> {
             return (Vec3::splat(value), pdf);
         }
         let cos = normal.dot(wi);
-        if let Self::Translucent { reflectance, transmittance, .. } = *self {
-            let passes = cos * normal.dot(wo) < 0.0;
-            let (color, pmf) = translucent_side(reflectance, transmittance, passes);
-            let cosine = cosine_hemisphere_pdf(cos.abs());
-            return (color * cosine, pmf * cosine);
+        if let Self::Translucent(translucent, _) = self {
+            let (value, pdf) = translucent.eval(normal.dot(wo), cos);
+            return (value.into(), pdf);
         }
         if cos <= 0.0 {
             return (Vec3::ZERO, 0.0);
         }
-        match *self {
+        let (value, pdf) = match *self {
+            Self::Metal(metal) => metal.seen(wo.into(), normal.into()).eval(wi.into()),
+            Self::Plastic(plastic) => plastic.seen(wo.into(), normal.into()).eval(wi.into()),
             Self::Diffuse { albedo } => {
                 let pdf = cosine_hemisphere_pdf(cos);
-                (albedo * pdf, pdf)
+                return (albedo * pdf, pdf);
             }
-            Self::Plastic(plastic) => plastic.eval(wo, wi, normal),
-            Self::Conductor { .. } => match self.rough_conductor(wo, normal) {
-                Some((facets, gain)) => {
-                    let (found, cos) = facets.eval(facets.local(wi));
-                    (gain * self.angular_tint(cos) * found.value, found.pdf)
-                }
-                None => (Vec3::ZERO, 0.0),
-            },
-            _ => match self.rough_metal(wo, normal) {
-                Some(metal) => {
-                    let found = metal.eval(metal.local(wi.into()));
-                    (Vec3::from(found.tint) * found.value, found.pdf)
-                }
-                None => (Vec3::ZERO, 0.0),
-            },
-        }
+            _ => return (Vec3::ZERO, 0.0),
+        };
+        (value.into(), pdf)
     }
 
     #[inline]
     fn through(&self) -> Option<Interface> {
         match self {
             Self::RoughGlass { interface, .. } => Some(*interface),
-            Self::Translucent { here, .. } => Some(Interface::thin(*here)),
+            Self::Translucent(_, here) => Some(Interface::thin(*here)),
             _ => None,
         }
     }
@@ -216,34 +140,9 @@ impl Scatter for Lobe<'_> {
                 })
             }
             Self::Mirror { reflectance } => Some(specular(1.0, mirrored(wo, normal), reflectance, None)),
-            Self::Metal { alpha, reflectance, fresnel, .. } if alpha < SMALLEST_ALPHA => {
-                let tint = fresnel.reflectance(reflectance, normal.dot(wo));
-                Some(specular(1.0, mirrored(wo, normal), tint, None))
-            }
-            Self::Conductor { facets, .. } if facets.is_smooth() => {
-                Some(specular(1.0, mirrored(wo, normal), self.angular_tint(normal.dot(wo)), None))
-            }
-            Self::Conductor { .. } => {
-                let (facets, gain) = self.rough_conductor(wo, normal)?;
-                let [wi, local] = facets.sample(u);
-                // Below the surface: light that a second bounce would have returned.
-                if local.z <= 0.0 {
-                    return None;
-                }
-                let (found, cos) = facets.eval(local);
-                let weight = gain * self.angular_tint(cos) * found.weight;
-                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
-            }
-            Self::Metal { .. } => {
-                let metal = self.rough_metal(wo, normal)?;
-                let [wi, local] = metal.sample(u.to_array());
-                // Below the surface: light that a second bounce would have returned.
-                if local.z <= 0.0 {
-                    return None;
-                }
-                let found = metal.eval(local);
-                let weight = Vec3::from(found.tint) * found.weight;
-                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, probability: 1.0, through: None })
+            Self::Metal(metal) => metal.seen(wo.into(), normal.into()).sample(u.to_array()).reflected(),
+            Self::Plastic(plastic) => {
+                plastic.seen(wo.into(), normal.into()).sample(u_choice(), u.to_array()).reflected()
             }
             Self::RoughGlass { interface, facets, compensate } => {
                 let surface = RoughGlass::new(normal, wo, facets, interface, compensate);
@@ -255,19 +154,10 @@ impl Scatter for Lobe<'_> {
                     through: passes.then_some(interface),
                 })
             }
-            Self::Plastic(plastic) => plastic.sample(wo, normal, u_choice(), u),
-            Self::Translucent { reflectance, transmittance, here } => {
-                let passes = u_choice() < translucent_side(reflectance, transmittance, true).1;
-                let (color, pmf) = translucent_side(reflectance, transmittance, passes);
-                let local = cosine_hemisphere(u);
-                let side = if passes { -normal } else { normal };
-                (local.z > 0.0 && pmf > 0.0).then(|| BsdfSample {
-                    wi: Frame::around(side).to_world(local),
-                    weight: color / pmf,
-                    pdf: pmf * cosine_hemisphere_pdf(local.z),
-                    probability: 1.0,
-                    through: passes.then(|| Interface::thin(here)),
-                })
+            Self::Translucent(translucent, here) => {
+                let (sampled, passes) = translucent.sample(normal.into(), u_choice(), u.to_array());
+                let through = passes.then(|| Interface::thin(here));
+                sampled.reflected().map(|sample| BsdfSample { through, ..sample })
             }
             Self::ThinGlass { ior, reflectance, transmittance, here } => {
                 let once = fresnel(normal.dot(wo).clamp(0.0, 1.0), 1.0 / ior).0;
@@ -299,32 +189,6 @@ impl Scatter for Lobe<'_> {
     }
 }
 
-impl Fresnel {
-    #[inline]
-    pub(crate) fn reflectance(self, facing: Vec3, cos: f32) -> Vec3 {
-        match self {
-            Self::Constant => facing,
-            Self::Schlick => schlick(facing.into(), cos).into(),
-        }
-    }
-}
-
-/// Colour and probability of one side of a translucent surface.
-#[inline]
-fn translucent_side(reflectance: Vec3, transmittance: Vec3, passes: bool) -> (Vec3, f32) {
-    let color = if passes { transmittance } else { reflectance };
-    let sum = luminance(reflectance + transmittance);
-    (color, if sum > 0.0 { luminance(color) / sum } else { 0.5 })
-}
-
-#[inline]
-fn metal_at(normal: Vec3, wo: Vec3, alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool) -> Metal<f32> {
-    let axes = frame_around(normal.into());
-    let wo = Vector3::from(wo).to_local(&axes);
-    let lost = if compensate { ggx::lost_over_returned(wo.z, alpha) } else { 0.0 };
-    Metal::new(axes, wo, alpha, reflectance.into(), fresnel == Fresnel::Schlick, lost)
-}
-
 #[inline]
 fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
     reflect(wo.into(), normal.into()).into()
@@ -334,32 +198,34 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use crate::shading::metal::Tint;
     use crate::shading::surface::blend::{Blend, Part};
 
     fn metal(alpha: f32, compensate: bool) -> Lobe<'static> {
-        Lobe::Metal { alpha, reflectance: Vec3::ONE, fresnel: Fresnel::Constant, compensate }
+        let tint = Tint { color: Vec3::ONE.into(), schlick: false, index: None };
+        Lobe::Metal(Metal { facets: Microfacets::ggx(alpha), tangent: None, tint, compensate })
     }
 
     /// Gold.
+    fn gold(facets: Microfacets, compensate: bool) -> Lobe<'static> {
+        let index = [Vec3::new(0.143, 0.375, 1.442).into(), Vec3::new(3.983, 2.386, 1.603).into()];
+        let tint = Tint { color: Vec3::new(1.0, 0.9, 0.8).into(), schlick: false, index: Some(index) };
+        Lobe::Metal(Metal { facets, tangent: Some(Vec3::X.into()), tint, compensate })
+    }
+
     fn conductor_of(alpha: f32, compensate: bool) -> Lobe<'static> {
-        let (eta, k) = (Vec3::new(0.143, 0.375, 1.442), Vec3::new(3.983, 2.386, 1.603));
-        let (facets, tangent) = (Microfacets::ggx(alpha), Vec3::X);
-        Lobe::Conductor { facets, tangent, eta, k, reflectance: Vec3::new(1.0, 0.9, 0.8), compensate }
+        gold(Microfacets::ggx(alpha), compensate)
     }
 
     const BECKMANN: Microfacets = Microfacets { alpha: [0.4; 2], beckmann: true };
 
     /// Gold with microfacets of Beckmann of two widths.
     fn anisotropic() -> Lobe<'static> {
-        let mut lobe = conductor_of(0.3, false);
-        if let Lobe::Conductor { facets, .. } = &mut lobe {
-            *facets = Microfacets { alpha: [0.5, 0.2], beckmann: true };
-        }
-        lobe
+        gold(Microfacets { alpha: [0.5, 0.2], beckmann: true }, false)
     }
 
     fn leaf(reflectance: Vec3, transmittance: Vec3) -> Lobe<'static> {
-        Lobe::Translucent { reflectance, transmittance, here: MediumId::OUTSIDE }
+        Lobe::Translucent(Translucent::new(reflectance.into(), transmittance.into()), MediumId::OUTSIDE)
     }
 
     fn direction(cos: f32) -> Vec3 {
@@ -475,13 +341,10 @@ mod tests {
 
     #[test]
     fn white_conductors_and_leaves_return_all_light() {
-        let white = |alpha, compensate| Lobe::Conductor {
-            facets: Microfacets::ggx(alpha),
-            tangent: Vec3::X,
-            eta: Vec3::ZERO,
-            k: Vec3::ONE,
-            reflectance: Vec3::ONE,
-            compensate,
+        let white = |alpha, compensate| {
+            let tint =
+                Tint { color: Vec3::ONE.into(), schlick: false, index: Some([Vec3::ZERO.into(), Vec3::ONE.into()]) };
+            Lobe::Metal(Metal { facets: Microfacets::ggx(alpha), tangent: None, tint, compensate })
         };
         for cos in [1.0, 0.5, 0.1] {
             for (lobe, tolerance) in [

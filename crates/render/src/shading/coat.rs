@@ -1,113 +1,122 @@
-//! What the dielectric coat of a plastic transmits and reflects inwards.
+//! What the dielectric coat of a plastic transmits and reflects inwards, at one point or at sixteen.
 //!
-//! Both are integrals over the visible microfacets of a rough coat, tabulated per material: all other parameters of a
-//! coat are constant over its surface, but its width may be textured.
+//! Both are integrals over the visible microfacets of a rough coat, tabulated by its index and width: all other
+//! parameters of a coat are constant over its surface, but its width may be textured.
 
-use crate::core::material::{Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
-use crate::prepare::prepared::Prepared;
+use crate::core::material::{MaterialId, SMALLEST_ALPHA};
+use crate::prepare::coat_table::{CoatRow, CoatTable};
 use crate::shading::dielectric::fresnel;
 use crate::shading::glass_loss::scattered_once;
 use crate::shading::integral_table::Between;
 use crate::shading::microfacets::Microfacets;
+use firstlight_simd::{Real, Truth, select};
 use rayon::prelude::*;
 
 /// Entries by angle, uniform in the root of the cosine.
 const N_COS: usize = 64;
-/// Rows of a coat of textured width, uniform in the root of the width.
-const N_ALPHA: usize = 17;
 /// Entries of a row: the transmitted share of light from outside, by angle; its mean for uniform light; the share of
 /// uniform light from inside that is reflected.
 const ROW: usize = N_COS + 2;
 
-/// A coat at one point of a surface.
+/// The coat of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Coat<'a> {
+pub(crate) struct Coat<'a, R: Real = f32> {
     /// Index of refraction.
-    pub ior: f32,
+    pub ior: R,
     /// Isotropic.
-    pub facets: Microfacets,
-    /// One row, or [`N_ALPHA`] of them.
-    rows: &'a [f32],
+    pub facets: Microfacets<R>,
+    table: &'a [f32],
+    /// Index of the row of its width, and the weight of the next one.
+    start: R,
+    part: R,
 }
 
 impl<'a> Coat<'a> {
-    /// Returns the coat of a plastic; its table is computed if this is the first.
-    pub fn at(scene: &'a Prepared, id: MaterialId, ior: f32, facets: Microfacets) -> Self {
-        let rows = scene.tables.coats[id as usize].get_or_init(|| rows_of(&scene.shading.materials[id as usize]));
-        Self::new(ior, facets, rows)
+    /// Returns the coat of a plastic; all tables are computed if this is the first.
+    pub fn at(table: &'a CoatTable, id: MaterialId, ior: f32, facets: Microfacets) -> Self {
+        Self::new(ior, facets, entries(table), [table.first[id as usize], table.n_more[id as usize]])
     }
+}
 
-    /// - `rows`: those of this index and width, or of all widths; see [`rows`].
-    pub fn new(ior: f32, facets: Microfacets, rows: &'a [f32]) -> Self {
-        Self { ior, facets, rows }
+impl<'a, R: Real> Coat<'a, R> {
+    /// - `table`: of [`entries`]; `rows`: the first row of this coat and the number of others, see [`CoatTable`].
+    #[inline(always)]
+    pub fn new(ior: R, facets: Microfacets<R>, table: &'a [f32], [first, n_more]: [R; 2]) -> Self {
+        let at = facets.alpha[0].at_least(0.0).at_most(1.0).sqrt() * n_more;
+        let row = at.whole().min(n_more - 1.0).at_least(0.0);
+        Self { ior, facets, table, start: (first + row) * ROW as f32, part: at - row }
     }
 
     /// Whether it reflects like a mirror.
-    #[inline]
-    pub fn is_smooth(&self) -> bool {
+    #[inline(always)]
+    pub fn is_smooth(&self) -> R::Mask {
         self.facets.is_smooth()
     }
 
-    fn mean(&self, of: impl Fn(&[f32]) -> f32) -> f32 {
-        match self.rows.len() / ROW {
-            1 => of(self.rows),
-            n => Between::new(self.facets.alpha[0].max(0.0).sqrt(), n).mean(|i| of(&self.rows[i * ROW..][..ROW])),
-        }
-    }
-
     /// Fresnel term at an angle with a microfacet.
-    #[inline]
-    pub fn reflected(&self, cos: f32) -> f32 {
-        fresnel(cos.clamp(0.0, 1.0), 1.0 / self.ior).0
+    #[inline(always)]
+    pub fn reflected(&self, cos: R) -> R {
+        fresnel(cos.at_least(0.0).at_most(1.0), cos.all(1.0) / self.ior).0
     }
 
     /// Share of light from one direction outside that is transmitted.
-    #[inline]
-    pub fn passed(&self, cos: f32) -> f32 {
-        if self.is_smooth() {
-            return 1.0 - self.reflected(cos);
+    #[inline(always)]
+    pub fn passed(&self, cos: R) -> R {
+        let smooth = self.is_smooth();
+        let exact = cos.all(1.0) - self.reflected(cos);
+        if !(!smooth).any() {
+            return exact;
         }
-        let columns = Between::new(cos.max(0.0).sqrt(), N_COS);
-        self.mean(|row| columns.mean(|i| row[i]))
+        let columns = Between::new(cos.at_least(0.0).sqrt(), N_COS);
+        let mut share = columns.in_row(self.table, self.start);
+        if self.part.is_positive().any() {
+            let next = columns.in_row(self.table, self.start + ROW as f32);
+            share += self.part * (next - share);
+        }
+        select(smooth, exact, share)
     }
 
     /// Share of uniform light from outside that is transmitted.
-    #[inline]
-    pub fn mean_passed(&self) -> f32 {
-        self.mean(|row| row[N_COS])
+    #[inline(always)]
+    pub fn mean_passed(&self) -> R {
+        self.entry(N_COS)
     }
 
     /// Share of uniform light from inside that is reflected, below 1.
-    #[inline]
-    pub fn reflected_inwards(&self) -> f32 {
-        self.mean(|row| row[N_COS + 1])
+    #[inline(always)]
+    pub fn reflected_inwards(&self) -> R {
+        self.entry(N_COS + 1)
+    }
+
+    #[inline(always)]
+    fn entry(&self, column: usize) -> R {
+        let first = self.start + column as f32;
+        let (share, next) = (first.entry_of(self.table), (first + ROW as f32).entry_of(self.table));
+        share + self.part * (next - share)
     }
 }
 
-/// Computes the tables of all coats, on all threads.
-pub(crate) fn compute(scene: &Prepared) {
-    let tables = scene.tables.coats.par_iter().zip(&scene.shading.materials);
-    tables.filter(|(_, material)| matches!(material, Material::Plastic { .. })).for_each(|(table, material)| {
-        table.get_or_init(|| rows_of(material));
-    });
+/// Returns the entries of all coats; computes them on this thread if there are none yet.
+pub(crate) fn entries(table: &CoatTable) -> &[f32] {
+    table.entries.get_or_init(|| padded(table.rows.iter().flat_map(row).collect()))
 }
 
-fn rows_of(material: &Material) -> Vec<f32> {
-    let Material::Plastic { alpha, ior, beckmann, .. } = *material else { return Vec::new() };
-    rows(ior, alpha, beckmann)
-}
-
-/// The table of a coat of constant width, or of all widths.
-pub(crate) fn rows(ior: f32, alpha: ScalarInput, beckmann: bool) -> Vec<f32> {
-    match alpha {
-        ScalarInput::Constant(alpha) => row(ior, alpha, beckmann).into(),
-        ScalarInput::Texture(_) => {
-            (0..N_ALPHA).flat_map(|i| row(ior, (i as f32 / (N_ALPHA - 1) as f32).powi(2), beckmann)).collect()
-        }
+/// Computes the entries of all coats on all threads.
+pub(crate) fn compute(table: &CoatTable) {
+    if table.entries.get().is_none() {
+        let rows = table.rows.par_iter().flat_map_iter(row).collect();
+        // Another thread may have set them first, to the same values.
+        let _ = table.entries.set(padded(rows));
     }
 }
 
-fn row(ior: f32, alpha: f32, beckmann: bool) -> [f32; ROW] {
+/// With a row after the last one: lanes that do not interpolate read it as well.
+fn padded(mut rows: Vec<f32>) -> Vec<f32> {
+    rows.extend([0.0; ROW]);
+    rows
+}
+
+fn row(&CoatRow { ior, alpha, beckmann }: &CoatRow) -> [f32; ROW] {
     /// Points of a mean over all angles: more for smooth coats, which cost nothing.
     const N_MEAN: [u32; 2] = [1024, 48];
     let is_smooth = alpha < SMALLEST_ALPHA || ior == 1.0;

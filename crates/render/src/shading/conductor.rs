@@ -1,6 +1,6 @@
-//! The Fresnel term of metals.
+//! The Fresnel term of metals, for one point or sixteen.
 
-use glam::Vec3;
+use firstlight_simd::{Real, Vector3, select};
 
 /// Larger indices reflect all light, and their squares would overflow.
 const LARGEST: f32 = 1e4;
@@ -8,33 +8,46 @@ const LARGEST: f32 = 1e4;
 /// Returns the reflectance of unpolarised light at a smooth metal in air, per channel.
 ///
 /// - `cos`: cosine of incidence, in `[0, 1]`; `eta`, `k`: index of refraction and extinction coefficient, at least 0.
+///   Exactly 1 for an index of 0.
 ///
 /// Source: the formulas of Fresnel for a complex index η + ik, as in Born and Wolf, "Principles of Optics", section
 /// 14.2.
-pub(crate) fn conductor(cos: f32, eta: Vec3, k: Vec3) -> Vec3 {
-    let cos = cos.clamp(0.0, 1.0);
-    let (cos2, sin2) = (cos * cos, (1.0 - cos) * (1.0 + cos));
-    // 0 / 0 where nothing is left of either: at grazing incidence all is reflected.
-    let share = |sum: f32, twice: f32| if sum + twice > 0.0 { (sum - twice) / (sum + twice) } else { 1.0 };
-    let of = |eta: f32, k: f32| {
-        let (eta, k) = (eta.min(LARGEST), k.min(LARGEST));
-        // (a + ib)² = (η + ik)² − sin².
-        let real = (eta - k) * (eta + k) - sin2;
-        let square = real.hypot(2.0 * eta * k);
-        let a = (0.5 * (square + real)).max(0.0).sqrt();
-        let twice = 2.0 * a * cos;
-        let perpendicular = share(square + cos2, twice);
-        let parallel = perpendicular * share(square * cos2 + sin2 * sin2, twice * sin2);
-        (0.5 * (perpendicular + parallel)).clamp(0.0, 1.0)
-    };
-    Vec3::new(of(eta.x, k.x), of(eta.y, k.y), of(eta.z, k.z))
+#[inline(always)]
+pub(crate) fn conductor<R: Real>(cos: R, eta: Vector3<R>, k: Vector3<R>) -> Vector3<R> {
+    let cos = cos.at_least(0.0).at_most(1.0);
+    Vector3 { x: of_channel(cos, eta.x, k.x), y: of_channel(cos, eta.y, k.y), z: of_channel(cos, eta.z, k.z) }
+}
+
+#[inline(always)]
+fn of_channel<R: Real>(cos: R, eta: R, k: R) -> R {
+    let one = cos.all(1.0);
+    let (cos2, sin2) = (cos * cos, (one - cos) * (one + cos));
+    let (eta, k) = (eta.at_most(LARGEST), k.at_most(LARGEST));
+    // (a + ib)² = (η + ik)² − sin².
+    let (real, imaginary) = ((eta - k) * (eta + k) - sin2, eta * k * 2.0);
+    let square = (real * real + imaginary * imaginary).sqrt();
+    let a = ((square + real) * 0.5).at_least(0.0).sqrt();
+    let twice = a * cos * 2.0;
+    let perpendicular = share(square + cos2, twice);
+    let parallel = perpendicular * share(square * cos2 + sin2 * sin2, twice * sin2);
+    ((perpendicular + parallel) * 0.5).at_least(0.0).at_most(1.0)
+}
+
+/// (sum − twice) / (sum + twice); where nothing is left of either, at grazing incidence, all is reflected.
+#[inline(always)]
+fn share<R: Real>(sum: R, twice: R) -> R {
+    let whole = sum + twice;
+    select(whole.is_positive(), (sum - twice) / whole, whole.all(1.0))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::shading::dielectric::fresnel;
-    use glam::DVec2;
+    use glam::{DVec2, Vec3};
+
+    fn conductor(cos: f32, eta: Vec3, k: Vec3) -> Vec3 {
+        super::conductor(cos, eta.into(), k.into()).into()
+    }
 
     /// ((η − 1)² + k²) / ((η + 1)² + k²), and gold as tables of its reflectance have it.
     #[test]

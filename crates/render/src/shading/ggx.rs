@@ -67,43 +67,12 @@ fn ln_factorial(x: f64) -> f64 {
     (z - 0.5) * z.ln() - z + 0.5 * std::f64::consts::TAU.ln() + series - product.ln()
 }
 
-/// Reflection of `wo` to `wi` at visible normals.
-pub struct Reflection<R> {
-    /// The half vector, unit.
-    pub half: Vector3<R>,
-    /// f · cos of single scattering divided by the reflectance; height-correlated masking and shadowing (Heitz 2014,
-    /// equation 99).
-    pub value: R,
-    /// Pdf per steradian of sampling `wi` by visible normals.
-    pub pdf: R,
-    /// f · cos / pdf divided by the reflectance: G2 / G1.
-    pub weight: R,
-}
-
-/// Evaluates the reflection.
-///
-/// - `wo`, `wi`: unit, above the surface; `lambda_o`: [`lambda`] of `wo`.
-#[inline(always)]
-pub fn reflection<R: Real>(wo: Vector3<R>, lambda_o: R, wi: Vector3<R>, alpha: R) -> Reflection<R> {
-    let half = (wo + wi).normalize();
-    let masking = lambda_o + 1.0;
-    let both = masking + lambda(wi, alpha);
-    let per_area = distribution(half, alpha) / (wo.z * 4.0);
-    Reflection { half, value: per_area / both, pdf: per_area / masking, weight: masking / both }
-}
-
 /// Samples a microfacet normal among those visible from `wo`.
 ///
-/// Its pdf is `D(h) · G1(wo) · max(0, wo·h) / wo.z` per steradian; `wo.z > 0`, `u` in `[0, 1)²`. Source: Dupuy and
-/// Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
+/// Its pdf is `D(h) · G1(wo) · max(0, wo·h) / wo.z` per steradian; `wo.z > 0`, `alpha`: width per axis, `u` in
+/// `[0, 1)²`. Source: Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
 #[inline(always)]
-pub fn sample_visible_normal<R: Real>(wo: Vector3<R>, alpha: R, u: [R; 2]) -> Vector3<R> {
-    sample_anisotropic_normal(wo, [alpha; 2], u)
-}
-
-/// Like [`sample_visible_normal`], with a width per axis.
-#[inline(always)]
-pub fn sample_anisotropic_normal<R: Real>(wo: Vector3<R>, alpha: [R; 2], u: [R; 2]) -> Vector3<R> {
+pub fn sample_visible_normal<R: Real>(wo: Vector3<R>, alpha: [R; 2], u: [R; 2]) -> Vector3<R> {
     let wo_std = stretched(wo, alpha).normalize();
     // The point on the cap is mapped from a disc, which preserves stratification and needs no sine: the squared radius
     // is uniform, and so is the height on the cap.
@@ -225,7 +194,7 @@ pub(crate) fn integrate_albedo(wo: Vec3, alpha: [f32; 2], panels: u32, n_angles:
                 .normalize_or(Vec3::Z);
             let wi = 2.0 * wo.dot(h) * h - wo;
             if wi.z > 0.0 {
-                // G2 / G1, see [`Reflection`].
+                // G2 / G1, see [`crate::shading::microfacets::Reflection`].
                 let masking = lambda_o + 1.0;
                 let returned = f64::from(weight * (masking / (masking + anisotropic_lambda(wi.into(), alpha))));
                 sum += returned;
@@ -240,16 +209,6 @@ pub(crate) fn integrate_albedo(wo: Vec3, alpha: [f32; 2], panels: u32, n_angles:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::Sampler;
-    use glam::Vec2;
-
-    fn reflected(wo: Vec3, wi: Vec3, alpha: f32) -> Reflection<f32> {
-        reflection(wo.into(), lambda(wo.into(), alpha), wi.into(), alpha)
-    }
-
-    fn normal(wo: Vec3, alpha: f32, u: Vec2) -> Vec3 {
-        sample_visible_normal(wo.into(), alpha, u.to_array()).into()
-    }
 
     #[test]
     fn projected_normals_cover_the_surface_once() {
@@ -267,23 +226,6 @@ mod tests {
             }
             let integral = sum * std::f64::consts::TAU * std::f64::consts::FRAC_PI_2 / f64::from(n);
             assert!((integral - 1.0).abs() < 2e-3, "α {alpha}: {integral}");
-        }
-    }
-
-    #[test]
-    fn weight_is_f_cos_over_pdf() {
-        for i in 0..1000 {
-            let sampler = Sampler::new(i, 0, 0, 0);
-            let (a, b) = (sampler.pair(0), sampler.pair(1));
-            let wo = crate::sampling::cosine_hemisphere(a).max(Vec3::new(-1.0, -1.0, 1e-3)).normalize();
-            let alpha = 0.02 + b.x * 0.9;
-            let h = normal(wo, alpha, b);
-            let wi = 2.0 * wo.dot(h) * h - wo;
-            if wi.z > 1e-3 {
-                let Reflection { value, pdf, weight, .. } = reflected(wo, wi, alpha);
-                let expected = value / pdf;
-                assert!((weight - expected).abs() < 1e-3 * expected, "{weight} for {expected}");
-            }
         }
     }
 

@@ -1,103 +1,140 @@
-//! Rough metal seen from one direction, at one point or at sixteen.
+//! Metals, at one point or at sixteen: microfacets, or a mirror, whose reflectance is constant, Schlick's, or that of a
+//! conductor.
 
-use crate::shading::dielectric::reflect;
+use crate::shading::conductor::conductor;
 use crate::shading::ggx;
-use firstlight_simd::{Real, Truth, Vector3, select_vector};
+use crate::shading::integral_table::GAUSS;
+use crate::shading::layer_albedo::SchlickAlbedo;
+use crate::shading::microfacets::{Microfacets, SeenMicrofacets};
+use crate::shading::scatter::Sampled;
+use firstlight_simd::{Real, Truth, Vector3, select, select_vector};
 
-/// A metal seen along `wo`.
-#[derive(Clone, Copy)]
-pub(crate) struct Metal<R: Real> {
-    /// GGX width, dimensionless; at least [`crate::core::material::SMALLEST_ALPHA`].
-    pub alpha: R,
-    /// Reflectance at normal incidence.
-    pub reflectance: Vector3<R>,
-    /// Whether the reflectance increases towards grazing angles, see [`schlick`].
-    pub schlick: R::Mask,
-    /// Shading frame in world space; the last axis is the normal.
-    axes: [Vector3<R>; 3],
-    /// Direction to the viewer in the frame `axes`.
-    wo: Vector3<R>,
-    lambda_o: R,
-    /// Factor that adds further bounces between microfacets, see [`with_further_bounces`]; 1 without compensation.
-    pub gain: Vector3<R>,
+/// A metal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Metal<R: Real = f32> {
+    pub facets: Microfacets<R>,
+    /// Direction of the first width, in world space; not needed where both are the same.
+    pub tangent: Option<Vector3<R>>,
+    pub tint: Tint<R>,
+    /// Whether the energy that single scattering of GGX loses is returned.
+    pub compensate: R::Mask,
 }
 
-/// BSDF value for one direction.
-pub(crate) struct MetalValue<R> {
-    pub tint: Vector3<R>,
-    /// f · cos divided by the tint.
-    pub value: R,
-    /// Pdf per steradian.
-    pub pdf: R,
-    /// f · cos / pdf divided by the tint.
-    pub weight: R,
+/// Reflectance by the angle with a microfacet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tint<R: Real = f32> {
+    /// At normal incidence; for conductors a factor.
+    pub color: Vector3<R>,
+    /// Whether it increases towards grazing angles, see [`schlick`].
+    pub schlick: R::Mask,
+    /// η and k of conductors; 0 and 1 in other lanes.
+    pub index: Option<[Vector3<R>; 2]>,
+}
+
+/// A metal seen along one direction.
+#[derive(Clone, Copy)]
+pub(crate) struct SeenMetal<R: Real> {
+    facets: SeenMicrofacets<R>,
+    tint: Tint<R>,
+    /// Factor that adds further bounces between microfacets, see [`with_further_bounces`]; 1 without compensation.
+    gain: Vector3<R>,
+    smooth: R::Mask,
 }
 
 impl<R: Real> Metal<R> {
-    /// Prepares the metal for a view direction.
+    /// - `wo`, `normal`: unit, in world space.
+    #[inline(always)]
+    pub fn seen(&self, wo: Vector3<R>, normal: Vector3<R>) -> SeenMetal<R> {
+        let facets = SeenMicrofacets::new(self.facets, normal, self.tangent, wo);
+        let (smooth, alpha) = (self.facets.is_smooth(), self.facets.alpha);
+        let mut lost = wo.x.all(0.0);
+        let mut gain = Vector3::all(wo.x.all(1.0));
+        let compensated = self.compensate & !self.facets.beckmann & !smooth;
+        if compensated.any() {
+            lost = select(compensated, ggx::lost_over_returned(facets.wo().z, alpha[0]), lost);
+            let elongated = compensated & !self.facets.is_isotropic();
+            if elongated.any() {
+                let returned = SchlickAlbedo::along(facets.wo(), alpha).whole();
+                lost = select(elongated, (returned.all(1.0) - returned) / returned, lost);
+            }
+            gain = with_further_bounces(self.tint.mean(), lost, mean_width(alpha));
+        }
+        SeenMetal { facets, tint: self.tint, gain, smooth }
+    }
+}
+
+impl<R: Real> SeenMetal<R> {
+    /// Lanes for which light sampling can contribute.
+    #[inline(always)]
+    pub fn non_specular(&self) -> R::Mask {
+        !self.smooth
+    }
+
+    /// f · cos and pdf of what is not specular.
     ///
-    /// - `axes`: frame about the normal; `wo`: in that frame, unit, towards the viewer.
-    /// - `lost`: lost over returned energy of single scattering, see [`ggx::single_scattering_albedo`]; 0 for no
-    ///   compensation.
+    /// - `wi`: unit, in world space; both are zero where it, or the viewer, is behind the normal.
     #[inline(always)]
-    pub fn new(
-        axes: [Vector3<R>; 3],
-        wo: Vector3<R>,
-        alpha: R,
-        reflectance: Vector3<R>,
-        schlick: R::Mask,
-        lost: R,
-    ) -> Self {
-        let gain = with_further_bounces(mean_reflectance(schlick, reflectance), lost, alpha);
-        Self { alpha, reflectance, schlick, axes, wo, lambda_o: ggx::lambda(wo, alpha), gain }
-    }
-
-    /// Lanes in which the normal faces the viewer.
-    #[inline(always)]
-    pub fn facing(&self) -> R::Mask {
-        self.wo.z.is_positive()
-    }
-
-    /// Samples a direction; returns it in world space and in the frame, both unit; it may lie below the surface.
-    #[inline(always)]
-    pub fn sample(&self, u: [R; 2]) -> [Vector3<R>; 2] {
-        let h = ggx::sample_visible_normal(self.wo, self.alpha, u);
-        let local = reflect(self.wo, h);
-        [local.to_world(&self.axes).normalize(), local]
+    pub fn eval(&self, wi: Vector3<R>) -> (Vector3<R>, R) {
+        let local = self.facets.local(wi);
+        let lit = self.facets.facing() & local.z.is_positive() & !self.smooth;
+        let (found, cos) = self.facets.eval(local);
+        let (value, zero) = (self.tint.at(cos).times(self.gain) * found.value, cos.all(0.0));
+        (select_vector(lit, value, Vector3::all(zero)), select(lit, found.pdf, zero))
     }
 
     #[inline(always)]
-    pub fn local(&self, wi: Vector3<R>) -> Vector3<R> {
-        wi.to_local(&self.axes)
-    }
-
-    /// - `wi`: in the frame, above the surface.
-    #[inline(always)]
-    pub fn eval(&self, wi: Vector3<R>) -> MetalValue<R> {
-        let found = ggx::reflection(self.wo, self.lambda_o, wi, self.alpha);
-        let cos = self.wo.dot(found.half);
-        let tint = tint(self.schlick, self.reflectance, cos);
-        MetalValue { tint: tint.times(self.gain), value: found.value, pdf: found.pdf, weight: found.weight }
+    pub fn sample(&self, u: [R; 2]) -> Sampled<R> {
+        let local = self.facets.sample(u);
+        let wi = self.facets.world(local);
+        let (found, cos) = self.facets.eval(local);
+        let one = cos.all(1.0);
+        // Below the surface: light that a second bounce would have returned.
+        let go_on = self.smooth | (self.facets.facing() & local.z.is_positive());
+        let weight = self.tint.at(cos).times(self.gain) * found.weight;
+        if !self.smooth.any() {
+            return Sampled { go_on, wi, weight, pdf: found.pdf, probability: one };
+        }
+        let weight = select_vector(self.smooth, self.tint.at(self.facets.wo().z), weight);
+        let pdf = select(self.smooth, one.all(f32::INFINITY), found.pdf);
+        Sampled { go_on, wi, weight, pdf, probability: one }
     }
 }
 
-/// Reflectance at an angle: by [`schlick`] where the mask is set, otherwise constant.
-#[inline(always)]
-pub(crate) fn tint<R: Real>(by_schlick: R::Mask, facing: Vector3<R>, cos: R) -> Vector3<R> {
-    if !by_schlick.any() {
-        return facing;
+impl<R: Real> Tint<R> {
+    #[inline(always)]
+    pub fn at(&self, cos: R) -> Vector3<R> {
+        let mut tint = self.color;
+        if self.schlick.any() {
+            tint = select_vector(self.schlick, schlick(tint, cos.all(1.0), cos), tint);
+        }
+        match self.index {
+            Some([eta, k]) => tint.times(conductor(cos, eta, k)),
+            None => tint,
+        }
     }
-    select_vector(by_schlick, schlick(facing, cos), facing)
+
+    /// Mean over all directions, weighted by their cosine, without the factor of conductors.
+    #[inline(always)]
+    pub fn mean(&self) -> Vector3<R> {
+        let mut mean = self.color;
+        if self.schlick.any() {
+            let Vector3 { x, y, z } = mean;
+            let of_schlick = Vector3 { x: mean_of_schlick(x), y: mean_of_schlick(y), z: mean_of_schlick(z) };
+            mean = select_vector(self.schlick, of_schlick, mean);
+        }
+        let Some([eta, k]) = self.index else { return mean };
+        let mut sum = Vector3::all(eta.x.all(0.0));
+        for &(cos, weight) in &GAUSS {
+            sum = sum + conductor(eta.x.all(cos), eta, k).mul_all(2.0 * cos * weight);
+        }
+        select_vector(eta.is_zero(), mean, sum)
+    }
 }
 
-/// Mean of [`schlick`] over all directions, weighted by their cosine, where the mask is set.
+/// Width of an isotropic surface on which light bounces between microfacets about as often.
 #[inline(always)]
-pub(crate) fn mean_reflectance<R: Real>(by_schlick: R::Mask, facing: Vector3<R>) -> Vector3<R> {
-    if !by_schlick.any() {
-        return facing;
-    }
-    let mean = Vector3 { x: mean_of_schlick(facing.x), y: mean_of_schlick(facing.y), z: mean_of_schlick(facing.z) };
-    select_vector(by_schlick, mean, facing)
+pub(crate) fn mean_width<R: Real>([x, y]: [R; 2]) -> R {
+    select(x.equals(y), x, ((x * x + y * y) * 0.5).sqrt())
 }
 
 /// ∫ 2 cos (facing + (1 − facing) (1 − cos)⁵) d cos.
@@ -131,14 +168,12 @@ fn with_bounces_of<R: Real>(mean: R, lost: R, again: R) -> R {
     first * lost / (-(mean * again) + 1.0) + 1.0
 }
 
-/// Fresnel reflectance of a metal with reflectance `facing` at normal incidence (Schlick 1994).
+/// Fresnel reflectance by those at normal incidence and at grazing angles (Schlick 1994).
 #[inline(always)]
-pub(crate) fn schlick<R: Real>(facing: Vector3<R>, cos: R) -> Vector3<R> {
+pub(crate) fn schlick<R: Real>(facing: Vector3<R>, grazing: R, cos: R) -> Vector3<R> {
     let x = (-cos + 1.0).at_least(0.0).at_most(1.0);
     let x2 = x * x;
-    let grazing = x2 * x2 * x;
-    let white = Vector3 { x: -facing.x + 1.0, y: -facing.y + 1.0, z: -facing.z + 1.0 };
-    facing + white * grazing
+    facing + (Vector3::all(grazing) - facing) * (x2 * x2 * x)
 }
 
 #[cfg(test)]
@@ -174,7 +209,7 @@ mod tests {
                 height = (height / (1.0 - u).powf(1.0 / lambda)).clamp(0.0, 1.0);
                 let back = -dir;
                 let u = Vec2::new(sampler.single(4 * k + 3), sampler.single(4 * k + 4));
-                let normal: Vec3 = ggx::sample_anisotropic_normal(back.into(), alpha, u.to_array()).into();
+                let normal: Vec3 = ggx::sample_visible_normal(back.into(), alpha, u.to_array()).into();
                 throughput *= reflectance(back.dot(normal).clamp(0.0, 1.0));
                 dir = (2.0 * back.dot(normal) * normal - back).normalize();
             }
@@ -187,7 +222,7 @@ mod tests {
         for alpha in [[0.1; 2], [0.3; 2], [0.6; 2], [1.0; 2], [1.0, 0.1], [0.6, 0.3]] {
             let once = SchlickAlbedo::mean(alpha);
             let whole = once.facing + once.grazing;
-            let wide = (0.5 * (alpha[0] * alpha[0] + alpha[1] * alpha[1])).sqrt();
+            let wide = mean_width(alpha);
             let lost = (1.0 - whole) / whole;
             let colors = Vec3::new(0.2, 0.5, 0.9);
             let gain: Vec3 = with_further_bounces(colors.into(), lost, wide).into();
@@ -195,9 +230,10 @@ mod tests {
             let off = (found / expected - 1.0).abs();
             assert!(off.max_element() < 0.015, "α {alpha:?}: {found} for {expected}");
             // Schlick's term: light that meets several microfacets meets them at other angles than the mean.
-            let gain: Vec3 = with_further_bounces(mean_reflectance(true, colors.into()), lost, wide).into();
+            let tint = Tint { color: colors.into(), schlick: true, index: None };
+            let gain: Vec3 = with_further_bounces(tint.mean(), lost, wide).into();
             let found = (colors * once.facing + Vec3::splat(once.grazing)) * gain;
-            let expected = walked(alpha, |cos| schlick(colors.into(), cos).into());
+            let expected = walked(alpha, |cos| schlick(colors.into(), 1.0, cos).into());
             let off = (found / expected - 1.0).abs();
             assert!(off.max_element() < 0.05, "α {alpha:?}, Schlick: {found} for {expected}");
         }

@@ -6,112 +6,115 @@
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::reflect;
-use crate::shading::ggx::{self, Reflection};
-use firstlight_simd::{Vector3, frame_around};
-use glam::{Vec2, Vec3};
+use crate::shading::ggx;
+use firstlight_simd::{Real, Truth, Vector3, frame_around, select, select_vector};
 use std::f32::consts::PI;
 use std::f64::consts::PI as PI_64;
 
-/// Microfacets of a rough surface at one point.
+/// Microfacets of a rough surface, at one point or sixteen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Microfacets {
+pub(crate) struct Microfacets<R: Real = f32> {
     /// Widths along x and y of the frame, dimensionless.
-    pub alpha: [f32; 2],
-    /// Beckmann's distribution, otherwise GGX.
-    pub beckmann: bool,
+    pub alpha: [R; 2],
+    /// Beckmann's distribution, otherwise GGX; its integrals are evaluated lane by lane.
+    pub beckmann: R::Mask,
 }
 
+#[cfg(test)]
 impl Microfacets {
-    /// With the same width in all directions.
-    pub fn isotropic(alpha: f32, beckmann: bool) -> Self {
-        Self { alpha: [alpha; 2], beckmann }
-    }
-
-    #[cfg(test)]
     pub fn ggx(alpha: f32) -> Self {
         Self::isotropic(alpha, false)
     }
+}
+
+impl<R: Real> Microfacets<R> {
+    /// With the same width in all directions.
+    #[inline(always)]
+    pub fn isotropic(alpha: R, beckmann: R::Mask) -> Self {
+        Self { alpha: [alpha; 2], beckmann }
+    }
 
     /// Whether the surface is a mirror.
-    #[inline]
-    pub fn is_smooth(&self) -> bool {
-        self.alpha[0].max(self.alpha[1]) < SMALLEST_ALPHA
+    #[inline(always)]
+    pub fn is_smooth(&self) -> R::Mask {
+        let alpha = self.alpha[0].max(self.alpha[1]);
+        alpha.lt(alpha.all(SMALLEST_ALPHA))
     }
 
     /// Neither width narrower than what `f32` resolves, unless both are.
+    #[inline(always)]
     pub fn at_least_rough(self) -> Self {
-        let least = if self.is_smooth() { 0.0 } else { SMALLEST_ALPHA };
-        Self { alpha: self.alpha.map(|alpha| alpha.max(least)), ..self }
+        let ([x, y], smooth) = (self.alpha, self.is_smooth());
+        let [wide_x, wide_y] = [x.at_least(SMALLEST_ALPHA), y.at_least(SMALLEST_ALPHA)];
+        Self { alpha: [select(smooth, x, wide_x), select(smooth, y, wide_y)], ..self }
     }
 
-    #[inline]
-    pub fn is_isotropic(&self) -> bool {
-        self.alpha[0] == self.alpha[1]
+    #[inline(always)]
+    pub fn is_isotropic(&self) -> R::Mask {
+        self.alpha[0].equals(self.alpha[1])
     }
 
     /// Distribution of normals D, per steradian.
-    #[inline]
-    pub fn distribution(&self, h: Vector3<f32>) -> f32 {
-        match (self.beckmann, self.is_isotropic()) {
-            (false, true) => ggx::distribution(h, self.alpha[0]),
-            (false, false) => ggx::anisotropic_distribution(h, self.alpha),
-            (true, _) => {
-                let (slope2, cos2) = (self.slope2(h), h.z * h.z);
-                let peak = 1.0 / (PI * self.alpha[0] * self.alpha[1] * cos2 * cos2);
-                // Of vertical normals the peak is infinite, and the exponential has underflowed.
-                if slope2 < -f32::MIN_POSITIVE.ln() { peak * (-slope2).exp() } else { 0.0 }
-            }
+    #[inline(always)]
+    pub fn distribution(&self, h: Vector3<R>) -> R {
+        let [ax, ay] = self.alpha;
+        let mut found = ggx::distribution(h, ax);
+        let elongated = !self.is_isotropic();
+        if elongated.any() {
+            found = select(elongated, ggx::anisotropic_distribution(h, self.alpha), found);
         }
-    }
-
-    /// Squared slope in units of the widths.
-    #[inline]
-    fn slope2(&self, h: Vector3<f32>) -> f32 {
-        let (x, y) = (h.x / (self.alpha[0] * h.z), h.y / (self.alpha[1] * h.z));
-        x * x + y * y
+        if self.beckmann.any() {
+            let (x, y, cos2) = (h.x / (ax * h.z), h.y / (ay * h.z), h.z * h.z);
+            let peak = h.z.all(1.0) / (ax * ay * cos2 * cos2 * PI);
+            // Of vertical normals the peak is infinite, and the exponential has underflowed.
+            let of_beckmann = R::each(self.beckmann, [x * x + y * y, peak], |[slope2, peak]| {
+                if slope2 < -f32::MIN_POSITIVE.ln() { peak * (-slope2).exp() } else { 0.0 }
+            });
+            found = select(self.beckmann, of_beckmann, found);
+        }
+        found
     }
 
     /// Smith's Λ (Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs").
-    #[inline]
-    pub fn lambda(&self, w: Vector3<f32>) -> f32 {
-        match (self.beckmann, self.is_isotropic()) {
-            (false, true) => ggx::lambda(w, self.alpha[0]),
-            (false, false) => ggx::anisotropic_lambda(w, self.alpha),
-            (true, _) => {
-                let sin = f64::from((self.alpha[0] * w.x).hypot(self.alpha[1] * w.y));
-                let a = f64::from(w.z) / sin;
-                if a.is_finite() {
-                    (0.5 * ((-a * a).exp() / (a * PI_64.sqrt()) - libm::erfc(a))).max(0.0) as f32
-                } else {
-                    0.0
-                }
-            }
+    #[inline(always)]
+    pub fn lambda(&self, w: Vector3<R>) -> R {
+        let [ax, ay] = self.alpha;
+        let mut found = ggx::lambda(w, ax);
+        let elongated = !self.is_isotropic();
+        if elongated.any() {
+            found = select(elongated, ggx::anisotropic_lambda(w, self.alpha), found);
         }
+        if self.beckmann.any() {
+            let of_beckmann = R::each(self.beckmann, [ax * w.x, ay * w.y, w.z], lambda_of_beckmann);
+            found = select(self.beckmann, of_beckmann, found);
+        }
+        found
     }
 
     /// Samples a normal among those visible from `wo`; see [`ggx::sample_visible_normal`].
-    #[inline]
-    pub fn sample(&self, wo: Vector3<f32>, u: [f32; 2]) -> Vector3<f32> {
-        if !self.beckmann {
-            return ggx::sample_anisotropic_normal(wo, self.alpha, u);
+    #[inline(always)]
+    pub fn sample(&self, wo: Vector3<R>, u: [R; 2]) -> Vector3<R> {
+        let normal = ggx::sample_visible_normal(wo, self.alpha, u);
+        if !self.beckmann.any() {
+            return normal;
         }
+        let (one, zero) = (wo.z.all(1.0), wo.z.all(0.0));
         let [ax, ay] = self.alpha;
         let (x, y) = (ax * wo.x, ay * wo.y);
-        let sin = x.hypot(y);
-        let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
+        let sin = (x * x + y * y).sqrt();
+        let tilted = sin.is_positive();
+        let (cos_phi, sin_phi) = (select(tilted, x / sin, one), select(tilted, y / sin, zero));
         // Only slopes along the view change how much of a microfacet is seen; those across are independent of it.
-        let along = visible_slope(f64::from(wo.z), f64::from(sin), f64::from(u[0]));
-        let across = visible_slope(1.0, 0.0, f64::from(u[1]));
+        let along = R::each(self.beckmann, [wo.z, sin, u[0]], visible_slope);
+        let across = R::each(self.beckmann, [one, zero, u[1]], visible_slope);
         let slopes = [along * cos_phi - across * sin_phi, along * sin_phi + across * cos_phi];
-        Vector3 { x: ax * slopes[0], y: ay * slopes[1], z: 1.0 }.normalize()
+        let of_beckmann = Vector3 { x: ax * slopes[0], y: ay * slopes[1], z: one }.normalize();
+        select_vector(self.beckmann, of_beckmann, normal)
     }
 
     /// Evaluates the reflection of `wo` to `wi`, both above the surface; `lambda_o`: [`Self::lambda`] of `wo`.
-    #[inline]
-    pub fn reflection(&self, wo: Vector3<f32>, lambda_o: f32, wi: Vector3<f32>) -> Reflection<f32> {
-        if !self.beckmann && self.is_isotropic() {
-            return ggx::reflection(wo, lambda_o, wi, self.alpha[0]);
-        }
+    #[inline(always)]
+    pub fn reflection(&self, wo: Vector3<R>, lambda_o: R, wi: Vector3<R>) -> Reflection<R> {
         let half = (wo + wi).normalize();
         let masking = lambda_o + 1.0;
         let both = masking + self.lambda(wi);
@@ -120,58 +123,91 @@ impl Microfacets {
     }
 }
 
-/// Microfacets seen along one direction.
-pub(crate) struct SeenMicrofacets {
-    facets: Microfacets,
-    /// Shading frame in world space; the last axis is the normal.
-    axes: [Vector3<f32>; 3],
-    /// Direction to the viewer in the frame.
-    wo: Vector3<f32>,
-    lambda_o: f32,
+/// Reflection of `wo` to `wi` at visible normals.
+pub(crate) struct Reflection<R> {
+    /// The half vector, unit.
+    pub half: Vector3<R>,
+    /// f · cos of single scattering divided by the reflectance; height-correlated masking and shadowing (Heitz 2014,
+    /// equation 99).
+    pub value: R,
+    /// Pdf per steradian of sampling `wi` by visible normals.
+    pub pdf: R,
+    /// f · cos / pdf divided by the reflectance: G2 / G1.
+    pub weight: R,
 }
 
-impl SeenMicrofacets {
-    /// `None` if the normal faces away from the viewer.
-    ///
+/// Microfacets seen along one direction.
+#[derive(Clone, Copy)]
+pub(crate) struct SeenMicrofacets<R: Real> {
+    facets: Microfacets<R>,
+    /// Shading frame in world space; the last axis is the normal.
+    axes: [Vector3<R>; 3],
+    /// Direction to the viewer in the frame.
+    wo: Vector3<R>,
+    lambda_o: R,
+}
+
+impl<R: Real> SeenMicrofacets<R> {
     /// - `normal`: unit; `tangent`: direction of the first width, in world space; any of isotropic ones.
-    #[inline]
-    pub fn new(facets: Microfacets, normal: Vec3, tangent: Vec3, wo: Vec3) -> Option<Self> {
-        let along = (tangent - normal.dot(tangent) * normal).try_normalize().filter(|_| !facets.is_isotropic());
-        let axes = match along {
-            Some(x) => [x.into(), normal.cross(x).into(), normal.into()],
-            None => frame_around(normal.into()),
-        };
-        let wo = Vector3::from(wo).to_local(&axes);
-        (wo.z > 0.0).then(|| Self { facets, axes, wo, lambda_o: facets.lambda(wo) })
+    #[inline(always)]
+    pub fn new(facets: Microfacets<R>, normal: Vector3<R>, tangent: Option<Vector3<R>>, wo: Vector3<R>) -> Self {
+        let mut axes = frame_around(normal);
+        if let Some(tangent) = tangent {
+            let elongated = !facets.is_isotropic();
+            let x = (tangent - normal * normal.dot(tangent)).normalize_or(axes[0]);
+            axes = [select_vector(elongated, x, axes[0]), select_vector(elongated, normal.cross(x), axes[1]), normal];
+        }
+        let wo = wo.to_local(&axes);
+        Self { facets, axes, wo, lambda_o: facets.lambda(wo) }
+    }
+
+    /// Whether the normal faces the viewer.
+    #[inline(always)]
+    pub fn facing(&self) -> R::Mask {
+        self.wo.z.is_positive()
     }
 
     /// Direction to the viewer, in the frame.
-    #[inline]
-    pub fn wo(&self) -> Vec3 {
-        self.wo.into()
+    #[inline(always)]
+    pub fn wo(&self) -> Vector3<R> {
+        self.wo
     }
 
-    /// Samples a direction; returns it in world space and in the frame, both unit; it may lie below the surface.
-    #[inline]
-    pub fn sample(&self, u: Vec2) -> [Vector3<f32>; 2] {
-        let local = reflect(self.wo, self.facets.sample(self.wo, u.to_array()));
-        [local.to_world(&self.axes).normalize(), local]
+    /// Samples a direction; returns it in the frame; it may lie below the surface.
+    #[inline(always)]
+    pub fn sample(&self, u: [R; 2]) -> Vector3<R> {
+        let smooth = self.facets.is_smooth();
+        let zero = self.wo.z.all(0.0);
+        let up = Vector3 { x: zero, y: zero, z: zero + 1.0 };
+        reflect(self.wo, select_vector(smooth, up, self.facets.sample(self.wo, u)))
     }
 
-    #[inline]
-    pub fn local(&self, wi: Vec3) -> Vector3<f32> {
-        Vector3::from(wi).to_local(&self.axes)
+    #[inline(always)]
+    pub fn local(&self, wi: Vector3<R>) -> Vector3<R> {
+        wi.to_local(&self.axes)
+    }
+
+    /// The inverse of [`Self::local`], unit.
+    #[inline(always)]
+    pub fn world(&self, local: Vector3<R>) -> Vector3<R> {
+        local.to_world(&self.axes).normalize()
     }
 
     /// Returns the reflection and the cosine with the microfacets that reflect this way.
     ///
     /// - `wi`: in the frame, above the surface.
-    #[inline]
-    pub fn eval(&self, wi: Vector3<f32>) -> (Reflection<f32>, f32) {
+    #[inline(always)]
+    pub fn eval(&self, wi: Vector3<R>) -> (Reflection<R>, R) {
         let found = self.facets.reflection(self.wo, self.lambda_o, wi);
         let cos = self.wo.dot(found.half);
         (found, cos)
     }
+}
+
+/// - `x`, `y`: of a direction times the widths; `z`: above 0.
+fn lambda_of_beckmann([x, y, z]: [f32; 3]) -> f32 {
+    let a = f64::from(z) / f64::from(x.hypot(y));
+    if a.is_finite() { (0.5 * ((-a * a).exp() / (a * PI_64.sqrt()) - libm::erfc(a))).max(0.0) as f32 } else { 0.0 }
 }
 
 /// Returns the slope towards the viewer of a visible microfacet, in units of the width: its pdf is proportional to
@@ -181,9 +217,10 @@ impl SeenMicrofacets {
 ///
 /// The cumulative distribution is inverted as by Jakob 2014, "An Improved Visible Normal Sampling Routine for the
 /// Beckmann Distribution", with the bracket of the root instead of a fit.
-fn visible_slope(cos: f64, sin: f64, u: f64) -> f32 {
+fn visible_slope(of: [f32; 3]) -> f32 {
     /// No `u` of 24 bits leads to larger slopes.
     const MOST: f64 = 6.0;
+    let [cos, sin, u] = of.map(f64::from);
     let least = -cos / sin;
     let half_root = 0.5 * PI_64.sqrt();
     // ∫ from `least` to s.
@@ -212,6 +249,7 @@ mod tests {
     use super::*;
     use crate::sampling::Sampler;
     use crate::test_statistics::ChiSquared;
+    use glam::{Vec2, Vec3};
     use std::f32::consts::TAU;
 
     /// Both distributions, narrow and wide, and of two widths.
@@ -223,6 +261,10 @@ mod tests {
     fn direction(cos: f32, phi: f32) -> Vec3 {
         let sin = (1.0 - cos * cos).sqrt();
         Vec3::new(sin * phi.cos(), sin * phi.sin(), cos)
+    }
+
+    fn seen_along(facets: Microfacets, wo: Vec3) -> SeenMicrofacets<f32> {
+        SeenMicrofacets::new(facets, Vec3::Z.into(), Some(Vec3::X.into()), wo.into())
     }
 
     /// ∫ of a function over slopes of up to twelve widths: the plane of normals (x, y, 1).
@@ -261,12 +303,12 @@ mod tests {
         let cases = all().filter(|facets| facets.alpha[0].min(facets.alpha[1]) > 0.05);
         for (case, (facets, (cos, phi))) in cases.flat_map(|facets| views.map(|view| (facets, view))).enumerate() {
             let wo = direction(cos, phi);
-            let seen = SeenMicrofacets::new(facets, Vec3::Z, Vec3::X, wo).unwrap();
-            let wo = seen.wo();
+            let seen = seen_along(facets, wo);
+            let wo = Vec3::from(seen.wo());
             let (nz, nphi, n) = (16usize, 32usize, 100_000u32);
             let mut counts = vec![0.0f64; nz * nphi + 1];
             for i in 0..n {
-                let wi: Vec3 = seen.sample(Sampler::new(i, case as u32, 0, 0).pair(3))[1].into();
+                let wi: Vec3 = seen.sample(Sampler::new(i, case as u32, 0, 0).pair(3).to_array()).into();
                 let bin = if wi.z <= 0.0 {
                     nz * nphi
                 } else {
@@ -274,6 +316,10 @@ mod tests {
                     ((wi.z * nz as f32) as usize).min(nz - 1) * nphi + ((phi * nphi as f32) as usize).min(nphi - 1)
                 };
                 counts[bin] += 1.0;
+                if wi.z > 1e-3 {
+                    let (found, _) = seen.eval(wi.into());
+                    assert!((found.weight * found.pdf - found.value).abs() < 1e-3 * found.value, "{facets:?}, {wo}");
+                }
             }
             let fine = 32;
             let mut expected = vec![0.0f64; nz * nphi + 1];
@@ -300,9 +346,9 @@ mod tests {
                 } else {
                     [sampler.pair(0); 2]
                 };
-                let seen = SeenMicrofacets::new(facets, Vec3::Z, Vec3::X, direction(cos, 0.4)).unwrap();
+                let seen = seen_along(facets, direction(cos, 0.4));
                 for u in u {
-                    let [_, wi] = seen.sample(u);
+                    let wi = seen.sample(u.to_array());
                     assert!((wi.length() - 1.0).abs() < 1e-4, "{facets:?}, {cos}: {wi:?}");
                     if wi.z <= 0.0 {
                         continue;

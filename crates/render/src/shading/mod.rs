@@ -30,4 +30,5 @@ pub(crate) mod sides;
 pub(crate) mod simd;
 pub(crate) mod surface;
 pub(crate) mod tangent;
+pub(crate) mod translucent;
 pub(crate) mod vertex;

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 /// Computes the tables that its materials need, on all threads.
 pub(crate) fn compute_for(scene: &Prepared) {
-    coat::compute(scene);
+    coat::compute(&scene.tables.coats);
     for material in &scene.shading.materials {
         match material {
             Material::Principled { anisotropy, sheen_color, .. } => {

@@ -5,6 +5,7 @@
 //! them.
 
 use crate::shading::interface::Interface;
+use firstlight_simd::{Real, Vector3};
 use glam::{Vec2, Vec3};
 
 /// The BSDF of a surface: one lobe, a blend, or layers.
@@ -41,4 +42,25 @@ pub(crate) struct BsdfSample {
     pub probability: f32,
     /// The interface that was passed, if `wi` is on the far side.
     pub through: Option<Interface>,
+}
+
+/// A direction sampled at one point or at sixteen, by what stays in the medium of the viewer.
+pub(crate) struct Sampled<R: Real> {
+    /// Lanes in which it carries light.
+    pub go_on: R::Mask,
+    /// Unit, in world space.
+    pub wi: Vector3<R>,
+    /// f · cos / pdf.
+    pub weight: Vector3<R>,
+    /// As of [`BsdfSample`], like the probability.
+    pub pdf: R,
+    pub probability: R,
+}
+
+impl Sampled<f32> {
+    #[inline]
+    pub fn reflected(self) -> Option<BsdfSample> {
+        let Self { go_on, wi, weight, pdf, probability } = self;
+        go_on.then(|| BsdfSample { wi: wi.into(), weight: weight.into(), pdf, probability, through: None })
+    }
 }

@@ -19,8 +19,8 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
-use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::scatter::{eval, sample, surface_of};
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance};
+use crate::shading::simd::scatter::{LobeLanes, eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector};
@@ -48,43 +48,19 @@ pub(crate) struct LightHits<'a> {
 
 /// Whether [`scatter`] handles a hit on a material of this kind.
 pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
-    knows(kind) && kind <= COATED && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
+    knows(kind) && kind <= COATED && kind != TRANSLUCENT && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
 }
 
 /// Connects the vertices to the lens, and continues the paths.
 pub(crate) fn scatter(set: InstructionSet, kind: usize, group: LightHits) {
     match kind {
-        DIFFUSE => dispatch!(set, scatter_diffuse(group: LightHits)),
-        MIRROR => dispatch!(set, scatter_mirror(group: LightHits)),
-        GLASS => dispatch!(set, scatter_glass(group: LightHits)),
-        METAL => dispatch!(set, scatter_metal(group: LightHits)),
-        _ => dispatch!(set, scatter_coated(group: LightHits)),
+        DIFFUSE => dispatch!(set, scatter_kind::<_, DIFFUSE>(group: LightHits)),
+        MIRROR => dispatch!(set, scatter_kind::<_, MIRROR>(group: LightHits)),
+        GLASS => dispatch!(set, scatter_kind::<_, GLASS>(group: LightHits)),
+        METAL => dispatch!(set, scatter_kind::<_, METAL>(group: LightHits)),
+        PLASTIC => dispatch!(set, scatter_kind::<_, PLASTIC>(group: LightHits)),
+        _ => dispatch!(set, scatter_kind::<_, COATED>(group: LightHits)),
     }
-}
-
-#[inline(always)]
-fn scatter_diffuse<S: Simd>(s: S, group: LightHits) {
-    scatter_kind::<S, DIFFUSE>(s, group);
-}
-
-#[inline(always)]
-fn scatter_mirror<S: Simd>(s: S, group: LightHits) {
-    scatter_kind::<S, MIRROR>(s, group);
-}
-
-#[inline(always)]
-fn scatter_glass<S: Simd>(s: S, group: LightHits) {
-    scatter_kind::<S, GLASS>(s, group);
-}
-
-#[inline(always)]
-fn scatter_metal<S: Simd>(s: S, group: LightHits) {
-    scatter_kind::<S, METAL>(s, group);
-}
-
-#[inline(always)]
-fn scatter_coated<S: Simd>(s: S, group: LightHits) {
-    scatter_kind::<S, COATED>(s, group);
 }
 
 #[inline(always)]
@@ -216,7 +192,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let &Self { at, place, ref sampler, dimension, .. } = self;
         let normal = place.geometric_normal;
         let surface = surface_of::<S, KIND>(s, at, place, sets, self.media);
-        let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension);
+        let bounce = sample::<S, KIND>(&surface, place, at.mask, &HintLanes::NONE, sampler, dimension);
         let (along, wi) = (bounce.wi.dot(normal), bounce.wi);
         let specular = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
@@ -227,7 +203,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             go_on &= specular;
         }
         let mut media = *self.media;
-        if let Some(glass) = &surface.glass
+        if let LobeLanes::Glass(glass) = &surface.lobe
             && KIND == GLASS
         {
             for lane in lanes_of(go_on & bounce.transmitted) {

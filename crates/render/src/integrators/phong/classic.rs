@@ -17,7 +17,7 @@ use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dielectric;
 use crate::shading::lights::power_heuristic;
 use crate::shading::medium::MediumSets;
-use crate::shading::metal;
+use crate::shading::metal::Tint;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
@@ -126,7 +126,8 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         if kind != MATTE {
             tint = color_of(s, &at, &table.shiny, row, &place);
             let schlick = Bits::gather(&table.flags, row).has(SCHLICK);
-            tint = metal::tint(schlick, tint, place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
+            let reflectance = Tint { color: tint, schlick, index: None };
+            tint = reflectance.at(place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
             exponent = Float::gather(&table.exponent, row);
             wi = dielectric::reflect(place.wo, place.normal);
         }

@@ -3,10 +3,10 @@
 use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::integrators::phong::lobe::lobe_pdf;
 use crate::prepare::prepared::Prepared;
-use crate::shading::conductor::conductor;
 use crate::shading::dielectric::fresnel;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lights::power_heuristic;
+use crate::shading::metal::{Tint, schlick};
 use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
 use glam::Vec3;
@@ -81,12 +81,15 @@ impl Finish {
                 self.push(Shiny::Mirror { tint: weight * reflectance.eval(scene, uv) });
             }
             Material::Metal { alpha, reflectance, fresnel, .. } => {
-                let tint = weight * fresnel.reflectance(reflectance.eval(scene, uv), vertex.normal.dot(vertex.wo));
+                let color = reflectance.eval(scene, uv).into();
+                let tint = Tint { color, schlick: *fresnel == Fresnel::Schlick, index: None };
+                let tint = weight * Vec3::from(tint.at(vertex.normal.dot(vertex.wo)));
                 self.push(glossy(tint, alpha.eval(scene, uv).clamp(0.0, 1.0)));
             }
             Material::Conductor { alpha, eta, k, reflectance, .. } => {
-                let cos = vertex.normal.dot(vertex.wo);
-                let tint = weight * reflectance.eval(scene, uv) * conductor(cos.clamp(0.0, 1.0), *eta, *k);
+                let color = reflectance.eval(scene, uv).into();
+                let tint = Tint { color, schlick: false, index: Some([(*eta).into(), (*k).into()]) };
+                let tint = weight * Vec3::from(tint.at(vertex.normal.dot(vertex.wo)));
                 self.push(glossy(tint, alpha.eval(scene, uv).clamp(0.0, 1.0)));
             }
             // The light between the two sides is left out.
@@ -129,8 +132,8 @@ impl Finish {
                 let cos = vertex.normal.dot(vertex.wo);
                 let facing = at_normal * specular_color.eval(scene, uv) * share(specular);
                 let opaque = (1.0 - metallic) * (1.0 - transmission);
-                let tint: Vec3 = opaque * Fresnel::Schlick.reflectance(facing, cos)
-                    + metallic * Fresnel::Schlick.reflectance(color, cos);
+                let tint: Vec3 = opaque * Vec3::from(schlick(facing.into(), 1.0, cos))
+                    + metallic * Vec3::from(schlick(color.into(), 1.0, cos));
                 let tint = weight * tint;
                 self.push(glossy(tint, alpha));
                 let diffuse = weight * opaque * (Vec3::ONE - facing) * color;

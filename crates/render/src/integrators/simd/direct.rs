@@ -11,7 +11,7 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::ShadowBatch;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::iors;
-use crate::shading::simd::lanes::transmittance;
+use crate::shading::simd::lanes::{TRANSLUCENT, transmittance};
 use crate::shading::simd::lights::LightPoints;
 use crate::shading::simd::scatter::{SurfaceScatter, eval};
 use crate::shading::simd::surface::SurfaceLanes;
@@ -25,7 +25,7 @@ pub(crate) struct DirectLanes<'a, S: Simd> {
     pub depth: u32,
     pub mask: Mask,
     pub place: &'a SurfaceLanes<S>,
-    pub surface: &'a SurfaceScatter<S>,
+    pub surface: &'a SurfaceScatter<'a, S>,
     pub hints: &'a HintLanes<'a>,
     pub media: &'a [MediumId; LANES],
     pub throughput: Vector<S>,
@@ -60,7 +60,10 @@ impl<S: Simd> DirectLanes<'_, S> {
         if found == 0 {
             return;
         }
-        let origin = place.leaving();
+        let mut origin = place.leaving();
+        if KIND == TRANSLUCENT {
+            origin = select_vector(wi.dot(place.normal).is_negative(), place.passing(), origin);
+        }
         if scene.tables.features.glass && infinite & found != 0 {
             let ior = iors(s, scene, sets, infinite & found, media);
             light = light * (ior * ior);
@@ -88,7 +91,7 @@ impl<S: Simd> DirectLanes<'_, S> {
             techniques,
             mask,
             position: place.position,
-            normal: place.normal,
+            normal: place.lit_side::<KIND>(),
             sampler,
             dimension: first_dimension(self.depth),
             candidate: k,
@@ -96,7 +99,11 @@ impl<S: Simd> DirectLanes<'_, S> {
         let wi = points.wi;
         let (value, pdf) = eval::<S, KIND>(surface, place, wi);
         let pdf = hints.mixed(s, wi, pdf);
-        let reached = wi.dot(place.reach_normal).is_positive();
+        let mut reached = wi.dot(place.reach_normal).is_positive();
+        if KIND == TRANSLUCENT {
+            let passes = wi.dot(place.normal).is_negative();
+            reached = (passes & wi.dot(place.geometric_normal).is_negative()) | (!passes & reached);
+        }
         let found = points.found & reached & pdf.is_positive();
         let weight = light_weight(techniques, points.pdf * n, pdf) / points.pdf;
         let light = self.throughput.times(value).times(points.radiance) * weight;

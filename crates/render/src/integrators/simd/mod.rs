@@ -1,4 +1,5 @@
-//! Shading of sixteen paths at a time, for diffuse, mirror, glass, metal, two of them in one surface, and layers.
+//! Shading of sixteen paths at a time, for diffuse, mirror, glass, metal, plastic and translucent surfaces, two in one
+//! surface, and layers.
 //!
 //! A wave's hits are sorted by kind of material, so the lanes of a group take the same branches. Rare cases use the
 //! scalar code lane by lane: texels, the media of a path, and emission of layers. The scalar version of the whole is

@@ -15,8 +15,8 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
-use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::scatter::{layered_surface_of, sample, surface_of};
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance};
+use crate::shading::simd::scatter::{LobeLanes, layered_surface_of, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
@@ -51,55 +51,27 @@ pub(crate) struct KindHits<'a> {
 
 /// Whether [`shade`] supports hits on materials of a kind.
 pub(crate) fn knows(kind: usize) -> bool {
-    [DIFFUSE, MIRROR, GLASS, METAL, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
+    [DIFFUSE, MIRROR, GLASS, METAL, PLASTIC, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Whether light sampling contributes to hits on materials of a kind.
 pub(crate) fn scatters(kind: usize) -> bool {
-    [DIFFUSE, METAL, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
+    [DIFFUSE, METAL, PLASTIC, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Shades hits on materials of one [`MaterialKind`](crate::core::material::MaterialKind).
 pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
     match kind {
-        DIFFUSE => dispatch!(set, shade_diffuse(group: KindHits)),
-        MIRROR => dispatch!(set, shade_mirror(group: KindHits)),
-        GLASS => dispatch!(set, shade_glass(group: KindHits)),
-        METAL => dispatch!(set, shade_metal(group: KindHits)),
-        COATED => dispatch!(set, shade_coated(group: KindHits)),
+        DIFFUSE => dispatch!(set, shade_kind::<_, DIFFUSE>(group: KindHits)),
+        MIRROR => dispatch!(set, shade_kind::<_, MIRROR>(group: KindHits)),
+        GLASS => dispatch!(set, shade_kind::<_, GLASS>(group: KindHits)),
+        METAL => dispatch!(set, shade_kind::<_, METAL>(group: KindHits)),
+        PLASTIC => dispatch!(set, shade_kind::<_, PLASTIC>(group: KindHits)),
+        TRANSLUCENT => dispatch!(set, shade_kind::<_, TRANSLUCENT>(group: KindHits)),
+        COATED => dispatch!(set, shade_kind::<_, COATED>(group: KindHits)),
         // Both kinds of layers share one copy of a large function.
-        _ => dispatch!(set, shade_layered(group: KindHits)),
+        _ => dispatch!(set, shade_kind::<_, LAYERED>(group: KindHits)),
     }
-}
-
-#[inline(always)]
-fn shade_diffuse<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, DIFFUSE>(s, group);
-}
-
-#[inline(always)]
-fn shade_mirror<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, MIRROR>(s, group);
-}
-
-#[inline(always)]
-fn shade_glass<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, GLASS>(s, group);
-}
-
-#[inline(always)]
-fn shade_metal<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, METAL>(s, group);
-}
-
-#[inline(always)]
-fn shade_coated<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, COATED>(s, group);
-}
-
-#[inline(always)]
-fn shade_layered<S: Simd>(s: S, group: KindHits) {
-    shade_kind::<S, LAYERED>(s, group);
 }
 
 #[inline(always)]
@@ -160,14 +132,14 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
                 .add::<KIND>(s, sets, shadows);
             }
         }
-        let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension);
+        let bounce = sample::<S, KIND>(&surface, &place, mask, &hints, &sampler, dimension);
         let bounce = hints.follow::<S, KIND>(s, &surface, &place, &sampler, dimension, bounce);
         let beyond = bounce.wi.dot(place.geometric_normal).is_negative();
         let reached = bounce.wi.dot(place.reach_normal).is_positive();
         let mut go_on = mask & bounce.go_on;
         go_on &= (bounce.transmitted & beyond) | (!bounce.transmitted & reached);
         throughput = throughput.times(bounce.weight);
-        if let Some(glass) = &surface.glass
+        if let LobeLanes::Glass(glass) = &surface.lobe
             && KIND == GLASS
         {
             lanes_of(go_on & bounce.transmitted).for_each(|lane| media[lane] = glass.beyond[lane]);
@@ -195,7 +167,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
             continue;
         }
         let mut origin = place.leaving();
-        if KIND == GLASS {
+        if KIND == GLASS || KIND == TRANSLUCENT {
             origin = select_vector(bounce.transmitted, place.passing(), origin);
         }
         if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
@@ -207,7 +179,8 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
         if is_resampled(techniques, KIND) {
             pdf = pdf / CANDIDATES as f32;
         }
-        let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
+        let normal = place.lit_side::<KIND>().unwrap_or(Vector::all(pdf.all(0.0)));
+        let path = PathLanes { throughput, pdf, position: place.position, normal, sampler, slot };
         next.append(go_on, origin, bounce.wi, &path);
         if let Some(next_media) = &mut next.media {
             next_media.extend(lanes_of(go_on).map(|lane| media[lane]));

@@ -5,7 +5,7 @@ use crate::core::material::Material;
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::caustics_weight::etendue_gain;
 use crate::prepare::casters::NO_CASTER;
-use crate::prepare::material_table::COATED;
+use crate::prepare::material_table::{COATED, MORE_THAN_UV, TANGENTS};
 use crate::sampling::cosine_hemisphere_pdf;
 use crate::shading::interface::MediumId;
 use crate::shading::mis_state::MisState;
@@ -99,8 +99,10 @@ impl<S: Simd> BounceMisStates<'_, S> {
                 let i = at.indices[lane] as usize;
                 let wi = Vec3::new(wi[0][lane], wi[1][lane], wi[2][lane]);
                 let material = at.materials[i];
-                // Layers may need tangents and normals that are not mapped.
-                let vertex = if KIND > COATED { at.vertex(i) } else { vertices.vertex(lane) };
+                let flags = at.scene.tables.materials.flags[material as usize];
+                // Layers may need normals that are not mapped.
+                let needs_more = KIND > COATED || flags & (TANGENTS | MORE_THAN_UV) != 0;
+                let vertex = if needs_more { at.vertex(i) } else { vertices.vertex(lane) };
                 pdfs[lane] = match at.scene.shading.materials[material as usize] {
                     Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } => {
                         blend_at(at.scene, material, &vertex, None)

@@ -12,6 +12,7 @@ use glam::{Vec2, Vec3};
 impl LightTable {
     /// Like [`Self::sample`], for the lanes of `mask`; `None` if there are no lights.
     ///
+    /// - `normal`: of one side; light from both sides matters if there is none;
     /// - `u_select`: used only if [`Self::selects_apart`].
     #[inline(always)]
     pub(crate) fn sample_lanes<S: Simd>(
@@ -19,12 +20,12 @@ impl LightTable {
         textures: &[Texture],
         techniques: &Techniques,
         mask: Mask,
-        [position, normal]: [Vector<S>; 2],
+        (position, normal): (Vector<S>, Option<Vector<S>>),
         u_select: Float<S>,
         mut u: [Float<S>; 2],
     ) -> Option<LightLanes<S>> {
         let wide = self.lanes.as_ref()?;
-        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
+        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, (position, normal), u_select, &mut u[0]);
         let found = wide.points(techniques.solid_angle, id, mask, position, u);
         let mut sample = self.shining(wide, textures, id, mask, position, found);
         sample.pdf = sample.pdf * pmf;
@@ -161,7 +162,7 @@ impl LightTable {
         }
         let (mut own, mut sum) = (one.all(0.0), one.all(0.0));
         for (i, bounds) in (0..).zip(self.selection.bounds()) {
-            let estimate = bounds.estimate_lanes(position, normal);
+            let estimate = bounds.estimate_lanes(position, Some(normal));
             own = select(id.equals(i), estimate, own);
             sum += estimate;
         }
@@ -175,7 +176,7 @@ impl LightTable {
         wide: &LightArrays,
         techniques: &Techniques,
         mask: Mask,
-        [position, normal]: [Vector<S>; 2],
+        (position, normal): (Vector<S>, Option<Vector<S>>),
         u_select: Float<S>,
         u: &mut Float<S>,
     ) -> (Bits<S>, Float<S>, Mask) {

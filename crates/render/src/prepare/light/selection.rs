@@ -174,10 +174,10 @@ impl LightBounds {
 
     /// Like the scalar estimate, for sixteen points.
     #[inline(always)]
-    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Option<Vector<S>>) -> Float<S> {
         let offset = Vector::in_all(position.x, self.center) - position;
         let distance2 = offset.length_squared();
-        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), Some(normal))
+        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), normal)
     }
 
     /// Estimates the irradiance that the light can cause, never zero if it can cause any.

@@ -216,7 +216,7 @@ mod tests {
             let [nx, ny, nz] = [0, 1, 2].map(|axis| std::array::from_fn(|k| at(k).1[axis]));
             let position = Vector::from_arrays(s, &[px, py, pz]);
             let normal = Vector::from_arrays(s, &[nx, ny, nz]);
-            let (id, pmf, found) = wide.sample(Mask::MAX, position, normal, Float::load(s, &u));
+            let (id, pmf, found) = wide.sample(Mask::MAX, position, Some(normal), Float::load(s, &u));
             let again = wide.pmf(found, id, position, normal).to_array();
             let (ids, pmfs) = (id.to_array(), pmf.to_array());
             for (k, &(position, normal)) in chunk.iter().enumerate() {

@@ -66,7 +66,7 @@ impl LightTreeArrays {
         &self,
         mask: Mask,
         position: Vector<S>,
-        normal: Vector<S>,
+        normal: Option<Vector<S>>,
         mut u: Float<S>,
     ) -> (Bits<S>, Float<S>, Mask) {
         let s = u.s;
@@ -102,8 +102,8 @@ impl LightTreeArrays {
                 way = Bits::gather(&self.ways[1], id);
             }
             let rows = self.rows(open, node);
-            let first = rows.bounds(self.has_spots, node, position, normal);
-            let second = rows.bounds(self.has_spots, node + 1, position, normal);
+            let first = rows.bounds(self.has_spots, node, position, Some(normal));
+            let second = rows.bounds(self.has_spots, node + 1, position, Some(normal));
             let sum = first + second;
             let take = way.has(1);
             let none = open & sum.is_zero();
@@ -148,7 +148,13 @@ impl NodeRows {
 
     /// See [`NodeBound::irradiance`].
     #[inline(always)]
-    fn bounds<S: Simd>(&self, has_spots: bool, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+    fn bounds<S: Simd>(
+        &self,
+        has_spots: bool,
+        node: Bits<S>,
+        position: Vector<S>,
+        normal: Option<Vector<S>>,
+    ) -> Float<S> {
         let bound = NodeBound {
             offset: Vector::gather(&self.center, node) - position,
             radius: Float::gather(&self.radius, node),
@@ -157,7 +163,7 @@ impl NodeRows {
             power: Float::gather(&self.power, node),
             least_cos: has_spots.then(|| Float::gather(&self.least_cos, node)),
         };
-        bound.irradiance(Some(normal))
+        bound.irradiance(normal)
     }
 
     /// Returns the next nodes of open lanes.

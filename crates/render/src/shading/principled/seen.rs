@@ -5,11 +5,13 @@
 use crate::core::color::luminance_of;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::reflect;
-use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_anisotropic_normal};
+use crate::shading::ggx::{anisotropic_distribution, anisotropic_lambda, sample_visible_normal};
 use crate::shading::integral_table::GAUSS;
 use crate::shading::layer_albedo::{SchlickAlbedo, azimuths, bounded_sheen, sheen_albedo};
-use crate::shading::metal::{mean_of_schlick, with_further_bounces};
+use crate::shading::metal::{mean_of_schlick, mean_width, schlick, with_further_bounces};
+use crate::shading::microfacets::Reflection;
 use crate::shading::principled::layers::{COAT_FACING, Inside, Principled};
+use crate::shading::scatter::Sampled;
 use firstlight_simd::{Elementary, Real, Truth, Vector3, frame_around, select, select_vector};
 
 /// Lower limit of cosines with the normal.
@@ -66,39 +68,14 @@ pub(crate) struct Proposed<R: Real> {
     pub(super) rest: R,
 }
 
-/// A sampled direction of [`Proposed`].
-pub(crate) struct Reflected<R: Real> {
-    pub go_on: R::Mask,
-    /// f · cos / pdf.
-    pub weight: Vector3<R>,
-    /// Pdf per steradian; infinite if it is specular.
-    pub pdf: R,
-    /// Probability of having selected the specular layer, else 1.
-    pub probability: R,
-}
-
-/// Half vector, value and pdf of microfacets.
-pub(super) struct Facets<R> {
-    pub half: Vector3<R>,
-    pub value: R,
-    pub pdf: R,
-}
-
 /// Evaluates GGX microfacets for two directions above them, both in the frame.
 #[inline(always)]
-pub(super) fn facets<R: Real>(wo: Vector3<R>, wi: Vector3<R>, alpha: [R; 2]) -> Facets<R> {
+pub(super) fn facets<R: Real>(wo: Vector3<R>, wi: Vector3<R>, alpha: [R; 2]) -> Reflection<R> {
     let half = (wo + wi).normalize();
     let masking = anisotropic_lambda(wo, alpha) + 1.0;
     let both = masking + anisotropic_lambda(wi, alpha);
     let per_area = anisotropic_distribution(half, alpha) / (wo.z * 4.0);
-    Facets { half, value: per_area / both, pdf: per_area / masking }
-}
-
-#[inline(always)]
-pub(super) fn schlick<R: Real>(facing: Vector3<R>, grazing: R, cos: R) -> Vector3<R> {
-    let x = (-cos + 1.0).at_least(0.0).at_most(1.0);
-    let x2 = x * x;
-    facing + (Vector3::all(grazing) - facing) * (x2 * x2 * x)
+    Reflection { half, value: per_area / both, pdf: per_area / masking, weight: masking / both }
 }
 
 #[inline(always)]
@@ -311,7 +288,7 @@ impl<R: Elementary> Seen<R> {
         let up = Vector3 { x: zero, y: zero, z: one };
         if by_base.any() {
             let smooth = of.is_smooth();
-            let half = select_vector(smooth, up, sample_anisotropic_normal(self.wo, of.alpha, u));
+            let half = select_vector(smooth, up, sample_visible_normal(self.wo, of.alpha, u));
             let local = reflect(self.wo, half);
             wi = select_vector(by_base, local.to_world(&self.axes), wi);
             go_on |= by_base & (smooth | local.z.is_positive());
@@ -320,7 +297,7 @@ impl<R: Elementary> Seen<R> {
             && by_coat.any()
         {
             let smooth = of.is_coat_smooth();
-            let half = select_vector(smooth, up, sample_anisotropic_normal(coat.wo, [of.coat_alpha; 2], u));
+            let half = select_vector(smooth, up, sample_visible_normal(coat.wo, [of.coat_alpha; 2], u));
             let local = reflect(coat.wo, half);
             let world = local.to_world(&coat.axes);
             wi = select_vector(by_coat, world, wi);
@@ -342,7 +319,7 @@ impl<R: Elementary> Seen<R> {
     ///
     /// - `value`, `pdf`: of [`Self::eval`] in that direction.
     #[inline(always)]
-    pub fn weighted(&self, proposed: &Proposed<R>, value: Vector3<R>, mut pdf: R) -> Reflected<R> {
+    pub fn weighted(&self, proposed: &Proposed<R>, value: Vector3<R>, mut pdf: R) -> Sampled<R> {
         let of = &self.of;
         let by_base = proposed.by_base & of.is_smooth();
         let by_coat = proposed.by_coat & of.is_coat_smooth();
@@ -362,7 +339,7 @@ impl<R: Elementary> Seen<R> {
             }
             pdf = select(specular, pdf.all(f32::INFINITY), pdf);
         }
-        Reflected { go_on, weight, pdf, probability }
+        Sampled { go_on, wi: proposed.wi, weight, pdf, probability }
     }
 }
 
@@ -389,12 +366,10 @@ pub(super) fn past_sheen<R: Real>(of: &Principled<R>, cos: R) -> R {
 /// - `base`: albedo of the microfacets in the direction of the viewer.
 #[inline(always)]
 fn gain_of_metal<R: Real>(of: &Principled<R>, base: SchlickAlbedo<R>) -> Vector3<R> {
-    let [x, y] = of.alpha;
-    let alpha = select(x.equals(y), x, ((x * x + y * y) * 0.5).sqrt());
     let returned = base.whole();
     let Vector3 { x, y, z } = of.metal;
     let mean = Vector3 { x: mean_of_schlick(x), y: mean_of_schlick(y), z: mean_of_schlick(z) };
-    with_further_bounces(mean, (returned.all(1.0) - returned) / returned, alpha)
+    with_further_bounces(mean, (returned.all(1.0) - returned) / returned, mean_width(of.alpha))
 }
 
 /// Mean transmittance of all layers over all directions; not 0.

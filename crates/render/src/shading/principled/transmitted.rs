@@ -1,11 +1,12 @@
 //! What a layered surface transmits, at one point.
 
 use crate::shading::dielectric::{fresnel, reflect, refract};
-use crate::shading::ggx::sample_anisotropic_normal;
+use crate::shading::ggx::sample_visible_normal;
 use crate::shading::interface::Interface;
-use crate::shading::microfacets::Microfacets;
+use crate::shading::metal::schlick;
+use crate::shading::microfacets::{Microfacets, Reflection};
 use crate::shading::principled::layers::{Inside, Transmission};
-use crate::shading::principled::seen::{Facets, Seen, facets, past_sheen, rest_of, schlick};
+use crate::shading::principled::seen::{Seen, facets, past_sheen, rest_of};
 use crate::shading::rough_glass::RoughGlass;
 use crate::shading::scatter::BsdfSample;
 use firstlight_simd::Vector3;
@@ -65,7 +66,7 @@ impl Seen {
             }
             // The reflected lobe on the far side.
             Inside::Thin(_) => {
-                let Facets { half, value, pdf } = facets(self.wo, above, self.of.alpha);
+                let Reflection { half, value, pdf, .. } = facets(self.wo, above, self.of.alpha);
                 (value * self.passed(self.wo.dot(half)) * self.passed_again(), pdf)
             }
         };
@@ -96,16 +97,8 @@ impl Seen {
         if !proposed.go_on {
             return None;
         }
-        let wi = proposed.wi.into();
-        let (value, pdf) = self.eval_all(wi);
-        let found = self.weighted(&proposed, value.into(), pdf);
-        found.go_on.then(|| BsdfSample {
-            wi,
-            weight: found.weight.into(),
-            pdf: found.pdf,
-            probability: found.probability,
-            through: None,
-        })
+        let (value, pdf) = self.eval_all(proposed.wi.into());
+        self.weighted(&proposed, value.into(), pdf).reflected()
     }
 
     fn sample_transmission(&self, u_choice: f32, u: Vec2) -> Option<BsdfSample> {
@@ -158,7 +151,7 @@ impl Seen {
                 specular(1.0, -wo, transmission.tint * self.passed(self.wo.z), true)
             }
             Inside::Thin(_) => {
-                let above = reflect(self.wo, sample_anisotropic_normal(self.wo, self.of.alpha, u.to_array()));
+                let above = reflect(self.wo, sample_visible_normal(self.wo, self.of.alpha, u.to_array()));
                 if above.z <= 0.0 {
                     return None;
                 }

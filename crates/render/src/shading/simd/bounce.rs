@@ -1,6 +1,7 @@
 //! Sampled continuations of sixteen paths.
 
 use crate::prepare::material_table::TEXTURED;
+use crate::shading::scatter::Sampled;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_simd::{Bits, Float, Mask, Simd, Vector};
@@ -12,6 +13,13 @@ pub(crate) struct Bounce<S: Simd> {
     pub weight: Vector<S>,
     pub pdf: Float<S>,
     pub transmitted: Mask,
+}
+
+impl<S: Simd> From<Sampled<Float<S>>> for Bounce<S> {
+    #[inline(always)]
+    fn from(Sampled { go_on, wi, weight, pdf, .. }: Sampled<Float<S>>) -> Self {
+        Self { go_on, wi, weight, pdf, transmitted: 0 }
+    }
 }
 
 /// Returns albedo or reflectance by rows of the material table, with textures.

@@ -5,13 +5,14 @@
 //! selects one and weights over both.
 
 use crate::core::color::luminance_of;
+use crate::prepare::material_table::{COMPENSATE, SCHLICK};
 use crate::sampling::cosine_hemisphere_pdf;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::shading::dielectric::reflect;
-use crate::shading::metal::Metal;
+use crate::shading::metal::{Metal, SeenMetal, Tint};
+use crate::shading::microfacets::Microfacets;
 use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
-use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, Mask, Real, Simd, Vector, frame_around, select, select_vector, two};
 
@@ -21,7 +22,7 @@ pub(crate) struct Coat<S: Simd> {
     rough: CoatPart<S>,
     mirror: CoatPart<S>,
     /// The rough parts; `None` if no lane has one.
-    metal: Option<Metal<Float<S>>>,
+    metal: Option<SeenMetal<Float<S>>>,
     /// Kinds in the order of selection.
     kinds: [Bits<S>; 2],
     pmfs: [Float<S>; 2],
@@ -59,7 +60,10 @@ impl<S: Simd> Coat<S> {
             let row = Bits { s, v: s.select_u(first, rows[0].v, rows[1].v) };
             let alpha = select(rough.here, Float::gather(&table.alpha, row), Float::splat(s, 1.0));
             let flags = Bits::gather(&table.flags, row);
-            metal = Some(metals(s, rough.here, place.normal, place.wo, alpha, rough.color, flags));
+            let tint = Tint { color: rough.color, schlick: flags.has(SCHLICK), index: None };
+            let compensate = rough.here & flags.has(COMPENSATE);
+            let facets = Microfacets::isotropic(alpha, 0);
+            metal = Some(Metal { facets, tangent: None, tint, compensate }.seen(place.wo, place.normal));
         }
         Self { matte, rough, mirror, metal, kinds, pmfs }
     }
@@ -74,16 +78,13 @@ impl<S: Simd> Coat<S> {
     #[inline(always)]
     pub fn eval(&self, normal: Vector<S>, wi: Vector<S>) -> (Vector<S>, Float<S>) {
         let cos = normal.dot(wi);
-        let above = cos.is_positive();
         let of_matte = select(self.matte.here, cosine_hemisphere_pdf(cos), cos.all(0.0));
         let mut value = self.matte.color * of_matte * self.matte.weight;
         let mut pdf = of_matte * self.matte.pmf;
         if let Some(metal) = &self.metal {
-            let found = metal.eval(metal.local(wi));
-            let valid = above & metal.facing() & self.rough.here;
-            let of_rough = found.tint * found.value * self.rough.weight;
-            value = select_vector(valid, value + of_rough, value);
-            pdf = select(valid, pdf + found.pdf * self.rough.pmf, pdf);
+            let (of_rough, density) = metal.eval(wi);
+            value = select_vector(self.rough.here, value + of_rough * self.rough.weight, value);
+            pdf = select(self.rough.here, pdf + density * self.rough.pmf, pdf);
         }
         (value, pdf)
     }
@@ -105,9 +106,9 @@ impl<S: Simd> Coat<S> {
         if let Some(metal) = &self.metal
             && rough != 0
         {
-            let [direction, local] = metal.sample(u);
-            wi = select_vector(rough, direction, wi);
-            go_on |= rough & metal.facing() & local.z.is_positive();
+            let sampled = metal.sample(u);
+            wi = select_vector(rough, sampled.wi, wi);
+            go_on |= rough & sampled.go_on;
         }
         let (value, mut pdf) = self.eval(place.normal, wi);
         go_on &= pdf.is_positive();

@@ -5,7 +5,7 @@ use crate::sampling::SamplerLanes;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::simd::bounce::Bounce;
 use crate::shading::simd::hints::HintLanes;
-use crate::shading::simd::lanes::lanes_of;
+use crate::shading::simd::lanes::{TRANSLUCENT, lanes_of};
 use crate::shading::simd::scatter::{SurfaceScatter, eval};
 use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Real, Simd, Vector, select, select_vector};
@@ -55,7 +55,11 @@ impl HintLanes<'_> {
             wi: select_vector(mixed, wi, bounce.wi),
             weight: alone,
             pdf: select(mixed, pdf, bounce.pdf),
-            transmitted: bounce.transmitted,
+            transmitted: if KIND == TRANSLUCENT {
+                (mixed & wi.dot(place.normal).is_negative()) | (!mixed & bounce.transmitted)
+            } else {
+                bounce.transmitted
+            },
         }
     }
 }

@@ -9,6 +9,8 @@ pub(crate) const DIFFUSE: usize = MaterialKind::Diffuse as usize;
 pub(crate) const MIRROR: usize = MaterialKind::Mirror as usize;
 pub(crate) const GLASS: usize = MaterialKind::Glass as usize;
 pub(crate) const METAL: usize = MaterialKind::Metal as usize;
+pub(crate) const PLASTIC: usize = MaterialKind::Plastic as usize;
+pub(crate) const TRANSLUCENT: usize = MaterialKind::Translucent as usize;
 
 #[inline(always)]
 pub(crate) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {

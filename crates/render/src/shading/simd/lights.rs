@@ -8,7 +8,7 @@ use crate::prepare::prepared::Prepared;
 use crate::sampling::warp::{shifted, shifted_single};
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
-use crate::shading::lights::{LightPoint, choose_light_point, environment_share};
+use crate::shading::lights::{LightPoint, environment_share};
 use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{
     Bits, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector,
@@ -32,8 +32,8 @@ pub(crate) struct LightPoints<'a, S: Simd> {
     pub techniques: &'a Techniques,
     pub mask: Mask,
     pub position: Vector<S>,
-    /// Not zero.
-    pub normal: Vector<S>,
+    /// The side that is lit; both are if there is none.
+    pub normal: Option<Vector<S>>,
     pub sampler: &'a SamplerLanes<S>,
     pub dimension: u32,
     /// Number of the sample, if several are taken.
@@ -70,7 +70,7 @@ fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
     let inside = mask & !outside;
     let textures = &scene.shading.textures;
     if inside != 0
-        && let Some(lights) = tables.lights.sample_lanes(textures, techniques, inside, [position, normal], u_select, u)
+        && let Some(lights) = tables.lights.sample_lanes(textures, techniques, inside, (position, normal), u_select, u)
     {
         let LightLanes { found, target, wi, pdf, radiance, is_far, .. } = lights;
         points = FoundLights { found, infinite: is_far, target, wi, pdf: pdf * (1.0 - share), radiance };
@@ -96,7 +96,7 @@ fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
 /// sides, and the sampler of its path.
 pub(crate) type LitPlace = (Vec3, Vec3, Sampler);
 
-/// As [`choose_light_point`] for each place, with the same result.
+/// As [`crate::shading::lights::choose_light_point`] for each place, with the same result.
 pub(crate) fn choose_light_points(
     set: InstructionSet,
     scene: &Prepared,
@@ -106,18 +106,15 @@ pub(crate) fn choose_light_points(
     places: &[Option<LitPlace>; LANES],
 ) -> [Option<LightPoint>; LANES] {
     let mut points = [None; LANES];
-    let mut lanes = LitLanes::default();
+    // Those that are lit from one side, and from both.
+    let mut groups = [false, true].map(|both_sides| LitLanes { both_sides, ..LitLanes::default() });
     for (lane, place) in places.iter().enumerate() {
-        let Some((position, normal, sampler)) = place else { continue };
-        if *normal == Vec3::ZERO {
-            let place = [*position, *normal];
-            points[lane] = choose_light_point(scene, techniques, place, sampler, dimension, candidate);
-        } else {
-            lanes.push(lane, *position, *normal, sampler);
+        if let Some((position, normal, sampler)) = place {
+            groups[usize::from(*normal == Vec3::ZERO)].push(lane, *position, *normal, sampler);
         }
     }
-    if lanes.mask != 0 {
-        let (lanes, points) = (&lanes, &mut points);
+    for lanes in groups.iter().filter(|lanes| lanes.mask != 0) {
+        let points = &mut points;
         dispatch!(
             set,
             choose(
@@ -137,6 +134,7 @@ pub(crate) fn choose_light_points(
 #[derive(Default)]
 struct LitLanes {
     mask: Mask,
+    both_sides: bool,
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
     samplers: [[u32; LANES]; 3],
@@ -166,7 +164,7 @@ fn choose<S: Simd>(
     let [stream, reversed_index, screen] = lanes.samplers.each_ref().map(|part| Bits::load(s, part));
     let sampler = &SamplerLanes { stream, reversed_index, screen };
     let [position, normal] = [&lanes.positions, &lanes.normals].map(|values| Vector::from_arrays(s, values));
-    let mask = lanes.mask;
+    let (mask, normal) = (lanes.mask, if lanes.both_sides { None } else { Some(normal) });
     let found = s.call(LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate });
     let [target, wi, radiance] = [found.target, found.wi, found.radiance].map(|values| values.to_arrays());
     let pdf = found.pdf.to_array();
@@ -184,6 +182,7 @@ mod tests {
     use crate::core::environment::Environment;
     use crate::core::material::{ColorInput, Material};
     use crate::core::snapshot::Object;
+    use crate::shading::lights::choose_light_point;
     use crate::test_scene::prepared;
     use firstlight_kdtree::Shape;
 

@@ -5,6 +5,7 @@ use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
+use crate::shading::simd::lanes::TRANSLUCENT;
 use crate::shading::simd::tangents::TangentLanes;
 use crate::shading::tangent::Tangent;
 use crate::shading::vertex::{Vertex, mesh_texture_point};
@@ -307,6 +308,12 @@ impl<S: Simd> SurfaceLanes<S> {
             uv: [self.uv[0].to_array(), self.uv[1].to_array()],
             front: self.front,
         }
+    }
+
+    /// The side for light sampling; none for both.
+    #[inline(always)]
+    pub fn lit_side<const KIND: usize>(&self) -> Option<Vector<S>> {
+        if KIND == TRANSLUCENT { None } else { Some(self.normal) }
     }
 
     /// Origin of a ray that stays on the side of `wo`.

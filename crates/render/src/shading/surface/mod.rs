@@ -3,11 +3,12 @@
 pub(crate) mod albedo;
 pub(crate) mod blend;
 
-use crate::core::material::{MAX_LOBES, Material, MaterialId};
+use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::coat::Coat;
 use crate::shading::interface::MediumId;
+use crate::shading::metal::{Metal, Tint};
 use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::Plastic;
 use crate::shading::principled::at::principled_at;
@@ -16,6 +17,7 @@ use crate::shading::rough_glass;
 use crate::shading::sides::Sides;
 use crate::shading::surface::blend::{Blend, Part};
 use crate::shading::tangent::NormalShadowing;
+use crate::shading::translucent::Translucent;
 use crate::shading::vertex::Vertex;
 use glam::{Vec2, Vec3};
 
@@ -132,14 +134,6 @@ fn rough_lobe(smooth: Lobe<'static>, alpha: f32, beckmann: bool, compensate: boo
     }
 }
 
-/// Returns the alpha of a metal, otherwise 0.
-pub(crate) fn scalar_at(scene: &Prepared, id: MaterialId, uv: Vec2) -> f32 {
-    match &scene.shading.materials[id as usize] {
-        Material::Metal { alpha, .. } => alpha.eval(scene, uv).clamp(0.0, 1.0),
-        _ => 0.0,
-    }
-}
-
 /// Returns the lobe of a plain material; `None` if the surface is black. `sides` as in [`blend_at`].
 #[inline]
 pub(crate) fn lobe_at<'a>(
@@ -153,38 +147,38 @@ pub(crate) fn lobe_at<'a>(
     match &scene.shading.materials[id as usize] {
         Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),
         Material::Mirror { reflectance } => Some(Lobe::Mirror { reflectance: reflectance.eval(scene, uv) }),
-        Material::Metal { alpha, reflectance, fresnel, compensate } => Some(Lobe::Metal {
-            alpha: alpha.eval(scene, uv).clamp(0.0, 1.0),
-            reflectance: reflectance.eval(scene, uv),
-            fresnel: *fresnel,
-            compensate: *compensate,
-        }),
+        Material::Metal { alpha, reflectance, fresnel, compensate } => {
+            let color = reflectance.eval(scene, uv).into();
+            Some(Lobe::Metal(Metal {
+                facets: Microfacets::isotropic(alpha.eval(scene, uv).clamp(0.0, 1.0), false),
+                tangent: None,
+                tint: Tint { color, schlick: *fresnel == Fresnel::Schlick, index: None },
+                compensate: *compensate,
+            }))
+        }
         Material::Conductor { alpha, alpha_v, beckmann, eta, k, reflectance, compensate } => {
             let along = alpha.eval(scene, uv).clamp(0.0, 1.0);
             let across = alpha_v.eval(scene, uv).clamp(0.0, 1.0);
-            let facets = Microfacets { alpha: [along, if across > 0.0 { across } else { along }], beckmann: *beckmann };
-            let is_isotropic = facets.is_isotropic();
-            let tangent = if is_isotropic { Vec3::ZERO } else { vertex.tangent.along(Vec2::X, vertex.normal) };
-            Some(Lobe::Conductor {
-                facets: if is_isotropic { facets } else { facets.at_least_rough() },
-                tangent,
-                eta: *eta,
-                k: *k,
-                reflectance: reflectance.eval(scene, uv),
+            let alpha = [along, if across > 0.0 { across } else { along }];
+            let facets = Microfacets { alpha, beckmann: *beckmann }.at_least_rough();
+            let color = reflectance.eval(scene, uv).into();
+            Some(Lobe::Metal(Metal {
+                facets,
+                tangent: (!facets.is_isotropic()).then(|| vertex.tangent.along(Vec2::X, vertex.normal).into()),
+                tint: Tint { color, schlick: false, index: Some([(*eta).into(), (*k).into()]) },
                 compensate: *compensate,
-            })
+            }))
         }
         Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann } => {
             let facets = Microfacets::isotropic(alpha.eval(scene, uv).clamp(0.0, 1.0), *beckmann);
-            let coat = Coat::at(scene, id, *ior, facets);
+            let coat = Coat::at(&scene.tables.coats, id, *ior, facets);
             let albedo = diffuse.eval(scene, uv).clamp(Vec3::ZERO, Vec3::ONE);
             let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
-            Some(Lobe::Plastic(Plastic::new(albedo, *nonlinear, specular, coat)))
+            Some(Lobe::Plastic(Plastic::new(albedo.into(), *nonlinear, specular, coat)))
         }
         Material::Translucent { reflectance, transmittance } => {
-            let [reflectance, transmittance] = [reflectance, transmittance].map(|color| color.eval(scene, uv));
-            let scale = (reflectance + transmittance).max(Vec3::ONE);
-            Some(Lobe::Translucent { reflectance: reflectance / scale, transmittance: transmittance / scale, here })
+            let [reflectance, transmittance] = [reflectance, transmittance].map(|color| color.eval(scene, uv).into());
+            Some(Lobe::Translucent(Translucent::new(reflectance, transmittance), here))
         }
         Material::ThinGlass { ior, reflectance, transmittance } => Some(Lobe::ThinGlass {
             ior: *ior,

@@ -1,0 +1,53 @@
+//! Metals and plastics at sixteen points; see [`crate::shading::metal`] and [`crate::shading::plastic`].
+
+use crate::prepare::layer_table::input;
+use crate::prepare::material_table::{BECKMANN, COMPENSATE, NONLINEAR, SCHLICK};
+use crate::shading::coat::{Coat, entries};
+use crate::shading::metal::{Metal, SeenMetal, Tint};
+use crate::shading::microfacets::Microfacets;
+use crate::shading::plastic::{Plastic, SeenPlastic};
+use crate::shading::simd::inputs::InputLanes;
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
+use crate::shading::simd::tangents::TangentLanes;
+use crate::shading::tangent::tangent_axes;
+use firstlight_simd::{Bits, Float, Real, Simd, select};
+
+#[inline(always)]
+pub(crate) fn metals_of<S: Simd>(at: &HitGroup<S>, place: &SurfaceLanes<S>) -> SeenMetal<Float<S>> {
+    let inputs = InputLanes::of(at, place);
+    let flags = Bits::gather(&at.scene.tables.materials.flags, Bits::gather(at.materials, at.index));
+    let along = inputs.share(input::ALPHA);
+    let mut alpha = [along; 2];
+    let mut index = None;
+    if at.scene.tables.materials.layers.has_conductors {
+        let across = inputs.share(input::ALPHA_V);
+        alpha[1] = select(across.is_positive(), across, along);
+        index = Some([inputs.color(input::ETA), inputs.color(input::K)]);
+    }
+    let facets = Microfacets { alpha, beckmann: at.mask & flags.has(BECKMANN) }.at_least_rough();
+    let mut tangent = None;
+    if let Some(TangentLanes { along_u, handedness, .. }) = place.tangent {
+        tangent = Some(tangent_axes(along_u, handedness, place.normal)[0]);
+    }
+    let metal = Metal {
+        facets,
+        tangent,
+        tint: Tint { color: inputs.color(input::COLOR), schlick: at.mask & flags.has(SCHLICK), index },
+        compensate: at.mask & flags.has(COMPENSATE),
+    };
+    metal.seen(place.wo, place.normal)
+}
+
+#[inline(always)]
+pub(crate) fn plastics_of<'a, S: Simd>(at: &HitGroup<'a, S>, place: &SurfaceLanes<S>) -> SeenPlastic<'a, Float<S>> {
+    let inputs = InputLanes::of(at, place);
+    let material = Bits::gather(at.materials, at.index);
+    let flags = Bits::gather(&at.scene.tables.materials.flags, material);
+    let table = &at.scene.tables.coats;
+    let facets = Microfacets::isotropic(inputs.share(input::ALPHA), at.mask & flags.has(BECKMANN));
+    let rows = [Float::gather(&table.first, material), Float::gather(&table.n_more, material)];
+    let coat = Coat::new(inputs.scalar(input::IOR), facets, entries(table), rows);
+    let nonlinear = flags.has(NONLINEAR);
+    Plastic::new(inputs.shares(input::COLOR), nonlinear, inputs.share(input::SPECULAR), coat)
+        .seen(place.wo, place.normal)
+}
