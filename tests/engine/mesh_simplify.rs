@@ -4,7 +4,7 @@ use crate::random::Random;
 use firstlight::mesh::procedural::{
     DisplacedSphere, Terrain, bored_block, cuboid, displaced_sphere, icosphere, slivers, terrain, torus,
 };
-use firstlight::mesh::simplify::{CollapseOrder, Method, SimplifyError, Target, collapse_order, simplify};
+use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Mesh, NormalWeight, Topology, Welding};
 use firstlight::scene::obj::{ObjExtras, load_obj, save_obj};
 use glam::{DVec3, Vec2, Vec3};
@@ -231,9 +231,6 @@ fn damaged_meshes_of_any_kind_are_simplified() {
             assert!(after.triangles <= before.triangles && after.triangles > 0, "{name}: {after:?}");
             assert!(after.non_manifold_edges <= before.non_manifold_edges, "{name}: {before:?} {after:?}");
             assert!(result.triangles.iter().all(|[a, b, c]| a != b && b != c && c != a), "{name}");
-            let order = collapse_order(&mesh, method, 1).unwrap();
-            let halfway = order.mesh_with(mesh.triangles.len() / 2);
-            halfway.validate().unwrap_or_else(|error| panic!("{name}, halfway: {error}"));
         }
     }
     assert!(seams > 50 && isolated > 50, "the meshes have what is tested: {seams} {isolated}");
@@ -328,26 +325,6 @@ fn scaling_by_a_power_of_two_changes_nothing_else() {
         let mut result = simplify(&scaled, Method::Quadric, Target::Ratio(0.3)).unwrap();
         result.positions.iter_mut().for_each(|p| *p /= scale);
         assert!(result == plain, "scale {scale}");
-    }
-}
-
-#[test]
-fn a_slider_over_the_order_gives_sound_meshes_of_every_size() {
-    let mesh = torus(1.0, 0.3, 80, 30).with_smooth_normals(NormalWeight::Angle, None);
-    for method in METHODS {
-        let order: CollapseOrder = collapse_order(&mesh, method, 100).unwrap();
-        let (most, fewest) = order.face_range();
-        assert_eq!(most, mesh.triangles.len());
-        assert!(fewest <= 100);
-        let before = Topology::of(&mesh);
-        for faces in [most, most / 2, most / 10, fewest] {
-            let result = order.mesh_with(faces);
-            assert!(result.triangles.len() <= faces && result.triangles.len() + 2 > faces, "{method:?}, {faces}");
-            assert_sound(&format!("{method:?}, {faces}"), &before, &result);
-        }
-        let direct = simplify(&mesh, method, Target::Faces(100)).unwrap();
-        let slid = order.mesh_with(100);
-        assert!(direct == slid, "{method:?}: the end of the slider is the simplified mesh");
     }
 }
 

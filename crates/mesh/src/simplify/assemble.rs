@@ -1,30 +1,13 @@
 //! Assembly of a mesh from the triangles that remain after simplification.
 
+use super::prepare::PreparedMesh;
 use super::surface::Wedge;
 use crate::Mesh;
-use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
-/// Remaining triangles: vertices, the index of each in the original mesh, and wedges if there are any.
-#[derive(Debug, Default)]
-pub(super) struct Remaining {
-    pub triangles: Vec<[u32; 3]>,
-    pub sources: Vec<u32>,
-    pub corner_wedges: Vec<u32>,
-}
-
-/// Properties of the original mesh that the result needs.
-#[derive(Debug)]
-pub(super) struct Original<'a> {
-    pub scale: f32,
-    pub center: DVec3,
-    pub slots: &'a [u16],
-    pub has_normals: bool,
-    pub has_uvs: bool,
-}
-
-/// Assembles a mesh with triangles in their original order and vertices in order of use.
-pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedge], original: &Original) -> Mesh {
+/// Assembles a mesh with the remaining triangles in their original order and vertices in order of use.
+pub(super) fn assemble(remaining: &PreparedMesh, original: &Mesh) -> Mesh {
+    let (positions, wedges) = (&remaining.positions, &remaining.wedges);
     // Each source occurs at most once, so a table over all of them sorts the triangles.
     let sources = remaining.sources.iter().max().map_or(0, |&last| last as usize + 1);
     let mut place_of = vec![Numbers::NONE; sources];
@@ -33,7 +16,7 @@ pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedg
     let mut mesh = Mesh { center: original.center, ..Mesh::default() };
     mesh.triangles.reserve(remaining.triangles.len());
     mesh.positions.reserve(remaining.triangles.len() / 2);
-    let unscale = original.scale.recip();
+    let unscale = remaining.scale.recip();
     let mut numbers = Numbers::new(positions.len(), wedges.len());
     for (source, t) in order {
         let t = t as usize;
@@ -46,10 +29,10 @@ pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedg
             if *corner == next {
                 mesh.positions.push(positions[place as usize] * unscale);
                 if let Some((_, wedge)) = wedge {
-                    if original.has_normals {
+                    if !original.normals.is_empty() {
                         mesh.normals.push(wedge.normal);
                     }
-                    if original.has_uvs {
+                    if !original.uvs.is_empty() {
                         mesh.uvs.push(wedge.uv);
                     }
                 }

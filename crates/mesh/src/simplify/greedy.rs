@@ -7,35 +7,8 @@
 
 use super::quadric::Quadric;
 use super::queue::LevelQueue;
-use super::surface::{Kind, NONE, Surface, WedgeJoin};
+use super::surface::{Kind, NONE, Surface};
 use glam::Vec3;
-
-/// One step: vertex `from` is merged into `to`, which moves to `position`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Collapse {
-    pub cost: f32,
-    pub from: u32,
-    pub to: u32,
-    pub position: Vec3,
-    /// Number of triangles removed.
-    pub died: u32,
-    /// Number of the log's wedge joins that belong to this step.
-    pub joins: u32,
-}
-
-/// All steps, in order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Log {
-    pub collapses: Vec<Collapse>,
-    pub joins: Vec<WedgeJoin>,
-}
-
-impl Log {
-    pub fn append(&mut self, later: Self) {
-        self.collapses.extend(later.collapses);
-        self.joins.extend(later.joins);
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 struct Edge {
@@ -67,7 +40,6 @@ pub(super) struct Greedy {
     last_key: f32,
     /// The edge that was last pushed back, by a hash of its ends: see [`Self::is_twin`].
     seen: Vec<u32>,
-    pub log: Log,
 }
 
 /// Conditions for stopping.
@@ -96,7 +68,6 @@ impl Greedy {
             seen: vec![NONE; edges.len().next_power_of_two()],
             edges,
             last_key: 0.0,
-            log: Log::default(),
         };
         for e in 0..greedy.edges.len() {
             let (_, _, _, cost) = greedy.plan(greedy.edges[e].ends);
@@ -141,7 +112,7 @@ impl Greedy {
                 sum.mean_at(position.as_dvec3()) <= limits.mean_square
             };
             if near_enough && self.surface.may_collapse(from, to, position) {
-                self.collapse(from, to, position, key);
+                self.collapse(from, to, position);
             } else {
                 self.sleep(e, ends);
             }
@@ -193,21 +164,18 @@ impl Greedy {
         (from, to, position, sum.at(position.as_dvec3()) as f32)
     }
 
-    fn collapse(&mut self, from: u32, to: u32, position: Vec3, cost: f32) {
+    fn collapse(&mut self, from: u32, to: u32, position: Vec3) {
         let start = self.surface.positions[from as usize];
         let along = self.surface.positions[to as usize] - start;
         let length2 = along.length_squared();
         let t = if length2 > 0.0 { ((position - start).dot(along) / length2).clamp(0.0, 1.0) } else { 1.0 };
-        let joins_before = self.log.joins.len();
-        let died = self.surface.collapse(from, to, position, t, &mut self.log.joins);
+        self.surface.collapse(from, to, position, t);
         let gone = self.quadrics[from as usize];
         self.quadrics[to as usize] += gone;
         self.merged_into[from as usize] = to;
         // Both old versions are included, so that no sum of two versions can repeat.
         self.versions[to as usize] =
             self.versions[to as usize].wrapping_add(self.versions[from as usize]).wrapping_add(1);
-        let joins = (self.log.joins.len() - joins_before) as u32;
-        self.log.collapses.push(Collapse { cost, from, to, position, died: died as u32, joins });
         self.wake(from);
         self.wake(to);
     }

@@ -4,16 +4,14 @@
 //! queue is exact, costs are updated wherever they can have changed, lines bend too, and the checks of [`Surface`]
 //! apply.
 
-use super::greedy::{Collapse, Log};
 use super::heap::IndexedHeap;
 use super::prepare::PreparedMesh;
 use super::surface::{Kind, Surface};
 use glam::DVec3;
 
 /// Simplifies in place until `faces` are left or no collapse is allowed; vertices keep their indices and positions.
-pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32) -> Log {
+pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32) {
     let mut melax = Melax::new(prepared);
-    let mut log = Log::default();
     while melax.surface.face_count > faces {
         let Some((cost, from)) = melax.heap.peek() else { break };
         if cost > max_cost {
@@ -21,7 +19,7 @@ pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32)
         }
         match melax.allowed_target(from) {
             // The cheaper neighbour is not allowed: the next one may cost more than other vertices do.
-            Some((to, true_cost)) if true_cost <= cost => melax.collapse(from, to, cost, &mut log),
+            Some((to, true_cost)) if true_cost <= cost => melax.collapse(from, to),
             Some((_, true_cost)) => melax.heap.set(from, true_cost),
             None => melax.heap.remove(from),
         }
@@ -34,7 +32,6 @@ pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32)
     drop(live);
     (prepared.triangles, prepared.sources, prepared.corner_wedges) = (triangles, sources, corner_wedges);
     prepared.wedges = surface.wedges;
-    log
 }
 
 struct Melax {
@@ -124,12 +121,9 @@ impl Melax {
         found
     }
 
-    fn collapse(&mut self, from: u32, to: u32, cost: f32, log: &mut Log) {
-        let joins_before = log.joins.len();
+    fn collapse(&mut self, from: u32, to: u32) {
         let position = self.surface.positions[to as usize];
-        let died = self.surface.collapse(from, to, position, 1.0, &mut log.joins) as u32;
-        let joins = (log.joins.len() - joins_before) as u32;
-        log.collapses.push(Collapse { cost, from, to, position, died, joins });
+        self.surface.collapse(from, to, position, 1.0);
         self.heap.remove(from);
         // The triangles that have changed are those around `to`: the bend at their vertices changes.
         let mut changed = vec![to];

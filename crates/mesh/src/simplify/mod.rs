@@ -11,7 +11,7 @@
 //! | `greedy`, `queue`, `quadric` | the quadric method on one thread |
 //! | `parts` | the quadric method on all threads |
 //! | `melax`, `heap` | Melax's method |
-//! | `order`, `assemble` | meshes from the recorded steps |
+//! | `assemble` | the mesh of what remains |
 //!
 //! Start reading at [`simplify`].
 
@@ -19,18 +19,15 @@ mod assemble;
 mod greedy;
 mod heap;
 mod melax;
-mod order;
 mod parts;
 mod prepare;
 mod quadric;
 mod queue;
 mod surface;
 
-pub use order::CollapseOrder;
-
 use super::{Deviation, Mesh};
-use assemble::{Original, Remaining, assemble};
-use greedy::{CollapseLimits, Log};
+use assemble::assemble;
+use greedy::CollapseLimits;
 use prepare::PreparedMesh;
 
 /// The cost of an edge.
@@ -90,8 +87,8 @@ pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, Sim
         Target::Error(error) => return within_error(mesh, method, error),
     };
     let mut prepared = prepare(mesh, method)?;
-    run(&mut prepared, method, faces, f64::INFINITY, false);
-    Ok(finish(mesh, prepared))
+    run(&mut prepared, method, faces, f64::INFINITY);
+    Ok(assemble(&prepared, mesh))
 }
 
 /// Checks that the target is in range, independent of a mesh.
@@ -107,17 +104,6 @@ pub fn check_target(target: Target) -> Result<(), SimplifyError> {
     }
 }
 
-/// Records all collapses down to as few triangles as `faces`, for a slider: see [`CollapseOrder::mesh_with`].
-///
-/// # Errors
-/// If no triangle has three different corners.
-pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<CollapseOrder, SimplifyError> {
-    let start = prepare(mesh, method)?;
-    let mut work = start.clone();
-    let log = run(&mut work, method, faces, f64::INFINITY, true);
-    Ok(CollapseOrder::new(mesh, start, log))
-}
-
 fn prepare(mesh: &Mesh, method: Method) -> Result<PreparedMesh, SimplifyError> {
     let prepared = PreparedMesh::of(mesh, method == Method::Quadric);
     if prepared.triangles.is_empty() { Err(SimplifyError::Degenerate) } else { Ok(prepared) }
@@ -127,28 +113,14 @@ fn prepare(mesh: &Mesh, method: Method) -> Result<PreparedMesh, SimplifyError> {
 ///
 /// - `error`: metres; it limits an estimate, which is the root of an edge's mean squared distance (quadric) or its cost
 ///   (Melax).
-fn run(prepared: &mut PreparedMesh, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
+fn run(prepared: &mut PreparedMesh, method: Method, faces: usize, error: f64) {
     let error = error * f64::from(prepared.scale);
     match method {
-        Method::Quadric => parts::simplify(
-            prepared,
-            CollapseLimits { faces, cost: f32::INFINITY, mean_square: error * error },
-            keep_log,
-        ),
+        Method::Quadric => {
+            parts::simplify(prepared, CollapseLimits { faces, cost: f32::INFINITY, mean_square: error * error });
+        }
         Method::Melax => melax::simplify(prepared, faces, error as f32),
     }
-}
-
-fn finish(mesh: &Mesh, prepared: PreparedMesh) -> Mesh {
-    let PreparedMesh { triangles, sources, corner_wedges, positions, wedges, scale, .. } = prepared;
-    let original = Original {
-        scale,
-        center: mesh.center,
-        slots: &mesh.slots,
-        has_normals: !mesh.normals.is_empty(),
-        has_uvs: !mesh.uvs.is_empty(),
-    };
-    assemble(&Remaining { triangles, sources, corner_wedges }, &positions, &wedges, &original)
 }
 
 /// Varies the limit on the estimate until the measured error is within `error`. The estimate is a mean, so the first
@@ -159,8 +131,8 @@ fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, Simplif
     let (mut works, mut fails) = (0.0, f64::INFINITY);
     for _ in 0..8 {
         let mut work = start.clone();
-        run(&mut work, method, 1, limit, false);
-        let candidate = finish(mesh, work);
+        run(&mut work, method, 1, limit);
+        let candidate = assemble(&work, mesh);
         let measured = Deviation::between(mesh, &candidate, ERROR_SAMPLES).max();
         if measured <= error {
             works = limit;
@@ -192,8 +164,8 @@ mod tests {
             let mut prepared = PreparedMesh::of(&mesh, true);
             let limits =
                 CollapseLimits { faces: mesh.triangles.len() / 5, cost: f32::INFINITY, mean_square: f64::INFINITY };
-            parts::simplify_in(mesh.triangles.len() / parts, &mut prepared, limits, false);
-            let result = finish(&mesh, prepared);
+            parts::simplify_in(mesh.triangles.len() / parts, &mut prepared, limits);
+            let result = assemble(&prepared, &mesh);
             assert!(result.triangles.len() <= limits.faces && result.triangles.len() + 2 > limits.faces);
             Deviation::between(&mesh, &result, 40_000).rms()
         };

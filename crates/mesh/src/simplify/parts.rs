@@ -5,10 +5,10 @@
 //! other places, so that the first rims lie inside of parts, and these finish. Parts depend on the mesh alone, so any
 //! number of threads gives the same result.
 
-use super::greedy::{Collapse, CollapseLimits, Greedy, Log};
+use super::greedy::{CollapseLimits, Greedy};
 use super::prepare::PreparedMesh;
 use super::quadric::Quadric;
-use super::surface::{Kind, NONE, Surface, WedgeJoin};
+use super::surface::{Kind, NONE, Surface};
 use firstlight_kdtree::geometry::Aabb;
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
@@ -21,19 +21,13 @@ const PART_TRIANGLES: usize = 8_192;
 const LEFT_FOR_SECOND_CUT: usize = 64;
 
 /// Simplifies in place: afterwards `prepared` holds the remaining mesh, and vertices keep their indices.
-pub(super) fn simplify(prepared: &mut PreparedMesh, limits: CollapseLimits, keep_log: bool) -> Log {
-    simplify_in(PART_TRIANGLES, prepared, limits, keep_log)
+pub(super) fn simplify(prepared: &mut PreparedMesh, limits: CollapseLimits) {
+    simplify_in(PART_TRIANGLES, prepared, limits);
 }
 
 /// Like [`simplify`], with a given part size. With parts as large as the mesh this is the plain method with one queue,
 /// the reference of tests.
-pub(super) fn simplify_in(
-    part_triangles: usize,
-    prepared: &mut PreparedMesh,
-    limits: CollapseLimits,
-    keep_log: bool,
-) -> Log {
-    let mut log = Log::default();
+pub(super) fn simplify_in(part_triangles: usize, prepared: &mut PreparedMesh, limits: CollapseLimits) {
     let mut threshold = None;
     for cut in [Cut::First, Cut::Second] {
         let total = prepared.triangles.len();
@@ -43,16 +37,15 @@ pub(super) fn simplify_in(
         }
         let mut parts = split(prepared, count, cut);
         threshold = Some(run_all(&mut parts, limits, total, cut, threshold));
-        log.append(join(prepared, parts, keep_log));
+        join(prepared, parts);
     }
     // Handles small meshes, and work that rims have prevented.
     if prepared.triangles.len() > limits.faces {
         let whole: Vec<u32> = (0..prepared.triangles.len() as u32).collect();
         let mut part = MeshPart::new(prepared, whole, &prepared.valences(), &mut Numbering::of(prepared));
         part.greedy.run(limits);
-        log.append(join(prepared, vec![part], keep_log));
+        join(prepared, vec![part]);
     }
-    log
 }
 
 /// Position of the cuts, and how far parts are simplified.
@@ -228,8 +221,8 @@ fn finish_one_by_one(parts: &mut [MeshPart], limits: CollapseLimits) {
     }
 }
 
-/// Writes the parts' results back into the whole mesh, and merges their logs.
-fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Log {
+/// Writes the parts' results back into the whole mesh.
+fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>) {
     let left: Vec<(Vec<[u32; 3]>, Vec<u32>, Vec<u32>)> = parts
         .par_iter()
         .with_max_len(1)
@@ -267,34 +260,6 @@ fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Lo
             prepared.wedges[global as usize] = wedge;
         }
     }
-    if keep_log { merge_logs(parts) } else { Log::default() }
-}
-
-/// Merges steps by cost. Those of each part are in order of cost already, and parts do not interact. Among equal costs,
-/// as in whole levels of the queue, parts alternate.
-fn merge_logs(parts: Vec<MeshPart>) -> Log {
-    let mut steps: Vec<(u32, usize, usize, usize, usize)> = Vec::new();
-    for (p, part) in parts.iter().enumerate() {
-        let (mut first_join, mut turn, mut last) = (0, 0, 0.0);
-        for (i, collapse) in part.greedy.log.collapses.iter().enumerate() {
-            turn = if collapse.cost == last { turn + 1 } else { 0 };
-            last = collapse.cost;
-            steps.push((collapse.cost.to_bits(), turn, p, i, first_join));
-            first_join += collapse.joins as usize;
-        }
-    }
-    steps.par_sort_unstable();
-    let mut log = Log::default();
-    for (.., p, i, first_join) in steps {
-        let part = &parts[p];
-        let collapse = part.greedy.log.collapses[i];
-        let name = |v: u32| part.vertices[v as usize];
-        log.collapses.push(Collapse { from: name(collapse.from), to: name(collapse.to), ..collapse });
-        log.joins.extend(part.greedy.log.joins[first_join..first_join + collapse.joins as usize].iter().map(|join| {
-            WedgeJoin { from: part.wedges[join.from as usize], to: part.wedges[join.to as usize], ..*join }
-        }));
-    }
-    log
 }
 
 /// Returns the position of a point along a curve that fills the box, 21 bits: near points mostly have near codes.

@@ -62,14 +62,6 @@ pub(super) struct Surface {
     scratch: Vec<u32>,
 }
 
-/// A wedge that absorbs another one, and its data afterwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WedgeJoin {
-    pub from: u32,
-    pub to: u32,
-    pub wedge: Wedge,
-}
-
 impl Surface {
     /// Creates a surface.
     ///
@@ -295,14 +287,11 @@ impl Surface {
     ///
     /// - `t`: parameter of the position between `from` (0) and `to` (1), for shading data.
     ///
-    /// Call it only directly after [`Self::may_collapse`] has allowed the same collapse. Appends wedge joins to
-    /// `joins`; returns the number of triangles removed.
-    pub fn collapse(&mut self, from: u32, to: u32, position: Vec3, t: f32, joins: &mut Vec<WedgeJoin>) -> usize {
+    /// Call it only directly after [`Self::may_collapse`] has allowed the same collapse.
+    pub fn collapse(&mut self, from: u32, to: u32, position: Vec3, t: f32) {
         if !self.corner_wedge.is_empty() {
             for &(gone, kept) in &self.joins {
-                let wedge = self.wedges[gone as usize].between(self.wedges[kept as usize], t);
-                self.wedges[kept as usize] = wedge;
-                joins.push(WedgeJoin { from: gone, to: kept, wedge });
+                self.wedges[kept as usize] = self.wedges[gone as usize].between(self.wedges[kept as usize], t);
             }
         }
         let mut corners = std::mem::take(&mut self.scratch);
@@ -333,7 +322,6 @@ impl Surface {
         self.positions[to as usize] = position;
         self.face_count -= died;
         self.scratch = corners;
-        died
     }
 
     fn new_stamps(&mut self, count: u32) -> u32 {
