@@ -1,14 +1,12 @@
 //! The program from outside: pictures, figures, and the same bytes for any number of threads.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, does, fails, program};
 use std::path::Path;
 
 fn firstlight(folder: &Path, args: &[&str]) -> String {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(args).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    let outcome = Outcome::of(program(folder).args(args));
+    assert_eq!(outcome.status, Some(0), "{args:?}: {}", outcome.err);
+    outcome.out().to_owned()
 }
 
 #[test]
@@ -66,24 +64,17 @@ fn a_picture_that_found_no_light_does_not_know_its_error() {
              quad(corner: (-9, -9, 7), edge_u: (18, 0, 0), edge_v: (0, 18, 0), material: \"m\")])"
         )
     };
-    let run = |name: &str, json: &[&str]| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let words = ["render", name, "-o", "a.png", "--size", "8x6", "--spp", "8"];
-        let output = command.current_dir(path).args(words).args(json).output().unwrap();
-        assert!(output.status.success());
-        [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
-    };
+    let run = |name: &str, json: &str| does(path, &format!("render {name} -o a.png --size 8x6 --spp 8 {json}"));
     // The light is behind a wall.
     std::fs::write(path.join("dark.ron"), scene("black")).unwrap();
-    let [_, told] = run("dark.ron", &[]);
+    let told = run("dark.ron", "").err;
     assert!(told.contains("none of 8 samples") && !told.contains("estimated error"), "{told}");
-    let [json, _] = run("dark.ron", &["--json"]);
-    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let json = run("dark.ron", "--json").json();
     assert!(json["estimated_error"].is_null(), "{json}");
     // Where nothing shines, black is right.
     std::fs::write(path.join("void.ron"), "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: black)")
         .unwrap();
-    let [_, told] = run("void.ron", &[]);
+    let told = run("void.ron", "").err;
     assert!(!told.contains("none of") && told.contains("estimated error 0 %"), "{told}");
 }
 
@@ -132,11 +123,8 @@ fn time_and_error_end_a_render() {
     assert_eq!(spp(["--error", "5%"]).0, samples, "5% is not 0.05");
     // Who asked for an error and got another is told.
     for (limits, missed) in [(["--error", "1e-6", "--spp", "8"], true), (["--error", "0.05", "--spp", "9999"], false)] {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        command.current_dir(folder.path()).args(["render", "dof-balls", "-o", "d.png", "--size", "32x24"]).args(limits);
-        let output = command.output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && said.contains("above the target of") == missed, "{limits:?}: {said}");
+        let said = does(folder.path(), &format!("render dof-balls -o d.png --size 32x24 {}", limits.join(" "))).err;
+        assert_eq!(said.contains("above the target of"), missed, "{limits:?}: {said}");
     }
 }
 
@@ -155,10 +143,8 @@ fn the_error_of_each_pixel_is_written_as_the_picture_tells_it() {
     assert!(errors.pixels().all(|pixel| pixel[0] >= 0.0 && pixel[0] == pixel[2]));
     for (name, why) in [("e.png", "must end in .exr"), ("b.exr", "two outputs have the same name")] {
         let line = format!("render cornell -o b.exr --spp 2 --error-image {name}");
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let output = command.current_dir(folder.path()).args(line.split(' ')).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(2) && said.contains(why), "{said}");
+        let said = fails(folder.path(), &line, 2);
+        assert!(said.contains(why), "{said}");
         assert!(!folder.path().join("b.exr").exists());
     }
 }
@@ -221,11 +207,7 @@ fn whoever_closes_the_pipe_has_read_enough() {
 #[test]
 fn without_a_display_a_scene_that_is_not_there_is_one_error() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder.path()).arg("missing.obj").env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    let output = command.output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: missing.obj: cannot be read: no such file\n");
+    assert_eq!(fails(folder.path(), "missing.obj", 1), "error: missing.obj: cannot be read: no such file\n");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
@@ -266,9 +248,8 @@ fn every_built_in_scene_opens_by_its_name_alone() {
 
 /// What `firstlight stability` says, and how it ends.
 fn stability(args: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::cargo_bin("firstlight").unwrap().arg("stability").args(args).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code(), text(output.stdout), text(output.stderr))
+    let outcome = Outcome::of(program(&std::env::temp_dir()).arg("stability").args(args));
+    (outcome.status, outcome.out().to_owned(), outcome.err)
 }
 
 #[test]

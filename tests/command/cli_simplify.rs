@@ -1,27 +1,18 @@
 //! `firstlight simplify` from outside: what it writes, what it says, and what it makes of bad input.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, does, program};
 use firstlight::scene::obj::{ObjExtras, save_obj};
 use std::path::Path;
 
-struct Outcome {
-    code: i32,
-    out: String,
-    err: String,
-}
-
 fn simplify(folder: &Path, args: &[&str]) -> Outcome {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    let output = command.current_dir(folder).arg("simplify").args(args).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Outcome { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) }
+    Outcome::of(program(folder).arg("simplify").args(args))
 }
 
 /// Runs it with `--json` and reads the report, which is the last line.
 fn report(folder: &Path, args: &[&str]) -> serde_json::Value {
     let outcome = simplify(folder, &[args, &["--json"]].concat());
-    assert_eq!(outcome.code, 0, "{args:?}: {}", outcome.err);
-    serde_json::from_str(outcome.out.lines().last().unwrap()).unwrap()
+    assert_eq!(outcome.status, Some(0), "{args:?}: {}", outcome.err);
+    outcome.json()
 }
 
 /// A closed sphere of 8 · 4ⁿ triangles: an octahedron, split and rounded.
@@ -166,7 +157,7 @@ fn vertex_colours_are_kept() {
     let colored: String = colored.collect();
     std::fs::write(&model, colored).unwrap();
     let said = simplify(folder.path(), &["a.obj", "-o", "b.obj", "--ratio", "50%"]);
-    assert!(said.code == 0 && !said.err.contains("warning"), "{}", said.err);
+    assert!(said.status == Some(0) && !said.err.contains("warning"), "{}", said.err);
     let text = std::fs::read_to_string(out).unwrap();
     let points: Vec<&str> = text.lines().filter(|line| line.starts_with("v ")).collect();
     assert!(
@@ -181,18 +172,18 @@ fn a_report_for_people_names_faces_seconds_and_errors() {
     let folder = tempfile::tempdir().unwrap();
     write_ball(&folder.path().join("ball.obj"), 3);
     let outcome = simplify(folder.path(), &["ball.obj", "-o", "small.obj", "--ratio", "0.5"]);
-    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.err);
     for expected in
         ["512 -> 256 triangles in ", "original to result: mean ", "result to original: mean ", "RMS ", "maximum "]
     {
-        assert!(outcome.out.contains(expected), "expected {expected:?} in:\n{}", outcome.out);
+        assert!(outcome.out().contains(expected), "expected {expected:?} in:\n{}", outcome.out());
     }
 }
 
 /// One line that says what is wrong, and no file.
 fn assert_refused(folder: &Path, args: &[&str], code: i32, expected: &[&str]) {
     let outcome = simplify(folder, args);
-    assert_eq!(outcome.code, code, "{args:?}: {}{}", outcome.out, outcome.err);
+    assert_eq!(outcome.status, Some(code), "{args:?}: {}{}", outcome.out(), outcome.err);
     for words in expected {
         assert!(outcome.err.contains(words), "{args:?}: expected {words:?} in:\n{}", outcome.err);
     }
@@ -248,8 +239,8 @@ fn faults_of_a_mesh_are_named_and_survived() {
         v 7 0 0\nv 8 0 0\nv 8.5 1 0\nv 8 2 0\nv 7 2 0\nf 10 11 12 13 14\nf 1 1 2\n";
     std::fs::write(path.join("faulty.obj"), text).unwrap();
     let outcome = simplify(path, &["faulty.obj", "-o", "out.obj", "--ratio", "0.9", "--json"]);
-    assert_eq!(outcome.code, 0, "{}", outcome.err);
-    let json: serde_json::Value = serde_json::from_str(outcome.out.lines().last().unwrap()).unwrap();
+    assert_eq!(outcome.status, Some(0), "{}", outcome.err);
+    let json: serde_json::Value = outcome.json();
     // The square is two triangles, the pentagon three; of the walls three stay, and no face uses a vertex twice.
     assert!(json["faces_after"].as_u64().is_some_and(|faces| (3..=8).contains(&faces)), "{json}");
     assert_eq!((json["closed"].as_bool(), json["manifold"].as_bool()), (Some(false), Some(false)), "{json}");
@@ -263,7 +254,7 @@ fn faults_of_a_mesh_are_named_and_survived() {
     }
     // A second run has nothing left to complain of but the walls, which stay as they are.
     let again = simplify(path, &["out.obj", "-o", "again.obj", "--ratio", "0.9"]);
-    assert!(again.code == 0 && !again.err.contains("same three places"), "{}", again.err);
+    assert!(again.status == Some(0) && !again.err.contains("same three places"), "{}", again.err);
 }
 
 #[test]
@@ -278,12 +269,8 @@ fn every_command_counts_the_same_faults_and_what_is_left_out_is_gone() {
     // The loader leaves out what names a vertex twice; then two collapsed ones and three duplicates go.
     assert_eq!((json["faces_before"].as_u64(), json["faces_after"].as_u64()), (Some(9), Some(4)), "{json}");
     let said = simplify(path, &["faulty.obj", "-o", "out.obj", "--ratio", "1"]).err;
-    let info = |args: &[&str]| {
-        let output =
-            Command::cargo_bin("firstlight").unwrap().current_dir(path).arg("info").args(args).output().unwrap();
-        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
-    };
-    let (told, warned) = info(&["faulty.obj"]);
+    let info = does(path, "info faulty.obj");
+    let (told, warned) = (info.out(), &info.err);
     for fault in [
         "2 triangles have two corners at one place",
         "3 triangles lie on the same three places as an earlier one",
@@ -293,13 +280,13 @@ fn every_command_counts_the_same_faults_and_what_is_left_out_is_gone() {
     }
     let twice = "1 triangles use a vertex twice and were removed";
     assert!(said.contains(twice) && warned.contains(twice), "{said}{warned}");
-    let json: serde_json::Value = serde_json::from_str(&info(&["faulty.obj", "--json"]).0).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&does(path, "info faulty.obj --json").bytes).unwrap();
     let mesh = json["parts"].as_array().unwrap().iter().find(|part| part["triangles"] == 9).unwrap();
     let counts =
         ["collapsed_triangles", "duplicate_triangles", "flat_triangles"].map(|key| mesh[key].as_u64().unwrap());
     assert_eq!(counts, [2, 3, 1]);
     // Nothing but the flat one is left to complain of.
-    let told = info(&["out.obj"]).0;
+    let told = does(path, "info out.obj").out().to_owned();
     assert!(told.contains("1 triangles have") && !told.contains("place"), "{told}");
 }
 

@@ -1,21 +1,11 @@
 //! Which denoiser, and the error of the denoised image as a reason to stop.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, does, fails, program, run};
 use std::path::Path;
-use std::process::Output;
-
-fn run(folder: &Path, line: &str, library: Option<&str>) -> Output {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split(' ')).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    library.map(|path| command.env("FIRSTLIGHT_OIDN", path));
-    command.output().unwrap()
-}
 
 /// The JSON of a command that succeeds.
 fn told(folder: &Path, line: &str) -> serde_json::Value {
-    let output = run(folder, line, None);
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+    does(folder, line).json()
 }
 
 #[test]
@@ -56,11 +46,11 @@ fn merged_films_denoise_to_the_bytes_of_the_one_that_was_rendered_in_one_go() {
         assert_eq!(whole[key], merged[key], "{key}");
     }
     told(path, &format!("{scene} -o whole.png --spp 8 --uniform --denoise"));
-    let output = run(path, "merge a.exr b.exr -o again.exr --image merged.png --denoise", None);
-    assert!(output.status.success() && String::from_utf8_lossy(&output.stderr).contains("(denoised: "), "{output:?}");
+    let said = does(path, "merge a.exr b.exr -o again.exr --image merged.png --denoise").err;
+    assert!(said.contains("(denoised: "), "{said}");
     assert!(bytes("whole.png") == bytes("merged.png"));
-    let output = run(path, "merge a.exr b.exr -o more.exr --denoise", None);
-    assert_eq!(output.status.code(), Some(2), "there is no image to denoise");
+    // There is no image to denoise.
+    fails(path, "merge a.exr b.exr -o more.exr --denoise", 2);
 }
 
 /// A scene that has changed, or is gone, since its films were rendered has no guides for them.
@@ -71,15 +61,11 @@ fn films_of_another_version_of_a_scene_are_not_denoised() {
     let text = firstlight::scene::builtin_text("ball").unwrap();
     std::fs::write(path.join("scene.ron"), text).unwrap();
     for (name, samples) in [("a", "0..2"), ("b", "2..4")] {
-        told(
-            path,
-            &format!("render scene.ron --size 32x24 -o {name}.png --samples {samples} --film {name}.exr --json"),
-        );
+        does(path, &format!("render scene.ron --size 32x24 -o {name}.png --samples {samples} --film {name}.exr"));
     }
     std::fs::write(path.join("scene.ron"), text.replace("intensity: 800", "intensity: 700")).unwrap();
-    let output = run(path, "merge a.exr b.exr -o all.exr --image all.png --denoise", None);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && said.contains("a different scene"), "{said}");
+    let said = fails(path, "merge a.exr b.exr -o all.exr --image all.png --denoise", 1);
+    assert!(said.contains("a different scene"), "{said}");
     assert!(!path.join("all.png").exists());
 }
 
@@ -88,14 +74,13 @@ fn a_denoiser_that_is_missing_is_told_before_anything_is_rendered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let line = "render cornell -o a.png --size 16x16 --spp 1 --denoise --denoiser oidn";
-    let output = run(path, line, Some("no/such/library"));
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && said.contains("FIRSTLIGHT_OIDN: no/such/library cannot be loaded"), "{said}");
+    let outcome = Outcome::of(program(path).args(line.split(' ')).env("FIRSTLIGHT_OIDN", "no/such/library"));
+    let is_told = outcome.err.contains("FIRSTLIGHT_OIDN: no/such/library cannot be loaded");
+    assert!(outcome.status != Some(0) && is_told, "{outcome:?}");
     assert!(!path.join("a.png").exists());
     for line in ["render cornell -o a.png --denoiser oidn", "render cornell -o a.png --error 1% --error-of denoised"] {
-        let output = run(path, line, None);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.code() == Some(2) && said.contains("add --denoise"), "{line}: {said}");
+        let said = fails(path, line, 2);
+        assert!(said.contains("add --denoise"), "{line}: {said}");
     }
 }
 
@@ -105,18 +90,18 @@ fn open_image_denoise_takes_the_place_of_the_own_filter() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let scene = "render cornell --size 48x48 --spp 4 --denoise";
-    let output = run(path, &format!("{scene} -o oidn.exr --denoiser oidn --json"), None);
-    if !output.status.success() {
-        let said = String::from_utf8(output.stderr).unwrap();
+    let outcome = run(path, &format!("{scene} -o oidn.exr --denoiser oidn --json"));
+    if outcome.status != Some(0) {
+        let said = outcome.err;
         assert!(said.contains("Open Image Denoise is not installed") && said.contains("FIRSTLIGHT_OIDN"), "{said}");
         return;
     }
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let told = outcome.json();
     assert!(told["estimated_error_denoised"].as_f64() < told["estimated_error"].as_f64(), "{told}");
     let denoised_by = |name: &str| firstlight::scene::ImageMetadata::read(&path.join(name)).unwrap().denoised;
     assert_eq!(denoised_by("oidn.exr"), Some("oidn".to_owned()));
     let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb32f().into_raw();
-    assert!(run(path, &format!("{scene} -o own.exr"), None).status.success());
+    does(path, &format!("{scene} -o own.exr"));
     let mean = |pixels: &[f32]| pixels.iter().sum::<f32>() / pixels.len() as f32;
     let (own, oidn) = (pixels("own.exr"), pixels("oidn.exr"));
     assert!(own != oidn && (mean(&own) / mean(&oidn) - 1.0).abs() < 0.05, "{} and {}", mean(&own), mean(&oidn));

@@ -1,8 +1,8 @@
 //! Explanations of pixels, held against the film that they explain, and against light that can be told on paper.
 
 use crate::common::*;
-use assert_cmd::Command;
-use firstlight::frame::{Command as Ask, Explaining, Session, SessionOptions, Target};
+use crate::program::{Outcome, does, program};
+use firstlight::frame::{Command, Explaining, Session, SessionOptions, Target};
 use firstlight::render::{
     DeltaLight, Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,
     light_traced, replay_sample,
@@ -184,9 +184,9 @@ fn a_session_tells_the_story_of_a_pixel_with_names_and_keeps_it_while_the_camera
         }
     };
     // Asked before there is a picture, it waits for one.
-    session.send(Ask::ExplainAt { x: 0.5, y: 0.9 });
+    session.send(Command::ExplainAt { x: 0.5, y: 0.9 });
     run_until(&mut session, &|session| session.status().done && session.is_idle());
-    session.send(Ask::ExplainAt { x: 0.5, y: 0.9 });
+    session.send(Command::ExplainAt { x: 0.5, y: 0.9 });
     run_until(&mut session, &|session| session.is_idle());
     let story = session.world().resource::<Explaining>().story.clone().expect("it was asked for");
     assert_eq!((story.pixel, story.samples.clone(), story.ways.len()), (UVec2::new(24, 43), 0..64, 64));
@@ -198,10 +198,10 @@ fn a_session_tells_the_story_of_a_pixel_with_names_and_keeps_it_while_the_camera
     for sum in [by_light, by_bounces, story.by_itself + story.by_asking, story.parts().iter().sum()] {
         assert!((sum - story.mean).abs().max_element() < 1e-12, "{sum} {}", story.mean);
     }
-    session.send(Ask::Orbit { yaw_deg: 5.0, pitch_deg: 0.0 });
+    session.send(Command::Orbit { yaw_deg: 5.0, pitch_deg: 0.0 });
     run_until(&mut session, &|session| session.status().restarts > 1 && session.status().done && session.is_idle());
     assert_eq!(session.world().resource::<Explaining>().story.as_ref(), Some(&story));
-    session.send(Ask::ForgetExplanation);
+    session.send(Command::ForgetExplanation);
     run_until(&mut session, &|session| session.is_idle());
     assert_eq!(session.world().resource::<Explaining>().story, None);
 }
@@ -210,9 +210,8 @@ fn a_session_tells_the_story_of_a_pixel_with_names_and_keeps_it_while_the_camera
 fn the_program_explains_a_pixel() {
     let folder = tempfile::tempdir().unwrap();
     let run = |args: &[&str]| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let output = command.current_dir(folder.path()).arg("explain").args(args).output().unwrap();
-        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+        let outcome = Outcome::of(program(folder.path()).arg("explain").args(args));
+        (outcome.status, outcome.out().to_owned(), outcome.err)
     };
     let scene = ["cornell", "--size", "64x48", "--pixel", "32,40", "--spp", "16"];
     let (code, text, errors) = run(&scene);
@@ -253,12 +252,8 @@ fn a_black_pixel_is_named_and_told_to_be_unlit() {
         objects: [sphere(name: "shell", center: (0, 0, 0), radius: 4, material: "paint")],
     )"#;
     std::fs::write(folder.path().join("closed.ron"), scene).unwrap();
-    let explain = |pixel: &str| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let args = ["explain", "closed.ron", "--pixel", pixel, "--spp", "8"];
-        String::from_utf8(command.current_dir(folder.path()).args(args).output().unwrap().stdout).unwrap()
-    };
-    let text = explain("8,8");
+    let outcome = does(folder.path(), "explain closed.ron --pixel 8,8 --spp 8");
+    let text = outcome.out();
     for expected in
         ["`shell`, material `paint`, back", "at           7 m, ", "no light reaches it: none of 8 samples found any"]
     {

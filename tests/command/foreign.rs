@@ -2,9 +2,10 @@
 
 use super::pack::{hdr, names_in, unpack, write_scene};
 use super::parts::{does, fails};
+use crate::program::{Outcome, program};
 use firstlight::scene::image_metadata::NOTE_KEY;
 use firstlight::scene::{ImageMetadata, ImageScene};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 const SCENE: &str =
@@ -163,9 +164,8 @@ fn a_name_that_is_none_everywhere_is_not_packed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let run = |args: &[&str]| {
-        let program: PathBuf = assert_cmd::cargo::cargo_bin("firstlight");
-        let output = Command::new(program).args(args).current_dir(path).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        let outcome = Outcome::of(program(path).args(args));
+        (outcome.status, outcome.err)
     };
     for name in ["a\nb.ron", "a\rb.ron", "a\\b.ron", "a:b.ron"] {
         std::fs::write(path.join(name), SCENE).unwrap();

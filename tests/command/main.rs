@@ -13,6 +13,8 @@ mod frames;
 mod motion_blur;
 mod pack;
 mod parts;
+#[path = "../common/program.rs"]
+mod program;
 mod reopening;
 mod report;
 mod said;

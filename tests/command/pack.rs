@@ -1,6 +1,7 @@
 //! Scenes with all of their files in an archive: unpacked elsewhere, they render to the same bytes.
 
 use super::parts::{does, equal, fails};
+use crate::program::{Outcome, program};
 use std::path::Path;
 
 /// Names of the files of an archive, in order.
@@ -157,9 +158,8 @@ fn an_archive_opens_directly_and_only_whole() {
     write_scene(path);
     let cache = path.join("cache");
     let run = |line: &str| {
-        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-        let output = command.args(line.split(' ')).current_dir(path).env("XDG_CACHE_HOME", &cache).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        let outcome = Outcome::of(program(path).args(line.split(' ')).env("XDG_CACHE_HOME", &cache));
+        (outcome.status, outcome.err)
     };
     let pixels = |name: &str| image::open(path.join(name)).unwrap().to_rgb8();
     does(path, "render scenes/s.ron -o here.png --spp 2");
@@ -266,9 +266,7 @@ fn the_environment_image_of_an_archive_counts() {
     let model = "models/m.obj --env far/light.hdr";
     does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
     does(path, &format!("pack {model} -o m.zip"));
-    let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-    let line = "render m.zip -o there.png --size 24x16 --spp 2";
-    command.args(line.split(' ')).current_dir(path).env("XDG_CACHE_HOME", path).assert().success();
+    crate::program::does(path, "render m.zip -o there.png --size 24x16 --spp 2");
     let [here, there] = ["here.png", "there.png"].map(|name| image::open(path.join(name)).unwrap().to_rgb8());
     assert!(here == there);
 }
@@ -333,12 +331,7 @@ fn archives_have_limits_for_all_files_together() {
     out.start_file("SHA256SUMS", options).unwrap();
     out.write_all(sums.as_bytes()).unwrap();
     out.finish().unwrap();
-    let said = || {
-        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-        let output = command.args(["info", "bomb.zip"]).current_dir(path).env("XDG_CACHE_HOME", path).output().unwrap();
-        assert_eq!(output.status.code(), Some(1));
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
+    let said = || crate::program::fails(path, "info bomb.zip", 1);
     assert!(said().contains("would take 314573") && said().contains("268435456 bytes"), "{}", said());
     // Two files of the directory that share their data: the second one points to the first.
     let mut bytes = std::fs::read(path.join("bomb.zip")).unwrap();

@@ -1,11 +1,10 @@
 //! What foreign files hold does not act on a terminal: whatever a command reads and tells, on standard output or standard
 //! error, has no control characters, no marks that turn the order of letters round, no forged lines and no endless names.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, program};
 use firstlight::scene::image_metadata::NOTE_KEY;
 use std::ffi::OsStr;
 use std::path::Path;
-use std::time::Duration;
 
 /// Escape sequences, a bell, line ends of three kinds, bidirectional controls, marks of no width, C1, DEL.
 const ACTING: &str = "\u{1b}[2J\u{1b}]0;owned\u{7}\nerror: forged\r\u{b}\u{202e}txt\u{2066}\u{200f}\u{61c}\u{200b}\u{feff}\u{9b}31m\u{7f}";
@@ -20,16 +19,10 @@ fn acts(c: char) -> bool {
     c != '\n' && c.is_control() || c == '\u{61c}' || marks.iter().any(|range| range.contains(&c))
 }
 
-struct Said {
-    status: Option<i32>,
-    out: String,
-    err: String,
-}
-
-impl Said {
+impl Outcome {
     #[track_caller]
     fn check(&self, what: &str) {
-        for (stream, text) in [("output", &self.out), ("error", &self.err)] {
+        for (stream, text) in [("output", self.out()), ("error", &self.err)] {
             if let Some(c) = text.chars().find(|&c| acts(c)) {
                 panic!("{what}: standard {stream} has {c:?}: {text:?}");
             }
@@ -41,21 +34,18 @@ impl Said {
     }
 }
 
-fn run(folder: &Path, args: &[impl AsRef<OsStr>], log: Option<&str>) -> Said {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(args).env_remove("RUST_LOG").env("XDG_CONFIG_HOME", folder.join("config"));
-    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+fn run(folder: &Path, args: &[impl AsRef<OsStr>], log: Option<&str>) -> Outcome {
+    let mut command = program(folder);
+    command.args(args);
     if let Some(log) = log {
         command.env("RUST_LOG", log);
     }
-    let output = command.timeout(Duration::from_secs(120)).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).expect("what is printed is UTF-8");
-    Said { status: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    Outcome::of(&mut command)
 }
 
 /// Runs a line, and checks what it says; answers with it.
 #[track_caller]
-fn says(folder: &Path, line: &str, status: i32) -> Said {
+fn says(folder: &Path, line: &str, status: i32) -> Outcome {
     let said = run(folder, &line.split_whitespace().collect::<Vec<_>>(), None);
     said.check(line);
     assert_eq!(said.status, Some(status), "{line}: {}", said.err);
@@ -97,11 +87,11 @@ fn names_of_scene_files() {
          objects: [mesh(name: \"{name}\", source: builtin(\"cube\"), material: \"{name}\"), \
          spheres(name: \"{name}\", centers: [(2, 0, 0)], radii: all(0.5), material: \"{name}\")]"
     ));
-    assert!(says(path, "info a.ron", 0).out.contains("\\u{1b}[2J"));
-    assert!(says(path, "explain a.ron --pixel 4,4 --spp 4", 0).out.contains("\\u{1b}[2J"));
+    assert!(says(path, "info a.ron", 0).out().contains("\\u{1b}[2J"));
+    assert!(says(path, "explain a.ron --pixel 4,4 --spp 4", 0).out().contains("\\u{1b}[2J"));
     // For machines the name is what it is.
     let json = run(path, &["info", "a.ron", "--json"], None);
-    let told: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    let told: serde_json::Value = serde_json::from_str(&json.out()).unwrap();
     assert_eq!(told["parts"][0]["name"], ACTING);
     // A name of a megabyte.
     let long = "x".repeat(1 << 20);
@@ -116,8 +106,8 @@ fn names_of_scene_files() {
         assert!(said.len() < 4000 && (said.contains('…') || said.len() < 200), "{} bytes", said.len());
     }
     write(&format!("objects: [mesh(name: \"{long}\", source: builtin(\"cube\"))]"));
-    assert!(says(path, "info a.ron", 0).out.len() < 4000);
-    assert!(says(path, "explain a.ron --pixel 4,4 --spp 4", 0).out.len() < 4000);
+    assert!(says(path, "info a.ron", 0).out().len() < 4000);
+    assert!(says(path, "explain a.ron --pixel 4,4 --spp 4", 0).out().len() < 4000);
 }
 
 #[test]
@@ -254,7 +244,7 @@ fn file_names_and_what_is_not_utf_8() {
     std::fs::write(folder.path().join(&name), format!("({CAMERA})")).unwrap();
     let said = run(folder.path(), &["info", &name], None);
     said.check("a good scene of that name");
-    assert!(said.status == Some(0) && said.out.starts_with("\\u{1b}[2J"), "{}", said.out);
+    assert!(said.status == Some(0) && said.out().starts_with("\\u{1b}[2J"), "{}", said.out());
     let odd = OsStr::from_bytes(b"a\xff\x1b[2J.png");
     run(folder.path(), &[OsStr::new("render"), OsStr::new("cornell"), OsStr::new("--size"), odd], None).check("a size");
     run(folder.path(), &[OsStr::new("info"), odd], None).check("a picture");

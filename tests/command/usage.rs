@@ -1,46 +1,21 @@
 //! What people of other programs try: completions, manual pages, pipes, several scenes, typing errors.
 
-use assert_cmd::Command;
-use std::path::Path;
-use std::process::Output;
-
-fn run(folder: &Path, line: &str) -> Output {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split(' ')).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    command.output().unwrap()
-}
-
-/// Standard output and standard error of a command that succeeds.
-fn does(folder: &Path, line: &str) -> (Vec<u8>, String) {
-    let output = run(folder, line);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{line}: {said}");
-    (output.stdout, said)
-}
-
-/// Standard error of a command that is not understood.
-fn refused(folder: &Path, line: &str) -> String {
-    let output = run(folder, line);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{line}: {said}");
-    said
-}
+use crate::program::{Outcome, does, fails, program, run};
 
 #[test]
 fn every_shell_gets_completions_and_every_command_a_manual_page() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let (script, _) = does(path, &format!("completions {shell}"));
-        let script = String::from_utf8(script).unwrap();
+        let outcome = does(path, &format!("completions {shell}"));
+        let script = outcome.out();
         assert!(script.contains("turntable") && script.contains("simplify"), "{shell}");
     }
-    let (page, _) = does(path, "man");
-    assert!(String::from_utf8(page).unwrap().contains(".TH firstlight 1"));
+    assert!(does(path, "man").out().contains(".TH firstlight 1"));
     does(path, "man pages");
-    let (help, _) = does(path, "help");
-    let help = String::from_utf8(help).unwrap();
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let help = does(path, "help");
+    let commands =
+        help.out().lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     // Further lines of a description stand further to the right.
     let commands = commands.filter(|line| !line.starts_with("   "));
     for command in commands.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help") {
@@ -53,23 +28,23 @@ fn every_shell_gets_completions_and_every_command_a_manual_page() {
 fn a_mistyped_command_is_named() {
     let folder = tempfile::tempdir().unwrap();
     for line in ["rendr", "rendr cornell", "rendr cornell -o a.png", "--quiet rendr cornell"] {
-        let said = refused(folder.path(), line);
+        let said = fails(folder.path(), line, 2);
         assert_eq!(said, "error: unknown command `rendr` (did you mean `render`?)\n", "{line}");
     }
-    assert!(refused(folder.path(), "galery").contains("did you mean `gallery`?"));
+    assert!(fails(folder.path(), "galery", 2).contains("did you mean `gallery`?"));
 }
 
 #[test]
 fn a_second_scene_is_told_and_all_scenes_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let said = refused(path, "cornell gallery");
+    let said = fails(path, "cornell gallery", 2);
     assert!(said.starts_with("error: a window shows one scene, and `gallery` follows `cornell`"), "{said}");
     assert!(said.contains("firstlight render cornell gallery -o FOLDER"), "{said}");
-    assert_eq!(refused(path, "cornell info"), "error: the command comes first: firstlight info cornell\n");
-    let list = String::from_utf8(does(path, "scenes").0).unwrap();
+    assert_eq!(fails(path, "cornell info", 2), "error: the command comes first: firstlight info cornell\n");
+    let list = does(path, "scenes").out().to_owned();
     assert!(list.lines().any(|line| line.starts_with("veach-mis ")), "{list}");
-    let json: serde_json::Value = serde_json::from_slice(&does(path, "scenes --json").0).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&does(path, "scenes --json").bytes).unwrap();
     assert_eq!(json.as_array().unwrap().len(), list.lines().count());
 }
 
@@ -84,7 +59,7 @@ fn missing_folders_of_an_output_are_created_once_there_is_something_to_write() {
     assert!(path.join("several/ball.png").is_file());
     does(path, "save cornell -o scenes/cornell.ron");
     assert!(path.join("scenes/cornell.ron").is_file());
-    assert!(!run(path, &format!("render none.obj {options} -o nowhere/deep/a.png")).status.success());
+    assert!(run(path, &format!("render none.obj {options} -o nowhere/deep/a.png")).status != Some(0));
     assert!(!path.join("nowhere").exists());
 }
 
@@ -99,9 +74,9 @@ fn an_image_can_be_a_jpeg() {
     let [jpeg, png] = ["a.jpg", "a.png"].map(|name| image::open(path.join(name)).unwrap().into_rgb8());
     let difference: f64 = jpeg.iter().zip(png.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
     assert!(jpeg.dimensions() == (32, 24) && difference / (jpeg.len() as f64) < 10.0, "{difference}");
-    let (bytes, _) = does(path, &format!("{line} - --format jpg"));
+    let bytes = does(path, &format!("{line} - --format jpg")).bytes;
     assert!(bytes == std::fs::read(path.join("a.jpg")).unwrap());
-    let said = String::from_utf8(run(path, "info a.jpg").stderr).unwrap();
+    let said = run(path, "info a.jpg").err;
     assert!(said.starts_with("error: a.jpg: "), "{said}");
 }
 
@@ -116,14 +91,14 @@ fn a_colour_of_a_scene_can_be_hexadecimal() {
     let saved = std::fs::read_to_string(path.join("numbers.ron")).unwrap();
     assert!(saved.contains("0.6038") && !saved.contains('#'), "{saved}");
     std::fs::write(path.join("short.ron"), scene.replace("#ccbbaa", "#ccbb")).unwrap();
-    let said = String::from_utf8(run(path, "info short.ron").stderr).unwrap();
+    let said = run(path, "info short.ron").err;
     assert!(said.contains("`#ccbb` is not defined; a colour, where one is expected, is `\"#rgb\"`"), "{said}");
 }
 
 #[test]
 fn the_options_that_most_people_need_come_first() {
     let folder = tempfile::tempdir().unwrap();
-    let help = String::from_utf8(does(folder.path(), "render -h").0).unwrap();
+    let help = does(folder.path(), "render -h").out().to_owned();
     let at = |word: &str| help.find(word).unwrap_or_else(|| panic!("{word}: {help}"));
     let common = ["\nOptions:", "--output", "--size", "--spp", "--time", "--error ", "--denoise "].map(at);
     let others = ["\nScene:", "\nOutput:", "\nRendering:", "\nAnimation:", "\nFilms and parts:"].map(at);
@@ -136,14 +111,14 @@ fn a_picture_goes_to_standard_output() {
     let path = folder.path();
     let line = "render cornell --size 20x10 --spp 2 -o";
     for (options, file) in [("-", "a.png"), ("- --format exr", "a.exr")] {
-        let (bytes, said) = does(path, &format!("{line} {options}"));
-        assert!(said.contains("standard output: 20 x 10"), "{said}");
+        let Outcome { bytes, err, .. } = does(path, &format!("{line} {options}"));
+        assert!(err.contains("standard output: 20 x 10"), "{err}");
         does(path, &format!("{line} {file}"));
         assert!(bytes == std::fs::read(path.join(file)).unwrap(), "the same bytes as those of a file");
     }
-    assert!(refused(path, &format!("{line} - --json")).contains("both write to standard output"));
-    assert!(refused(path, &format!("{line} - --turntable 3")).contains("takes one image"));
-    assert!(refused(path, &format!("{line} b.png --format exr")).contains("a name that ends in .exr"));
+    assert!(fails(path, &format!("{line} - --json"), 2).contains("both write to standard output"));
+    assert!(fails(path, &format!("{line} - --turntable 3"), 2).contains("takes one image"));
+    assert!(fails(path, &format!("{line} b.png --format exr"), 2).contains("a name that ends in .exr"));
     assert!(!path.join("-").exists() && !path.join("b.png").exists());
 }
 
@@ -172,12 +147,11 @@ fn several_scenes_in_one_call() {
         ("render cornell cornell -o out", "same file"),
         ("render cornell bal -o out", "did you mean `ball`?"),
     ] {
-        let said = refused(path, line);
+        let said = fails(path, line, 2);
         assert!(said.contains(why), "{line}: {said}");
     }
     assert_eq!(std::fs::read_dir(path.join("out")).unwrap().count(), before, "nothing is rendered by mistake");
-    let (told, _) = does(path, "info cornell ball --json");
-    let titles = String::from_utf8(told).unwrap();
+    let titles = does(path, "info cornell ball --json").out().to_owned();
     let titles = titles.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()["scene"].clone());
     assert_eq!(titles.collect::<Vec<_>>(), ["cornell", "ball"]);
 }
@@ -198,21 +172,20 @@ fn an_environment_image_lights_any_scene_and_the_picture_knows_it() {
     assert!(picture.pixels().all(|pixel| pixel.0 == [188; 3]), "half the light is byte 188 in sRGB");
     // A picture of it opens as what it shows, and so does a picture of that.
     for (from, to) in [("a.png", "b.png"), ("b.png", "c.png")] {
-        let (_, said) = does(path, &format!("render {from} -o {to}"));
+        let said = does(path, &format!("render {from} -o {to}")).err;
         assert!(!said.contains("warning"), "{said}");
         assert!(image::open(path.join(to)).unwrap().into_rgb8() == picture, "{to}");
     }
     // A model loses its light: all light is that of the image.
-    let (told, _) = does(path, "info tent.obj --env sky.exr --json");
-    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    let told: serde_json::Value =
+        serde_json::from_slice(&does(path, "info tent.obj --env sky.exr --json").bytes).unwrap();
     assert_eq!((told["emissive_objects"].as_u64(), told["environment"].as_str()), (Some(0), Some("image, 8 x 4")));
     does(path, "save tent.obj --env sky.exr -o saved.ron");
     assert!(std::fs::read_to_string(path.join("saved.ron")).unwrap().contains("\"sky.exr\""));
-    let output = run(path, "info empty.ron --env none.hdr");
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(1) && said.contains("none.hdr: cannot be read: no such file"), "{said}");
+    let said = fails(path, "info empty.ron --env none.hdr", 1);
+    assert!(said.contains("none.hdr: cannot be read: no such file"), "{said}");
     std::fs::write(path.join("sky.hdr"), "").unwrap();
-    assert!(String::from_utf8(run(path, "info sky.hdr").stderr).unwrap().contains("--env FILE.hdr"));
+    assert!(run(path, "info sky.hdr").err.contains("--env FILE.hdr"));
 }
 
 #[test]
@@ -221,20 +194,20 @@ fn quiet_says_nothing_but_warnings_and_verbose_says_more() {
     let path = folder.path();
     let line = "render cornell --size 8x6 --spp 4 -o a.png";
     for quiet in [format!("--quiet {line}"), format!("{line} -q")] {
-        assert_eq!(does(path, &quiet).1, "");
+        assert_eq!(does(path, &quiet).err, "");
     }
-    assert!(does(path, &format!("{line} -q --error 0.1%")).1.starts_with("warning: the estimated error is "));
-    let (_, said) = does(path, &format!("-v {line}"));
+    assert!(does(path, &format!("{line} -q --error 0.1%")).err.starts_with("warning: the estimated error is "));
+    let said = does(path, &format!("-v {line}")).err;
     assert!(said.contains("cornell: loaded in") && said.contains("threads"), "{said}");
-    refused(path, &format!("{line} -q -v"));
+    fails(path, &format!("{line} -q -v"), 2);
 }
 
 #[test]
 fn colours_are_left_out_where_they_are_not_wanted() {
     for (name, value, is_plain) in [("CLICOLOR_FORCE", "1", false), ("NO_COLOR", "1", true)] {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let output = command.arg("--help").env("CLICOLOR_FORCE", "1").env(name, value).output().unwrap();
-        assert_eq!(!output.stdout.contains(&0x1b), is_plain, "{name}");
+        let mut command = program(&std::env::temp_dir());
+        let outcome = Outcome::of(command.arg("--help").env("CLICOLOR_FORCE", "1").env(name, value));
+        assert_eq!(!outcome.bytes.contains(&0x1b), is_plain, "{name}");
     }
 }
 
@@ -253,12 +226,11 @@ fn a_deviation_in_percent_is_a_share_of_the_diagonal() {
     });
     std::fs::write(path.join("grid.obj"), points.chain(faces).collect::<String>()).unwrap();
     let after = |error: &str| {
-        let (out, _) = does(path, &format!("simplify grid.obj -o out.obj --error {error} --json"));
-        let json: serde_json::Value = serde_json::from_slice(&out).unwrap();
+        let json = does(path, &format!("simplify grid.obj -o out.obj --error {error} --json")).json();
         (json["faces_after"].as_u64().unwrap(), json["diagonal"].as_f64().unwrap())
     };
     let (faces, diagonal) = after("0.5%");
     assert!(faces < 2 * (n * n) as u64);
     assert_eq!(after(&format!("{}", 0.005 * diagonal)).0, faces);
-    assert!(refused(path, "simplify grid.obj -o out.obj --error half%").contains("percentage of the diagonal"));
+    assert!(fails(path, "simplify grid.obj -o out.obj --error half%", 2).contains("percentage of the diagonal"));
 }

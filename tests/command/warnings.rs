@@ -1,14 +1,11 @@
 //! Warnings of a model: each once, one line per kind, all with `-v`.
 
-use assert_cmd::Command;
+use crate::program::does;
 use std::path::Path;
 
 /// Standard error of a command that succeeds, line by line.
 fn said(folder: &Path, line: &str) -> Vec<String> {
-    let output = Command::cargo_bin("firstlight").unwrap().current_dir(folder).args(line.split(' ')).output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{line}: {said}");
-    said.lines().map(str::to_owned).collect()
+    does(folder, line).err.lines().map(str::to_owned).collect()
 }
 
 /// A glTF of `n` meshes with two triangles each, one of which uses a vertex twice, whose material has an image that is
@@ -67,9 +64,7 @@ fn a_kind_of_warning_is_one_line_and_none_is_told_twice() {
     assert_eq!(of(&all, "use a vertex twice").len(), 5, "{all:#?}");
     let quiet = said(path, &format!("-q {render}"));
     assert!(quiet.iter().all(|line| line.starts_with("warning: ")) && quiet.len() == 2, "{quiet:#?}");
-    let info =
-        Command::cargo_bin("firstlight").unwrap().current_dir(path).args(["info", "many.gltf", "--json"]).output();
-    let json: serde_json::Value = serde_json::from_slice(&info.unwrap().stdout).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&does(path, "info many.gltf --json").bytes).unwrap();
     assert_eq!(
         (json["warnings"].as_array().unwrap().len(), json["notices"].as_array().unwrap().len()),
         (6, 1),

@@ -1,6 +1,6 @@
 //! Bad input: a clear error with place and advice, the right exit status, and nothing half-written.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, program};
 use bevy_ecs::world::World;
 use firstlight::scene::file::SceneFile;
 use firstlight::scene::{EnvironmentSource, Extraction, LoadOptions, Rgb, SceneInputs, SceneSource, load, save_scene};
@@ -381,17 +381,12 @@ fn a_model_of_nothing_but_lines_is_refused() {
     assert!(load(&SceneSource::Model(path), &LoadOptions::default()).is_ok());
 }
 
-fn firstlight() -> Command {
-    Command::cargo_bin("firstlight").unwrap()
-}
-
 /// Runs a command that must fail, and gives back what it says.
 #[track_caller]
 fn fails(folder: &Path, args: &[&str], status: i32) -> String {
-    let output = firstlight().args(args).current_dir(folder).output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{args:?}: {said}");
-    said
+    let Outcome { status: found, err, .. } = Outcome::of(program(folder).args(args));
+    assert_eq!(found, Some(status), "{args:?}: {err}");
+    err
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Values that no picture comes of, in every place from which they can come: scene files, the notes of pictures and films,
 //! recordings, kept views, settings, the command line, and the library. Each is refused by its name, never rendered.
 
-use assert_cmd::Command;
+use crate::program::{self, does};
 use firstlight::frame::{
     Bookmarks, Command as Asked, Session, SessionOptions, SettingsStore, Target, navigation::Rig, read_film_file,
     write_film_file,
@@ -96,11 +96,7 @@ fn write_exr(path: &Path, note: &str) {
 /// Runs a command that must fail, and gives back what it says.
 #[track_caller]
 fn fails(folder: &Path, line: &str, status: i32) -> String {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split_whitespace()).env("XDG_CONFIG_HOME", folder.join("config"));
-    let output = command.timeout(Duration::from_secs(120)).output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+    let said = program::fails(folder, line, status);
     assert!(!folder.join("out.png").exists(), "{line} wrote a picture");
     said
 }
@@ -412,14 +408,9 @@ fn a_byte_order_mark_changes_nothing() {
     write("a.ron", &text);
     write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
     write("a.mtl", "newmtl red\nKd 1 0 0\n");
-    let output = |line: &str| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let output = command.current_dir(folder.path()).args(line.split(' ')).output().unwrap();
-        assert!(output.status.success() && output.stderr.is_empty(), "{line}: {output:?}");
-        String::from_utf8(output.stdout).unwrap()
-    };
     for line in ["info a.ron", "info a.obj"] {
-        assert!(output(line).contains("1 triangle"), "{line}");
+        let outcome = does(folder.path(), line);
+        assert!(outcome.err.is_empty() && outcome.out().contains("1 triangle"), "{line}: {outcome:?}");
     }
     // Lines and columns are those of the text.
     assert_eq!(SceneFile::parse(&format!("\u{feff}{text}"), "a.ron"), SceneFile::parse(&text, "a.ron"));

@@ -2,23 +2,8 @@
 //! what is too long. Each is refused by its name, at once and with status 1.
 #![cfg(unix)]
 
-use assert_cmd::Command;
+use crate::program::{Outcome, run};
 use std::path::Path;
-use std::time::Duration;
-
-/// A command that waits for a pipe or reads a device would be ended after this, with no status at all.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-/// Exit status, and what it said.
-fn run(folder: &Path, line: &str) -> (Option<i32>, String) {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split_whitespace()).timeout(PATIENCE);
-    for name in ["XDG_CONFIG_HOME", "XDG_CACHE_HOME"] {
-        command.env(name, folder.join(name));
-    }
-    let output = command.output().unwrap();
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
-}
 
 #[derive(Clone, Copy, Debug)]
 enum NoFile {
@@ -79,7 +64,7 @@ fn nothing_but_regular_files_is_read() {
             write("uses-sky.ron", &scene("environment: image(file: \"a.hdr\")"));
             write("uses-library.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
             kind.make(&folder.path().join(name));
-            let (status, said) = run(folder.path(), line);
+            let Outcome { status, err: said, .. } = run(folder.path(), line);
             assert_eq!(status, Some(expected), "{kind:?} {line}: {said}");
             assert!(said.lines().any(|line| line.contains(name)), "{kind:?} {line}: {said}");
         }
@@ -104,7 +89,7 @@ fn settings_and_views_that_are_no_files_stop_nothing() {
             std::fs::remove_file(&file).unwrap()
         }
         kind.make(&file);
-        let (status, said) = run(folder.path(), line);
+        let Outcome { status, err: said, .. } = run(folder.path(), line);
         assert!(status == Some(1) && said.contains("cannot be read"), "{kind:?}: {said}");
         assert!(said.contains("has no bookmark 1"), "{kind:?}: {said}");
     }
@@ -124,7 +109,7 @@ fn what_is_too_long_is_refused_before_it_is_read() {
         let file = std::fs::File::create(folder.path().join(name)).unwrap();
         // Sparse: it takes no room on the disk.
         file.set_len(1 << 40).unwrap();
-        let (status, said) = run(folder.path(), line);
+        let Outcome { status, err: said, .. } = run(folder.path(), line);
         assert_eq!(status, Some(1), "{line}: {said}");
         assert!(said.contains("is larger than") && said.contains("FIRSTLIGHT_LIMITS"), "{line}: {said}");
     }
@@ -147,13 +132,13 @@ fn recordings_with_endless_lines_are_refused_by_the_line() {
         (String::new(), "a.rec: is not a recording"),
     ] {
         std::fs::write(&path, text).unwrap();
-        let (status, said) = run(folder.path(), "--replay a.rec -o out.png");
+        let Outcome { status, err: said, .. } = run(folder.path(), "--replay a.rec -o out.png");
         assert!(status == Some(1) && said.contains(expected), "{expected}: {said}");
         assert!(said.len() < 1000, "a message is for people: {} bytes", said.len());
         assert!(!folder.path().join("out.png").exists());
     }
     std::fs::write(&path, b"\xff\xfe(\n").unwrap();
-    assert!(run(folder.path(), "--replay a.rec -o out.png").1.contains("a.rec: is not a recording"));
+    assert!(run(folder.path(), "--replay a.rec -o out.png").err.contains("a.rec: is not a recording"));
 }
 
 #[test]
@@ -162,7 +147,7 @@ fn a_recording_with_a_byte_order_mark_or_a_cut_end_is_played() {
     let lines = "Opened(0,1,\"\")\nEnd(1,1)\n";
     for text in [format!("\u{feff}{HEADER}\r\n{lines}"), format!("{HEADER}\n{lines}Do(2,0.")] {
         std::fs::write(folder.path().join("a.rec"), text).unwrap();
-        let (status, said) = run(folder.path(), "--replay a.rec -o out.png");
+        let Outcome { status, err: said, .. } = run(folder.path(), "--replay a.rec -o out.png");
         assert_eq!(status, Some(0), "{said}");
         std::fs::remove_file(folder.path().join("out.png")).unwrap();
     }

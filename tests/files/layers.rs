@@ -1,29 +1,16 @@
 //! Pictures with layers, read back by the library that other programs use too, and films that keep what layers are made
 //! of.
 
-use assert_cmd::Command;
+use crate::program::{does, run};
 use exr::prelude::{AttributeValue, FlatSamples, ReadChannels, ReadLayers, read};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Output;
-
-fn run(folder: &Path, line: &str) -> Output {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split_whitespace()).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    command.output().unwrap()
-}
-
-#[track_caller]
-fn does(folder: &Path, line: &str) {
-    let output = run(folder, line);
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-}
 
 #[track_caller]
 fn refused(folder: &Path, line: &str) -> String {
-    let output = run(folder, line);
-    assert!(!output.status.success(), "{line}");
-    String::from_utf8(output.stderr).unwrap()
+    let outcome = run(folder, line);
+    assert_ne!(outcome.status, Some(0), "{line}");
+    outcome.err
 }
 
 /// Channels by name, and the texts of the header.
@@ -93,9 +80,8 @@ fn a_film_that_is_opened_again_denoises_to_the_same_image() {
     let merge = "merge part-2.exr part-1.exr --overwrite -o merged.exr --image image.exr";
     does(path, &format!("{merge} {layers}"));
     assert!(of("image.exr") == of("at-once.exr"), "by merge");
-    let refused = run(path, &format!("{merge} --denoiser own"));
-    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success() && message.contains("--layers denoised"), "{message}");
+    let message = refused(path, &format!("{merge} --denoiser own"));
+    assert!(message.contains("--layers denoised"), "{message}");
 }
 
 /// Names as other programs expect them; sizes, ranges and sums as they must be.
@@ -171,7 +157,7 @@ fn a_picture_with_layers_can_be_rendered_again() {
     does(path, "render cornell -o a.exr --size 16x16 --spp 2 --layers albedo,object");
     does(path, "render a.exr -o b.exr --layers albedo,object");
     assert!(std::fs::read(path.join("a.exr")).unwrap() == std::fs::read(path.join("b.exr")).unwrap());
-    let stdout = run(path, "render a.exr -o - --format exr --layers albedo,object").stdout;
+    let stdout = run(path, "render a.exr -o - --format exr --layers albedo,object").bytes;
     assert!(
         layers_of(&path.join("a.exr")).0 == {
             std::fs::write(path.join("c.exr"), stdout).unwrap();
@@ -189,7 +175,7 @@ fn films_keep_layers_through_resuming_and_merging() {
     let scene = "render cornell-balls --size 40x33 --uniform";
     does(path, &format!("{scene} --spp 4 -o whole.exr --film whole-film.exr --layers {ALL}"));
     let layers_told = |name: &str| -> Vec<String> {
-        let told = run(path, &format!("info {name} --json")).stdout;
+        let told = run(path, &format!("info {name} --json")).bytes;
         serde_json::from_value(serde_json::from_slice::<serde_json::Value>(&told).unwrap()["layers"].take()).unwrap()
     };
     assert_eq!(layers_told("whole.exr").join(","), ALL);

@@ -19,6 +19,8 @@ mod pbrt;
 mod pictures;
 mod ply_programs;
 mod ply_stl;
+#[path = "../common/program.rs"]
+mod program;
 mod save;
 mod scene;
 mod shared_lists;

@@ -1,28 +1,8 @@
 //! No command destroys what it reads, another of its outputs, or a film; and what is refused has not been touched.
 
-use assert_cmd::Command;
+use crate::program::{Outcome, does, fails, program, run};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Output;
-
-fn run(folder: &Path, line: &str) -> Output {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(line.split_whitespace());
-    // Settings of the machine are left alone.
-    for variable in ["DISPLAY", "WAYLAND_DISPLAY"] {
-        command.env_remove(variable);
-    }
-    command.env("XDG_CONFIG_HOME", folder.join("../config")).env("XDG_CACHE_HOME", folder.join("../cache"));
-    command.output().unwrap()
-}
-
-#[track_caller]
-fn does(folder: &Path, line: &str) -> String {
-    let output = run(folder, line);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{line}: {said}");
-    said
-}
 
 /// Every file and its bytes.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -34,9 +14,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[track_caller]
 fn refused(folder: &Path, line: &str, status: i32) -> String {
     let before = contents(folder);
-    let output = run(folder, line);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+    let said = fails(folder, line, status);
     assert_eq!(said.lines().count(), 1, "{line}: {said}");
     let after = contents(folder);
     let names = |files: &BTreeMap<PathBuf, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
@@ -167,15 +145,14 @@ fn a_film_is_replaced_by_nothing_that_lacks_its_samples() {
 fn a_render_says_what_it_replaces() {
     let (_folder, path) = room();
     let line = "render room.ron -o a.png --spp 2";
-    assert!(!does(&path, line).contains("replaced"));
-    assert!(does(&path, line).contains("replaced the existing a.png"));
-    let out = run(&path, &format!("{line} --error-image e.exr --json"));
-    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(!does(&path, line).err.contains("replaced"));
+    assert!(does(&path, line).err.contains("replaced the existing a.png"));
+    let json = run(&path, &format!("{line} --error-image e.exr --json")).json();
     assert_eq!(json["replaced"], serde_json::json!(["a.png"]));
-    let said = does(&path, &format!("{line} --error-image e.exr"));
+    let said = does(&path, &format!("{line} --error-image e.exr")).err;
     assert!(said.contains("replaced the existing a.png, e.exr"), "{said}");
     std::fs::write(path.join("turn-0002.png"), "old").unwrap();
-    let said = does(&path, "render room.ron -o turn.png --spp 1 --turntable 3");
+    let said = does(&path, "render room.ron -o turn.png --spp 1 --turntable 3").err;
     assert!(said.contains("3 frames, replacing 1 existing file"), "{said}");
 }
 
@@ -221,10 +198,9 @@ fn a_film_has_one_process_at_a_time() {
         }
         // Also by another name, and as an output of another kind.
         for other in ["--film ./a.exr -o b.png", "--film a.exr --resume -o b.png", "-o a.exr"] {
-            let output = run(&path, &format!("render room.ron --spp 1 {other}"));
-            let said = String::from_utf8_lossy(&output.stderr);
+            let said = fails(&path, &format!("render room.ron --spp 1 {other}"), 1);
             let expected = said.contains("is being written by another process") || said.contains("is a film");
-            assert!(output.status.code() == Some(1) && (expected || said.contains("already exists")), "{said}");
+            assert!(expected || said.contains("already exists"), "{said}");
         }
         let kill = Command::new("kill").args(["-INT", &first.id().to_string()]).status().unwrap();
         assert!(kill.success());
@@ -297,12 +273,8 @@ fn names_of_any_bytes_are_read_and_written() {
         OsString::from_vec(bytes.collect())
     };
     let run = |line: &str, status: i32| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        command.current_dir(&path).args(line.split(' ').map(odd)).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-        command.env("XDG_CONFIG_HOME", folder.path().join("config")).env("XDG_CACHE_HOME", folder.path().join("cache"));
-        let output = command.output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(status), "{line}: {said}");
+        let Outcome { status: found, err: said, .. } = Outcome::of(program(&path).args(line.split(' ').map(odd)));
+        assert_eq!(found, Some(status), "{line}: {said}");
         assert!(!said.contains("warning"), "{line}: {said}");
         said
     };
@@ -353,8 +325,7 @@ fn names_of_any_bytes_are_read_and_written() {
 #[test]
 fn an_error_that_is_meant_in_per_cent_is_not_taken_for_a_share() {
     let (_folder, path) = room();
-    let said = run(&path, "render room.ron -o a.png --error 5");
-    let said = String::from_utf8(said.stderr).unwrap();
+    let said = run(&path, "render room.ron -o a.png --error 5").err;
     assert!(said.contains("5 means 500 %: write 5% for 5 percent"), "{said}");
     assert!(!path.join("a.png").exists());
     does(&path, "render room.ron -o a.png --error 5%");

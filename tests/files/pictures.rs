@@ -1,32 +1,7 @@
 //! Pictures and films that can be gone on with, through the program: open, resume, merge, stop.
 
-use assert_cmd::Command;
+use crate::program::{does, fails, run};
 use std::path::Path;
-use std::process::Output;
-
-fn run(folder: &Path, args: &[&str]) -> Output {
-    let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).args(args).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    command.output().unwrap()
-}
-
-/// Runs a command that must succeed, and gives back what it says beside its result.
-#[track_caller]
-fn does(folder: &Path, line: &str) -> String {
-    let output = run(folder, &line.split_whitespace().collect::<Vec<_>>());
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{line}: {said}");
-    said
-}
-
-/// Runs a command that must fail with this status, and gives back what it says.
-#[track_caller]
-fn fails(folder: &Path, line: &str, status: i32) -> String {
-    let output = run(folder, &line.split_whitespace().collect::<Vec<_>>());
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{line}: {said}");
-    said
-}
 
 /// Two files hold the same bytes.
 #[track_caller]
@@ -81,8 +56,7 @@ fn a_picture_opens_as_the_scene_that_it_shows_and_renders_to_the_same_bytes() {
     // Without a display the picture opens as a picture.
     does(path, "first.png --size 8x6");
     assert_eq!(image::image_dimensions(path.join("firstlight-first.png")).unwrap(), (8, 6));
-    let said = run(path, &["info", "first.png"]);
-    assert!(String::from_utf8(said.stdout).unwrap().contains("40 x 30, tent filter"));
+    assert!(run(path, "info first.png").out().contains("40 x 30, tent filter"));
 
     // It is found beside the picture too, and missed when it is nowhere.
     std::fs::create_dir(path.join("elsewhere")).unwrap();
@@ -90,7 +64,7 @@ fn a_picture_opens_as_the_scene_that_it_shows_and_renders_to_the_same_bytes() {
     let said = fails(path, "render elsewhere/first.png -o c.png", 1);
     assert!(said.contains("scenes/room.ron was not found"), "{said}");
     write_room(&path.join("elsewhere"));
-    let said = does(path, "render elsewhere/first.png -o elsewhere/c.png");
+    let said = does(path, "render elsewhere/first.png -o elsewhere/c.png").err;
     assert!(!said.contains("changed"), "{said}");
 }
 
@@ -100,19 +74,19 @@ fn a_scene_that_has_changed_since_the_picture_is_noticed() {
     let path = folder.path();
     write_room(path);
     does(path, "render room.ron -o a.png --size 20x15 --spp 1");
-    assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
+    assert_eq!(does(path, "render a.png -o b.png").err.lines().count(), 1, "nothing but what was written");
     // Another camera or size in the file changes nothing: the picture has its own.
     std::fs::write(path.join("room.ron"), ROOM.replace("eye: (0.3, 1, 4)", "eye: (0.4, 1, 4)")).unwrap();
-    assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
+    assert_eq!(does(path, "render a.png -o b.png").err.lines().count(), 1, "nothing but what was written");
     assert_equal(path, "a.png", "b.png");
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
-    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the image was rendered"));
+    assert!(does(path, "render a.png -o b.png").err.contains("room.ron has changed since the image was rendered"));
     // A vertex of the mesh moves.
     std::fs::write(path.join("room.ron"), ROOM).unwrap();
-    assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
+    assert_eq!(does(path, "render a.png -o b.png").err.lines().count(), 1, "nothing but what was written");
     let tent = std::fs::read_to_string(path.join("tent.obj")).unwrap().replace("v 0 1 0", "v 0 1.001 0");
     std::fs::write(path.join("tent.obj"), tent).unwrap();
-    assert!(does(path, "render a.png -o b.png").contains("has changed since"));
+    assert!(does(path, "render a.png -o b.png").err.contains("has changed since"));
     // What is no picture of ours says so.
     image::RgbImage::new(4, 4).save(path.join("plain.png")).unwrap();
     assert!(fails(path, "render plain.png -o b.png", 1).contains("plain.png: it has no embedded firstlight scene"));

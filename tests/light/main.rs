@@ -21,6 +21,8 @@ mod motion_blur;
 mod orthographic;
 mod phong;
 mod principled;
+#[path = "../common/program.rs"]
+mod program;
 mod region;
 mod resampling;
 mod rough_glass;

@@ -2,8 +2,8 @@
 //! have in a whole picture of as many.
 
 use crate::common::*;
-use assert_cmd::Command;
-use firstlight::frame::{Command as Ask, Session, SessionOptions, StopAt, Target, read_film_file};
+use crate::program::{does, fails};
+use firstlight::frame::{Command, Session, SessionOptions, StopAt, Target, read_film_file};
 use firstlight::kdtree::Shape;
 use firstlight::render::{Environment, Film, Material, Prepared, Region, RenderSettings, advance, advance_region};
 use firstlight::scene::SceneSource;
@@ -129,7 +129,7 @@ fn a_session_gives_its_samples_to_the_region_until_it_is_cleared() {
     let finished = |session: &Session| session.status().done && session.is_idle();
     run_until(&mut session, &finished);
     let (few, restarts) = (session.film_snapshot().unwrap(), session.status().restarts);
-    session.send(Ask::SetRegion { region: Some([0.4, 0.4, 0.5, 0.6]) });
+    session.send(Command::SetRegion { region: Some([0.4, 0.4, 0.5, 0.6]) });
     session.world_mut().resource_mut::<StopAt>().0 = spp(64);
     run_until(&mut session, &|session| finished(session) && session.status().region.is_some_and(|(_, spp)| spp == 64));
     let region = Region { start: UVec2::new(32, 32), end: UVec2::new(64, 64) };
@@ -145,12 +145,12 @@ fn a_session_gives_its_samples_to_the_region_until_it_is_cleared() {
     let kept = session.keep_film().recv_timeout(Duration::from_secs(60)).unwrap();
     assert_eq!((kept.spp(), kept.max_spp()), (8, 64));
     // It stays over a restart, once every pixel has a sample.
-    session.send(Ask::Restart);
+    session.send(Command::Restart);
     run_until(&mut session, &|session| {
         finished(session) && session.status().restarts > restarts && session.status().region.is_some()
     });
     assert_eq!((session.status().spp, session.status().region), (1, Some((region, 64))));
-    session.send(Ask::SetRegion { region: None });
+    session.send(Command::SetRegion { region: None });
     run_until(&mut session, &|session| finished(session) && session.status().spp == 64);
     assert_eq!(session.status().region, None);
     let whole = session.film_snapshot().unwrap();
@@ -161,12 +161,7 @@ fn a_session_gives_its_samples_to_the_region_until_it_is_cleared() {
 #[test]
 fn the_program_goes_on_with_a_part_of_a_film() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |args: &str| {
-        let mut command = Command::cargo_bin("firstlight").unwrap();
-        let output = command.current_dir(folder.path()).args(args.split_whitespace()).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-    };
-    let done = |args: &str| assert_eq!(run(args).0, Some(0), "{args}: {}", run(args).1);
+    let done = |line: &str| drop(does(folder.path(), line));
     done("render cornell -o a.png --film a.exr --size 96x64 --spp 8 --uniform");
     done("render cornell -o a.png --film a.exr --size 96x64 --spp 24 --resume --region 40,10,10,10");
     let film = read_film_file(&folder.path().join("a.exr")).unwrap().film;
@@ -178,8 +173,11 @@ fn the_program_goes_on_with_a_part_of_a_film() {
     done("render cornell -o c.png --film c.exr --size 96x64 --spp 4 --region 0,0,1,1");
     let film = read_film_file(&folder.path().join("c.exr")).unwrap().film;
     assert_eq!([film.samples(31, 31), film.samples(32, 31)], [4, 1]);
-    let (code, errors) = run("render cornell -o d.png --size 96x64 --region 96,0,10,10");
-    assert!(code == Some(2) && errors.contains("--region"), "{code:?} {errors}");
-    let (code, errors) = run("render cornell -o d.png --region 1,2,3");
-    assert!(code == Some(2) && errors.contains("X,Y,W,H"), "{code:?} {errors}");
+    for (line, expected) in [
+        ("render cornell -o d.png --size 96x64 --region 96,0,10,10", "--region"),
+        ("render cornell -o d.png --region 1,2,3", "X,Y,W,H"),
+    ] {
+        let said = fails(folder.path(), line, 2);
+        assert!(said.contains(expected), "{said}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
 use crate::driver::{Drive, Driver};
+use crate::program::{Outcome, does, program};
 use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
 use firstlight::scene::{
     ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
@@ -70,10 +71,8 @@ impl Driver {
 fn a_film_opens_as_its_scene_only_if_it_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let film = folder.path().join("film.exr");
-    let render = ["render", "cornell", "-o", "a.png", "--film", "film.exr", "--size", "16x16", "--spp", "2"];
-    let program = env!("CARGO_BIN_EXE_firstlight");
-    let done = std::process::Command::new(program).args(render).current_dir(folder.path()).output().unwrap();
-    assert!(done.status.success(), "{done:?}");
+    let render = "render cornell -o a.png --film film.exr --size 16x16 --spp 2";
+    does(folder.path(), render);
     let whole = std::fs::read(&film).unwrap();
     let place = whole.windows(7).position(|part| part == b"seed: 0").expect("the note has the seed");
     let mut edited = whole.clone();
@@ -241,9 +240,8 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     let cut = &text[..text.trim_end().len() - 3];
     std::fs::write(&recording, cut).unwrap();
     let run = |args: &[&str]| {
-        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-        let output = command.current_dir(path).args(args).output().unwrap();
-        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+        let outcome = Outcome::of(program(path).args(args));
+        (outcome.status, outcome.err)
     };
     let (status, said) = run(&["--replay", "session.rec", "-o", "a.exr", "--spp", "5", "--threads", "1"]);
     let broken = "warning: the recording is incomplete: its last line is not the end of a session\n";
@@ -280,10 +278,8 @@ fn a_camera_that_moves_is_rendered_to_numbered_pictures() {
     let path = folder.path();
     write_room(path);
     let run = |line: &str| {
-        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-        command.current_dir(path).args(line.split(' ')).env("XDG_CONFIG_HOME", path.join("config"));
-        let output = command.output().unwrap();
-        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+        let outcome = Outcome::of(program(path).args(line.split(' ')).env("XDG_CONFIG_HOME", path.join("config")));
+        (outcome.status, outcome.err)
     };
     let (status, said) = run("render room.ron -o turn.png --turntable 3 --size 20x15 --spp 2");
     assert_eq!(status, Some(0), "{said}");

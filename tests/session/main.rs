@@ -5,6 +5,8 @@ mod edit;
 mod keys;
 mod lists;
 mod living_files;
+#[path = "../common/program.rs"]
+mod program;
 mod properties;
 #[path = "../common/random.rs"]
 mod random;
