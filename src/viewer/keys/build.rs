@@ -5,6 +5,14 @@ use crate::render::Inspection;
 use crate::viewer::keys::binding::{Action, Chord, Item, Menu, Motion, Trigger, Typed};
 use winit::keyboard::{KeyCode, NamedKey};
 
+/// A line: its effect, and its triggers.
+macro_rules! row {
+    ($effect:literal, $($trigger:expr),+ $(,)?) => {
+        $crate::viewer::keys::binding::Binding { triggers: &[$($trigger),+], effect: $effect }
+    };
+}
+pub(super) use row;
+
 pub const fn hold(key: KeyCode, motion: Motion) -> Trigger {
     Trigger::Hold(key, motion)
 }

@@ -3,7 +3,7 @@
 
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::build::{edit, named, send, shifted, text};
+use crate::viewer::keys::build::{edit, named, row, send, shifted, text};
 use crate::viewer::keys::table::BINDINGS;
 use winit::keyboard::NamedKey;
 
@@ -16,22 +16,19 @@ static BLENDER: &[KeyGroup] = &[
     KeyGroup {
         title: "Blender: navigate",
         bindings: &[
-            Binding {
-                triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")],
-                effect: "orbit around the pivot",
-            },
-            Binding {
-                triggers: &[Trigger::Mouse("Shift+middle drag"), Trigger::Mouse("Shift+Alt+drag")],
-                effect: "pan: move sideways, up, down",
-            },
-            Binding {
-                triggers: &[
-                    Trigger::Mouse("Wheel"),
-                    Trigger::Mouse("Ctrl+middle drag"),
-                    Trigger::Mouse("Ctrl+Alt+drag"),
-                ],
-                effect: "zoom: move nearer to, farther from the pivot",
-            },
+            row!(
+                "orbit around the pivot",
+                Trigger::Mouse("Middle drag"),
+                Trigger::Mouse("Alt+drag"),
+                Trigger::Mouse("Ctrl+drag")
+            ),
+            row!("pan: move sideways, up, down", Trigger::Mouse("Shift+middle drag"), Trigger::Mouse("Shift+Alt+drag")),
+            row!(
+                "zoom: move nearer to, farther from the pivot",
+                Trigger::Mouse("Wheel"),
+                Trigger::Mouse("Ctrl+middle drag"),
+                Trigger::Mouse("Ctrl+Alt+drag")
+            ),
             FLY,
             FLY_SPEED,
         ],
@@ -39,34 +36,25 @@ static BLENDER: &[KeyGroup] = &[
     KeyGroup {
         title: "Blender: edit",
         bindings: &[
-            Binding {
-                triggers: &[
-                    text("g", Action::Grab(gizmo::Mode::Move)),
-                    text("r", Action::Grab(gizmo::Mode::Turn)),
-                    text("s", Action::Grab(gizmo::Mode::Scale)),
-                ],
-                effect: "move, rotate, scale the selection with the mouse",
-            },
-            Binding {
-                triggers: &[Trigger::Mouse("then X, Y, Z"), Trigger::Mouse("or a number")],
-                effect: "lock an axis (with Shift: all but it); the amount",
-            },
-            Binding {
-                triggers: &[Trigger::Mouse("Enter or click"), Trigger::Mouse("Esc or right click")],
-                effect: "keep, restore",
-            },
-            Binding { triggers: &[text("x", DELETE), named(NamedKey::Delete, DELETE)], effect: "delete the selection" },
-            Binding {
-                triggers: &[shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))],
-                effect: "select everything",
-            },
-            Binding {
-                triggers: &[
-                    shifted(Typed::Text("d"), true, Action::Send(Command::Edit(Edit::Duplicate))),
-                    edit("d", None, Edit::Duplicate),
-                ],
-                effect: "duplicate the selection",
-            },
+            row!(
+                "move, rotate, scale the selection with the mouse",
+                text("g", Action::Grab(gizmo::Mode::Move)),
+                text("r", Action::Grab(gizmo::Mode::Turn)),
+                text("s", Action::Grab(gizmo::Mode::Scale))
+            ),
+            row!(
+                "lock an axis (with Shift: all but it); the amount",
+                Trigger::Mouse("then X, Y, Z"),
+                Trigger::Mouse("or a number")
+            ),
+            row!("keep, restore", Trigger::Mouse("Enter or click"), Trigger::Mouse("Esc or right click")),
+            row!("delete the selection", text("x", DELETE), named(NamedKey::Delete, DELETE)),
+            row!("select everything", shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))),
+            row!(
+                "duplicate the selection",
+                shifted(Typed::Text("d"), true, Action::Send(Command::Edit(Edit::Duplicate))),
+                edit("d", None, Edit::Duplicate)
+            ),
         ],
     },
 ];
@@ -75,26 +63,19 @@ static MAYA: &[KeyGroup] = &[
     KeyGroup {
         title: "Maya: navigate",
         bindings: &[
-            Binding {
-                triggers: &[Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")],
-                effect: "orbit around the pivot",
-            },
-            Binding {
-                triggers: &[
-                    Trigger::Mouse("Alt+middle drag"),
-                    Trigger::Mouse("Ctrl+middle drag"),
-                    Trigger::Mouse("Middle drag"),
-                ],
-                effect: "pan: move sideways, up, down",
-            },
-            Binding {
-                triggers: &[
-                    Trigger::Mouse("Wheel"),
-                    Trigger::Mouse("Alt+right drag"),
-                    Trigger::Mouse("Ctrl+right drag"),
-                ],
-                effect: "zoom: move nearer to, farther from the pivot",
-            },
+            row!("orbit around the pivot", Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")),
+            row!(
+                "pan: move sideways, up, down",
+                Trigger::Mouse("Alt+middle drag"),
+                Trigger::Mouse("Ctrl+middle drag"),
+                Trigger::Mouse("Middle drag")
+            ),
+            row!(
+                "zoom: move nearer to, farther from the pivot",
+                Trigger::Mouse("Wheel"),
+                Trigger::Mouse("Alt+right drag"),
+                Trigger::Mouse("Ctrl+right drag")
+            ),
             FLY,
             FLY_SPEED,
         ],
@@ -102,23 +83,22 @@ static MAYA: &[KeyGroup] = &[
     KeyGroup {
         title: "Maya: edit",
         bindings: &[
-            Binding { triggers: &[text("q", Action::Gizmo(None))], effect: "handles: none" },
-            Binding { triggers: &[text("w", Action::Gizmo(Some(gizmo::Mode::Move)))], effect: "handles: move" },
-            Binding { triggers: &[text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))], effect: "handles: rotate" },
-            Binding { triggers: &[text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))], effect: "handles: scale" },
-            Binding { triggers: &[send("a", Command::FrameAll)], effect: "frame the selection, or the whole scene" },
+            row!("handles: none", text("q", Action::Gizmo(None))),
+            row!("handles: move", text("w", Action::Gizmo(Some(gizmo::Mode::Move)))),
+            row!("handles: rotate", text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))),
+            row!("handles: scale", text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))),
+            row!("frame the selection, or the whole scene", send("a", Command::FrameAll)),
         ],
     },
 ];
 
-const FLY: Binding = Binding {
-    triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("with W A S D Q E")],
-    effect: "look around and fly; Shift: four times as fast",
-};
-const FLY_SPEED: Binding = Binding {
-    triggers: &[Trigger::Mouse("Right drag + wheel"), Trigger::Mouse("Ctrl+wheel")],
-    effect: "change the flying speed",
-};
+const FLY: Binding = row!(
+    "look around and fly; Shift: four times as fast",
+    Trigger::Mouse("Right drag"),
+    Trigger::Mouse("with W A S D Q E")
+);
+const FLY_SPEED: Binding =
+    row!("change the flying speed", Trigger::Mouse("Right drag + wheel"), Trigger::Mouse("Ctrl+wheel"));
 
 /// The groups of a preset.
 pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {
