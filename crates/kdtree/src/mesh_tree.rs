@@ -83,15 +83,26 @@ impl Triangles {
     }
 }
 
-/// The builder's view of a mesh.
-struct LeafTriangles<'a> {
-    positions: &'a [Vec3],
-    triangles: &'a [[u32; 3]],
+/// The builder's view of triangles.
+pub(super) struct LeafTriangles<'a> {
+    pub positions: &'a [Vec3],
+    pub triangles: &'a [[u32; 3]],
+    /// First triangle of each mesh: equal triangles of one mesh are one.
+    pub firsts: &'a [u32],
 }
 
 impl LeafTriangles<'_> {
-    fn vertices(&self, prim: u32) -> [Vec3; 3] {
+    #[inline]
+    pub fn vertices(&self, prim: u32) -> [Vec3; 3] {
         self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// A tree over them.
+    pub fn tree(&self, config: &BuildConfig) -> BlockTree<TriangleBlock> {
+        let vertices = |prim| self.vertices(prim);
+        let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
+        let make_compact = |prims: &[u32]| SharedBlock::pack_if_small(prims, vertices);
+        BlockTree::build(self, config, make_block, make_compact)
     }
 }
 
@@ -109,18 +120,20 @@ impl Primitives for LeafTriangles<'_> {
     }
 
     fn shape(&self, prim: u32) -> Option<[u32; 10]> {
-        Some(triangle_bits(self.vertices(prim), 0))
+        // A copy in another mesh may outlive this one.
+        let mesh = self.firsts.partition_point(|&first| first <= prim) as u32;
+        Some(triangle_bits(self.vertices(prim), mesh))
     }
 }
 
 /// Bounds of a triangle; empty if no ray can hit it.
-pub(super) fn triangle_bounds([a, b, c]: [Vec3; 3]) -> Aabb {
+fn triangle_bounds([a, b, c]: [Vec3; 3]) -> Aabb {
     // With two equal vertices the edge functions cancel exactly, so no ray can hit.
     if a == b || b == c || c == a { Aabb::EMPTY } else { Aabb::from_points([a, b, c]) }
 }
 
 /// The bits of a triangle for [`Primitives::shape`], among triangles of the same group.
-pub(super) fn triangle_bits(vertices: [Vec3; 3], group: u32) -> [u32; 10] {
+fn triangle_bits(vertices: [Vec3; 3], group: u32) -> [u32; 10] {
     let [a, b, c] = vertices.map(|vertex| vertex.to_array().map(f32::to_bits));
     [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], group]
 }
@@ -141,7 +154,7 @@ impl MeshTree {
     pub fn deferred(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
         assert!(triangles.len() < MAX_PRIMS, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
-        let view = LeafTriangles { positions: &positions, triangles: &triangles };
+        let view = LeafTriangles { positions: &positions, triangles: &triangles, firsts: &[] };
         let boxes = (0..triangles.len() as u32).map(|prim| view.bounds(prim));
         let bounds = boxes.fold(Aabb::EMPTY, |all, one| if one.is_empty() { all } else { all.union(one) });
         let mesh = Arc::new(Triangles { positions, triangles, bounds });
@@ -183,11 +196,7 @@ impl MeshTree {
         }
         // Not by `get_or_init`: while this thread waits for its helpers, it may take over work that asks for this tree.
         let Triangles { positions, triangles, .. } = &*self.mesh;
-        let view = LeafTriangles { positions, triangles };
-        let vertices = |prim| view.vertices(prim);
-        let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
-        let make_compact = |prims: &[u32]| SharedBlock::pack_if_small(prims, vertices);
-        let built = Arc::new(BlockTree::build(&view, &self.config, make_block, make_compact));
+        let built = Arc::new(LeafTriangles { positions, triangles, firsts: &[] }.tree(&self.config));
         self.blocks.get_or_init(|| built)
     }
 

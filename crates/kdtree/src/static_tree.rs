@@ -10,13 +10,10 @@
 use super::MeshTree;
 use super::block_tree::BlockTree;
 use super::blocks::TriangleBlock;
-use super::build::clip_triangle;
 use super::leaf::{BLOCK, MAX_PRIMS};
-use super::mesh_tree::{BuildPreset, Triangles, triangle_bits, triangle_bounds};
+use super::mesh_tree::{BuildPreset, LeafTriangles, Triangles};
 use super::present::PresentPrimitives;
-use super::reference::Primitives;
 use super::shape::{HitSpace, Shape, transform_point};
-use super::shared_block::SharedBlock;
 use crate::geometry::Aabb;
 use glam::{Affine3A, Vec3};
 use rayon::prelude::*;
@@ -65,11 +62,10 @@ impl StaticTree {
             n_triangles += member.mesh.triangles.len();
             assert!(n_triangles < MAX_PRIMS, "more than 2^31 triangles");
         }
-        let view = PlacedTriangles::new(&members);
-        let vertices = |prim| view.vertices(prim);
-        let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
-        let make_compact = |prims: &[u32]| SharedBlock::pack_if_small(prims, vertices);
-        let blocks = BlockTree::build(&view, &preset.config(BLOCK), make_block, make_compact);
+        let (positions, triangles) = all_triangles(&members);
+        let firsts: Vec<u32> = members.iter().map(|member| member.first).collect();
+        let view = LeafTriangles { positions: &positions, triangles: &triangles, firsts: &firsts };
+        let blocks = view.tree(&preset.config(BLOCK));
         let mut by_mesh: HashMap<usize, Vec<usize>> = HashMap::new();
         for (i, member) in members.iter().enumerate() {
             by_mesh.entry(address(&member.mesh)).or_default().push(i);
@@ -172,50 +168,17 @@ fn groups(members: Vec<Member>) -> Vec<Vec<Member>> {
     groups
 }
 
-/// The builder's view of the members: all their triangles, in the space of the snapshot.
-struct PlacedTriangles<'a> {
-    members: &'a [Member],
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-}
-
-impl<'a> PlacedTriangles<'a> {
-    fn new(members: &'a [Member]) -> Self {
-        let count = |of: fn(&Triangles) -> usize| members.iter().map(|member| of(&member.mesh)).sum();
-        let mut positions = Vec::with_capacity(count(|mesh| mesh.positions.len()));
-        let mut triangles = Vec::with_capacity(count(|mesh| mesh.triangles.len()));
-        for Member { mesh, world_from_object, .. } in members {
-            let first = positions.len() as u32;
-            triangles.par_extend(mesh.triangles.par_iter().map(|corners| corners.map(|vertex| first + vertex)));
-            positions.par_extend(mesh.positions.par_iter().map(|&at| transform_point(world_from_object, at)));
-        }
-        Self { members, positions, triangles }
+/// All vertices of the members in the space of the snapshot, and their triangles.
+fn all_triangles(members: &[Member]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let count = |of: fn(&Triangles) -> usize| members.iter().map(|member| of(&member.mesh)).sum();
+    let mut positions = Vec::with_capacity(count(|mesh| mesh.positions.len()));
+    let mut triangles = Vec::with_capacity(count(|mesh| mesh.triangles.len()));
+    for Member { mesh, world_from_object, .. } in members {
+        let first = positions.len() as u32;
+        triangles.par_extend(mesh.triangles.par_iter().map(|corners| corners.map(|vertex| first + vertex)));
+        positions.par_extend(mesh.positions.par_iter().map(|&at| transform_point(world_from_object, at)));
     }
-
-    #[inline]
-    fn vertices(&self, prim: u32) -> [Vec3; 3] {
-        self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
-    }
-}
-
-impl Primitives for PlacedTriangles<'_> {
-    fn len(&self) -> usize {
-        self.triangles.len()
-    }
-
-    fn bounds(&self, prim: u32) -> Aabb {
-        triangle_bounds(self.vertices(prim))
-    }
-
-    fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
-        clip_triangle(&self.vertices(prim), axis, limit, below, padding)
-    }
-
-    fn shape(&self, prim: u32) -> Option<[u32; 10]> {
-        // A copy in another member may outlive this one.
-        let member = self.members.partition_point(|member| member.first <= prim) as u32;
-        Some(triangle_bits(self.vertices(prim), member))
-    }
+    (positions, triangles)
 }
 
 /// A static tree in a scene: which object each of its members is.
