@@ -11,22 +11,14 @@ use crate::scene::{
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::selected::property_row;
 use crate::viewer::panel::state::{Asked, PanelState};
-use crate::viewer::panel::widgets::{choice, color, number, row, row_with_hint, rows, short_color, strength_drag};
+use crate::viewer::panel::widgets::{color, number, row, row_with_hint, rows, selectable, short_color, strength_drag};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
 
 impl Listed for LightEntry {
-    fn entity(&self) -> Entity {
-        self.entity
-    }
-
-    fn label(&self) -> &str {
-        &self.label
-    }
-
-    fn kind(&self) -> &str {
-        self.kind
+    fn listed(&self) -> (Entity, &str, &str) {
+        (self.entity, &self.label, self.kind)
     }
 }
 
@@ -36,13 +28,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
     let which = Which { id: "lights", revision: session.revision(), chosen: selection.active() };
     list(ui, &mut state.light_list, &which, &inventory.lights, |ui, entry| {
         emission(ui, session, entry, asked);
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(RichText::new(entry.kind).size(11.0).weak());
-            if choice(ui, selection.0.contains(&entry.entity), &entry.label).clicked() {
-                let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
-                asked.edit(Edit::Select { id: entry.entity.to_bits(), add });
-            }
-        });
+        selectable(ui, entry, selection, asked);
     });
     let environment = &session.inputs().environment;
     let light = &environment.light;

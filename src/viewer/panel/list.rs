@@ -8,10 +8,8 @@ use egui::{CursorIcon, Rect, Sense, Ui, vec2};
 
 /// An item that a list can show.
 pub trait Listed {
-    fn entity(&self) -> Entity;
-    fn label(&self) -> &str;
-    /// Additional text for searching.
-    fn kind(&self) -> &str;
+    /// Its entity, its label, and its kind, which is searched as well.
+    fn listed(&self) -> (Entity, &str, &str);
 }
 
 /// State of a list.
@@ -74,7 +72,7 @@ pub fn list<T: Listed>(
     let height = state.height.unwrap_or(ROWS * full).clamp(3.0 * full, all.max(3.0 * full));
     // An item chosen in the image is scrolled into view.
     let news = which.chosen.filter(|_| which.chosen != state.chosen);
-    let target = news.and_then(|entity| found.iter().position(|&i| items[i].entity() == entity));
+    let target = news.and_then(|entity| found.iter().position(|&i| items[i].listed().0 == entity));
     if target.is_some() || which.chosen.is_none() {
         state.chosen = which.chosen;
     }
@@ -133,7 +131,8 @@ fn grip(ui: &mut Ui) -> f32 {
 fn find<T: Listed>(items: &[T], filter: &str) -> Vec<usize> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     let has = |item: &T| {
-        let line = format!("{} {}", item.label(), item.kind()).to_lowercase();
+        let (_, label, kind) = item.listed();
+        let line = format!("{label} {kind}").to_lowercase();
         words.iter().all(|word| line.contains(word))
     };
     (0..items.len()).filter(|&i| words.is_empty() || has(&items[i])).collect()
@@ -144,16 +143,8 @@ mod tests {
     use super::*;
 
     impl Listed for (&str, &str) {
-        fn entity(&self) -> Entity {
-            Entity::PLACEHOLDER
-        }
-
-        fn label(&self) -> &str {
-            self.0
-        }
-
-        fn kind(&self) -> &str {
-            self.1
+        fn listed(&self) -> (Entity, &str, &str) {
+            (Entity::PLACEHOLDER, self.0, self.1)
         }
     }
 
@@ -186,16 +177,8 @@ mod tests {
     struct Thing(Entity, String);
 
     impl Listed for Thing {
-        fn entity(&self) -> Entity {
-            self.0
-        }
-
-        fn label(&self) -> &str {
-            &self.1
-        }
-
-        fn kind(&self) -> &str {
-            "ball"
+        fn listed(&self) -> (Entity, &str, &str) {
+            (self.0, &self.1, "ball")
         }
     }
 

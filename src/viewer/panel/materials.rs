@@ -13,16 +13,8 @@ use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 
 impl Listed for MaterialEntry {
-    fn entity(&self) -> Entity {
-        self.entity
-    }
-
-    fn label(&self) -> &str {
-        &self.label
-    }
-
-    fn kind(&self) -> &str {
-        "material"
+    fn listed(&self) -> (Entity, &str, &str) {
+        (self.entity, &self.label, "material")
     }
 }
 

@@ -6,21 +6,13 @@ use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::openable;
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::state::{Asked, PanelState};
-use crate::viewer::panel::widgets::choice;
+use crate::viewer::panel::widgets::selectable;
 use bevy_ecs::prelude::Entity;
-use egui::{RichText, Ui};
+use egui::Ui;
 
 impl Listed for ObjectEntry {
-    fn entity(&self) -> Entity {
-        self.entity
-    }
-
-    fn label(&self) -> &str {
-        &self.label
-    }
-
-    fn kind(&self) -> &str {
-        self.kind
+    fn listed(&self) -> (Entity, &str, &str) {
+        (self.entity, &self.label, self.kind)
     }
 }
 
@@ -29,13 +21,7 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
     let selection = session.world().resource::<Selection>();
     let which = Which { id: "objects", revision: session.revision(), chosen: selection.active() };
     list(ui, &mut state.object_list, &which, &inventory.objects, |ui, entry| {
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(RichText::new(entry.kind).size(11.0).weak());
-            if choice(ui, selection.0.contains(&entry.entity), &entry.label).clicked() {
-                let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
-                asked.edit(Edit::Select { id: entry.entity.to_bits(), add });
-            }
-        });
+        selectable(ui, entry, selection, asked);
     });
 }
 

@@ -4,8 +4,9 @@
 //! dragging at once.
 
 use crate::files::printable;
-use crate::frame::Edit;
+use crate::frame::{Edit, Selection};
 use crate::viewer::panel::hints::hint_of;
+use crate::viewer::panel::list::Listed;
 use crate::viewer::panel::state::Asked;
 use egui::{Color32, RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -172,6 +173,18 @@ fn of_hex(text: &str) -> Option<DVec3> {
     let color = Color32::from_hex(&format!("#{digits}")).ok().filter(|color| color.is_opaque())?;
     let linear = egui::Rgba::from(color);
     Some(DVec3::new(linear.r().into(), linear.g().into(), linear.b().into()))
+}
+
+/// The rest of the row of an object or a light: a click selects it, or with a modifier adds it to the selection.
+pub fn selectable<T: Listed>(ui: &mut Ui, item: &T, selection: &Selection, asked: &mut Asked) {
+    let (entity, label, kind) = item.listed();
+    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        ui.label(RichText::new(kind).size(11.0).weak());
+        if choice(ui, selection.0.contains(&entity), label).clicked() {
+            let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
+            asked.edit(Edit::Select { id: entity.to_bits(), add });
+        }
+    });
 }
 
 /// A number of any magnitude: each step of a drag changes it by the same ratio.
