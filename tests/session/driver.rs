@@ -1,6 +1,6 @@
 //! Runs the frames of a session, as a window does.
 
-use firstlight::frame::{Property, Session, SessionOptions};
+use firstlight::frame::{Command, Edit, Property, Session, SessionOptions};
 use firstlight::scene::{MaterialProperty, SceneSource};
 use std::time::{Duration, Instant};
 
@@ -21,6 +21,14 @@ pub trait Drive {
             std::thread::sleep(Duration::from_millis(3));
             let waits = start.elapsed() < Duration::from_secs(120);
             assert!(waits, "nothing came: {:?}", self.session().0.status());
+            self.frame();
+        }
+    }
+
+    /// Each in a frame of its own.
+    fn edit(&mut self, edits: impl IntoIterator<Item = Edit>) {
+        for edit in edits {
+            self.session().0.send(Command::Edit(edit));
             self.frame();
         }
     }

@@ -1,6 +1,6 @@
 //! Changing a scene through a session, without a window: selecting, editing, undoing, looking at it in other ways.
 
-use crate::driver::of_material;
+use crate::driver::{Drive, Driver, of_material};
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
@@ -14,45 +14,15 @@ use firstlight::scene::{
     Rgb, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
-use std::time::{Duration, Instant};
-
-struct Driver {
-    session: Session,
-    start: Instant,
-}
 
 impl Driver {
     /// A small picture of a scene, with two samples a pixel.
-    fn open(name: &str) -> Self {
+    fn builtin(name: &str) -> Self {
         let target = Target { spp: Some(2), ..Target::default() };
         let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
-        let mut driver = Self { session: Session::new(options).unwrap(), start: Instant::now() };
-        driver.session.open(SceneSource::Builtin(name.to_owned()));
-        driver.until(|session| session.status().done && session.is_idle());
+        let mut driver = Self::new(options, SceneSource::Builtin(name.to_owned()));
+        driver.settle();
         driver
-    }
-
-    fn frame(&mut self) {
-        self.session.update(self.start.elapsed());
-    }
-
-    #[track_caller]
-    fn until(&mut self, done: impl Fn(&Session) -> bool) {
-        let start = Instant::now();
-        self.frame();
-        while !done(&self.session) {
-            assert!(start.elapsed() < Duration::from_secs(120), "nothing came: {:?}", self.session.status());
-            std::thread::sleep(Duration::from_millis(2));
-            self.frame();
-        }
-    }
-
-    /// Each in a frame of its own.
-    fn edit(&mut self, edits: impl IntoIterator<Item = Edit>) {
-        for edit in edits {
-            self.session.send(Command::Edit(edit));
-            self.frame();
-        }
     }
 
     fn named(&self, name: &str) -> Entity {
@@ -81,7 +51,7 @@ impl Driver {
 
 #[test]
 fn clicking_selects_what_is_seen_there() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.edit([Edit::PickAt { x: 0.8, y: 0.95, add: false }]);
     assert_eq!(driver.selected().active(), Some(driver.named("floor")));
     driver.edit([Edit::PickAt { x: 0.2, y: 0.42, add: true }]);
@@ -95,7 +65,7 @@ fn clicking_selects_what_is_seen_there() {
 /// How the scene is rendered and shown is no edit: an undo after it undoes the edit before it.
 #[test]
 fn an_undo_leaves_the_integrator_and_the_exposure_alone() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let (before, exposure) = (driver.session.inputs().clone(), driver.session.status().display.exposure_stops);
     driver.select("gold ball");
     driver.edit([Edit::Move { by: DVec3::new(0.5, 0.25, -1.0) }]);
@@ -117,7 +87,7 @@ fn an_undo_leaves_the_integrator_and_the_exposure_alone() {
 
 #[test]
 fn a_material_stays_when_the_object_that_uses_it_is_deleted() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.edit([Edit::Add(NewThing::Sphere)]);
     let material = driver.get::<MaterialSlots>("ball").0[0];
     driver.edit([
@@ -131,13 +101,13 @@ fn a_material_stays_when_the_object_that_uses_it_is_deleted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("saved.ron");
     driver.session.send(Command::SaveScene { path: path.clone() });
-    driver.until(|session| !session.is_saving());
+    driver.run_until(|session| !session.is_saving());
     assert!(std::fs::read_to_string(path).unwrap().contains("leaf green"));
 }
 
 #[test]
 fn every_edit_can_be_undone_and_done_again_to_the_bit() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let mut states = vec![driver.session.inputs().clone()];
     let red = driver.named("red").to_bits();
     let ball = driver.select("gold ball");
@@ -180,7 +150,7 @@ fn every_edit_can_be_undone_and_done_again_to_the_bit() {
 
 #[test]
 fn a_drag_is_one_step_and_counts_from_where_it_began() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.select("red ball");
     let before: Placement = driver.get("red ball");
     driver.edit([Edit::Begin]);
@@ -211,7 +181,7 @@ fn a_drag_is_one_step_and_counts_from_where_it_began() {
 
 #[test]
 fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.edit([Edit::Add(NewThing::Sphere)]);
     assert_eq!(driver.selected().active(), Some(driver.named("ball")));
     let (shape, place): (Shape, Placement) = (driver.get("ball"), driver.get("ball"));
@@ -270,7 +240,7 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
 /// Each stands on something, in sight, and within nothing that was there before, not even when many were added.
 #[test]
 fn new_things_find_room() {
-    let mut driver = Driver::open("cornell-balls");
+    let mut driver = Driver::builtin("cornell-balls");
     for round in 0..6 {
         driver.edit([Edit::Add(NewThing::Sphere)]);
         let new = driver.selected().active().expect("what is new is selected");
@@ -297,7 +267,7 @@ fn new_things_find_room() {
 
 #[test]
 fn what_comes_back_is_selected_as_it_was_when_it_came() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.select("gold ball");
     let original = driver.selected().0.clone();
     driver.edit([Edit::Duplicate]);
@@ -321,13 +291,13 @@ fn what_comes_back_is_selected_as_it_was_when_it_came() {
 
 #[test]
 fn a_mesh_is_simplified_beside_the_picture() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let id = driver.named("serpent").to_bits();
     let whole: Shape = driver.get("serpent");
     let restarts = driver.session.status().restarts;
     driver.edit([Edit::Remesh { id, shading: MeshShading::Auto, ratio: 0.05 }]);
     assert!(!driver.session.is_idle() && driver.get::<Shape>("serpent") == whole, "the frame did not wait for it");
-    driver.until(|session| session.status().restarts > restarts && session.is_idle());
+    driver.run_until(|session| session.status().restarts > restarts && session.is_idle());
     let (shape, measure): (Shape, MeshMeasure) = (driver.get("serpent"), driver.get("serpent"));
     let Shape::Mesh(coarse) = shape else { panic!() };
     assert_eq!(measure.faces, coarse.triangles.len());
@@ -336,17 +306,17 @@ fn a_mesh_is_simplified_beside_the_picture() {
     assert!(deviation.mean() > 0.0 && deviation.max() < 0.2, "{deviation:?}");
     assert_eq!(driver.get::<MeshOrigin>("serpent").simplify, Some(0.05));
     driver.edit([Edit::Undo]);
-    driver.until(Session::is_idle);
+    driver.run_until(Session::is_idle);
     assert_eq!(driver.get::<Shape>("serpent"), whole);
     driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Builtin("torus".to_owned())))]);
-    driver.until(|session| session.inputs().objects.iter().any(|object| object.name.as_deref() == Some("torus")));
+    driver.run_until(|session| session.inputs().objects.iter().any(|object| object.name.as_deref() == Some("torus")));
     driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Obj("/no/such.obj".to_owned())))]);
-    driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
+    driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
 }
 
 #[test]
 fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let entity = driver.named("serpent");
     let id = entity.to_bits();
     let wanted = |driver: &Driver| wanted_mesh(driver.session.world(), entity);
@@ -362,99 +332,99 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
     assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
     driver.edit([Edit::Undo]);
-    driver.until(Session::is_idle);
+    driver.run_until(Session::is_idle);
     assert_eq!((wanted(&driver), count(&driver)), (before, n_objects), "the mesh was what came last, not the sphere");
     assert_eq!(driver.get::<Shape>("serpent"), whole);
     // What was done after it was asked for goes first.
     driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
     driver.edit([Edit::Add(NewThing::Sphere), Edit::Undo]);
     assert_eq!(count(&driver), n_objects);
-    driver.until(Session::is_idle);
+    driver.run_until(Session::is_idle);
     assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
     assert!(driver.get::<MeshMeasure>("serpent").faces <= driver.get::<MeshMeasure>("serpent").whole_faces / 20);
     // Nor does it begin again for what is so already.
     driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
     assert!(driver.session.status().loading.is_none());
     driver.edit([Edit::Undo]);
-    driver.until(Session::is_idle);
+    driver.run_until(Session::is_idle);
     assert_eq!((driver.get::<Shape>("serpent"), count(&driver)), (whole, n_objects));
 }
 
 /// Samples stay, the raw image comes back byte for byte, and what is displayed is named.
 #[test]
 fn the_denoised_image_keeps_all_samples_and_has_an_error() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let (raw, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
     assert_eq!(driver.session.picture().denoising, Denoising::Raw);
     driver.session.send(Command::SetDenoising(Denoising::Denoised));
-    driver.until(|session| session.status().denoised_error.is_some() && session.is_idle());
+    driver.run_until(|session| session.status().denoised_error.is_some() && session.is_idle());
     let denoised = driver.session.picture().rgba.clone();
     assert_ne!(denoised, raw);
     assert_eq!([driver.session.status().denoising, driver.session.picture().denoising], [Denoising::Denoised; 2]);
     driver.session.send(Command::SetDenoising(Denoising::Split));
-    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Split);
+    driver.run_until(|session| session.is_idle() && session.picture().denoising == Denoising::Split);
     let (picture, width) = (driver.session.picture(), 4 * driver.session.picture().width as usize);
     let middle = width / 8 * 4;
     for ((row, raw), denoised) in picture.rgba.chunks(width).zip(raw.chunks(width)).zip(denoised.chunks(width)) {
         assert_eq!((&row[..middle], &row[middle + 4..]), (&raw[..middle], &denoised[middle + 4..]));
     }
     driver.session.send(Command::NextDenoising);
-    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
+    driver.run_until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
     assert_eq!((&driver.session.picture().rgba, driver.session.status().denoised_error), (&raw, None));
     assert_eq!((driver.session.status().restarts, driver.session.status().spp), (restarts, 2));
     // A moving camera: the coarse image is smoothed, and named so.
     driver.session.send(Command::SetDenoising(Denoising::Denoised));
     driver.session.send(Command::Turn { yaw_deg: 5.0, pitch_deg: 0.0 });
-    driver.until(|session| session.status().restarts > restarts && session.status().denoised_error.is_some());
+    driver.run_until(|session| session.status().restarts > restarts && session.status().denoised_error.is_some());
 }
 
 /// Where the other filter is not installed, firstlight's own is used, and named.
 #[test]
 fn another_filter_denoises_the_same_samples() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let (raw, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
     driver.session.send(Command::SetDenoising(Denoising::Denoised));
-    driver.until(|session| session.status().denoised_error.is_some() && session.is_idle());
+    driver.run_until(|session| session.status().denoised_error.is_some() && session.is_idle());
     let own = driver.session.picture().rgba.clone();
     assert_eq!(driver.session.status().denoised_by, DenoiseFilter::Own);
     let is_installed = DenoiseFilter::Oidn.check().is_ok();
     let number = driver.session.picture().number;
     driver.session.send(Command::SetDenoiseFilter(DenoiseFilter::Oidn));
-    driver.until(|session| {
+    driver.run_until(|session| {
         session.picture().number > number && session.status().denoised_error.is_some() && session.is_idle()
     });
     let (other, by) = (driver.session.picture().rgba.clone(), driver.session.status().denoised_by);
     assert_eq!((other != own, by == DenoiseFilter::Oidn), (is_installed, is_installed));
     driver.session.send(Command::SetDenoising(Denoising::Raw));
-    driver.until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
+    driver.run_until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
     assert_eq!((&driver.session.picture().rgba, driver.session.status().restarts), (&raw, restarts));
 }
 
 #[test]
 fn looking_in_other_ways_keeps_all_samples() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let (picture, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
     let mut seen = vec![picture.clone()];
     for inspection in Inspection::ALL.into_iter().filter(|inspection| *inspection != Inspection::Picture) {
         let number = driver.session.picture().number;
         driver.session.send(Command::SetInspection(inspection));
-        driver.until(|session| session.picture().number > number && session.is_idle());
+        driver.run_until(|session| session.picture().number > number && session.is_idle());
         let rgba = driver.session.picture().rgba.clone();
         assert!(!seen.contains(&rgba), "{inspection:?} looks like another one");
         seen.push(rgba);
     }
     driver.session.send(Command::SetInspection(Inspection::Picture));
-    driver.until(|session| session.is_idle() && session.picture().rgba == picture);
+    driver.run_until(|session| session.is_idle() && session.picture().rgba == picture);
     driver.session.send(Command::SetSharpZone { shown: true });
-    driver.until(|session| session.is_idle() && session.picture().rgba != picture);
+    driver.run_until(|session| session.is_idle() && session.picture().rgba != picture);
     driver.session.send(Command::SetSharpZone { shown: false });
-    driver.until(|session| session.is_idle() && session.picture().rgba == picture);
+    driver.run_until(|session| session.is_idle() && session.picture().rgba == picture);
     assert_eq!((driver.session.status().restarts, driver.session.status().spp), (restarts, 2));
 }
 
 #[test]
 fn focus_stays_with_a_thing_and_views_can_be_come_back_to() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     driver.session.send(Command::FocusAt { x: 0.2, y: 0.42 });
     driver.session.send(Command::ToggleFocusLock);
     driver.frame();
@@ -489,7 +459,7 @@ fn focus_stays_with_a_thing_and_views_can_be_come_back_to() {
 
 #[test]
 fn focus_follows_a_place_of_the_picture_wherever_the_camera_goes() {
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let follow = |driver: &mut Driver, x: f64, y: f64| {
         driver.session.send(Command::FocusFollows { x, y });
         driver.frame();
@@ -520,7 +490,7 @@ fn colours_become_textures_and_textures_change() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("stripes.png");
     image::RgbImage::from_fn(4, 4, |x, _| image::Rgb([if x % 2 == 0 { 200 } else { 20 }; 3])).save(&file).unwrap();
-    let mut driver = Driver::open("gallery");
+    let mut driver = Driver::builtin("gallery");
     let id = driver.named("red").to_bits();
     let checker = |squares: f64| TextureSource::Checker {
         a: Rgb(Vec3::splat(0.7)),
@@ -546,11 +516,11 @@ fn colours_become_textures_and_textures_change() {
     // A picture is read beside.
     let picture = TextureSource::image(file.to_string_lossy().into_owned());
     driver.edit([Edit::Paint { id, part: picture.clone() }]);
-    driver.until(Session::is_idle);
+    driver.run_until(Session::is_idle);
     assert_eq!(texture(&driver), Some(("stripes".to_owned(), picture)));
     // It is saved, and all of it can be taken back.
     driver.session.send(Command::SaveScene { path: folder.path().join("painted.ron") });
-    driver.until(|session| session.is_idle() && folder.path().join("painted.ron").exists());
+    driver.run_until(|session| session.is_idle() && folder.path().join("painted.ron").exists());
     let text = std::fs::read_to_string(folder.path().join("painted.ron")).unwrap();
     assert!(text.contains("\"stripes.png\""), "{text}");
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
@@ -558,6 +528,6 @@ fn colours_become_textures_and_textures_change() {
     // What cannot be read is told, and changes nothing.
     let missing = TextureSource::image("nowhere.png".to_owned());
     driver.edit([Edit::Paint { id, part: missing }]);
-    driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
+    driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
 }

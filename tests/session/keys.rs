@@ -46,14 +46,6 @@ impl Driver {
         driver
     }
 
-    /// Each in a frame of its own.
-    fn edit(&mut self, edits: impl IntoIterator<Item = Edit>) {
-        for edit in edits {
-            self.session.send(Command::Edit(edit));
-            self.frame();
-        }
-    }
-
     fn go_to(&mut self, seconds: f64) {
         self.session.send(Command::SetMoment { seconds: Some(seconds) });
         self.frame();

@@ -1,6 +1,6 @@
 //! Lists of materials and lights, and what is done to all that share one, without a window.
 
-use crate::driver::of_material;
+use crate::driver::{Drive, of_material};
 use bevy_ecs::entity::Entity;
 use firstlight::format::property::SkyProperty;
 use firstlight::frame::{Command, Edit, History, Property, Selection, Session, SessionOptions, Target, sky_strength};
@@ -10,7 +10,7 @@ use firstlight::scene::{
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 const SCENE: &str = r#"(
     camera: (eye: (0, 1, 6), look_at: (0, 0.5, 0)),
@@ -39,6 +39,12 @@ struct Driver {
     _folder: tempfile::TempDir,
 }
 
+impl Drive for Driver {
+    fn session(&mut self) -> (&mut Session, Instant) {
+        (&mut self.session, self.start)
+    }
+}
+
 impl Driver {
     fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
@@ -48,21 +54,8 @@ impl Driver {
         let options = SessionOptions { width: 32, height: 32, threads: Some(1), target, ..SessionOptions::default() };
         let mut driver = Self { session: Session::new(options).unwrap(), start: Instant::now(), _folder: folder };
         driver.session.open(SceneSource::Scene(path));
-        while driver.session.inputs().objects.is_empty() {
-            assert!(driver.start.elapsed() < Duration::from_secs(60), "{:?}", driver.session.status().messages);
-            driver.frame();
-            std::thread::sleep(Duration::from_millis(2));
-        }
+        driver.run_until(|session| !session.inputs().objects.is_empty());
         driver
-    }
-
-    fn frame(&mut self) {
-        self.session.update(self.start.elapsed());
-    }
-
-    fn edit(&mut self, edit: Edit) {
-        self.session.send(Command::Edit(edit));
-        self.frame();
     }
 
     fn material(&self, inventory: &Inventory, name: &str) -> Entity {
@@ -110,16 +103,16 @@ fn a_shared_material_changes_on_all_that_share_it_and_they_can_be_selected() {
     let inventory = driver.session.inventory();
     let clay = driver.material(&inventory, "clay");
     let selected = |driver: &Driver| driver.session.world().resource::<Selection>().0.clone();
-    driver.edit(Edit::SelectUsers { material: clay.to_bits() });
+    driver.edit([Edit::SelectUsers { material: clay.to_bits() }]);
     assert_eq!(driver.labels(&inventory, &selected(&driver)), ["one", "two", "three"]);
     let before = selected(&driver);
-    driver.edit(Edit::SelectUsers { material: driver.material(&inventory, "spare").to_bits() });
+    driver.edit([Edit::SelectUsers { material: driver.material(&inventory, "spare").to_bits() }]);
     assert_eq!(selected(&driver), before, "what no object uses selects nothing, and says so");
     assert!(driver.session.status().messages.back().is_some_and(|message| message.text.contains("no object uses")));
     // One edit and one undo for all three.
     let restarts = driver.session.status().restarts;
     let value = DVec3::new(0.1, 0.8, 0.1);
-    driver.edit(Edit::Set { id: clay.to_bits(), property: of_material("albedo"), value });
+    driver.edit([Edit::Set { id: clay.to_bits(), property: of_material("albedo"), value }]);
     let color = |driver: &Driver| match SurfaceMaterial::of(driver.session.world(), clay) {
         Some(Material::Diffuse { albedo: ColorParam::Rgb(rgb) }) => *rgb,
         other => panic!("{other:?}"),
@@ -127,11 +120,11 @@ fn a_shared_material_changes_on_all_that_share_it_and_they_can_be_selected() {
     assert_eq!(color(&driver), value.as_vec3());
     assert_eq!(driver.session.status().restarts, restarts + 1);
     assert_eq!(driver.session.status().restart_cause, "material `clay`");
-    driver.edit(Edit::Undo);
+    driver.edit([Edit::Undo]);
     assert_eq!(color(&driver), Vec3::new(0.6, 0.3, 0.2));
     // With a copy of its own, one leaves the others.
     let one = before[0].to_bits();
-    driver.edit(Edit::OwnMaterial { id: one });
+    driver.edit([Edit::OwnMaterial { id: one }]);
     let inventory = driver.session.inventory();
     let users = |name: &str| inventory.material(driver.material(&inventory, name)).unwrap().users.len();
     assert_eq!((users("clay"), users("clay 2")), (2, 1));
@@ -147,7 +140,7 @@ fn lists_are_as_old_as_the_scene_and_not_as_the_camera() {
     assert_eq!(driver.session.revision(), revision, "a camera that moves makes no list wrong");
     let inventory = driver.session.inventory();
     let spare = driver.material(&inventory, "spare");
-    driver.edit(Edit::Rename { id: spare.to_bits(), name: "silver".to_owned() });
+    driver.edit([Edit::Rename { id: spare.to_bits(), name: "silver".to_owned() }]);
     assert_ne!(driver.session.revision(), revision, "no object uses it, and it is in the list all the same");
     driver.material(&driver.session.inventory(), "silver");
 }
@@ -157,16 +150,16 @@ fn the_sky_is_made_stronger_in_proportion() {
     let mut driver = Driver::open();
     let sky = |driver: &Driver| driver.session.inputs().environment.light.clone();
     assert_eq!(sky_strength(&sky(&driver)), 0.8);
-    driver.edit(Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(1.6) });
+    driver.edit([Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(1.6) }]);
     let Environment::Gradient { zenith, horizon, ground } = sky(&driver) else { panic!("it was a gradient") };
     for (new, old) in [(zenith, Vec3::new(0.2, 0.4, 0.8)), (horizon, Vec3::splat(0.5)), (ground, Vec3::splat(0.1))] {
         assert!(new.abs_diff_eq(2.0 * old, 1e-6), "{new} {old}");
     }
     assert_eq!(driver.session.world().resource::<History>().undo_label(), Some("environment"));
-    driver.edit(Edit::Set { id: 0, property: Property::SkyRotation, value: DVec3::splat(30.0) });
+    driver.edit([Edit::Set { id: 0, property: Property::SkyRotation, value: DVec3::splat(30.0) }]);
     let refused = &driver.session.status().messages.back().expect("it is told").text;
     assert!(refused.contains("SkyRotation"), "{refused}");
-    driver.edit(Edit::Undo);
+    driver.edit([Edit::Undo]);
     assert_eq!(sky_strength(&sky(&driver)), 0.8);
 }
 
@@ -176,7 +169,7 @@ fn any_environment_becomes_a_clear_sky() {
     let sky = |driver: &Driver| driver.session.inputs().environment.clone();
     let set = |driver: &mut Driver, property, value| {
         let property = Property::ClearSky(property);
-        driver.edit(Edit::Set { id: 0, property, value: DVec3::splat(value) });
+        driver.edit([Edit::Set { id: 0, property, value: DVec3::splat(value) }]);
         sky(driver)
     };
     let image = |sky: &SceneEnvironment| match &sky.light {
@@ -192,11 +185,11 @@ fn any_environment_becomes_a_clear_sky() {
     let hazy = set(&mut driver, SkyProperty::Turbidity, 99.0);
     assert_eq!(SkyProperty::Turbidity.get(&hazy.part), Some(10.0));
     assert!(!Arc::ptr_eq(&image(&turned).0, &image(&hazy).0));
-    driver.edit(Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(2.0) });
+    driver.edit([Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(2.0) }]);
     let EnvironmentSource::Sky { scale, azimuth: 90.0, .. } = sky(&driver).part else { panic!() };
     assert_eq!(scale.0, Vec3::splat(2.0));
     for _ in 0..4 {
-        driver.edit(Edit::Undo);
+        driver.edit([Edit::Undo]);
     }
     assert!(matches!(sky(&driver).light, Environment::Gradient { .. }));
 }

@@ -9,4 +9,5 @@ mod navigation;
 mod noise;
 mod saving;
 mod tools;
+mod views;
 mod window;

@@ -2,33 +2,10 @@
 #![cfg(all(feature = "viewer", target_os = "linux"))]
 
 use crate::desktop::{Desktop, Program, until};
-use firstlight::scene::file::{CameraPart, SceneFile};
+use crate::views::{camera, camera_when, target};
+use firstlight::scene::file::CameraPart;
 use glam::DVec3;
 use std::time::Duration;
-
-/// The view as the program prints it on V, once it is as it should be and has come to rest.
-fn camera_when(program: &Program, what: &str, is_right: impl Fn(&CameraPart) -> bool) -> CameraPart {
-    until(what, || {
-        let now = camera(program);
-        std::thread::sleep(Duration::from_millis(300));
-        (is_right(&now) && camera(program) == now).then_some(now)
-    })
-}
-
-fn camera(program: &Program) -> CameraPart {
-    let before = program.output().matches("camera:").count();
-    program.key("v");
-    let text = until("the camera to be printed", || {
-        let output = program.output();
-        let complete = output.matches("camera:").count() > before && output.ends_with("),\n");
-        complete.then(|| output[output.rfind("camera:").expect("just counted")..].to_owned())
-    });
-    SceneFile::parse(&format!("({text})"), "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera
-}
-
-fn target(camera: &CameraPart) -> DVec3 {
-    camera.look_at.expect("V prints what the camera looks at")
-}
 
 fn focus(camera: &CameraPart) -> f64 {
     camera.focus_distance.expect("it is always printed")
