@@ -153,62 +153,30 @@ fn assault(target: &str, drive: fn(&[u8]), usual: usize, bytes: usize, factor: u
 
 const MIB: usize = 1 << 20;
 
-#[test]
-fn models() {
-    assault("obj", drive::obj, 2500, MIB, 64);
+/// A test for each target: its function, the usual number of mutations, and the most memory, of its own and for each
+/// byte of input.
+macro_rules! assaults {
+    ($($name:ident: $target:ident, $usual:expr, $bytes:expr, $factor:expr;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                assault(stringify!($target), drive::$target, $usual, $bytes, $factor);
+            }
+        )*
+    };
 }
 
-#[test]
-fn ply_models() {
-    assault("ply", drive::ply, 4000, MIB, 64);
-}
-
-#[test]
-fn stl_models() {
-    assault("stl", drive::stl, 2500, MIB, 64);
-}
-
-#[test]
-fn gltf_models() {
-    assault("gltf", drive::gltf, 2500, 64 * MIB, 512);
-}
-
-#[test]
-fn material_libraries() {
-    assault("mtl", drive::mtl, 2000, 16 * MIB, 64);
-}
-
-#[test]
-fn scenes() {
-    assault("scene", drive::scene, 4000, 2 * MIB, 64);
-}
-
-#[test]
-fn pbrt_scenes() {
-    assault("pbrt", drive::pbrt, 2500, 64 * MIB, 512);
-}
-
-#[test]
-fn mitsuba_scenes() {
-    assault("mitsuba", drive::mitsuba, 2500, 64 * MIB, 512);
-}
-
-#[test]
-fn pictures() {
-    assault("picture", drive::picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8);
-}
-
-#[test]
-fn whole_scenes_to_the_last_pixel() {
-    assault("render", drive::render, 3000, 64 * MIB, 64);
-}
-
-#[test]
-fn films() {
-    assault("film", drive::film, 2000, 8 * MIB, 1200);
-}
-
-#[test]
-fn notes_of_pictures() {
-    assault("shot", drive::shot, 2000, 8 * MIB, 64);
+assaults! {
+    models: obj, 2500, MIB, 64;
+    ply_models: ply, 4000, MIB, 64;
+    stl_models: stl, 2500, MIB, 64;
+    gltf_models: gltf, 2500, 64 * MIB, 512;
+    material_libraries: mtl, 2000, 16 * MIB, 64;
+    scenes: scene, 4000, 2 * MIB, 64;
+    pbrt_scenes: pbrt, 2500, 64 * MIB, 512;
+    mitsuba_scenes: mitsuba, 2500, 64 * MIB, 512;
+    pictures: picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8;
+    whole_scenes_to_the_last_pixel: render, 3000, 64 * MIB, 64;
+    films: film, 2000, 8 * MIB, 1200;
+    notes_of_pictures: shot, 2000, 8 * MIB, 64;
 }

@@ -306,12 +306,7 @@ pub fn read_film_summary(path: &Path) -> Result<FilmSummary, FilmError> {
 }
 
 fn summary(path: &Path, limits: &Limits) -> Result<FilmSummary, FilmProblem> {
-    let mut file = InputFile::open_within(path, FileKind::Film, FileKind::Film.limit(limits))?;
-    let mut start = [0; 4];
-    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
-    if start[..n] != MAGIC {
-        return Err(FilmProblem::NoFilm);
-    }
+    let file = opened(path, limits)?;
     let damaged = |error: &dyn std::fmt::Display| FilmProblem::Damaged(error.to_string());
     let meta = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| damaged(&error))?;
     let layout = layout_in(&meta)?;
@@ -322,18 +317,30 @@ fn summary(path: &Path, limits: &Limits) -> Result<FilmSummary, FilmProblem> {
     Ok(FilmSummary { shot, layout })
 }
 
-/// Reads the layout of a film from its attribute.
-fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
+/// Opens a file that begins as a film does: gigabytes of something else are not read.
+fn opened(path: &Path, limits: &Limits) -> Result<InputFile<'static>, FilmProblem> {
+    let mut file = InputFile::open_within(path, FileKind::Film, FileKind::Film.limit(limits))?;
+    let mut start = [0; 4];
+    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
+    if start[..n] == MAGIC { Ok(file) } else { Err(FilmProblem::NoFilm) }
+}
+
+/// The attribute with the header of a film.
+fn header_text(meta: &exr::meta::MetaData) -> Result<String, FilmProblem> {
     let header = meta.headers.first().ok_or(FilmProblem::NoFilm)?;
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
         return Err(FilmProblem::NoFilm);
     };
     let text = string_of(text);
+    let HeaderStart { format, .. } =
+        ron::from_str(&text).map_err(|error: ron::error::SpannedError| FilmProblem::Damaged(error.to_string()))?;
+    if format > FORMAT { Err(FilmProblem::Newer) } else { Ok(text) }
+}
+
+/// Reads the layout of a film from its attribute.
+fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
+    let text = header_text(meta)?;
     let damaged = |error: ron::error::SpannedError| FilmProblem::Damaged(error.to_string());
-    let HeaderStart { format, .. } = ron::from_str(&text).map_err(damaged)?;
-    if format > FORMAT {
-        return Err(FilmProblem::Newer);
-    }
     Ok(ron::from_str::<FilmHeader>(&text).map_err(damaged)?.layout)
 }
 
@@ -373,16 +380,7 @@ pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, F
 }
 
 fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
-    let limit = FileKind::Film.limit(limits);
-    let mut file = InputFile::open_within(path, FileKind::Film, limit)?;
-    // Checked before gigabytes of something else are read.
-    let mut start = [0; 4];
-    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
-    if start[..n] != MAGIC {
-        return Err(FilmProblem::NoFilm);
-    }
-    let bytes = file.bytes()?;
-    decode(&bytes, limits)
+    decode(&opened(path, limits)?.bytes()?, limits)
 }
 
 /// Decodes a film from the bytes of its file.
@@ -392,15 +390,7 @@ fn decode(bytes: &[u8], limits: &Limits) -> Result<FilmFile, FilmProblem> {
     }
     let damaged = |error: &dyn std::fmt::Display| FilmProblem::Damaged(error.to_string());
     let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(|error| damaged(&error))?;
-    let header = meta.headers.first().ok_or(FilmProblem::NoFilm)?;
-    let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
-        return Err(FilmProblem::NoFilm);
-    };
-    let text = string_of(text);
-    let HeaderStart { format } = ron::from_str(&text).map_err(|error| damaged(&error))?;
-    if format > FORMAT {
-        return Err(FilmProblem::Newer);
-    }
+    let text = header_text(&meta)?;
     const WRONG: &str = "checksum mismatch";
     let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
     if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
@@ -409,7 +399,7 @@ fn decode(bytes: &[u8], limits: &Limits) -> Result<FilmFile, FilmProblem> {
     let FilmHeader { layout, features, .. } = ron::from_str(&text).map_err(|error| damaged(&error))?;
     let FilmLayout { width, height, .. } = layout;
     check_film_size(width, height)?;
-    if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {
+    if (meta.headers[0].layer_size.width(), meta.headers[0].layer_size.height()) != (width as usize, height as usize) {
         return Err(damaged(&"inconsistent size"));
     }
     let n_pixels = u64::from(width) * u64::from(height);

@@ -138,11 +138,6 @@ impl Animation {
         self.duration.unwrap_or_else(|| ends.fold(model, f64::max))
     }
 
-    /// Time of a frame, seconds.
-    pub fn moment_of(&self, frame: u32) -> f64 {
-        f64::from(frame) / self.fps
-    }
-
     /// Number of frames; at least 1.
     pub fn n_frames(&self) -> u32 {
         // Tolerance for rounding of a whole number of frames.

@@ -4,7 +4,7 @@
 //! The header declares the rows of each element (`header`); values are read in sequence from text or bytes (`rows`),
 //! and those of the mesh are kept: `vertices` with normals, texture coordinates and colours; `faces` and triangle
 //! strips with texture coordinates of corners, textures and colours of their own. Memory for declared elements is
-//! allocated only after checking that the file is long enough. Start reading at [`load_ply`].
+//! allocated only after checking that the file is long enough. Start reading at [`load_ply_with`].
 
 pub(crate) mod faces;
 pub(crate) mod header;
@@ -29,14 +29,6 @@ use firstlight_files::reference::References;
 use firstlight_files::warnings::Warnings;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-
-/// [`load_ply_with`] with the default options.
-///
-/// # Errors
-/// Like [`load_ply_with`].
-pub fn load_ply(path: &Path) -> Result<ImportedModel, ModelError> {
-    load_ply_with(path, &ModelOptions::default())
-}
 
 /// Loads the faces and triangle strips of a PLY file as one mesh.
 ///

@@ -1,7 +1,7 @@
 //! STL (stereolithography): unconnected triangles, in text or binary form.
 //!
 //! Corners with exactly equal positions become one vertex, so that the mesh is connected; facet normals are ignored,
-//! since they are redundant. A facet that is broken is left out. Start reading at [`load_stl`].
+//! since they are redundant. A facet that is broken is left out. Start reading at [`load_stl_with`].
 
 mod binary;
 mod soup;
@@ -18,14 +18,6 @@ use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::warnings::Warnings;
 use firstlight_mesh::Welding;
 use std::path::Path;
-
-/// [`load_stl_with`] with the default options.
-///
-/// # Errors
-/// Like [`load_stl_with`].
-pub fn load_stl(path: &Path) -> Result<ImportedModel, ModelError> {
-    load_stl_with(path, &ModelOptions::default())
-}
 
 /// Loads all solids of an STL file as one mesh; detects from the contents whether it is text or binary.
 ///
