@@ -39,26 +39,21 @@ fn room() -> Prepared {
 }
 
 /// Mean of the picture over independent renders, and its standard error.
-fn mean_of_renders(prepared: &Prepared, techniques: Techniques) -> (f64, f64) {
-    let n = 8;
-    let means: Vec<f64> = (0..n)
-        .map(|seed| {
-            let settings = RenderSettings { seed: 100 + seed, techniques, ..RenderSettings::default() };
-            picture_mean(&render(prepared, &settings, 24, 16, 64).0).0
-        })
-        .collect();
-    let mean = means.iter().sum::<f64>() / f64::from(n);
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
-    (mean, (variance / f64::from(n)).sqrt())
+fn mean_over_seeds(prepared: &Prepared, techniques: Techniques) -> (f64, f64) {
+    let mean = |seed: u32| {
+        let settings = RenderSettings { seed: 100 + seed, techniques, ..RenderSettings::default() };
+        picture_mean(&render(prepared, &settings, 24, 16, 64).0).0
+    };
+    mean_of(&(0..8).map(mean).collect::<Vec<_>>())
 }
 
 #[test]
 fn every_technique_switched_off_leaves_the_mean_alone() {
     let room = room();
-    let (expected, error) = mean_of_renders(&room, Techniques::default());
+    let (expected, error) = mean_over_seeds(&room, Techniques::default());
     assert!(error < 5e-3 * expected, "{expected} ± {error}");
     for (technique, techniques) in Techniques::ablations() {
-        let (found, other) = mean_of_renders(&room, techniques);
+        let (found, other) = mean_over_seeds(&room, techniques);
         assert_ne!(found, expected, "without {technique} nothing changed: the switch is not connected");
         // Student's t with about 14 degrees of freedom: 5 is one in 5,000 for each of six.
         let t = (found - expected) / error.hypot(other);

@@ -60,11 +60,30 @@ pub fn render(scene: &Prepared, settings: &RenderSettings, width: u32, height: u
     (film, report)
 }
 
-/// Mean over the picture, and its standard error from the scatter between pixels.
-pub fn picture_mean(film: &Film) -> (f64, f64) {
-    let values: Vec<f64> = film.means().iter().map(|c| f64::from(c.y)).collect();
+/// Mean of the values, and its standard error.
+pub fn mean_of(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+    (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
+}
+
+/// Mean over the image, and its standard error from the scatter between pixels.
+pub fn picture_mean(film: &Film) -> (f64, f64) {
+    mean_of(&film.means().iter().map(|color| f64::from(color.y)).collect::<Vec<_>>())
+}
+
+/// Mean of all pixels and channels over renders with seeds of their own, and its standard error.
+pub fn mean_of_renders(
+    scene: &Prepared,
+    settings: RenderSettings,
+    (width, height): (u32, u32),
+    spp: u32,
+    renders: u32,
+) -> (f64, f64) {
+    let mean = |k| {
+        let means =
+            render(scene, &RenderSettings { seed: settings.seed + k, ..settings }, width, height, spp).0.means();
+        means.iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum::<f64>() / means.len() as f64
+    };
+    mean_of(&(0..renders).map(mean).collect::<Vec<_>>())
 }

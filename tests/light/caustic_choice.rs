@@ -50,19 +50,9 @@ fn large_light() -> Prepared {
     still_life(quad(Vec3::new(-8.0, 4.0, -8.0), Vec3::X * 16.0, Vec3::Z * 16.0), 1.0, 0.8)
 }
 
-/// Means of the picture, each of a seed of its own, and mean and standard error of them.
+/// Mean of the image over several seeds, and its standard error.
 fn mean(scene: &Prepared, plan: Option<CausticPlan>, spp: u32) -> (f64, f64) {
-    let n = 8;
-    let means: Vec<f64> = (0..n)
-        .map(|seed| {
-            let (film, _) = render(scene, &settings(100 + seed, plan), SIZE.0, SIZE.1, spp);
-            let sum: f64 = film.means().iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum();
-            sum / f64::from(SIZE.0 * SIZE.1)
-        })
-        .collect();
-    let mean = means.iter().sum::<f64>() / f64::from(n);
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
-    (mean, (variance / f64::from(n)).sqrt())
+    mean_of_renders(scene, settings(100, plan), SIZE, spp, 8)
 }
 
 #[test]

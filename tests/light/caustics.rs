@@ -28,22 +28,6 @@ fn settings(seed: u32, caustics: bool) -> RenderSettings {
     }
 }
 
-/// Mean of all pixels and channels over renders with seeds of their own, and its standard error.
-fn mean_of_renders(scene: &Prepared, settings: RenderSettings, size: (u32, u32), spp: u32, renders: u32) -> (f64, f64) {
-    let means: Vec<f64> = (0..renders)
-        .map(|k| {
-            let settings = RenderSettings { seed: settings.seed + k, ..settings };
-            let (film, _) = render(scene, &settings, size.0, size.1, spp);
-            film.means().iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum::<f64>()
-                / f64::from(size.0 * size.1)
-        })
-        .collect();
-    let n = f64::from(renders);
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
-}
-
 /// A room with a light, a floor and something smooth.
 fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
     let mut shapes = vec![

@@ -191,17 +191,14 @@ fn no_ray_runs_into_one() {
 }
 
 /// Mean over renders with seeds of their own, and its standard error.
-fn mean_of_renders(scene: &Prepared, settings: RenderSettings, spp: u32, renders: u32) -> (f64, f64) {
+fn mean_over_seeds(scene: &Prepared, settings: RenderSettings, spp: u32, renders: u32) -> (f64, f64) {
     let means: Vec<f64> = (0..renders)
         .map(|k| {
             let settings = RenderSettings { seed: settings.seed + k, ..settings };
             picture_mean(&render(scene, &settings, 24, 18, spp).0).0
         })
         .collect();
-    let n = f64::from(renders);
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+    mean_of(&means)
 }
 
 #[track_caller]
@@ -233,8 +230,8 @@ fn rough_metal_shines_as_under_a_small_sphere() {
     with_sphere.push((sphere(at, radius), 1));
     // The sphere itself is seen in no smooth surface, so what is left are rays that run into it: too few to matter.
     let settings = RenderSettings::default();
-    let found = mean_of_renders(&with_lights(&of(things), vec![point(at, 6.0)]), settings, 64, 8);
-    let expected = mean_of_renders(&of(with_sphere), settings, 256, 8);
+    let found = mean_over_seeds(&with_lights(&of(things), vec![point(at, 6.0)]), settings, 64, 8);
+    let expected = mean_over_seeds(&of(with_sphere), settings, 256, 8);
     assert_equal("rough metal", found, expected, 0.005);
 }
 
@@ -270,13 +267,13 @@ fn what_one_of_many_sends_is_the_sum_of_all_alone() {
         for n in [2, 11, 40] {
             let lights = lights_of_all_kinds(n);
             let expected = lights.iter().fold((0.0, 0.0f64), |(sum, error), &light| {
-                let (mean, of_mean) = mean_of_renders(&with_lights(&table, vec![light]), settings, 64, 4);
+                let (mean, of_mean) = mean_over_seeds(&with_lights(&table, vec![light]), settings, 64, 4);
                 (sum + mean, error.hypot(of_mean))
             });
             let all = with_lights(&table, lights);
             assert_equal(
                 &format!("{n} lights, {integrator:?}"),
-                mean_of_renders(&all, settings, 64, 8),
+                mean_over_seeds(&all, settings, 64, 8),
                 expected,
                 0.01,
             );
@@ -292,11 +289,11 @@ fn what_one_of_many_sends_is_the_sum_of_all_alone() {
     };
     let settings = RenderSettings { max_depth: 2, ..RenderSettings::default() };
     let lights = lights_of_all_kinds(7);
-    let expected = mean_of_renders(&lit(&[]), settings, 256, 4).0
-        + mean_of_renders(&with_lights(&table, lights.clone()), settings, 256, 4).0;
+    let expected = mean_over_seeds(&lit(&[]), settings, 256, 4).0
+        + mean_over_seeds(&with_lights(&table, lights.clone()), settings, 256, 4).0;
     for light_selection in [true, false] {
         let techniques = Techniques { light_selection, ..Techniques::ALL };
-        let found = mean_of_renders(&lit(&lights), RenderSettings { techniques, ..settings }, 256, 8);
+        let found = mean_over_seeds(&lit(&lights), RenderSettings { techniques, ..settings }, 256, 8);
         // The sphere hides a little of the floor from the others.
         assert!((found.0 / expected - 1.0).abs() < 0.02, "{found:?} for {expected}");
     }
@@ -322,20 +319,20 @@ fn glass_gathers_the_light_of_points_spots_and_the_sun() {
         };
         let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
         let of_sphere = of(Some((up, radius, 8.0 / (PI * radius * radius))));
-        let expected = mean_of_renders(&of_sphere, RenderSettings { seed: 100, ..settings }, 256, 10);
+        let expected = mean_over_seeds(&of_sphere, RenderSettings { seed: 100, ..settings }, 256, 10);
         for (what, light) in [("point", point(up, 8.0)), ("spot", spot(up, ball, 8.0, 80.0, 89.0))] {
             let scene = with_lights(&of(None), vec![light]);
             assert!(scene.features().caustics);
             for simd in [settings.simd, None] {
-                let found = mean_of_renders(&scene, RenderSettings { simd, ..settings }, 128, 10);
+                let found = mean_over_seeds(&scene, RenderSettings { simd, ..settings }, 128, 10);
                 assert_equal(&format!("{name}, {what}"), found, expected, 0.02);
             }
         }
         let sun = irradiance * far.length_squared() / (PI * sun_radius * sun_radius);
         let expected =
-            mean_of_renders(&of(Some((far, sun_radius, sun))), RenderSettings { seed: 100, ..settings }, 256, 10);
+            mean_over_seeds(&of(Some((far, sun_radius, sun))), RenderSettings { seed: 100, ..settings }, 256, 10);
         let scene = with_lights(&of(None), vec![directional(-far, irradiance)]);
-        assert_equal(&format!("{name}, sun"), mean_of_renders(&scene, settings, 128, 10), expected, 0.02);
+        assert_equal(&format!("{name}, sun"), mean_over_seeds(&scene, settings, 128, 10), expected, 0.02);
     }
 }
 
@@ -348,9 +345,9 @@ fn gathered_light_is_as_bright_as_on_paper() {
     let floor = (plane(Vec3::ZERO, Vec3::Y), 0);
     let lights = vec![point(up, 5.0)];
     let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
-    let expected = mean_of_renders(&with_lights(&of(vec![floor.clone()]), lights.clone()), settings, 64, 4);
+    let expected = mean_over_seeds(&with_lights(&of(vec![floor.clone()]), lights.clone()), settings, 64, 4);
     let bulb = with_lights(&of(vec![floor.clone(), (sphere(up, 0.3), 1)]), lights);
-    assert_equal("a bulb", mean_of_renders(&bulb, settings, 256, 10), expected, 0.02);
+    assert_equal("a bulb", mean_over_seeds(&bulb, settings, 256, 10), expected, 0.02);
 
     // The sun falls onto the floor by way of a mirror, through air that absorbs from there on.
     let mirror = Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(0.8)) };
@@ -369,7 +366,7 @@ fn gathered_light_is_as_bright_as_on_paper() {
     let distance = f64::from(Vec3::new(0.3, 1.0, 2.0).length());
     let expected = 3.0 * 0.8 * 0.5 / f64::from(PI) * (-0.2 * (2.0 + distance)).exp();
     for simd in [settings.simd, None] {
-        let found = mean_of_renders(&lit, RenderSettings { simd, ..settings }, 256, 8);
+        let found = mean_over_seeds(&lit, RenderSettings { simd, ..settings }, 256, 8);
         println!("mirrored sun: {found:?} for {expected}");
         assert!((found.0 / expected - 1.0).abs() < 0.02 && found.1 < 0.01 * expected, "{found:?} for {expected}");
     }

@@ -1,6 +1,7 @@
 //! How much light images of few samples lose: adaptive ones beside even ones, and denoised ones beside raw ones. Prints the
 //! figures of docs/accuracy.md and docs/denoising.md.
 
+use crate::common::mean_of;
 use firstlight::render::{
     ErrorMetric, Film, Prepared, RenderSettings, SampleAllocation, advance, denoise_film, gather_guides, guide_samples,
 };
@@ -20,13 +21,6 @@ fn prepared(name: &str) -> (Prepared, RenderSettings) {
 
 fn mean(colors: &[Vec3]) -> f64 {
     colors.iter().map(|color| color.as_dvec3().element_sum() / 3.0).sum::<f64>() / colors.len() as f64
-}
-
-/// Mean of the values, and its standard error.
-fn estimate(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
 }
 
 #[test]
@@ -58,9 +52,9 @@ fn the_light_that_images_of_few_samples_lose() {
                     (raw, even, clean)
                 })
                 .collect();
-            let (ours, our_error) = estimate(&both.iter().map(|it| it.0).collect::<Vec<_>>());
-            let (even, even_error) = estimate(&both.iter().map(|it| it.1).collect::<Vec<_>>());
-            let (clean, clean_error) = estimate(&both.iter().filter_map(|it| it.2).collect::<Vec<_>>());
+            let (ours, our_error) = mean_of(&both.iter().map(|it| it.0).collect::<Vec<_>>());
+            let (even, even_error) = mean_of(&both.iter().map(|it| it.1).collect::<Vec<_>>());
+            let (clean, clean_error) = mean_of(&both.iter().filter_map(|it| it.2).collect::<Vec<_>>());
             let percent = |ratio: f64, error: f64| format!("{:+.2} ± {:.2}", 100.0 * (ratio - 1.0), 100.0 * error);
             let adaptive = percent(ours / even, (our_error.powi(2) + even_error.powi(2)).sqrt() / even);
             let size = format!("{width}x{height}");

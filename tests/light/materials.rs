@@ -66,16 +66,7 @@ fn room() -> Prepared {
 #[test]
 fn light_is_the_same_by_bounces_and_by_asking_for_it() {
     let mean = |techniques, spp| {
-        let means: Vec<f64> = (0..8)
-            .map(|seed| {
-                let settings = RenderSettings { seed, techniques, ..RenderSettings::default() };
-                let means = render(&room(), &settings, 40, 24, spp).0.means();
-                means.iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum::<f64>() / means.len() as f64
-            })
-            .collect();
-        let mean = means.iter().sum::<f64>() / means.len() as f64;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (means.len() - 1) as f64;
-        (mean, (variance / means.len() as f64).sqrt())
+        mean_of_renders(&room(), RenderSettings { techniques, ..RenderSettings::default() }, (40, 24), spp, 8)
     };
     let plain = Techniques { light_sampling: false, caustics: false, ..Techniques::ALL };
     let ((found, error), (expected, other)) = (mean(Techniques::ALL, 64), mean(plain, 256));

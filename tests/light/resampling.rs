@@ -31,13 +31,6 @@ fn renders(scene: &Prepared, settings: RenderSettings, spp: u32, n: u32) -> (Vec
     (found.into_iter().map(|(pixels, _)| pixels).collect(), shadows)
 }
 
-/// Mean, and its standard error.
-fn mean(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (mean, (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
-}
-
 fn means_of_images(renders: &[Vec<f64>]) -> Vec<f64> {
     renders.iter().map(|pixels| pixels.iter().sum::<f64>() / pixels.len() as f64).collect()
 }
@@ -46,14 +39,14 @@ fn means_of_images(renders: &[Vec<f64>]) -> Vec<f64> {
 fn noise(renders: &[Vec<f64>], pixels: impl Iterator<Item = usize> + Clone) -> f64 {
     let of_pixel = |i: usize| {
         let values: Vec<f64> = renders.iter().map(|render| render[i]).collect();
-        let (mean, error) = mean(&values);
+        let (mean, error) = mean_of(&values);
         if mean > 0.0 { error * error * values.len() as f64 / (mean * mean) } else { 0.0 }
     };
     pixels.clone().map(of_pixel).sum::<f64>() / pixels.count() as f64
 }
 
 fn assert_same(a: &[Vec<f64>], b: &[Vec<f64>]) {
-    let ((a, of_a), (b, of_b)) = (mean(&means_of_images(a)), mean(&means_of_images(b)));
+    let ((a, of_a), (b, of_b)) = (mean_of(&means_of_images(a)), mean_of(&means_of_images(b)));
     assert!((a - b).abs() < 4.0 * of_a.hypot(of_b), "{a} ± {of_a}, {b} ± {of_b}");
 }
 

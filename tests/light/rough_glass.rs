@@ -38,25 +38,10 @@ fn eye() -> Camera {
     camera(Vec3::new(0.2, 1.2, 4.0), Vec3::new(0.0, 0.6, 0.0), 35.0)
 }
 
-/// Mean of all pixels and channels over renders with seeds of their own, and its standard error.
-fn mean_of_renders(scene: &Prepared, settings: RenderSettings, spp: u32, renders: u32) -> (f64, f64) {
-    let means: Vec<f64> = (0..renders)
-        .map(|k| {
-            let settings = RenderSettings { seed: settings.seed + k, ..settings };
-            let (film, _) = render(scene, &settings, 16, 12, spp);
-            film.means().iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum::<f64>() / (16.0 * 12.0)
-        })
-        .collect();
-    let n = f64::from(renders);
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
-}
-
 /// Asserts that two settings have the same mean, known to within `precision` of it.
 fn assert_same_mean(name: &str, scene: &Prepared, [a, b]: [(Techniques, u32); 2], precision: f64) {
     let mean = |seed, (techniques, spp)| {
-        mean_of_renders(scene, RenderSettings { seed, techniques, ..RenderSettings::default() }, spp, 10)
+        mean_of_renders(scene, RenderSettings { seed, techniques, ..RenderSettings::default() }, (16, 12), spp, 10)
     };
     let ((found, error), (expected, other)) = (mean(1, a), mean(100, b));
     let deviation = error.hypot(other);
