@@ -117,6 +117,23 @@ fn what_takes_the_square_of_its_length_is_refused() {
 }
 
 #[test]
+fn parameters_of_any_number_are_found_at_once() {
+    // Minutes if each were compared with all others.
+    let many: String = (0..200_000).map(|i| format!("<default name=\"a{i:06}\" value=\"\"/>\n")).collect();
+    let uses = |n: usize| format!("<string name=\"x\" value=\"{}\"/>", "$a$a0".repeat(n / 2));
+    let known = "<default name=\"a\" value=\"\"/><default name=\"a0\" value=\"\"/>";
+    let sphere = "<shape type=\"sphere\"/>";
+    mitsuba(&format!("{many}{known}{}{sphere}", uses(1_000_000))).unwrap();
+    let refused = |body: &str| mitsuba(body).err().unwrap_or_default();
+    assert!(refused(&format!("{known}{}", uses((1 << 20) + 2))).contains("may use parameters 1048576 times"));
+    let named = |name: &str| format!("<default name=\"{name}\" value=\"\"/>{sphere}");
+    assert!(mitsuba(&named(&"é".repeat(128))).is_ok());
+    for name in [&*"é".repeat(129), "a\\$b"] {
+        assert!(refused(&named(name)).contains("at most 256 bytes and no `$`"), "{name}");
+    }
+}
+
+#[test]
 fn sizes_at_the_ends_of_their_range_are_sizes() {
     let film = |x: i64, y: i64| {
         let value = |name: &str, value: i64| format!("<integer name=\"{name}\" value=\"{value}\"/>");

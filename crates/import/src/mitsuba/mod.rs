@@ -13,6 +13,7 @@ pub(crate) mod emitter;
 pub(crate) mod graph;
 pub(crate) mod ior;
 pub(crate) mod meshes;
+mod parameters;
 pub(crate) mod read;
 pub(crate) mod scene;
 pub(crate) mod serialized;

@@ -1,11 +1,12 @@
 //! XML text to a [`Graph`]: parameters, `default` and `$name`, `include`, `ref`, `alias`, `path`.
 //!
-//! Document type definitions are refused, so that no entity expands; nesting, includes and substituted text are limited.
+//! Document type definitions are refused, so that no entity expands; nesting and includes are limited.
 //! Files of version 0.x are read by the rules of their time: parameters in camel case.
 //!
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/key_topics/scene_format.html>
 
 use crate::mitsuba::graph::{Child, Graph, Object, Parameter, Place, SourceFile, Spectrum, Target, Value};
+use crate::mitsuba::parameters::{Defines, Parameters};
 use crate::mitsuba::spectrum;
 use crate::mitsuba::transform;
 use crate::mitsuba::words::{check_tags, hex, is_old, number, numbers, snake_case};
@@ -31,11 +32,6 @@ const MAX_FILES: usize = 1000;
 const MAX_ELEMENTS: usize = 1 << 22;
 /// Folders in which each file is looked for.
 const MAX_FOLDERS: usize = 16;
-/// Bytes of all attributes in which a parameter was substituted.
-const MAX_SUBSTITUTED: usize = 16 << 20;
-
-/// Numbers and names from the command line that take the place of `$name`.
-pub(crate) type Defines = [(String, String)];
 
 /// Reads the scene at `path` and the files that it includes.
 ///
@@ -49,10 +45,9 @@ pub(crate) fn read_graph(
 ) -> Result<Graph, SceneError> {
     let mut reader = Reader {
         graph: Graph::default(),
-        parameters: defines.iter().map(|(name, value)| (name.clone(), value.clone(), false)).collect(),
+        parameters: Parameters::of(defines),
         references: References::of(path, allow_outside),
         warnings,
-        substituted: 0,
         bytes_left: Limits::of_this_process().scene_bytes,
         n_elements: 0,
         spectra: HashMap::new(),
@@ -61,8 +56,7 @@ pub(crate) fn read_graph(
         old: false,
     };
     reader.file(path, None)?;
-    let unused = reader.parameters.iter().zip(defines).filter(|((.., used), _)| !used);
-    for (_, (name, _)) in unused {
+    for (name, _) in defines.iter().filter(|(name, _)| !reader.parameters.is_used(name)) {
         let name = printable::name(name);
         reader.warnings.push(format!("{}: has no parameter `${name}`: -D {name} has no effect", path.display()));
     }
@@ -71,11 +65,9 @@ pub(crate) fn read_graph(
 
 struct Reader<'a> {
     graph: Graph,
-    /// Name, value, whether it was used.
-    parameters: Vec<(String, String, bool)>,
+    parameters: Parameters,
     references: References<'a>,
     warnings: &'a mut Warnings,
-    substituted: usize,
     /// Bytes of text that may still be read.
     bytes_left: u64,
     n_elements: usize,
@@ -170,12 +162,7 @@ impl Reader<'_> {
             "default" => {
                 let name = self.required(element, place, "name")?;
                 let value = self.required(element, place, "value")?;
-                if name.is_empty() {
-                    return Err(self.graph.error(place, "`name` of a `<default>` is empty"));
-                }
-                if !self.parameters.iter().any(|(known, ..)| *known == name) {
-                    self.parameters.push((name, value, true));
-                }
+                self.parameters.add_default(name, value).map_err(|why| self.graph.error(place, why))?;
             }
             "include" => self.include(element, place, parent)?,
             "path" => {
@@ -426,42 +413,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Replaces `$name` by its value; `\$` is a dollar. The longest name that fits is meant, as in Mitsuba.
     fn substitute(&mut self, text: &str, place: Place) -> Result<String, SceneError> {
-        if !text.contains('$') {
-            return Ok(text.to_owned());
-        }
-        let mut out = String::new();
-        let mut rest = text;
-        while let Some(at) = rest.find('$') {
-            let (before, after) = (&rest[..at], &rest[at + 1..]);
-            if let Some(before) = before.strip_suffix('\\') {
-                out += before;
-                out.push('$');
-                rest = after;
-                continue;
-            }
-            out += before;
-            let fitting =
-                self.parameters.iter_mut().filter(|(name, ..)| !name.is_empty() && after.starts_with(name.as_str()));
-            let Some((name, value, used)) = fitting.max_by_key(|(name, ..)| name.len()) else {
-                let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
-                let name = printable::name(&after[..end]).into_owned();
-                let message = format!(
-                    "`${name}` has no value: add `<default name=\"{name}\" value=\"…\"/>`, or give -D {name}=…"
-                );
-                return Err(self.graph.error(place, message));
-            };
-            *used = true;
-            out += value;
-            self.substituted += value.len();
-            rest = &after[name.len()..];
-            if self.substituted > MAX_SUBSTITUTED {
-                return Err(self.graph.error(place, "parameters give more text than a scene may have"));
-            }
-        }
-        out += rest;
-        Ok(out)
+        self.parameters.substitute(text).map_err(|why| self.graph.error(place, why))
     }
 
     /// The name of a parameter today.
