@@ -7,21 +7,40 @@
 
 use crate::printable::name;
 use crate::relative::{path_to_text, text_to_path};
-use std::ffi::OsStr;
+use std::collections::HashMap;
+use std::ffi::{OsStr, OsString};
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Bytes of a name, at most: no path is longer.
 const LONGEST: usize = 4096;
 
-/// Entries of a folder that are compared with a name, at most.
+/// Entries of a folder that are compared with names, at most.
 const MAX_ENTRIES: usize = 20_000;
 
-/// What the names in a model may refer to.
-#[derive(Clone, Copy, Debug)]
-pub struct References<'a> {
+/// The same of all folders: through links, one folder has names without end.
+const MAX_ENTRIES_OF_ALL: usize = 10 * MAX_ENTRIES;
+
+/// Parts of a path whose case is looked at, at most: the time for each grows with those before it.
+const MAX_PARTS: usize = 32;
+
+/// What the names in a model may refer to: made once for each file that is read.
+///
+/// It lists a folder once, for all names. What comes into the folder later is found by its exact name only.
+#[derive(Debug)]
+pub struct References {
     /// The folder of the model.
-    folder: &'a Path,
+    folder: PathBuf,
     allow_outside: bool,
+    listings: Mutex<Listings>,
+}
+
+/// The folders that were listed.
+#[derive(Debug, Default)]
+struct Listings {
+    /// By folder and name in lower case: the name, `None` if there are several.
+    by_folder: HashMap<PathBuf, HashMap<String, Option<OsString>>>,
+    n_entries: usize,
 }
 
 /// What a name refers to.
@@ -61,11 +80,12 @@ pub struct Outside {
     pub why: &'static str,
 }
 
-impl<'a> References<'a> {
+impl References {
     /// - `model`: the file of the model.
     /// - `allow_outside`: whether files outside of its folder may be read.
-    pub fn of(model: &'a Path, allow_outside: bool) -> Self {
-        Self { folder: model.parent().unwrap_or(Path::new("")), allow_outside }
+    pub fn of(model: &Path, allow_outside: bool) -> Self {
+        let folder = model.parent().unwrap_or(Path::new("")).to_owned();
+        Self { folder, allow_outside, listings: Mutex::default() }
     }
 
     /// Whether files outside of the model's folder may be read.
@@ -91,7 +111,7 @@ impl<'a> References<'a> {
         let spellings = [&decoded, name, &decoded.replace('\\', "/"), &name.replace('\\', "/")].map(text_to_path);
         let last = &spellings[2];
         if self.allow_outside {
-            return Ok(existing(base, &spellings));
+            return Ok(self.existing(base, &spellings));
         }
         if let Some(why) = spellings.iter().find_map(|path| self.leaves(base, path)) {
             // Files are moved together with the model; where they were on its computer is of no use here.
@@ -103,7 +123,7 @@ impl<'a> References<'a> {
                 _ => refused(why),
             };
         }
-        self.without_link(base, existing(base, &spellings), name)
+        self.without_link(base, self.existing(base, &spellings), name)
     }
 
     /// Why a path is not one in the folder of the model, by its text.
@@ -113,7 +133,7 @@ impl<'a> References<'a> {
         if path.is_absolute() || path.has_root() || is_drive {
             return Some(ABSOLUTE);
         }
-        let mut depth = base.strip_prefix(self.folder).map_or(0, |below| below.components().count());
+        let mut depth = base.strip_prefix(&self.folder).map_or(0, |below| below.components().count());
         for part in path.components() {
             match part {
                 Component::CurDir => {}
@@ -131,7 +151,7 @@ impl<'a> References<'a> {
 
     /// Refuses what a symbolic link leads to: out of the folder, or to a hidden file.
     fn without_link(&self, base: &Path, referred: Referred, name: &str) -> Result<Referred, Outside> {
-        let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { self.folder };
+        let folder = or_here(&self.folder);
         // `model.glb#3` is an image inside a model.
         let full = base.join(&referred.path);
         let file = full.to_str().filter(|_| !full.exists()).and_then(|text| text.rsplit_once('#'));
@@ -146,26 +166,70 @@ impl<'a> References<'a> {
             Ok(_) => Ok(referred),
         }
     }
+
+    /// The first of these paths that exists, where a folder that is not there may be left out (`missing/../a.png`), or
+    /// what differs from the last one by case.
+    fn existing(&self, base: &Path, spellings: &[PathBuf; 4]) -> Referred {
+        let last = &spellings[2];
+        let direct = direct(last);
+        match spellings.iter().chain([&direct]).find(|path| base.join(path).exists()) {
+            Some(path) => path.clone().into(),
+            None => match self.in_any_case(base, &direct) {
+                Some(path) => Referred { path, is_renamed: true },
+                None => last.clone().into(),
+            },
+        }
+    }
+
+    /// The file below `base` whose name differs in upper and lower case only. If there are several, none of them is
+    /// meant.
+    fn in_any_case(&self, base: &Path, path: &Path) -> Option<PathBuf> {
+        if path.components().nth(MAX_PARTS).is_some() {
+            return None;
+        }
+        let mut listings = self.listings.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = PathBuf::new();
+        for part in path.components() {
+            let here = base.join(&found);
+            match part {
+                Component::Normal(wanted) if !here.join(wanted).exists() => {
+                    found.push(listings.in_any_case(here, wanted.to_str()?)?);
+                }
+                part => found.push(part),
+            }
+        }
+        base.join(&found).exists().then_some(found)
+    }
+}
+
+impl Listings {
+    /// The only entry of the folder that differs from this name by case alone.
+    fn in_any_case(&mut self, folder: PathBuf, name: &str) -> Option<&OsString> {
+        let entries = self.by_folder.entry(folder).or_insert_with_key(|folder| {
+            let left = MAX_ENTRIES.min(MAX_ENTRIES_OF_ALL - self.n_entries);
+            let mut entries = HashMap::new();
+            for entry in std::fs::read_dir(or_here(folder)).into_iter().flatten().take(left) {
+                self.n_entries += 1;
+                let Ok(name) = entry.map(|entry| entry.file_name()) else { continue };
+                if let Some(lower) = name.to_str().map(str::to_lowercase) {
+                    entries.entry(lower).and_modify(|known| *known = None).or_insert(Some(name));
+                }
+            }
+            entries
+        });
+        entries.get(&name.to_lowercase())?.as_ref()
+    }
+}
+
+/// A folder as the system names it.
+fn or_here(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
 
 const ABSOLUTE: &str = "an absolute path";
 
 fn is_hidden(name: &OsStr) -> bool {
     name.as_encoded_bytes().starts_with(b".")
-}
-
-/// The first of these paths that exists, where a folder that is not there may be left out (`missing/../a.png`), or what
-/// differs from the last one by case.
-fn existing(base: &Path, spellings: &[PathBuf; 4]) -> Referred {
-    let last = &spellings[2];
-    let direct = direct(last);
-    match spellings.iter().chain([&direct]).find(|path| base.join(path).exists()) {
-        Some(path) => path.clone().into(),
-        None => match in_any_case(base, last) {
-            Some(path) => Referred { path, is_renamed: true },
-            None => last.clone().into(),
-        },
-    }
 }
 
 /// A path without the folders that it enters and leaves again.
@@ -178,29 +242,6 @@ fn direct(path: &Path) -> PathBuf {
         }
     }
     direct
-}
-
-/// The file below `base` whose name differs in upper and lower case only. If there are several, none of them is meant.
-fn in_any_case(base: &Path, path: &Path) -> Option<PathBuf> {
-    let mut found = PathBuf::new();
-    for part in path.components() {
-        let here = base.join(&found);
-        match part {
-            Component::Normal(wanted) if !here.join(wanted).exists() => {
-                let wanted = wanted.to_str()?.to_lowercase();
-                let folder = if here.as_os_str().is_empty() { Path::new(".") } else { &here };
-                let entries =
-                    std::fs::read_dir(folder).ok()?.take(MAX_ENTRIES).flatten().map(|entry| entry.file_name());
-                let mut same = entries.filter(|entry| entry.to_str().is_some_and(|it| it.to_lowercase() == wanted));
-                match (same.next(), same.next()) {
-                    (Some(name), None) => found.push(name),
-                    _ => return None,
-                }
-            }
-            part => found.push(part),
-        }
-    }
-    base.join(&found).exists().then_some(found)
 }
 
 /// Decodes `%20` and the like; sequences that are invalid, not UTF-8 or zero stay unchanged.
@@ -318,5 +359,39 @@ mod tests {
         for link in ["link.png", "up/secret.png", "LINK.png", "/away/link.png", "link.glb#0", "up/secret.glb#12"] {
             assert_eq!(at(link), Err("a link out of the folder"), "{link}");
         }
+    }
+
+    #[test]
+    fn many_names_are_looked_for_in_a_large_folder_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        (0..5_000).for_each(|i| drop(std::fs::File::create(folder.path().join(format!("Wood {i}"))).unwrap()));
+        let model = folder.path().join("a.obj");
+        let files = References::of(&model, false);
+        // Minutes if the folder were listed for each.
+        for i in 0..20_000 {
+            let found = files.resolve(folder.path(), &format!("wood {i}")).unwrap();
+            let name = if i < 5_000 { format!("Wood {i}") } else { format!("wood {i}") };
+            assert_eq!(found, Referred { path: name.into(), is_renamed: i < 5_000 });
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_of_endless_names_is_listed_a_few_times() {
+        let folder = tempfile::tempdir().unwrap();
+        (0..5_000).for_each(|i| drop(std::fs::File::create(folder.path().join(format!("W{i}"))).unwrap()));
+        for link in ["a", "b"] {
+            std::os::unix::fs::symlink(".", folder.path().join(link)).unwrap();
+        }
+        let files = References::of(&folder.path().join("a.obj"), false);
+        let resolve = |name: &str| files.resolve(folder.path(), name).unwrap();
+        // Links as the digits of a number.
+        let through = |i: u32| (0..15).map(|k| if i >> k & 1 == 0 { "a/" } else { "b/" }).collect::<String>();
+        assert_eq!(resolve(&format!("{}w1", through(0))).path, Path::new(&format!("{}W1", through(0))));
+        (0..20_000).for_each(|i| drop(resolve(&format!("{}x{i}", through(i)))));
+        assert!(files.listings.lock().unwrap().n_entries <= MAX_ENTRIES_OF_ALL);
+        assert!(!resolve(&format!("{}W1", through(20_000))).is_renamed);
+        let deep = "a/".repeat(MAX_PARTS);
+        assert_eq!(resolve(&format!("{deep}w1")).path, Path::new(&format!("{deep}w1")), "too deep to be looked for");
     }
 }

@@ -95,6 +95,8 @@ pub struct Document {
     n_bytes: u64,
     /// The file and the files of its buffers.
     pub(crate) files: Vec<PathBuf>,
+    /// Where its URIs lead.
+    references: References,
 }
 
 impl Document {
@@ -134,6 +136,7 @@ impl Document {
             decoded: HashMap::new(),
             n_bytes: 0,
             files: vec![path.to_owned()],
+            references: References::of(path, options.allow_outside),
         };
         for (part, problem) in omitted {
             document.omissions.kept::<()>(&part, Err(problem));
@@ -274,8 +277,7 @@ impl Document {
     /// # Errors
     /// If it may not be read, or is no URI.
     pub(crate) fn resolved(&self, uri: &str, part: &str) -> Result<Uri, GltfProblem> {
-        let files = References::of(&self.path, self.options.allow_outside);
-        let resolved = resolve(uri, files, self.folder())?;
+        let resolved = resolve(uri, &self.references, self.folder())?;
         if let Uri::File(file) = &resolved
             && let Some(difference) = file.difference(uri)
         {

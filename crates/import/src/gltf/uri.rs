@@ -26,7 +26,7 @@ pub(crate) fn is_data(uri: &str) -> bool {
 ///
 /// # Errors
 /// If it leaves the folder, refers to the network or is not a valid URI.
-pub(crate) fn resolve(uri: &str, files: References, folder: &Path) -> Result<Uri, GltfProblem> {
+pub(crate) fn resolve(uri: &str, files: &References, folder: &Path) -> Result<Uri, GltfProblem> {
     if is_data(uri) {
         return data_uri(&uri[5..]).map(Uri::Data);
     }
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     fn file(uri: &str, outside: bool) -> Option<String> {
-        match resolve(uri, References::of(Path::new("nowhere/a.gltf"), outside), Path::new("nowhere")) {
+        match resolve(uri, &References::of(Path::new("nowhere/a.gltf"), outside), Path::new("nowhere")) {
             Ok(Uri::File(Referred { path, .. })) => Some(path.to_string_lossy().into_owned()),
             _ => None,
         }
@@ -110,7 +110,7 @@ mod tests {
             "//server/share/a.bin",
             "\\\\server\\a.bin",
         ] {
-            let found = resolve(uri, References::of(Path::new("nowhere/a.gltf"), false), Path::new("nowhere"));
+            let found = resolve(uri, &References::of(Path::new("nowhere/a.gltf"), false), Path::new("nowhere"));
             let error = found.err().expect(uri).to_string();
             assert!(error.contains("--allow-outside"), "{uri}: {error}");
         }
@@ -134,7 +134,7 @@ mod tests {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let model = folder.path().join("a.gltf");
-        let found = |uri: &str| match resolve(uri, References::of(&model, false), folder.path()) {
+        let found = |uri: &str| match resolve(uri, &References::of(&model, false), folder.path()) {
             Ok(Uri::File(file)) => (file.path.to_string_lossy().into_owned(), file.is_renamed),
             _ => panic!("{uri}"),
         };
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn data_uris_are_decoded_or_refused() {
-        let data = |uri: &str| match resolve(uri, References::of(Path::new("a.gltf"), false), Path::new("")) {
+        let data = |uri: &str| match resolve(uri, &References::of(Path::new("a.gltf"), false), Path::new("")) {
             Ok(Uri::Data(bytes)) => Some(bytes),
             _ => None,
         };

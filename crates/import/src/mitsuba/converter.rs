@@ -79,7 +79,7 @@ pub(crate) struct Converter<'a> {
     pub world: DMat4,
     pub file: SceneFile,
     pub warnings: Warnings,
-    pub references: References<'a>,
+    pub references: References,
     /// Of the scene: paths are relative to it.
     pub folder: &'a Path,
     /// Names and values from the command line.

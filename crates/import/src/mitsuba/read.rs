@@ -66,7 +66,7 @@ pub(crate) fn read_graph(
 struct Reader<'a> {
     graph: Graph,
     parameters: Parameters,
-    references: References<'a>,
+    references: References,
     warnings: &'a mut Warnings,
     /// Bytes of text that may still be read.
     bytes_left: u64,

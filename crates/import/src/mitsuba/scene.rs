@@ -44,7 +44,7 @@ pub(crate) struct Converted {
 impl<'a> Converter<'a> {
     pub(crate) fn new(
         graph: &'a Graph,
-        references: References<'a>,
+        references: References,
         folder: &'a Path,
         file_name: String,
         options: &'a ForeignOptions,

@@ -286,7 +286,7 @@ fn find_materials(
                 }
             };
             if seen.insert(library.clone()) {
-                let materials = mtl::load_library(&library, files, options.max_library_bytes, warnings);
+                let materials = mtl::load_library(&library, &files, options.max_library_bytes, warnings);
                 // Any text can be named here; only what has materials is a library.
                 has_materials.extend((!materials.is_empty()).then(|| library.clone()));
                 known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));

@@ -74,7 +74,7 @@ const KEYWORDS: &[(&str, KeywordValue)] = &[
 /// - `files`: what it may refer to.
 pub(crate) fn load_library(
     path: &Path,
-    files: References,
+    files: &References,
     max_bytes: u64,
     warnings: &mut Warnings,
 ) -> Vec<ImportedMaterial> {
@@ -244,7 +244,7 @@ mod tests {
         std::fs::write(file.path(), text).unwrap();
         let mut warnings = Warnings::default();
         let files = References::of(file.path(), false);
-        (load_library(file.path(), files, 1 << 20, &mut warnings), warnings)
+        (load_library(file.path(), &files, 1 << 20, &mut warnings), warnings)
     }
 
     fn image(name: &str) -> TextureMap {
@@ -368,7 +368,7 @@ mod tests {
         let mut warnings = Warnings::default();
         let folder = std::env::temp_dir();
         for missing in [Path::new("no such.mtl"), &folder] {
-            assert!(load_library(missing, References::of(missing, false), 9, &mut warnings).is_empty());
+            assert!(load_library(missing, &References::of(missing, false), 9, &mut warnings).is_empty());
         }
         assert_eq!(warnings.len(), 2);
     }

@@ -65,7 +65,7 @@ pub(crate) struct TooMany;
 pub(crate) struct Builder<'a> {
     pub(super) path: &'a Path,
     pub(super) folder: &'a Path,
-    pub(super) references: References<'a>,
+    pub(super) references: References,
     pub(super) allow_outside: bool,
     image: ReadImage,
     /// From the world of the file to ours.

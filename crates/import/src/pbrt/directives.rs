@@ -11,7 +11,6 @@ use firstlight_files::gzip::decompressed;
 use firstlight_files::input_file::{BYTE_ORDER_MARK, FileKind, InputFile};
 use firstlight_files::limits::Limits;
 use firstlight_files::printable;
-use firstlight_files::reference::References;
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_format::error::{SceneError, suggestion};
 use glam::DAffine3;
@@ -85,7 +84,6 @@ enum Saved {
 pub(crate) struct Reader<'a> {
     path: &'a Path,
     folder: &'a Path,
-    allow_outside: bool,
     state: State,
     stack: Vec<(Saved, State)>,
     systems: HashMap<String, DAffine3>,
@@ -105,7 +103,6 @@ impl<'a> Reader<'a> {
         Self {
             path,
             folder: path.parent().unwrap_or(Path::new("")),
-            allow_outside: options.allow_outside,
             state: State::default(),
             stack: Vec::new(),
             systems: HashMap::new(),
@@ -420,9 +417,8 @@ impl<'a> Reader<'a> {
         if self.n_includes > MAX_INCLUDES {
             return Err(cursor.wrong(at, format!("more than {MAX_INCLUDES} files are included")));
         }
-        let references = References::of(self.path, self.allow_outside);
         // A part that is missing costs only itself.
-        let found = references.resolve(self.folder, file).map_err(|outside| outside.to_string());
+        let found = self.builder.references.resolve(self.folder, file).map_err(|outside| outside.to_string());
         let folder = self.folder;
         let source = found.and_then(|found| self.text(&folder.join(found.path)).map_err(|error| error.to_string()));
         let source = match source {

@@ -98,7 +98,7 @@ pub(crate) fn load_ply_colored(
     let has_uvs = !vertices.indexed.uvs.is_empty() || !faces.uvs.is_empty();
     let mut material_warnings = Warnings::default();
     let files = References::of(path, options.allow_outside);
-    let images = images(path, files, &header.textures, has_uvs, &mut material_warnings);
+    let images = images(path, &files, &header.textures, has_uvs, &mut material_warnings);
     let plain = if faces.colours.count > 0 { faces.colours.material() } else { vertices.colours.material() };
     let (materials, slots) = materials(plain, &images, faces.take_textures());
     let polygons = faces.polygons();
@@ -132,7 +132,7 @@ pub(crate) fn has_normals(path: &Path) -> Option<bool> {
 /// The image of each texture that the header names; `None` if it cannot be used.
 fn images(
     path: &Path,
-    files: References,
+    files: &References,
     names: &[String],
     has_uvs: bool,
     warnings: &mut Warnings,
