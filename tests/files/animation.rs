@@ -3,6 +3,7 @@
 use bevy_ecs::change_detection::DetectChanges;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
+use firstlight::format::animation::TrackPart;
 use firstlight::scene::animation::{Channel, Interpolation};
 use firstlight::scene::file::SceneFile;
 use firstlight::scene::{
@@ -202,6 +203,44 @@ fn what_moves_keeps_its_keys_under_a_new_name() {
     assert_eq!(description.losses.len(), 1, "{:?}", description.losses);
     assert!(description.losses[0].contains("`albedo`") && description.losses[0].contains("`ruby`"));
     assert_eq!(description.file.animation.tracks.len(), 8);
+}
+
+#[test]
+fn many_things_that_move_are_described_at_once() {
+    // Minutes if each were looked for among all others.
+    const N: usize = 30_000;
+    let all = |line: &dyn Fn(usize) -> String| -> String { (0..N).map(line).collect() };
+    let spheres = all(&|i| format!("sphere(name: \"s{i}\", center: ({i}, 0, 0), radius: 0.1, material: \"m\"),\n"));
+    let lights = all(&|i| format!("point(name: \"p{i}\", position: ({i}, 3, 0), intensity: 1, radius: 0),\n"));
+    let tracks = all(&|i| {
+        format!(
+            "object(name: \"s{i}\", property: translate, keys: [(0, ({i}, 0, 0)), (1, ({i}, 1, 0))]),\n\
+             light(name: \"p{i}\", property: intensity, keys: [(0, 1), (1, 2)]),\n"
+        )
+    });
+    let (mut world, loaded) = open_at(
+        &format!(
+            "(camera: (eye: (0, 1, 6), look_at: (0, 0, 0)), materials: {{ \"m\": diffuse(albedo: 0.5) }},\n\
+             objects: [{spheres}], lights: [{lights}], animation: (tracks: [{tracks}]))"
+        ),
+        None,
+    );
+    let part = Description::of(&mut world, Some(&loaded)).file.animation;
+    assert_eq!(part.tracks, loaded.file.animation.tracks);
+    // Those that have one name get numbers, those without one as well.
+    for entity in SceneInputs::of(&mut world).objects.iter().map(|object| object.entity) {
+        world.entity_mut(entity).insert(Name::new("s"));
+    }
+    for entity in SceneInputs::of(&mut world).lights.iter().map(|light| light.entity) {
+        world.entity_mut(entity).remove::<Name>();
+    }
+    let part = Description::of(&mut world, Some(&loaded)).file.animation;
+    let wanted = (0..N).flat_map(|i| [format!("s {}", i + 2), format!("light {}", i + 2)]);
+    let named = |track: &TrackPart| match track {
+        TrackPart::Object { name, .. } | TrackPart::Light { name, .. } => name.clone(),
+        other => panic!("{other:?}"),
+    };
+    assert!(part.tracks.iter().map(named).eq(wanted));
 }
 
 #[test]

@@ -2,11 +2,12 @@
 
 use crate::format::animation::{AnimationPart, EditedPart};
 use crate::format::camera::camera_part;
+use crate::format::names::Names;
 use crate::format::placement::{Linear, Placement};
 use crate::scene::animation::written::to_part;
 use crate::scene::animation::{Animation, Channel};
 use crate::scene::world::components::SurfaceMaterial;
-use crate::scene::world::inputs::SceneInputs;
+use crate::scene::world::inputs::{LightInput, ObjectInput, SceneInputs};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
@@ -21,44 +22,42 @@ pub(in crate::scene) struct Moved {
 
 impl Moved {
     pub(in crate::scene) fn of(animation: Option<&Animation>, inputs: &SceneInputs) -> Self {
-        let channels: Vec<Channel> =
-            animation.iter().flat_map(|it| it.tracks.iter().map(|track| track.channel)).collect();
-        let mut moved = Self::default();
-        for channel in &channels {
-            if let Channel::Material(entity, _) = channel {
-                moved.materials.insert(*entity);
-            }
+        let (mut objects, mut lights, mut materials) = (HashSet::new(), HashSet::new(), HashSet::new());
+        for track in animation.iter().flat_map(|it| &it.tracks) {
+            match track.channel {
+                Channel::Camera(_) => continue,
+                Channel::Object(entity, _) => objects.insert(entity),
+                Channel::Light(entity, _) => lights.insert(entity),
+                Channel::Material(entity, _) => materials.insert(entity),
+            };
         }
-        let is_object = |entity: Entity| channels.iter().any(|c| matches!(c, Channel::Object(of, _) if *of == entity));
-        let is_light = |entity: Entity| channels.iter().any(|c| matches!(c, Channel::Light(of, _) if *of == entity));
-        if channels.iter().any(|c| matches!(c, Channel::Object(..))) {
+        let mut moved = Self { materials, ..Self::default() };
+        if !objects.is_empty() {
             let names = inputs.objects.iter().map(|object| (object.entity, object.name.as_deref()));
-            moved.give_names("object", names.collect(), is_object);
+            moved.give_names("object", names.collect(), &objects);
         }
-        if channels.iter().any(|c| matches!(c, Channel::Light(..))) {
+        if !lights.is_empty() {
             let names = inputs.lights.iter().map(|light| (light.entity, light.name.as_deref()));
-            moved.give_names("light", names.collect(), is_light);
+            moved.give_names("light", names.collect(), &lights);
         }
         moved
     }
 
     /// Assigns names to the animated ones of `things`, all of one kind.
-    fn give_names(&mut self, what: &str, things: Vec<(Entity, Option<&str>)>, moves: impl Fn(Entity) -> bool) {
-        let mut uses: HashMap<String, usize> = HashMap::new();
+    fn give_names(&mut self, what: &str, things: Vec<(Entity, Option<&str>)>, animated: &HashSet<Entity>) {
+        let mut uses: HashMap<&str, usize> = HashMap::new();
         for name in things.iter().filter_map(|(_, name)| *name) {
-            *uses.entry(name.to_owned()).or_default() += 1;
+            *uses.entry(name).or_default() += 1;
         }
-        for (entity, name) in things.into_iter().filter(|(entity, _)| moves(*entity)) {
+        let mut names = Names::taken(uses.keys().map(|name| (*name).to_owned()));
+        // A thing without a name gets a number.
+        names.take(what);
+        for (entity, name) in things.into_iter().filter(|(entity, _)| animated.contains(entity)) {
             let name = name.filter(|name| !name.is_empty());
             let own = match name {
                 Some(name) if uses[name] == 1 => name.to_owned(),
-                _ => {
-                    let wanted = name.unwrap_or(what);
-                    let mut free = (2_u64..).map(|number| format!("{wanted} {number}"));
-                    free.find(|name| !uses.contains_key(name)).expect("numbers do not end")
-                }
+                _ => names.free(name.unwrap_or(what)),
             };
-            uses.entry(own.clone()).or_insert(1);
             self.names.insert(entity, own);
         }
     }
@@ -86,13 +85,15 @@ impl Moved {
         losses: &mut Vec<String>,
     ) -> AnimationPart {
         let edited = self.edited_part(animation, at, (world, inputs), materials);
+        let objects = inputs.objects.iter().map(|object| (object.entity, object)).collect();
+        let lights = inputs.lights.iter().map(|light| (light.entity, light)).collect();
         let part = to_part(animation, at, |channel| {
             let name = match channel {
                 Channel::Camera(_) => return None,
                 Channel::Object(entity, _) | Channel::Light(entity, _) => self.names.get(&entity)?.clone(),
                 Channel::Material(entity, _) => materials.get(&entity)?.clone(),
             };
-            match has_property(channel, world, inputs) {
+            match has_property(channel, world, &objects, &lights) {
                 Some(false) => {
                     let property = channel.property();
                     losses
@@ -140,17 +141,22 @@ impl Moved {
 }
 
 /// Whether the property of the channel can be set; `None` if its entity does not exist.
-fn has_property(channel: Channel, world: &World, inputs: &SceneInputs) -> Option<bool> {
+fn has_property(
+    channel: Channel,
+    world: &World,
+    objects: &HashMap<Entity, &ObjectInput>,
+    lights: &HashMap<Entity, &LightInput>,
+) -> Option<bool> {
     use crate::format::property::ObjectProperty::{Rotate, Scale};
     Some(match channel {
         Channel::Camera(_) => true,
         Channel::Object(entity, property) => {
-            let object = inputs.objects.iter().find(|object| object.entity == entity)?;
+            let object = objects.get(&entity)?;
             let is_matrix = matches!(object.placement, Placement { linear: Linear::Matrix(_), .. });
             !(is_matrix && matches!(property, Rotate | Scale))
         }
         Channel::Light(entity, property) => {
-            let light = inputs.lights.iter().find(|light| light.entity == entity)?;
+            let light = lights.get(&entity)?;
             property.set(&mut light.light.clone(), &mut light.placement.clone(), DVec3::ONE).is_some()
         }
         Channel::Material(entity, property) => {

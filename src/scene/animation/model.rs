@@ -82,10 +82,12 @@ impl ModelMotion {
                 object.placement = **placement;
             }
         }
-        for (i, kind, placement) in &moment.lights {
-            let light = inputs.lights.iter_mut().find(|light| self.lights.get(*i) == Some(&light.entity));
-            if let Some(light) = light {
-                (light.light, light.placement) = (*kind, *placement);
+        let lights =
+            moment.lights.iter().filter_map(|(i, kind, placement)| Some((*self.lights.get(*i)?, (*kind, *placement))));
+        let lights: HashMap<Entity, _> = lights.collect();
+        for light in &mut inputs.lights {
+            if let Some(&(kind, placement)) = lights.get(&light.entity) {
+                (light.light, light.placement) = (kind, placement);
             }
         }
     }
