@@ -16,8 +16,8 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
-/// Number of folders that are tried for one archive.
-const MOST_FOLDERS: u32 = 1000;
+/// Number of places that are tried for one archive.
+const MOST_PLACES: u32 = 1000;
 /// Bytes of the list of checksums.
 const MOST_SUMS: u64 = 64 << 20;
 /// Compression ratio above which a file is refused; Deflate reaches 1032.
@@ -28,6 +28,10 @@ const MOST_RATIO_OF_ALL: u64 = 200;
 const SMALL: u64 = 256 << 20;
 /// Files of an archive.
 const MOST_FILES: usize = 100_000;
+/// Folders of an archive: one name can have two thousand.
+const MOST_FOLDERS: usize = 20_000;
+/// Folders of an archive that lie in one another.
+const MOST_DEPTH: usize = 64;
 /// Beginning of the names of folders that are being written.
 const PART: &str = ".part-";
 
@@ -64,6 +68,12 @@ pub enum UnpackError {
     /// There are too many files.
     #[error("has {0} files, more than the {MOST_FILES} of the largest scenes")]
     TooMany(usize),
+    /// There are too many folders.
+    #[error("has {0} folders, more than the {MOST_FOLDERS} of the largest scenes")]
+    TooManyFolders(usize),
+    /// A file is in too many folders.
+    #[error("`{}` in the archive is in more than {MOST_DEPTH} folders", printable::name(.0))]
+    TooDeep(String),
     /// All files together are too large.
     #[error(
         "would take {size} bytes on the disk, above the limit of {limit} bytes for an archive of this size: {}",
@@ -102,7 +112,7 @@ pub fn unpack(archive: &Path, cache: &Path) -> Result<Unpacked, UnpackError> {
     let sums = sums_of(&mut zip)?;
     check_entries(&mut zip, &sums, std::fs::metadata(archive).map_or(0, |info| info.len()))?;
     let scene = scene_in(zip.comment(), &sums)?;
-    for number in 1..MOST_FOLDERS {
+    for number in 1..MOST_PLACES {
         let name = &sum[..32];
         let folder = cache.join(if number == 1 { name.to_owned() } else { format!("{name}-{number}") });
         let is_there = folder.exists();
@@ -220,12 +230,33 @@ fn check_entries(
     if let Some((_, below)) = pairs.find(|(file, next)| next.starts_with(file)) {
         return Err(UnpackError::Twice(path_to_text(below)));
     }
+    let n_folders = count_folders(&places)?;
+    if n_folders > MOST_FOLDERS {
+        return Err(UnpackError::TooManyFolders(n_folders));
+    }
     // In the list there may be any path of this computer.
     if let Some(missing) = sums.keys().find(|name| !names.contains(*name) || *name == CHECKSUMS) {
         return Err(UnpackError::Damaged(missing.clone()));
     }
     let limit = Limits::of_this_process().archive_bytes.min(length.saturating_mul(MOST_RATIO_OF_ALL).max(SMALL));
     if size > limit { Err(UnpackError::TooLargeTogether { size, limit }) } else { Ok(()) }
+}
+
+/// Number of folders that files have.
+fn count_folders(files: &BTreeSet<PathBuf>) -> Result<usize, UnpackError> {
+    let mut n_folders = 0;
+    let mut before = Path::new("");
+    for file in files {
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let depth = folder.components().count();
+        if depth > MOST_DEPTH {
+            return Err(UnpackError::TooDeep(path_to_text(file)));
+        }
+        // What is in one folder follows one another.
+        n_folders += depth - folder.components().zip(before.components()).take_while(|(a, b)| a == b).count();
+        before = folder;
+    }
+    Ok(n_folders)
 }
 
 /// Locks the cache for writing, shared with other processes that unpack. Where there are none, what interrupted ones have

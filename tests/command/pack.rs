@@ -361,6 +361,41 @@ fn archives_have_limits_for_all_files_together() {
     assert!(said().contains("1.bin") && said().contains("damaged"), "{}", said());
 }
 
+/// Empty files in folders that nothing else needs: each is an entry of the file system.
+#[test]
+fn an_archive_has_few_folders() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let refused = |names: &[String]| {
+        let mut out = zip::ZipWriter::new(std::fs::File::create(path.join("many.zip")).unwrap());
+        let options = zip::write::SimpleFileOptions::default();
+        let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+        let mut sums = String::new();
+        for name in names {
+            out.start_file(name.as_str(), options).unwrap();
+            sums += &format!("{empty}  {name}\n");
+        }
+        out.start_file("SHA256SUMS", options).unwrap();
+        out.write_all(sums.as_bytes()).unwrap();
+        out.finish().unwrap();
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        let output = command.args(["info", "many.zip"]).current_dir(path).env("XDG_CACHE_HOME", path).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        let unpacked = path.join("firstlight/packed").exists();
+        (String::from_utf8_lossy(&output.stderr).into_owned(), unpacked)
+    };
+    let deep = |i: usize, depth: usize| format!("{i:04}/{}s.ron", "a/".repeat(depth - 1));
+    let (said, unpacked) = refused(&[deep(0, 65)]);
+    assert!(said.contains("is in more than 64 folders") && !unpacked, "{said}");
+    let (said, unpacked) = refused(&(0..400).map(|i| deep(i, 60)).collect::<Vec<_>>());
+    assert!(said.contains("has 24000 folders, more than the 20000") && !unpacked, "{said}");
+    // Folders of several files count once; what is opened here is no scene, which is another error.
+    let shared: Vec<String> = (0..1000).map(|i| format!("{}{i}.ron", "a/".repeat(64))).collect();
+    let (said, _) = refused(&shared);
+    assert!(said.contains("does not say which scene to open"), "{said}");
+}
+
 /// With what it includes, and the meshes and images that are named there; as a scene of ours that refers to it, too.
 #[test]
 fn a_packed_scene_of_pbrt_takes_its_files_along() {
