@@ -2,6 +2,7 @@
 
 pub(crate) mod environment;
 pub(crate) mod folder;
+pub(crate) mod identifiers;
 pub(crate) mod number;
 pub(crate) mod objects;
 pub(crate) mod picture;

@@ -8,6 +8,7 @@ mod xml;
 
 use crate::common::environment::{FINE, round_image};
 use crate::common::folder::Folder;
+use crate::common::identifiers::Identifiers;
 use crate::common::number::number;
 use crate::common::objects::{Geometry, Placed, placed, radiance_of};
 use crate::common::picture::exr;
@@ -20,7 +21,6 @@ use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
 use firstlight_format::light::{ImageFrame, LightKind};
-use firstlight_format::names::Names;
 use firstlight_format::parts::LightPart;
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_render::{Environment, Falloff};
@@ -45,14 +45,15 @@ struct Writer<'a> {
     surfaces: HashMap<String, Surface>,
     /// Identifiers of materials.
     ids: HashMap<String, String>,
-    /// Identifiers of everything.
-    taken: Names,
+    /// Identifiers of everything. In Mitsuba, a period separates objects from their parameters, and `$` begins a
+    /// parameter of the file.
+    taken: Identifiers,
 }
 
 /// The text of a scene; its meshes and images go to the folder.
 pub(crate) fn text(scene: &WholeScene, folder: &mut Folder, warnings: &mut Warnings) -> Result<String, WriteError> {
     let xml = Xml::default();
-    let (surfaces, ids, taken) = (HashMap::new(), HashMap::new(), Names::default());
+    let (surfaces, ids, taken) = (HashMap::new(), HashMap::new(), Identifiers::without(&['.', '$']));
     let mut writer = Writer { scene, folder, warnings, xml, surfaces, ids, taken };
     writer.xml.open("scene", &[("version", "3.0.0")]);
     writer.scene()?;
@@ -75,7 +76,7 @@ impl Writer<'_> {
             self.light(light)?;
         }
         for name in names {
-            let id = self.id(&name);
+            let id = self.taken.free(&name);
             let surface = self.surfaces[&name].clone();
             self.surface(&surface, &id, &name)?;
             self.ids.insert(name, id);
@@ -91,7 +92,7 @@ impl Writer<'_> {
             }
             let known = known_groups.get(&group).cloned();
             let is_new = known.is_none();
-            let id = known.unwrap_or_else(|| self.id("group"));
+            let id = known.unwrap_or_else(|| self.taken.free("group"));
             if is_new {
                 known_groups.insert(group, id.clone());
                 self.xml.open("shape", &[("type", "shapegroup"), ("id", &id)]);
@@ -106,12 +107,6 @@ impl Writer<'_> {
             self.xml.close();
         }
         Ok(())
-    }
-
-    /// An identifier of its own. In Mitsuba, a period separates objects from their parameters, and `$` begins a parameter
-    /// of the file.
-    fn id(&mut self, wanted: &str) -> String {
-        self.taken.free(&wanted.replace(['.', '$', '\n', '\r', '\t'], "_"))
     }
 
     fn tell(&mut self, name: &str, what: &str) {

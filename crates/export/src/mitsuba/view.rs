@@ -35,7 +35,7 @@ impl Writer<'_> {
     }
 
     fn sensor(&mut self, part: &CameraPart, name: &str) {
-        let id = self.id(name);
+        let id = self.taken.free(name);
         let (view, projection, lens) = camera(part);
         let View { eye, forward, up, pivot_distance } = view;
         let (Projection { vfov_deg, orthographic_height }, film) = (projection, self.scene.file.film);

@@ -11,7 +11,7 @@
 
 use crate::common::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use crate::pbrt::text::List;
-use crate::pbrt::{FORMATS, Writer};
+use crate::pbrt::{FORMATS, Writer, inside_of};
 use firstlight_files::write_error::WriteError;
 use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
 use glam::{DVec2, Vec3};
@@ -24,12 +24,13 @@ const THIN: f64 = 1e-6;
 impl Writer<'_> {
     /// Writes a material; returns its name in pbrt.
     pub(crate) fn surface(&mut self, surface: &Surface, name: &str) -> Result<String> {
+        let id = self.bsdf(&surface.bsdf, surface.normals.as_ref(), name)?;
         if surface.absorption != Vec3::ZERO {
             let list = List::default().string("type", "homogeneous").rgb("sigma_a", surface.absorption);
             let list = list.rgb("sigma_s", Vec3::ZERO);
-            self.text.directive("MakeNamedMedium", &[&format!("inside of {name}")], list);
+            self.text.directive("MakeNamedMedium", &[&inside_of(&id)], list);
         }
-        self.bsdf(&surface.bsdf, surface.normals.as_ref(), name)
+        Ok(id)
     }
 
     fn bsdf(&mut self, bsdf: &Bsdf, normals: Option<&Normals>, name: &str) -> Result<String> {

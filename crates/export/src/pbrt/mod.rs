@@ -8,18 +8,18 @@ mod view;
 
 use crate::common::environment::square_image;
 use crate::common::folder::Folder;
+use crate::common::identifiers::Identifiers;
 use crate::common::objects::{Geometry, Placed, placed, radiance_of};
 use crate::common::picture::exr;
 use crate::common::projected::Projected;
 use crate::common::scene::WholeScene;
 use crate::common::surface::{Color, Scalar, Surface, Use};
-use crate::pbrt::text::{List, Text, quoted};
+use crate::pbrt::text::{List, MARKS, Text, quoted};
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
 use firstlight_format::light::LightKind;
-use firstlight_format::names::Names;
 use firstlight_format::parts::LightPart;
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_render::{Environment, Falloff};
@@ -42,10 +42,10 @@ struct Writer<'a> {
     surfaces: HashMap<String, Surface>,
     /// Names of materials in pbrt.
     ids: HashMap<String, String>,
-    taken: Names,
+    taken: Identifiers,
     /// Names of textures by what they are.
     textures: HashMap<String, String>,
-    texture_names: Names,
+    texture_names: Identifiers,
 }
 
 /// The text of a scene; its meshes and images go to the folder.
@@ -62,9 +62,9 @@ pub(crate) fn text(
         text: Text::default(),
         surfaces: HashMap::new(),
         ids: HashMap::new(),
-        taken: Names::default(),
+        taken: Identifiers::without(&MARKS),
         textures: HashMap::new(),
-        texture_names: Names::default(),
+        texture_names: Identifiers::without(&MARKS),
     };
     writer.view(image);
     writer.text.line("\nWorldBegin\n");
@@ -124,11 +124,10 @@ impl Writer<'_> {
         let mut list = List::default();
         self.text.begin("AttributeBegin");
         if let Some(surface) = &surface {
-            if surface.absorption != Vec3::ZERO {
-                let medium = format!("inside of {}", placed.material);
-                self.text.directive("MediumInterface", &[&medium, ""], List::default());
-            }
             if let Some(id) = self.ids.get(&placed.material) {
+                if surface.absorption != Vec3::ZERO {
+                    self.text.directive("MediumInterface", &[&inside_of(id), ""], List::default());
+                }
                 self.text.directive("NamedMaterial", &[id], List::default());
             }
             if let Some(radiance) = &surface.radiance {
@@ -302,4 +301,9 @@ impl Writer<'_> {
         self.text.end("AttributeEnd");
         Ok(())
     }
+}
+
+/// The medium that a body of this material is full of.
+fn inside_of(material: &str) -> String {
+    format!("inside of {material}")
 }

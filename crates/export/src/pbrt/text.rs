@@ -9,9 +9,12 @@ pub(crate) struct Text {
     depth: usize,
 }
 
+/// Marks that no quoted word may have.
+pub(crate) const MARKS: [char; 2] = ['"', '\\'];
+
 /// A name as pbrt quotes it.
 pub(crate) fn quoted(name: &str) -> String {
-    let plain = |c: char| if c == '"' || c == '\\' || c.is_control() { '_' } else { c };
+    let plain = |c: char| if MARKS.contains(&c) || c.is_control() { '_' } else { c };
     format!("\"{}\"", name.chars().map(plain).collect::<String>())
 }
 
