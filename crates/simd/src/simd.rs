@@ -311,36 +311,16 @@ impl Simd for Portable {
     }
 
     operations! {
-        fn splat(self, x: f32) -> Self::F {
-            [x; LANES]
-        }
-        fn load(self, from: &[f32; LANES]) -> Self::F {
-            *from
-        }
-        fn store(self, a: Self::F, to: &mut [f32; LANES]) {
-            *to = a;
-        }
-        fn add(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| a + b)
-        }
-        fn sub(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| a - b)
-        }
-        fn mul(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| a * b)
-        }
-        fn div(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| a / b)
-        }
-        fn min(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| if a < b { a } else { b })
-        }
-        fn max(self, a: Self::F, b: Self::F) -> Self::F {
-            zip(a, b, |a, b| if a > b { a } else { b })
-        }
-        fn abs(self, a: Self::F) -> Self::F {
-            a.map(f32::abs)
-        }
+        fn splat(self, x: f32) -> Self::F { [x; LANES] }
+        fn load(self, from: &[f32; LANES]) -> Self::F { *from }
+        fn store(self, a: Self::F, to: &mut [f32; LANES]) { *to = a; }
+        fn add(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| a + b) }
+        fn sub(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| a - b) }
+        fn mul(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| a * b) }
+        fn div(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| a / b) }
+        fn min(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| if a < b { a } else { b }) }
+        fn max(self, a: Self::F, b: Self::F) -> Self::F { zip(a, b, |a, b| if a > b { a } else { b }) }
+        fn abs(self, a: Self::F) -> Self::F { a.map(f32::abs) }
         fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
             std::array::from_fn(|i| a[i].mul_add(b[i], -c[i]))
         }
@@ -353,123 +333,53 @@ impl Simd for Portable {
         fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
             std::array::from_fn(|i| c[i] - a[i] * b[i])
         }
-        fn reciprocal_about(self, a: Self::F) -> Self::F {
-            a.map(f32::recip)
-        }
-        fn negative(self, a: Self::F) -> Mask {
-            bits(|i| a[i].is_sign_negative())
-        }
-        fn lt(self, a: Self::F, b: Self::F) -> Mask {
-            bits(|i| a[i] < b[i])
-        }
-        fn le(self, a: Self::F, b: Self::F) -> Mask {
-            bits(|i| a[i] <= b[i])
-        }
-        fn eq(self, a: Self::F, b: Self::F) -> Mask {
-            bits(|i| a[i] == b[i])
-        }
+        fn reciprocal_about(self, a: Self::F) -> Self::F { a.map(f32::recip) }
+        fn negative(self, a: Self::F) -> Mask { bits(|i| a[i].is_sign_negative()) }
+        fn lt(self, a: Self::F, b: Self::F) -> Mask { bits(|i| a[i] < b[i]) }
+        fn le(self, a: Self::F, b: Self::F) -> Mask { bits(|i| a[i] <= b[i]) }
+        fn eq(self, a: Self::F, b: Self::F) -> Mask { bits(|i| a[i] == b[i]) }
         fn select(self, mask: Mask, a: Self::F, b: Self::F) -> Self::F {
             std::array::from_fn(|i| if mask >> i & 1 != 0 { a[i] } else { b[i] })
         }
         fn least(self, mask: Mask, a: Self::F) -> f32 {
             (0..LANES).filter(|i| mask >> i & 1 != 0).fold(f32::INFINITY, |least, i| least.min(a[i]))
         }
-        fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F {
-            axes.map(|axis| point[axis as usize & 3])
-        }
+        fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F { axes.map(|axis| point[axis as usize & 3]) }
         fn lookup(self, table: Self::F, indices: Self::U) -> Self::F {
             indices.map(|index| table[index as usize % LANES])
         }
-        fn splat_u(self, x: u32) -> Self::U {
-            [x; LANES]
-        }
-        fn load_u(self, from: &[u32; LANES]) -> Self::U {
-            *from
-        }
-        fn load_bytes(self, from: &[u8; LANES]) -> Self::U {
-            from.map(u32::from)
-        }
-        fn store_u(self, a: Self::U, to: &mut [u32; LANES]) {
-            *to = a;
-        }
-        fn lt_u(self, a: Self::U, b: Self::U) -> Mask {
-            bits(|i| a[i] < b[i])
-        }
+        fn splat_u(self, x: u32) -> Self::U { [x; LANES] }
+        fn load_u(self, from: &[u32; LANES]) -> Self::U { *from }
+        fn load_bytes(self, from: &[u8; LANES]) -> Self::U { from.map(u32::from) }
+        fn store_u(self, a: Self::U, to: &mut [u32; LANES]) { *to = a; }
+        fn lt_u(self, a: Self::U, b: Self::U) -> Mask { bits(|i| a[i] < b[i]) }
         fn select_u(self, mask: Mask, a: Self::U, b: Self::U) -> Self::U {
             std::array::from_fn(|i| if mask >> i & 1 != 0 { a[i] } else { b[i] })
         }
-        fn splat_d(self, x: f64) -> Self::D {
-            [x; LANES]
-        }
-        fn widen(self, a: Self::F) -> Self::D {
-            a.map(f64::from)
-        }
-        fn narrow(self, a: Self::D) -> Self::F {
-            a.map(|a| a as f32)
-        }
-        fn add_d(self, a: Self::D, b: Self::D) -> Self::D {
-            zip(a, b, |a, b| a + b)
-        }
-        fn sub_d(self, a: Self::D, b: Self::D) -> Self::D {
-            zip(a, b, |a, b| a - b)
-        }
-        fn mul_d(self, a: Self::D, b: Self::D) -> Self::D {
-            zip(a, b, |a, b| a * b)
-        }
-        fn div_d(self, a: Self::D, b: Self::D) -> Self::D {
-            zip(a, b, |a, b| a / b)
-        }
-        fn sqrt_d(self, a: Self::D) -> Self::D {
-            a.map(f64::sqrt)
-        }
-        fn abs_d(self, a: Self::D) -> Self::D {
-            a.map(f64::abs)
-        }
-        fn max_d(self, a: Self::D, b: Self::D) -> Self::D {
-            zip(a, b, |a, b| if a > b { a } else { b })
-        }
-        fn le_d(self, a: Self::D, b: Self::D) -> Mask {
-            bits(|i| a[i] <= b[i])
-        }
-        fn sqrt(self, a: Self::F) -> Self::F {
-            a.map(f32::sqrt)
-        }
-        fn truncate(self, a: Self::F) -> Self::U {
-            a.map(|a| a as i32 as u32)
-        }
-        fn to_f(self, a: Self::U) -> Self::F {
-            a.map(|a| a as i32 as f32)
-        }
-        fn to_bits(self, a: Self::F) -> Self::U {
-            a.map(f32::to_bits)
-        }
-        fn float_of(self, a: Self::U) -> Self::F {
-            a.map(f32::from_bits)
-        }
-        fn add_u(self, a: Self::U, b: Self::U) -> Self::U {
-            zip(a, b, u32::wrapping_add)
-        }
-        fn mul_u(self, a: Self::U, b: Self::U) -> Self::U {
-            zip(a, b, u32::wrapping_mul)
-        }
-        fn and_u(self, a: Self::U, b: Self::U) -> Self::U {
-            zip(a, b, |a, b| a & b)
-        }
-        fn or_u(self, a: Self::U, b: Self::U) -> Self::U {
-            zip(a, b, |a, b| a | b)
-        }
-        fn xor_u(self, a: Self::U, b: Self::U) -> Self::U {
-            zip(a, b, |a, b| a ^ b)
-        }
-        fn shl_u(self, a: Self::U, bits: u32) -> Self::U {
-            a.map(|a| a << bits)
-        }
-        fn shr_u(self, a: Self::U, bits: u32) -> Self::U {
-            a.map(|a| a >> bits)
-        }
-        fn eq_u(self, a: Self::U, b: Self::U) -> Mask {
-            bits(|i| a[i] == b[i])
-        }
+        fn splat_d(self, x: f64) -> Self::D { [x; LANES] }
+        fn widen(self, a: Self::F) -> Self::D { a.map(f64::from) }
+        fn narrow(self, a: Self::D) -> Self::F { a.map(|a| a as f32) }
+        fn add_d(self, a: Self::D, b: Self::D) -> Self::D { zip(a, b, |a, b| a + b) }
+        fn sub_d(self, a: Self::D, b: Self::D) -> Self::D { zip(a, b, |a, b| a - b) }
+        fn mul_d(self, a: Self::D, b: Self::D) -> Self::D { zip(a, b, |a, b| a * b) }
+        fn div_d(self, a: Self::D, b: Self::D) -> Self::D { zip(a, b, |a, b| a / b) }
+        fn sqrt_d(self, a: Self::D) -> Self::D { a.map(f64::sqrt) }
+        fn abs_d(self, a: Self::D) -> Self::D { a.map(f64::abs) }
+        fn max_d(self, a: Self::D, b: Self::D) -> Self::D { zip(a, b, |a, b| if a > b { a } else { b }) }
+        fn le_d(self, a: Self::D, b: Self::D) -> Mask { bits(|i| a[i] <= b[i]) }
+        fn sqrt(self, a: Self::F) -> Self::F { a.map(f32::sqrt) }
+        fn truncate(self, a: Self::F) -> Self::U { a.map(|a| a as i32 as u32) }
+        fn to_f(self, a: Self::U) -> Self::F { a.map(|a| a as i32 as f32) }
+        fn to_bits(self, a: Self::F) -> Self::U { a.map(f32::to_bits) }
+        fn float_of(self, a: Self::U) -> Self::F { a.map(f32::from_bits) }
+        fn add_u(self, a: Self::U, b: Self::U) -> Self::U { zip(a, b, u32::wrapping_add) }
+        fn mul_u(self, a: Self::U, b: Self::U) -> Self::U { zip(a, b, u32::wrapping_mul) }
+        fn and_u(self, a: Self::U, b: Self::U) -> Self::U { zip(a, b, |a, b| a & b) }
+        fn or_u(self, a: Self::U, b: Self::U) -> Self::U { zip(a, b, |a, b| a | b) }
+        fn xor_u(self, a: Self::U, b: Self::U) -> Self::U { zip(a, b, |a, b| a ^ b) }
+        fn shl_u(self, a: Self::U, bits: u32) -> Self::U { a.map(|a| a << bits) }
+        fn shr_u(self, a: Self::U, bits: u32) -> Self::U { a.map(|a| a >> bits) }
+        fn eq_u(self, a: Self::U, b: Self::U) -> Mask { bits(|i| a[i] == b[i]) }
         fn gather(self, from: &[f32], indices: Self::U) -> Self::F {
             let last = last_index(from.len());
             indices.map(|i| from[i.min(last) as usize])
@@ -478,12 +388,8 @@ impl Simd for Portable {
             let last = last_index(from.len());
             indices.map(|i| from[i.min(last) as usize])
         }
-        fn compress(self, mask: Mask, a: Self::F) -> Self::F {
-            pack(mask, a)
-        }
-        fn compress_u(self, mask: Mask, a: Self::U) -> Self::U {
-            pack(mask, a)
-        }
+        fn compress(self, mask: Mask, a: Self::F) -> Self::F { pack(mask, a) }
+        fn compress_u(self, mask: Mask, a: Self::U) -> Self::U { pack(mask, a) }
     }
 }
 
