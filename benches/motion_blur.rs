@@ -5,21 +5,23 @@
 //! and what it takes longer is the price of working sample by sample. `-- [SCENE]...` measures other scenes.
 
 mod common;
+#[path = "common/turns.rs"]
+mod turns;
 
 use common::{scenes, world_of};
 use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Exposed, Film, Geometry, Material, Object, Prepared, RenderSettings,
-    SampleAllocation, Shading, Snapshot, advance,
+    Camera, ColorInput, Environment, Exposed, Geometry, Material, Object, Prepared, RenderSettings, SampleAllocation,
+    Shading, Snapshot,
 };
 use firstlight::report::cpu_seconds;
 use firstlight::scene::{BUILTIN_SCENES, Extraction, Rendering, SceneInputs};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::hint::black_box;
 use std::sync::Arc;
+use turns::{ROUNDS, compare, median};
 
-const ROUNDS: usize = 9;
 const SPP: u32 = 64;
 
 fn main() {
@@ -81,32 +83,7 @@ fn row(name: &str) {
     let settings = RenderSettings { allocation: SampleAllocation::Uniform, ..world.resource::<Rendering>().0 };
     let still = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
     let moments = |_: f64| still.clone();
-    let (mut seconds, mut ratios) = ([vec![], vec![]], vec![]);
-    for round in 0..=ROUNDS {
-        let exposed = [Exposed::still(&still), Exposed::moving(&still, &moments)];
-        let [(a, first), (b, second)] = exposed.map(|scene| render(scene, &settings));
-        assert!(first == second, "{name}: the films differ");
-        // The first round warms up.
-        if round > 0 {
-            seconds[0].push(a);
-            seconds[1].push(b);
-            ratios.push(b / a);
-        }
-    }
-    let [still, moving] = seconds.map(|mut seconds| median(&mut seconds));
-    println!("| {name} | {still:.3} | {moving:.3} | {:.3} |", median(&mut ratios));
-}
-
-/// CPU seconds and the picture, bit by bit.
-fn render(scene: Exposed, settings: &RenderSettings) -> (f64, Vec<[u32; 3]>) {
-    let mut film = Film::new(256, 192);
-    let before = cpu_seconds().expect("a system that tells CPU time");
-    advance(scene, settings, &mut film, SPP, &|| false);
-    let seconds = cpu_seconds().expect("a system that tells CPU time") - before;
-    (seconds, film.means().iter().map(|mean| mean.to_array().map(f32::to_bits)).collect())
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
+    let two = [Exposed::still(&still), Exposed::moving(&still, &moments)];
+    let [still, moving, ratio] = compare(name, two, &settings, SPP);
+    println!("| {name} | {still:.3} | {moving:.3} | {ratio:.3} |");
 }

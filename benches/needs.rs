@@ -1,16 +1,17 @@
 //! What it saves to model only what a scene needs: `cargo bench -p firstlight-benches --bench needs`.
 //!
 //! Each scene is rendered twice in turns, as it is and with loops that are told that it might also have glass, absorbing
-//! media, textures and surroundings that shine. The pictures must be the same. `-- [SCENE]...` measures other scenes.
+//! media, textures and an environment that shines. The images must be the same. `-- [SCENE]...` measures other scenes.
 
 mod common;
+#[path = "common/turns.rs"]
+mod turns;
 
 use common::{scenes, world_of};
-use firstlight::render::{Features, Film, Prepared, RenderSettings, advance};
-use firstlight::report::cpu_seconds;
+use firstlight::render::{Exposed, Features, Prepared};
 use firstlight::scene::{BUILTIN_SCENES, Extraction, Rendering, SceneInputs};
+use turns::compare;
 
-const ROUNDS: usize = 9;
 const SPP: u32 = 16;
 
 fn main() {
@@ -30,39 +31,11 @@ fn row(name: &str) {
     let own = needed.features();
     let all = Features { glass: true, media: true, textures: true, environment: true, ..own };
     let everything = Prepared::with_features((*needed).clone(), all);
-    let (mut seconds, mut ratios) = ([vec![], vec![]], vec![]);
-    for round in 0..=ROUNDS {
-        let [(a, first), (b, second)] = [&needed, &everything].map(|prepared| render(prepared, &settings));
-        assert!(first == second, "{name}: the pictures differ");
-        // The first round warms up.
-        if round > 0 {
-            seconds[0].push(a);
-            seconds[1].push(b);
-            ratios.push(b / a);
-        }
-    }
+    let two = [Exposed::still(&needed), Exposed::still(&everything)];
+    let [own_seconds, all_seconds, ratio] = compare(name, two, &settings, SPP);
     let uses =
-        [(own.glass, "glass"), (own.media, "media"), (own.textures, "textures"), (own.environment, "surroundings")];
+        [(own.glass, "glass"), (own.media, "media"), (own.textures, "textures"), (own.environment, "environment")];
     let uses: Vec<_> = uses.iter().filter(|(used, _)| *used).map(|(_, what)| *what).collect();
     let uses = if uses.is_empty() { "none of them".to_owned() } else { uses.join(", ") };
-    println!(
-        "| {name} | {uses} | {:.3} | {:.3} | {:.2} |",
-        median(&mut seconds[0]),
-        median(&mut seconds[1]),
-        median(&mut ratios)
-    );
-}
-
-/// CPU seconds and the picture, bit by bit.
-fn render(prepared: &Prepared, settings: &RenderSettings) -> (f64, Vec<[u32; 3]>) {
-    let mut film = Film::new(256, 192);
-    let before = cpu_seconds().expect("a system that tells CPU time");
-    advance(prepared, settings, &mut film, SPP, &|| false);
-    let seconds = cpu_seconds().expect("a system that tells CPU time") - before;
-    (seconds, film.means().iter().map(|mean| mean.to_array().map(f32::to_bits)).collect())
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
+    println!("| {name} | {uses} | {own_seconds:.3} | {all_seconds:.3} | {ratio:.2} |");
 }
