@@ -178,32 +178,18 @@ impl RenderOptions {
 
 impl fmt::Debug for RenderOptions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            size,
-            target,
-            integrator,
-            max_depth,
-            seed,
-            filter,
-            allocation,
-            exposure,
-            threads,
-            features,
-            denoise,
-            ..
-        } = self;
         f.debug_struct("RenderOptions")
-            .field("size", size)
-            .field("target", target)
-            .field("integrator", integrator)
-            .field("max_depth", max_depth)
-            .field("seed", seed)
-            .field("filter", filter)
-            .field("allocation", allocation)
-            .field("exposure", exposure)
-            .field("threads", threads)
-            .field("features", features)
-            .field("denoise", denoise)
+            .field("size", &self.size)
+            .field("target", &self.target)
+            .field("integrator", &self.integrator)
+            .field("max_depth", &self.max_depth)
+            .field("seed", &self.seed)
+            .field("filter", &self.filter)
+            .field("allocation", &self.allocation)
+            .field("exposure", &self.exposure)
+            .field("threads", &self.threads)
+            .field("features", &self.features)
+            .field("denoise", &self.denoise)
             .finish_non_exhaustive()
     }
 }

@@ -3,61 +3,32 @@
 /// An image (JPEG) of each built-in scene, from left to right in the order of [`BUILTIN_SCENES`], all of one width.
 pub const SCENES_IMAGE: &[u8] = include_bytes!("../../assets/scenes/thumbnails.jpg");
 
+/// Makes the list of scenes from their names, which are those of their files, and descriptions.
+macro_rules! scenes {
+    ($($name:literal: $about:literal,)*) => {
+        &[$(($name, $about, include_str!(concat!("../../assets/scenes/", $name, ".ron"))),)*]
+    };
+}
+
 /// Name, description, and text of the scene file.
-pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
-    (
-        "gallery",
-        "glass, mirror, metal and diffuse objects on a checkered floor",
-        include_str!("../../assets/scenes/gallery.ron"),
-    ),
-    ("cornell", "the Cornell box", include_str!("../../assets/scenes/cornell.ron")),
-    (
-        "cornell-balls",
-        "the Cornell box with a mirror sphere and a glass sphere",
-        include_str!("../../assets/scenes/cornell-balls.ron"),
-    ),
-    ("dof-balls", "a row of spheres through a wide aperture", include_str!("../../assets/scenes/dof-balls.ron")),
-    (
-        "veach-mis",
-        "Veach's test for multiple importance sampling: four lights over plates from glossy to rough",
-        include_str!("../../assets/scenes/veach-mis.ron"),
-    ),
-    ("ball", "a blue sphere on a checkered floor", include_str!("../../assets/scenes/ball.ron")),
-    (
-        "kd-tree",
-        "a large mesh over fifty spheres on a reflective checkered floor",
-        include_str!("../../assets/scenes/kd-tree.ron"),
-    ),
-    ("models", "six models in a circle", include_str!("../../assets/scenes/models.ron")),
-    (
-        "simplified",
-        "one model with 100 %, 20 % and 1 % of its triangles",
-        include_str!("../../assets/scenes/simplified.ron"),
-    ),
-    ("soft-shadow", "a sphere and its soft shadow", include_str!("../../assets/scenes/soft-shadow.ron")),
-    (
-        "everything",
-        "mirrors, glass, spheres and models in one room",
-        include_str!("../../assets/scenes/everything.ron"),
-    ),
-    ("gi-ball", "a sphere under a large sphere light", include_str!("../../assets/scenes/gi-ball.ron")),
-    ("gi-balls", "diffuse and mirror spheres next to a large mesh", include_str!("../../assets/scenes/gi-balls.ron")),
-    (
-        "glass-balls",
-        "glass spheres and a glass torus with caustics",
-        include_str!("../../assets/scenes/glass-balls.ron"),
-    ),
-    (
-        "ten-thousand-balls",
-        "a mesh of 344,064 triangles above 10,000 spheres",
-        include_str!("../../assets/scenes/ten-thousand-balls.ron"),
-    ),
-    (
-        "carousel",
-        "an animation: a sphere orbits a turning ring, and the camera moves",
-        include_str!("../../assets/scenes/carousel.ron"),
-    ),
-];
+pub const BUILTIN_SCENES: &[(&str, &str, &str)] = scenes! {
+    "gallery": "glass, mirror, metal and diffuse objects on a checkered floor",
+    "cornell": "the Cornell box",
+    "cornell-balls": "the Cornell box with a mirror sphere and a glass sphere",
+    "dof-balls": "a row of spheres through a wide aperture",
+    "veach-mis": "Veach's test for multiple importance sampling: four lights over plates from glossy to rough",
+    "ball": "a blue sphere on a checkered floor",
+    "kd-tree": "a large mesh over fifty spheres on a reflective checkered floor",
+    "models": "six models in a circle",
+    "simplified": "one model with 100 %, 20 % and 1 % of its triangles",
+    "soft-shadow": "a sphere and its soft shadow",
+    "everything": "mirrors, glass, spheres and models in one room",
+    "gi-ball": "a sphere under a large sphere light",
+    "gi-balls": "diffuse and mirror spheres next to a large mesh",
+    "glass-balls": "glass spheres and a glass torus with caustics",
+    "ten-thousand-balls": "a mesh of 344,064 triangles above 10,000 spheres",
+    "carousel": "an animation: a sphere orbits a turning ring, and the camera moves",
+};
 
 /// The text of a built-in scene; `None` if there is no such scene.
 pub fn builtin_text(name: &str) -> Option<&'static str> {

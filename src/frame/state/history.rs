@@ -212,33 +212,33 @@ impl History {
 
     /// Undoes the last step.
     pub fn step_back(world: &mut World) -> Option<()> {
-        Self::remember_now(world);
-        let mut history = world.resource_mut::<Self>();
-        let step = history.undo.pop()?;
-        history.revision += 1;
-        let now = history.now.replace(step.before.clone())?;
-        let at_moment = std::mem::replace(&mut history.at_moment, step.at_moment.clone());
-        history.redo.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
-        history.begun = None;
-        history.compare();
-        restore(world, &now, &step.before);
-        select_what_came(world, &now, &step.before, &step.selected);
-        Some(())
+        Self::step(world, |history| (&mut history.undo, &mut history.redo), true)
     }
 
     /// Redoes the step that was undone last.
     pub fn step_on(world: &mut World) -> Option<()> {
+        Self::step(world, |history| (&mut history.redo, &mut history.undo), false)
+    }
+
+    /// Moves the last step of one list to the other, and restores what was before it.
+    ///
+    /// - `selects`: whether what was selected at the step is selected again.
+    fn step(
+        world: &mut World,
+        lists: fn(&mut Self) -> (&mut Vec<UndoStep>, &mut Vec<UndoStep>),
+        selects: bool,
+    ) -> Option<()> {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
-        let step = history.redo.pop()?;
+        let step = lists(&mut *history).0.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
         let at_moment = std::mem::replace(&mut history.at_moment, step.at_moment.clone());
-        history.undo.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
+        lists(&mut *history).1.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);
-        select_what_came(world, &now, &step.before, &[]);
+        select_what_came(world, &now, &step.before, if selects { &step.selected } else { &[] });
         Some(())
     }
 

@@ -162,7 +162,7 @@ pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceText
 }
 
 /// A colour, linear Rec. 709, or a texture.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ColorParam {
     /// The same colour everywhere.
     Rgb(Vec3),
@@ -176,19 +176,8 @@ impl From<Vec3> for ColorParam {
     }
 }
 
-impl PartialEq for ColorParam {
-    /// Textures are equal if they are the same allocation.
-    fn eq(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Rgb(a), Self::Rgb(b)) => a == b,
-            (Self::Texture(a), Self::Texture(b)) => Arc::ptr_eq(a, b),
-            _ => false,
-        }
-    }
-}
-
 /// A number, or a texture, of which the red channel is used.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ScalarParam {
     /// The same number everywhere.
     Number(f32),
@@ -202,17 +191,6 @@ impl From<f32> for ScalarParam {
     }
 }
 
-impl PartialEq for ScalarParam {
-    /// Textures are equal if they are the same allocation.
-    fn eq(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Number(a), Self::Number(b)) => a == b,
-            (Self::Texture(a), Self::Texture(b)) => Arc::ptr_eq(a, b),
-            _ => false,
-        }
-    }
-}
-
 /// A texture with its name and description in the scene file.
 #[derive(Clone, Debug)]
 pub struct SurfaceTexture {
@@ -222,6 +200,13 @@ pub struct SurfaceTexture {
     pub part: TextureSource,
     /// The texture itself.
     pub texture: render::Texture,
+}
+
+/// Textures are equal if they are the same allocation.
+impl PartialEq for SurfaceTexture {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
 }
 
 /// Origin of the mesh of an object, for saving and reloading it.
