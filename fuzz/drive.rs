@@ -216,17 +216,18 @@ fn go_on(mut film: Film) {
 }
 
 /// The note of a picture, in a PNG or EXR or by itself.
-pub fn shot(bytes: &[u8]) {
+pub fn metadata(bytes: &[u8]) {
     let path = write("fuzz.png", bytes);
     let own_note = std::str::from_utf8(bytes).ok().map(ImageMetadata::from_note);
-    for shot in [Some(ImageMetadata::read_within(&path, &LIMITS)), own_note].into_iter().flatten().flatten() {
-        let again = ImageMetadata::from_note(&shot.to_note()).expect("what is written can be read");
-        assert_eq!(format!("{again:?}"), format!("{shot:?}"));
-        drop((shot.source(&path), shot.up(), shot.differs_from(&again)));
-        drop(shot.moved(&path, &FOLDER.path().join("elsewhere/other.png")));
+    for metadata in [Some(ImageMetadata::read_within(&path, &LIMITS)), own_note].into_iter().flatten().flatten() {
+        let again = ImageMetadata::from_note(&metadata.to_note()).expect("what is written can be read");
+        assert_eq!(format!("{again:?}"), format!("{metadata:?}"));
+        drop((metadata.source(&path), metadata.up(), metadata.differs_from(&again)));
+        drop(metadata.moved(&path, &FOLDER.path().join("elsewhere/other.png")));
     }
     // Whole scenes are the business of `render`.
-    let shows_no_scene = |shot: &ImageMetadata| shot.text.is_none() && !matches!(shot.scene, ImageScene::Builtin(_));
+    let shows_no_scene =
+        |metadata: &ImageMetadata| metadata.text.is_none() && !matches!(metadata.scene, ImageScene::Builtin(_));
     if ImageMetadata::read_within(&path, &LIMITS).as_ref().is_ok_and(shows_no_scene)
         && let Err(error) = load(&SceneSource::Picture(path), &LoadOptions::default())
     {

@@ -178,5 +178,5 @@ assaults! {
     pictures: picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8;
     whole_scenes_to_the_last_pixel: render, 3000, 64 * MIB, 64;
     films: film, 2000, 8 * MIB, 1200;
-    notes_of_pictures: shot, 2000, 8 * MIB, 64;
+    metadata_of_images: metadata, 2000, 8 * MIB, 64;
 }

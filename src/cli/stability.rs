@@ -25,7 +25,7 @@ pub struct StabilityArgs {
     #[arg(long, conflicts_with_all = ["cases", "replay"])]
     list: bool,
     /// Trace one ray of a case in detail, as named by a finding; use the same --rays as the finding.
-    #[arg(long, requires = "cases", value_name = "CASE:RAY", value_parser = parse_ray)]
+    #[arg(long, requires = "cases", value_name = "SCENE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
     /// Number of worker threads [default: all cores]; the counts do not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u16>(1, 1024))]
@@ -40,8 +40,8 @@ pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
         return list(args.json);
     }
     let cases = chosen(args)?;
-    if let Some((stage, ray)) = args.replay {
-        return replay(args, &cases, stage, ray);
+    if let Some((test_scene, ray)) = args.replay {
+        return replay(args, &cases, test_scene, ray);
     }
     let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
@@ -60,11 +60,11 @@ fn list(as_json: bool) -> Result<(), Failure> {
     CASES.iter().try_for_each(|case| print(format_args!("{:width$}  {}", case.name, case.about)))
 }
 
-fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Result<(), Failure> {
+fn replay(args: &StabilityArgs, cases: &[&Case], test_scene: usize, ray: u64) -> Result<(), Failure> {
     let [case] = cases else {
         return Err(Failure::Usage("--replay needs exactly one --case NAME".to_owned()));
     };
-    let told = case.replay(stage, ray, args.rays);
+    let told = case.replay(test_scene, ray, args.rays);
     let told = told.map_err(|error| Failure::Usage(format!("--replay: {}: {error}", case.name)))?;
     if !args.json {
         return print(lines(&told.to_string()));
@@ -72,14 +72,14 @@ fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Resu
     let rows = told.rows().map(|(label, value)| (label.to_owned(), value.json()));
     let mut object: serde_json::Map<_, _> = rows.collect();
     object.insert("case".to_owned(), case.name.into());
-    object.insert("replay".to_owned(), format!("{stage}:{ray}").into());
+    object.insert("replay".to_owned(), format!("{test_scene}:{ray}").into());
     print(serde_json::Value::from(object))
 }
 
 /// The arguments that replay the ray of a finding.
 fn replay_args(args: &StabilityArgs, case: &Case, worst: &Worst) -> String {
     let rays = if args.rays == USUAL_RAYS { String::new() } else { format!(" --rays {}", args.rays) };
-    format!("--case {} --replay {}:{}{rays}", case.name, worst.stage, worst.ray)
+    format!("--case {} --replay {}:{}{rays}", case.name, worst.test_scene, worst.ray)
 }
 
 fn chosen(args: &StabilityArgs) -> Result<Vec<&'static Case>, Failure> {
@@ -183,6 +183,6 @@ fn parse_rays(text: &str) -> Result<u64, String> {
 }
 
 fn parse_ray(text: &str) -> Result<(usize, u64), String> {
-    let parsed = text.split_once(':').and_then(|(stage, ray)| Some((stage.parse().ok()?, ray.parse().ok()?)));
-    parsed.ok_or_else(|| "expected CASE:RAY as printed by a finding, such as 12:345".to_owned())
+    let parsed = text.split_once(':').and_then(|(test_scene, ray)| Some((test_scene.parse().ok()?, ray.parse().ok()?)));
+    parsed.ok_or_else(|| "expected SCENE:RAY as printed by a finding, such as 12:345".to_owned())
 }

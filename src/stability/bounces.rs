@@ -46,10 +46,10 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     boxes
         .par_iter()
         .enumerate()
-        .flat_map(|(stage, (name, scene))| {
+        .flat_map(|(test_scene, (name, scene))| {
             (0..paths.div_ceil(PATHS)).into_par_iter().map(move |batch| {
                 let count = PATHS.min(paths - batch * PATHS);
-                bounce(stage, name, scene, batch * PATHS, count, tick)
+                bounce(test_scene, name, scene, batch * PATHS, count, tick)
             })
         })
         .reduce(Tally::default, Tally::merged)
@@ -58,9 +58,16 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
 /// Paths per batch.
 const PATHS: u64 = 256;
 
-fn bounce(stage: usize, name: &str, scene: &SceneTree, first: u64, count: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
+fn bounce(
+    test_scene: usize,
+    name: &str,
+    scene: &SceneTree,
+    first: u64,
+    count: u64,
+    tick: &(dyn Fn(u64) + Sync),
+) -> Tally {
     let mut tally = Tally { rays: count * BOUNCES, ..Tally::default() };
-    let mut randoms: Vec<Random> = (0..count).map(|i| Random::new(0xB0 + stage as u64, first + i)).collect();
+    let mut randoms: Vec<Random> = (0..count).map(|i| Random::new(0xB0 + test_scene as u64, first + i)).collect();
     let start = |random: &mut Random| Ray::new(random.point() * 0.5, random.direction());
     let mut rays: RayBatch = randoms.iter_mut().map(start).collect::<Vec<_>>().iter().collect();
     let (mut hits, mut next) = (HitBatch::default(), RayBatch::default());
@@ -71,7 +78,7 @@ fn bounce(stage: usize, name: &str, scene: &SceneTree, first: u64, count: u64, t
             let ray = rays.get(i);
             let Some(hit) = hits.get(i) else {
                 tally.leaks += 1;
-                tally.offer(1e9, stage, first + i as u64, || {
+                tally.offer(1e9, test_scene, first + i as u64, || {
                     format!("{name}, bounce {depth}: {}", describe(&ray, &None))
                 });
                 next.push(&start(random));

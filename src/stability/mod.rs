@@ -159,8 +159,8 @@ impl Case {
             CaseKind::RaySet(plans) => {
                 let plans = plans();
                 let each = rays_of_plan(n, &plans);
-                let stages = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
-                stages.map(|(i, stage)| stage.run(i, each, tick)).fold(Tally::default(), Tally::merged)
+                let test_scenes = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
+                test_scenes.map(|(i, test_scene)| test_scene.run(i, each, tick)).fold(Tally::default(), Tally::merged)
             }
             CaseKind::Pictures(pictures) => {
                 let pictures = pictures();
@@ -181,22 +181,23 @@ impl Case {
     /// Returns all details of one ray of the case.
     ///
     /// - `rays`: as for [`Self::run`]: it determines how many rays each test scene has, but not which ray an index is.
-    pub fn replay(&self, stage: usize, ray: u64, rays: u64) -> Result<Replay, ReplayError> {
+    pub fn replay(&self, test_scene: usize, ray: u64, rays: u64) -> Result<Replay, ReplayError> {
         let n = self.rays(rays);
-        let no_stage = |count: usize| ReplayError::NoStage { stage, last: count - 1 };
-        let check =
-            |count: u64| if ray < count { Ok(()) } else { Err(ReplayError::NoRay { stage, ray, last: count - 1 }) };
+        let no_scene = |count: usize| ReplayError::NoScene { test_scene, last: count - 1 };
+        let check = |count: u64| {
+            if ray < count { Ok(()) } else { Err(ReplayError::NoRay { test_scene, ray, last: count - 1 }) }
+        };
         match self.kind {
             CaseKind::RaySet(plans) => {
                 let plans = plans();
-                let plan = plans.get(stage).ok_or(no_stage(plans.len()))?;
+                let plan = plans.get(test_scene).ok_or(no_scene(plans.len()))?;
                 check(rays_of_plan(n, &plans))?;
-                Ok((plan.build)().ok_or(ReplayError::EmptyStage { stage })?.replay(stage, ray))
+                Ok((plan.build)().ok_or(ReplayError::EmptyScene { test_scene })?.replay(test_scene, ray))
             }
             CaseKind::Pictures(pictures) => {
                 let pictures = pictures();
-                let picture = pictures.get(stage).ok_or(no_stage(pictures.len()))?;
-                check(picture.samples(spp_of_picture(n, &pictures, stage)))?;
+                let picture = pictures.get(test_scene).ok_or(no_scene(pictures.len()))?;
+                check(picture.samples(spp_of_picture(n, &pictures, test_scene)))?;
                 Ok(picture.replay(ray))
             }
             _ => Err(ReplayError::NoRays),

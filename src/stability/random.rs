@@ -7,8 +7,8 @@ use glam::Vec3;
 pub struct Random(u64);
 
 impl Random {
-    pub fn new(stage: u64, index: u64) -> Self {
-        let mut random = Self(stage.wrapping_mul(0x2545_F491_4F6C_DD1D) ^ index);
+    pub fn new(test_scene: u64, index: u64) -> Self {
+        let mut random = Self(test_scene.wrapping_mul(0x2545_F491_4F6C_DD1D) ^ index);
         Self(random.next())
     }
 

@@ -28,12 +28,12 @@ pub enum ReplayValue {
 pub enum ReplayError {
     #[error("has no rays to replay")]
     NoRays,
-    #[error("there is no stage {stage}, only 0 to {last}")]
-    NoStage { stage: usize, last: usize },
-    #[error("stage {stage} has no rays: single precision does not suffice at its position")]
-    EmptyStage { stage: usize },
-    #[error("stage {stage} has no ray {ray}, only 0 to {last}; more --rays make it larger")]
-    NoRay { stage: usize, ray: u64, last: u64 },
+    #[error("there is no test scene {test_scene}, only 0 to {last}")]
+    NoScene { test_scene: usize, last: usize },
+    #[error("test scene {test_scene} has no rays: single precision does not suffice at its position")]
+    EmptyScene { test_scene: usize },
+    #[error("test scene {test_scene} has no ray {ray}, only 0 to {last}; more --rays make it larger")]
+    NoRay { test_scene: usize, ray: u64, last: u64 },
 }
 
 impl Replay {

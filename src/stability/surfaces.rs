@@ -80,7 +80,7 @@ impl TriangleSoup {
     }
 }
 
-fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: RaySet) -> TestScene {
+fn test_scene(name: String, shapes: Vec<Shape>, brute_every: u64, rays: RaySet) -> TestScene {
     let scene = SceneTree::build(shapes);
     let reference = ReferenceIntersector::of(&scene);
     TestScene { name, scene, reference, rays, brute_every }
@@ -174,7 +174,7 @@ pub fn closed() -> Vec<Plan> {
                     let reference = ReferenceIntersector::of(&SceneTree::build(vec![shape.clone()]));
                     let origins = insides(&reference, &world, index as u64);
                     let rays = rays_from_inside(world, origins.clone());
-                    (!origins.is_empty()).then(|| stage(name.clone(), vec![shape], 4096, rays))
+                    (!origins.is_empty()).then(|| test_scene(name.clone(), vec![shape], 4096, rays))
                 };
                 plans.push(Plan { build: Box::new(build) });
             }
@@ -229,7 +229,7 @@ fn plans_of_soup(make: fn() -> TriangleSoup) -> Vec<Plan> {
         let build = move || {
             let soup = make().mapped(|p| place.apply(p));
             let shape = mesh_shape(&soup.tree(), Affine3A::IDENTITY);
-            Some(stage(place.name(), vec![shape], 1, awkward_rays(soup)))
+            Some(test_scene(place.name(), vec![shape], 1, awkward_rays(soup)))
         };
         Plan { build: Box::new(build) }
     };
@@ -342,7 +342,7 @@ pub fn leaving() -> Vec<Plan> {
                 let origin = target + random.direction() * distance;
                 Probe { ray: towards(origin, target), must_hit: false }
             });
-            Some(stage(name.clone(), vec![shape], 16, rays))
+            Some(test_scene(name.clone(), vec![shape], 16, rays))
         };
         Plan { build: Box::new(build) }
     };
@@ -390,7 +390,7 @@ pub fn tangent() -> Vec<Plan> {
                 let origin = place.apply(random.point() * 2.0 + vec3(0.0, 2.1, 0.0));
                 Probe { ray: towards(origin, target), must_hit: false }
             });
-            Some(stage(name.clone(), shapes(place), 1, rays))
+            Some(test_scene(name.clone(), shapes(place), 1, rays))
         };
         Plan { build: Box::new(build) }
     };

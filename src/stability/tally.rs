@@ -47,7 +47,7 @@ pub struct Worst {
     pub severity: f64,
     pub what: String,
     /// Index of the test scene within its case, and of the ray within the test scene.
-    pub stage: usize,
+    pub test_scene: usize,
     pub ray: u64,
 }
 
@@ -74,17 +74,17 @@ impl Tally {
         };
         let worst = [self.worst.take(), other.worst].into_iter().flatten();
         self.worst = worst.reduce(|a, b| {
-            let a_first = (a.stage, a.ray) <= (b.stage, b.ray);
+            let a_first = (a.test_scene, a.ray) <= (b.test_scene, b.ray);
             if a.severity > b.severity || (a.severity == b.severity && a_first) { a } else { b }
         });
         self
     }
 
     /// Keeps a ray if it is worse than the worst so far.
-    pub fn offer(&mut self, severity: f64, stage: usize, ray: u64, what: impl FnOnce() -> String) {
+    pub fn offer(&mut self, severity: f64, test_scene: usize, ray: u64, what: impl FnOnce() -> String) {
         let severity = if severity.is_nan() { f64::INFINITY } else { severity };
         if self.worst.as_ref().is_none_or(|worst| severity > worst.severity) {
-            self.worst = Some(Worst { severity, what: what(), stage, ray });
+            self.worst = Some(Worst { severity, what: what(), test_scene, ray });
         }
     }
 }

@@ -47,14 +47,14 @@ impl TestScene {
             .reduce(Tally::default, Tally::merged)
     }
 
-    fn probe(&self, stage: usize, ray: u64) -> (Probe, Random) {
-        let mut random = Random::new(stage as u64, ray);
+    fn probe(&self, test_scene: usize, ray: u64) -> (Probe, Random) {
+        let mut random = Random::new(test_scene as u64, ray);
         ((self.rays)(&mut random), random)
     }
 
-    fn run_batch(&self, stage: usize, first: u64, end: u64) -> Tally {
+    fn run_batch(&self, test_scene: usize, first: u64, end: u64) -> Tally {
         let mut tally = Tally { rays: end - first, ..Tally::default() };
-        let (probes, mut randoms): (Vec<Probe>, Vec<Random>) = (first..end).map(|i| self.probe(stage, i)).unzip();
+        let (probes, mut randoms): (Vec<Probe>, Vec<Random>) = (first..end).map(|i| self.probe(test_scene, i)).unzip();
         let rays: RayBatch = probes.iter().map(|probe| &probe.ray).collect();
         // Alternates between both traversals.
         let class = if (first / BATCH).is_multiple_of(2) { RayClass::Incoherent } else { RayClass::Coherent };
@@ -67,14 +67,15 @@ impl TestScene {
             let hit = hits.get(k);
             if occluded[k] != hit.is_some() {
                 tally.missed += 1;
-                tally.offer(1e9, stage, index, || format!("any-hit says {}: {}", occluded[k], describe(ray, &hit)));
+                tally
+                    .offer(1e9, test_scene, index, || format!("any-hit says {}: {}", occluded[k], describe(ray, &hit)));
             }
             match &hit {
                 None if probe.must_hit => {
                     tally.leaks += 1;
-                    tally.offer(1e9, stage, index, || format!("leak: {}", describe(ray, &hit)));
+                    tally.offer(1e9, test_scene, index, || format!("leak: {}", describe(ray, &hit)));
                 }
-                _ => self.check_ray(&mut tally, stage, index, ray, &hit),
+                _ => self.check_ray(&mut tally, test_scene, index, ray, &hit),
             }
             // Rays that leave must not hit the same flat primitive again, nor a sphere from outside.
             if let Some(hit) = hit {
@@ -90,13 +91,13 @@ impl TestScene {
             if let Some(found) = self.self_hit(ray, from, &next, &again) {
                 let count = if found == "leak" { &mut tally.leaks } else { &mut tally.acne };
                 *count += 1;
-                tally.offer(1e9, stage, *index, || format!("{found}: {}", describe(&next, &again)));
+                tally.offer(1e9, test_scene, *index, || format!("{found}: {}", describe(&next, &again)));
             }
         }
         tally
     }
 
-    fn check_ray(&self, tally: &mut Tally, stage: usize, index: u64, ray: &Ray, hit: &Option<Hit>) {
+    fn check_ray(&self, tally: &mut Tally, test_scene: usize, index: u64, ray: &Ray, hit: &Option<Hit>) {
         let check = if index.is_multiple_of(self.brute_every) {
             self.reference.check(ray, hit.as_ref())
         } else {
@@ -113,7 +114,7 @@ impl TestScene {
                 1e9
             }
         };
-        tally.offer(severity, stage, index, || describe(ray, hit));
+        tally.offer(severity, test_scene, index, || describe(ray, hit));
     }
 
     /// Returns a ray that leaves the hit on either side.
@@ -150,11 +151,11 @@ impl TestScene {
     }
 
     /// Returns all details of one ray.
-    pub fn replay(&self, stage: usize, index: u64) -> Replay {
-        let (Probe { ray, must_hit }, mut random) = self.probe(stage, index);
+    pub fn replay(&self, test_scene: usize, index: u64) -> Replay {
+        let (Probe { ray, must_hit }, mut random) = self.probe(test_scene, index);
         let hit = self.scene.closest_hit(&ray);
         let mut replay = Replay::default();
-        replay.push("stage", ReplayValue::Text(self.name.clone()));
+        replay.push("test_scene", ReplayValue::Text(self.name.clone()));
         replay.push_ray("", &ray);
         replay.push("must_hit", ReplayValue::Flag(must_hit));
         replay.push("any_hit", ReplayValue::Flag(self.scene.any_hit(&ray)));

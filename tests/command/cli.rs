@@ -274,9 +274,9 @@ fn a_ray_is_replayed_for_people_and_for_machines() {
     assert_eq!((value("result"), json["result"].as_str()), ("right", Some("right")));
     assert_eq!((value("must_hit"), json["must_hit"].as_bool()), ("yes", Some(true)));
     for (args, expected) in [
-        (&["--case", "closed", "--replay", "0:99999999999"][..], "stage 0 has no ray 99999999999, only 0 to "),
-        (&["--case", "closed", "--replay", "5000:1"], "there is no stage 5000"),
-        (&["--case", "glass", "--replay", "0:99999999999"], "stage 0 has no ray 99999999999"),
+        (&["--case", "closed", "--replay", "0:99999999999"][..], "test scene 0 has no ray 99999999999, only 0 to "),
+        (&["--case", "closed", "--replay", "5000:1"], "there is no test scene 5000"),
+        (&["--case", "glass", "--replay", "0:99999999999"], "test scene 0 has no ray 99999999999"),
         (&["--case", "white-box", "--replay", "0:0"], "has no rays to replay"),
         (&["--case", "closed", "--case", "glass", "--replay", "0:0"], "needs exactly one --case"),
         (&["--replay", "0:0"], "--case"),

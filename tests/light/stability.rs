@@ -90,14 +90,15 @@ fn names_are_unique_and_rays_can_be_replayed() {
 
 #[test]
 fn what_is_not_there_cannot_be_replayed() {
-    let replay = |name: &str, stage, ray, rays| Case::find(name).unwrap().replay(stage, ray, rays).unwrap_err();
-    assert!(matches!(replay("closed", 1_000_000, 7, 10_000_000), ReplayError::NoStage { stage: 1_000_000, .. }));
+    let replay =
+        |name: &str, test_scene, ray, rays| Case::find(name).unwrap().replay(test_scene, ray, rays).unwrap_err();
+    assert!(matches!(replay("closed", 1_000_000, 7, 10_000_000), ReplayError::NoScene { test_scene: 1_000_000, .. }));
     assert_eq!(replay("white-box", 0, 0, 10_000_000), ReplayError::NoRays);
     for name in ["closed", "glass"] {
         let case = Case::find(name).unwrap();
         let ReplayError::NoRay { last, .. } = replay(name, 0, u64::MAX, 1) else { panic!("{name} has rays") };
         assert!(case.replay(0, last, 1).is_ok(), "{name}: the last one is {last}");
-        assert_eq!(replay(name, 0, last + 1, 1), ReplayError::NoRay { stage: 0, ray: last + 1, last });
+        assert_eq!(replay(name, 0, last + 1, 1), ReplayError::NoRay { test_scene: 0, ray: last + 1, last });
         assert!(case.replay(0, last + 1, 10_000_000_000).is_ok(), "{name}: more rays have it");
     }
 }
