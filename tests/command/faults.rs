@@ -1,5 +1,6 @@
 //! Disks that fill up, files that change, processes that are killed, memory that is not there.
 
+use crate::program::{Outcome, fails, program};
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::obj::load_obj;
@@ -95,9 +96,10 @@ fn help_that_cannot_be_written_is_a_failure() {
 #[test]
 fn limits_that_are_no_number_are_told() {
     for (text, is_wrong) in [("2", false), (" 0.5 ", false), ("0", true), ("-1", true), ("two", true), ("NaN", true)] {
-        let output = Command::new(PROGRAM).args(["info", "cornell"]).env("FIRSTLIGHT_LIMITS", text).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{text}: {said}");
+        let mut command = program(&std::env::temp_dir());
+        let outcome = Outcome::of(command.args(["info", "cornell"]).env("FIRSTLIGHT_LIMITS", text));
+        let said = &outcome.err;
+        assert_eq!(outcome.status, Some(0), "{text}: {said}");
         assert_eq!(said.contains("FIRSTLIGHT_LIMITS"), is_wrong, "{text}: {said}");
     }
 }
@@ -105,9 +107,7 @@ fn limits_that_are_no_number_are_told() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_that_takes_no_files_is_named_before_anything_is_rendered() {
-    let output = Command::new(PROGRAM).args(["render", "cornell", "-o", "/proc/out.png"]).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let said = fails(&std::env::temp_dir(), "render cornell -o /proc/out.png", 1);
     assert!(said.contains("/proc/out.png: cannot be written"), "{said}");
 }
 
@@ -184,10 +184,7 @@ fn a_file_that_is_replaced_while_it_is_read_is_read_whole_or_refused() {
 
 #[test]
 fn a_film_beyond_the_limit_is_refused_with_the_size_that_it_would_take() {
-    let output =
-        Command::new(PROGRAM).args(["render", "cornell", "-o", "out.png", "--size", "65000x65000"]).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = fails(&std::env::temp_dir(), "render cornell -o out.png --size 65000x65000", 2);
     assert!(said.contains("GiB"), "{said}");
 }
 
@@ -260,14 +257,10 @@ fn shapes_of_formulas_end_where_their_bytes_do() {
                  [0 0 0 1 0 0 0 1 0 0 0 1] \"integer indices\" [0 2 1 0 1 3 1 2 3 0 3 2]\n";
     let scene = format!("Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\n{}", shape.repeat(40));
     std::fs::write(folder.path().join("many.pbrt"), scene).unwrap();
-    let output = Command::new(PROGRAM)
-        .args(["info", "--json", "many.pbrt"])
-        .current_dir(&folder)
-        .env("FIRSTLIGHT_LIMITS", "0.01")
-        .output()
-        .unwrap();
-    assert!(output.status.success());
-    let said = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
+    let mut command = program(folder.path());
+    let outcome = Outcome::of(command.args(["info", "--json", "many.pbrt"]).env("FIRSTLIGHT_LIMITS", "0.01"));
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
+    let said = format!("{}{}", outcome.err, outcome.out());
     assert!(said.contains("there are too many shapes like it") && said.contains("FIRSTLIGHT_LIMITS"), "{said}");
 }
 

@@ -1,6 +1,7 @@
 //! `render --frames`: numbered images of an animation, their films, parts, and videos.
 
 use super::parts::{does, equal, fails};
+use crate::program::{Outcome, program};
 use firstlight::scene::ImageMetadata;
 use std::path::Path;
 use std::time::SystemTime;
@@ -101,13 +102,9 @@ fn a_video_is_made_of_the_frames_by_ffmpeg() {
     let line = format!("render carousel {SMALL} --frames 0..3 -o f.png --video f.mp4");
     let bin = path.join("bin");
     std::fs::create_dir(&bin).unwrap();
-    let run = |line: &str| super::parts::run_in(path, line, &[("PATH", bin.to_str().unwrap())]);
-    let output = run(&line);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        !output.status.success() && said.contains("--video needs the program ffmpeg, which was not found"),
-        "{said}"
-    );
+    let run = |line: &str| Outcome::of(program(path).args(line.split(' ')).env("PATH", &bin));
+    let Outcome { status, err: said, .. } = run(&line);
+    assert!(status != Some(0) && said.contains("--video needs the program ffmpeg, which was not found"), "{said}");
     assert!(!path.join("f-0000.png").exists());
 
     let program = bin.join("ffmpeg");
@@ -120,9 +117,8 @@ fn a_video_is_made_of_the_frames_by_ffmpeg() {
     std::fs::write(path.join("thesis.txt"), "my only copy").unwrap();
     std::os::unix::fs::symlink("thesis.txt", path.join(".unfinished-f.mp4")).unwrap();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
-    let output = run(&line);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success() && said.contains("f.mp4: 3 frames at 24 per second"), "{said}");
+    let Outcome { status, err: said, .. } = run(&line);
+    assert!(status == Some(0) && said.contains("f.mp4: 3 frames at 24 per second"), "{said}");
     let words = std::fs::read_to_string(path.join("words")).unwrap();
     assert!(words.contains("-f rawvideo -pix_fmt rgb24 -video_size 48x27 -framerate 24 -i -"), "{words}");
     assert_eq!(std::fs::read_to_string(path.join("thesis.txt")).unwrap(), "my only copy");
@@ -133,9 +129,8 @@ fn a_video_is_made_of_the_frames_by_ffmpeg() {
     // A failure is told in the words of ffmpeg, and leaves nothing that looks like a video.
     std::fs::write(&program, "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\necho 'no such codec' >&2\nexit 1\n").unwrap();
     std::fs::remove_file(path.join("f.mp4")).unwrap();
-    let output = run(&line);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(!output.status.success() && said.contains("ffmpeg: no such codec"), "{said}");
+    let Outcome { status, err: said, .. } = run(&line);
+    assert!(status != Some(0) && said.contains("ffmpeg: no such codec"), "{said}");
     let left = || std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let is_rest = |name: &String| name.contains("mp4") || name.contains(".part");
     assert_eq!(left().find(is_rest), None);

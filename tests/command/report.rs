@@ -2,6 +2,7 @@
 //! error that the renderer tells is the error that it has.
 
 use crate::common::*;
+use crate::program::{does, run};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
@@ -134,14 +135,8 @@ fn references_are_kept_and_found_again() {
 #[test]
 fn the_command_writes_a_page_and_a_table() {
     let folder = tempfile::tempdir().unwrap();
-    let command = || {
-        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
-        command.current_dir(&folder).env("XDG_CACHE_HOME", folder.path().join("cache"));
-        command
-    };
-    let text = ["report", "cornell", "--size", "20x20", "--spp", "4", "--output", "deep/page"];
-    let output = command().args(text).assert().success();
-    let said = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+    let outcome = does(folder.path(), "report cornell --size 20x20 --spp 4 --output deep/page");
+    let said = outcome.out();
     assert!(said.contains("cornell") && said.contains("20x20"), "{said}");
     let page = std::fs::read_to_string(folder.path().join("deep/page/index.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("firstlight report cornell --size 20x20"));
@@ -153,13 +148,14 @@ fn the_command_writes_a_page_and_a_table() {
     assert_eq!(rows.iter().filter(|row| row[4] == "denoised").count(), 3, "{table}");
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
 
-    let fail = |args: &[&str]| {
-        let output = command().arg("report").args(args).assert().failure();
-        String::from_utf8_lossy(&output.get_output().stderr).into_owned()
-    };
-    assert!(fail(&["cornell", "--reference", "none.exr"]).contains("none.exr"));
-    assert!(fail(&["--reference", "none.exr"]).contains("name the scene"));
-    assert!(fail(&["cornel"]).contains("cornell"));
+    for (line, expected) in [
+        ("report cornell --reference none.exr", "none.exr"),
+        ("report --reference none.exr", "name the scene"),
+        ("report cornel", "cornell"),
+    ] {
+        let outcome = run(folder.path(), line);
+        assert!(outcome.status != Some(0) && outcome.err.contains(expected), "{outcome:?}");
+    }
 }
 
 /// A program in `folder` that keeps its references there.

@@ -91,7 +91,7 @@ fn names_of_scene_files() {
     assert!(says(path, "explain a.ron --pixel 4,4 --spp 4", 0).out().contains("\\u{1b}[2J"));
     // For machines the name is what it is.
     let json = run(path, &["info", "a.ron", "--json"], None);
-    let told: serde_json::Value = serde_json::from_str(&json.out()).unwrap();
+    let told: serde_json::Value = serde_json::from_str(json.out()).unwrap();
     assert_eq!(told["parts"][0]["name"], ACTING);
     // A name of a megabyte.
     let long = "x".repeat(1 << 20);

@@ -36,8 +36,13 @@ impl Outcome {
 /// The program in a folder, without a display, with settings and a cache of its own there.
 pub fn program(folder: &Path) -> Command {
     let mut command = Command::cargo_bin("firstlight").unwrap();
-    command.current_dir(folder).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
-    command.env("XDG_CONFIG_HOME", folder.join(".home")).env("XDG_CACHE_HOME", folder.join(".home"));
+    for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET", "RUST_LOG"] {
+        command.env_remove(variable);
+    }
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder.join(".home"))
+        .env("XDG_CACHE_HOME", folder.join(".home"));
     command
 }
 

@@ -1,5 +1,6 @@
 //! `scripts/neutral_to_scene.py`: every field of the neutral form is carried over or refused by its name.
 
+use crate::program::{Outcome, program};
 use assert_cmd::Command;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -82,12 +83,11 @@ fn convert_text(folder: &Path, text: &str) -> Result<String, String> {
 /// The linear picture of a scene file after a few samples, and what was said meanwhile.
 fn picture_of(scene: &Path) -> (image::Rgb32FImage, String) {
     let picture = scene.with_extension("exr");
-    let mut program = Command::cargo_bin("firstlight").unwrap();
-    let output = program.arg("render").arg(scene).args(["--spp", "4", "-o"]).arg(&picture).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let mut command = program(scene.parent().expect("its folder"));
+    let outcome = Outcome::of(command.arg("render").arg(scene).args(["--spp", "4", "-o"]).arg(&picture));
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
     // The last line is the result.
-    let warnings = said.lines().filter(|line| !line.starts_with(&*picture.to_string_lossy())).collect();
+    let warnings = outcome.err.lines().filter(|line| !line.starts_with(&*picture.to_string_lossy())).collect();
     (image::open(picture).unwrap().into_rgb32f(), warnings)
 }
 

@@ -7,6 +7,8 @@ mod guest;
 mod mouse;
 mod navigation;
 mod noise;
+#[path = "../common/program.rs"]
+mod program;
 mod saving;
 mod tools;
 mod views;

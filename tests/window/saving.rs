@@ -3,8 +3,8 @@
 
 use crate::desktop::{Desktop, Program, until};
 use crate::guest::seen;
+use crate::program::does;
 use std::path::Path;
-use std::process::Command;
 use std::time::Duration;
 
 fn saved(program: &Program, path: &Path) -> String {
@@ -16,9 +16,7 @@ fn saved(program: &Program, path: &Path) -> String {
 fn a_scene_of_an_archive_is_saved_to_a_file_of_its_own() {
     let Some(desktop) = Desktop::start() else { return };
     let (folder, cache) = (desktop.folder(), desktop.folder().join("cache"));
-    let program = env!("CARGO_BIN_EXE_firstlight");
-    let packed = Command::new(program).args(["pack", "cornell", "-o", "box.zip"]).current_dir(folder).output();
-    assert!(packed.expect("the program runs").status.success());
+    does(folder, "pack cornell -o box.zip");
     let cache_text = cache.display().to_string();
     let program = desktop.open(&["box.zip", "--size", "320x240"], &[("XDG_CACHE_HOME", &cache_text)]);
     seen(&program);
@@ -67,9 +65,7 @@ fn a_view_flown_away_from_its_tracks_comes_back() {
     assert!(text.contains("property: eye"), "the track stays: {text}");
     // The image has the same view, and renders to its own bytes.
     let render = |scene: &str, output: &str| {
-        let line = format!("render {scene} -o {output} --size 64x48 --spp 2 -q");
-        let done = Command::new(env!("CARGO_BIN_EXE_firstlight")).args(line.split(' ')).current_dir(folder).output();
-        assert!(done.expect("the program runs").status.success());
+        does(folder, &format!("render {scene} -o {output} --size 64x48 --spp 2 -q"));
         image::open(folder.join(output)).expect("an image").into_rgb32f().into_raw()
     };
     let of_scene = render("carousel-0001.ron --uniform --seed 0", "a.exr");

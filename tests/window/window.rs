@@ -3,11 +3,11 @@
 #![cfg(all(feature = "viewer", target_os = "linux"))]
 
 use crate::desktop::{Desktop, Program, until};
+use crate::program::does;
 use crate::views::{camera, camera_when, target};
 use firstlight::scene::file::{CameraPart, SceneFile};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 
 /// Presses the key and waits for the file.
@@ -394,16 +394,7 @@ fn without_a_graphics_driver_the_way_out_is_told() {
 #[test]
 fn without_a_display_the_scene_is_rendered_to_a_picture() {
     let folder = tempfile::tempdir().expect("a folder for the test");
-    let output = Command::new(env!("CARGO_BIN_EXE_firstlight"))
-        .args(["cornell", "--size", "48x32"])
-        .current_dir(folder.path())
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET")
-        .output()
-        .expect("firstlight starts");
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{errors}");
+    let errors = does(folder.path(), "cornell --size 48x32").err;
     assert!(errors.contains("no display"), "{errors}");
     let picture = open_picture(&folder.path().join("firstlight-cornell.png"));
     assert_eq!(picture.dimensions(), (48, 32));

@@ -230,11 +230,11 @@ impl History {
     ) -> Option<()> {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
-        let step = lists(&mut *history).0.pop()?;
+        let step = lists(&mut history).0.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
         let at_moment = std::mem::replace(&mut history.at_moment, step.at_moment.clone());
-        lists(&mut *history).1.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
+        lists(&mut history).1.push(UndoStep { before: now.clone(), at_moment, ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);

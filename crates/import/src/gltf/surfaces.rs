@@ -72,6 +72,12 @@ struct TextureRole {
     vertex_colors: bool,
 }
 
+impl TextureRole {
+    fn new(what: &'static str, channel: Option<Channel>, encoding: Encoding, tint: Vec3) -> Self {
+        Self { what, channel, encoding, tint, invert: false, vertex_colors: false }
+    }
+}
+
 impl Textures<'_> {
     fn add(&mut self, name: &str, source: TextureSource) -> String {
         let key = format!("{source:?}");
@@ -146,9 +152,7 @@ impl Textures<'_> {
     ) -> ScalarValue {
         match texture {
             Some(used) if factor != 0.0 => {
-                let (encoding, tint) = (Encoding::Linear, Vec3::splat(factor));
-                let role =
-                    TextureRole { what, channel: Some(channel), encoding, tint, invert: false, vertex_colors: false };
+                let role = TextureRole::new(what, Some(channel), Encoding::Linear, Vec3::splat(factor));
                 ScalarValue::Texture(self.of(used, role))
             }
             _ => ScalarValue::Number(factor),
@@ -159,10 +163,9 @@ impl Textures<'_> {
     fn roughness_of(&mut self, (glossiness, texture): &(f32, Option<TextureUse>)) -> ScalarValue {
         match texture {
             Some(used) if *glossiness != 0.0 => {
-                let (channel, encoding, tint) = (Some(Channel::A), Encoding::Linear, Vec3::splat(*glossiness));
-                let role =
-                    TextureRole { what: "roughness", channel, encoding, tint, invert: true, vertex_colors: false };
-                ScalarValue::Texture(self.of(used, role))
+                let tint = Vec3::splat(*glossiness);
+                let role = TextureRole::new("roughness", Some(Channel::A), Encoding::Linear, tint);
+                ScalarValue::Texture(self.of(used, TextureRole { invert: true, ..role }))
             }
             _ => ScalarValue::Number(1.0 - glossiness),
         }
@@ -172,9 +175,7 @@ impl Textures<'_> {
     fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> ColorValue {
         match texture {
             Some(used) if factor != Vec3::ZERO => {
-                let (channel, encoding) = (None, Encoding::Auto);
-                let role = TextureRole { what, channel, encoding, tint: factor, invert: false, vertex_colors: false };
-                ColorValue::Texture(self.of(used, role))
+                ColorValue::Texture(self.of(used, TextureRole::new(what, None, Encoding::Auto, factor)))
             }
             _ => ColorValue::Rgb(factor),
         }
@@ -183,9 +184,7 @@ impl Textures<'_> {
     /// A map of vectors; `None` if there is none.
     fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Option<ColorValue> {
         let used = texture?;
-        let (channel, encoding) = (None, Encoding::Linear);
-        let role = TextureRole { what, channel, encoding, tint: Vec3::ONE, invert: false, vertex_colors: false };
-        Some(ColorValue::Texture(self.of(used, role)))
+        Some(ColorValue::Texture(self.of(used, TextureRole::new(what, None, Encoding::Linear, Vec3::ONE))))
     }
 
     /// Base colour and coverage (alpha).
@@ -195,9 +194,9 @@ impl Textures<'_> {
         let is_cut = material.alpha != AlphaMode::Opaque;
         match &material.base_color_texture {
             Some(used) => {
-                let role = |what, channel, tint| {
-                    let encoding = Encoding::Auto;
-                    TextureRole { what, channel, encoding, tint, invert: false, vertex_colors }
+                let role = |what, channel, tint| TextureRole {
+                    vertex_colors,
+                    ..TextureRole::new(what, channel, Encoding::Auto, tint)
                 };
                 let color = ColorValue::Texture(self.of(used, role("color", None, rgb)));
                 let opacity = match is_cut {
@@ -297,13 +296,11 @@ fn surface(
         return glass;
     }
     let (base, alpha) = textures.base(material, vertex_colors);
-    let usual = Material::principled(base.clone());
-    let Material::Principled { .. } = &usual else { return usual };
     let cutoff = match material.alpha {
         AlphaMode::Mask(cutoff) => Some(cutoff.clamp(0.0, 1.0)),
         AlphaMode::Opaque | AlphaMode::Blend => None,
     };
-    let mut part = usual;
+    let mut part = Material::principled(base.clone());
     let Material::Principled {
         base_color,
         metallic,
