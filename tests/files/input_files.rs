@@ -74,7 +74,7 @@ fn nothing_but_regular_files_is_read() {
 #[test]
 fn settings_and_views_that_are_no_files_stop_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let bookmarks = folder.path().join("XDG_CONFIG_HOME/firstlight/bookmarks");
+    let bookmarks = folder.path().join(".home/firstlight/bookmarks");
     std::fs::create_dir_all(&bookmarks).unwrap();
     // The name holds a hash of the scene's name, which the message tells.
     let line = "render cornell --bookmarks 1 --frames 1 -o out.png --spp 1";

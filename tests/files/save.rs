@@ -8,7 +8,7 @@ use firstlight::scene::{
     LightTexture, LoadOptions, LoadedScene, Material, Placement, PointLight, Projection, Rendering, Rgb, SceneInputs,
     SceneSource, Shape, SpotLight, SurfaceMaterial, SurfaceTexture, TextureSource, View, load, save_scene,
 };
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -144,7 +144,11 @@ proptest! {
                 let (a, b) = (Rgb(Vec3::X), Rgb(Vec3::splat(intensity)));
                 let (squares, offset) = (DVec2::splat(3.0), DVec2::X);
                 let part = TextureSource::Checker { a, b, squares, offset, rotate: 5.0 };
-                let texture = Texture::new(TexturePattern::Checker { a: a.0, b: b.0 });
+                let texture = Texture {
+                    uv_matrix: Mat2::from_diagonal(Vec2::splat(3.0)) * Mat2::from_angle(5.0_f64.to_radians() as f32),
+                    uv_offset: Vec2::X,
+                    ..Texture::new(TexturePattern::Checker { a: a.0, b: b.0 })
+                };
                 let slide = SurfaceTexture { name: "slide".to_owned(), part, texture };
                 world.entity_mut(spot).insert(LightTexture(Arc::new(slide)));
             }

@@ -110,7 +110,7 @@ impl RegressionStart {
         let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
         let mut samples = samples(input, &albedo, &at_emitters, stop)?;
         let excess = limit(input, &albedo, &at_emitters, &mut samples, stop)?;
-        let independent = input.half_steps.map_or(1.0, |halves| halves.calibration.min(1.0).max(1e-3).recip());
+        let independent = input.half_steps.map_or(1.0, |halves| halves.calibration.clamp(1e-3, 1.0).recip());
         samples.variance.iter_mut().for_each(|variance| *variance *= independent);
         let mut blocks = Blocks::finest(&samples, stop)?;
         let variance = match input.half_steps {
@@ -247,8 +247,8 @@ pub(super) fn pick(
     let level = |i: usize| (candidates[i][0].color * candidates[i][0].color + 0.01).recip();
     let pooled = Pooled::of(input, &of_raw.at_emitters, stop)?;
     let mut picked: Vec<Candidate> = each(n, stop, |i| candidates[i][0])?;
-    for k in 1..candidates[0].len() {
-        let smaller = |i: usize| &candidates[i][k];
+    for of_sizes in [1, 2] {
+        let smaller = |i: usize| &candidates[i][of_sizes];
         let off = |i: usize| smaller(i).color - picked[i].color;
         let difference = pooled.narrow(&|i| level(i).dot(off(i) * off(i)), stop)?;
         let more = |i: usize| (smaller(i).own - picked[i].own).max(0.0) * level(i).dot(of_raw.usual(i));
