@@ -36,7 +36,7 @@ fn ground_material() -> MaterialPart {
     MaterialPart::Diffuse { albedo: ColorValue::rgb(0.45, 0.45, 0.43) }
 }
 
-/// For a light of the size of the model, five radii away: about three times the irradiance of the sky.
+/// For a light of the size of the model, five radii away: about three times the irradiance of the environment.
 fn key_material(share: f32) -> MaterialPart {
     MaterialPart::Emissive { radiance: ColorValue::Rgb(share * Vec3::new(26.0, 24.0, 21.0)) }
 }

@@ -278,10 +278,15 @@ fn a_scene_beyond_the_memory_of_the_process_is_told() {
         sphere.repeat(100_000)
     );
     std::fs::write(folder.path().join("sky.ron"), sky).unwrap();
+    let own: String = (0..50_000).map(|i| format!("sphere(radius: 1, material: \"m{i}\"), ")).collect();
+    let materials: String = (0..50_000).map(|i| format!("\"m{i}\": mirror(), ")).collect();
+    let own = format!("({camera}, environment: constant(1), materials: {{ {materials} }}, objects: [{own}])");
     std::fs::write(folder.path().join("spheres.ron"), spheres).unwrap();
+    std::fs::write(folder.path().join("materials.ron"), own).unwrap();
     for (scene, code, expected) in [
         ("sky.ron", 0, "`sky.png`: not enough memory; an environment of one colour is shown"),
-        ("spheres.ron", 1, "its 100000 objects take about 429 MiB to render, more than is available"),
+        ("spheres.ron", 1, "its 100000 objects, 1 materials and 0 textures take about 429 MiB to render, more than"),
+        ("materials.ron", 1, "its 50000 objects, 50000 materials and 0 textures take about 500 MiB to render, more"),
     ] {
         let line =
             format!("ulimit -v 700000; exec {PROGRAM} render {scene} -o {scene}.png --spp 1 --size 8x6 --threads 2");

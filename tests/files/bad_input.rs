@@ -252,6 +252,7 @@ fn what_is_wrong_around_values_is_told_where_it_is() {
         ("(camera: \u{feff}(0, 1))".to_owned(), "1:"),
         (format!("# comment\n({view})"), "1:1: a comment begins with `//`, not with `#`"),
         (format!("{view},\n{clay},\n"), "1:1: a scene is in round brackets: put `(` before `camera`"),
+        (format!("scene({view})"), "1:1: a scene starts with `(`: remove `scene`"),
         (
             scene("materials: { \"clay\": principled(base_color: 0.5, two_sided: 1) },"),
             "`two_sided`: expected true or false",

@@ -1,12 +1,11 @@
 //! glTF files: geometry of every encoding, nodes, poses, what becomes of a scene, and files that lie.
 
-use super::gltf_writer::{Writer, f32s, quad};
+use super::gltf_writer::{Writer, animated, f32s, quad};
 use firstlight::mesh::Mesh;
 use firstlight::scene::file::{LightPart, MaterialPart, ObjectPart};
 use firstlight::scene::model::{ModelFormat, ModelOptions, load_model};
 use firstlight::scene::{
-    Animation, EnvironmentSource, LoadOptions, LoadedScene, ModelChoice, SceneInputs, SceneSource, Shape, load,
-    save_scene, show_moment,
+    EnvironmentSource, LoadOptions, LoadedScene, ModelChoice, SceneInputs, SceneSource, Shape, load, save_scene,
 };
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -14,16 +13,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A folder with a model in it.
-struct Kept(tempfile::TempDir, PathBuf);
+pub struct Kept(pub tempfile::TempDir, pub PathBuf);
 
-fn keep(name: &str, bytes: &[u8]) -> Kept {
+pub fn keep(name: &str, bytes: &[u8]) -> Kept {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     Kept(folder, path)
 }
 
-fn open(path: &Path, choice: &ModelChoice) -> Result<LoadedScene, String> {
+pub fn open(path: &Path, choice: &ModelChoice) -> Result<LoadedScene, String> {
     let options = LoadOptions { choice: Some(choice), ..LoadOptions::default() };
     load(&SceneSource::Model(path.to_owned()), &options).map_err(|error| error.to_string())
 }
@@ -47,7 +46,7 @@ fn refusal(bytes: &[u8]) -> String {
 }
 
 /// Meshes that came from the file, with their placements.
-fn meshes(scene: &LoadedScene) -> Vec<(String, Arc<Mesh>, DAffine3)> {
+pub fn meshes(scene: &LoadedScene) -> Vec<(String, Arc<Mesh>, DAffine3)> {
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let inputs = SceneInputs::of(&mut world);
@@ -343,175 +342,6 @@ fn equal_images_are_decoded_once() {
     assert_eq!(opened(&writer.glb()).picture_bytes(), 64 * 64);
 }
 
-/// A square whose upper corners follow a joint, and that has a morph target; both are animated from 0 to 2 seconds.
-fn animated() -> Writer {
-    let mut writer = Writer::default();
-    quad(&mut writer);
-    let joints = writer.view(&[[0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]].concat(), None);
-    let joints = writer.accessor(json!({ "bufferView": joints, "componentType": 5121, "count": 4, "type": "VEC4" }));
-    let weights = writer.floats("VEC4", &[[1.0, 0.0, 0.0, 0.0]; 4].concat());
-    let target = writer.floats("VEC3", &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let primitive = &mut writer.json["meshes"][0]["primitives"][0];
-    primitive["targets"] = json!([{ "POSITION": target }]);
-    let morphed = writer.json["meshes"][0].clone();
-    let mut skinned = morphed.clone();
-    skinned["primitives"][0]["attributes"]["JOINTS_0"] = json!(joints);
-    skinned["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
-    writer.json["meshes"] = json!([morphed, skinned]);
-    // The joint stands at (0, 1, 0) when the skin is bound.
-    let mut inverse = [0.0_f32; 32];
-    for i in [0, 5, 10, 15] {
-        (inverse[i], inverse[16 + i]) = (1.0, 1.0);
-    }
-    inverse[16 + 13] = -1.0;
-    let inverse = writer.floats("MAT4", &inverse);
-    writer.json["skins"] = json!([{ "joints": [2, 3], "inverseBindMatrices": inverse }]);
-    writer.json["nodes"] = json!([
-        { "name": "morphed", "mesh": 0, "weights": [0.25] },
-        { "name": "skinned", "mesh": 1, "skin": 0, "translation": [100, 0, 0] },
-        { "name": "root", "children": [3] },
-        { "name": "upper", "translation": [0, 1, 0] },
-    ]);
-    writer.json["scenes"] = json!([{ "nodes": [0, 1, 2] }]);
-    let times = writer.floats("SCALAR", &[0.0, 2.0]);
-    let weights = writer.floats("SCALAR", &[0.0, 1.0]);
-    let moves = writer.floats("VEC3", &[0.0, 1.0, 0.0, 0.0, 1.0, 4.0]);
-    writer.json["animations"] = json!([{ "name": "all", "samplers": [
-        { "input": times, "output": weights },
-        { "input": times, "output": moves },
-    ], "channels": [
-        { "sampler": 0, "target": { "node": 0, "path": "weights" } },
-        { "sampler": 1, "target": { "node": 3, "path": "translation" } },
-    ] }]);
-    writer
-}
-
-#[test]
-fn poses_are_those_of_the_moment() {
-    let kept = keep("a.glb", &animated().glb());
-    let at = |at: Option<f64>| {
-        let choice = ModelChoice { at, ..ModelChoice::default() };
-        let scene = open(&kept.1, &choice).unwrap();
-        let found = meshes(&scene);
-        let points = |i: usize| -> Vec<DVec3> {
-            let (_, mesh, world) = &found[i];
-            mesh.positions.iter().map(|p| world.transform_point3(p.as_dvec3() + mesh.center)).collect()
-        };
-        (points(0), points(1))
-    };
-    for (time, weight, z) in [(None, 0.25, 0.0), (Some(0.0), 0.0, 0.0), (Some(0.5), 0.25, 1.0), (Some(9.0), 1.0, 4.0)] {
-        let (morphed, skinned) = at(time);
-        assert!((morphed[0] - DVec3::new(0.0, 0.0, weight)).length() < 1e-6, "{time:?}: {}", morphed[0]);
-        let expected = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, z], [0.0, 1.0, z]].map(DVec3::from);
-        for (found, expected) in skinned.iter().zip(expected) {
-            assert!((found - expected).length() < 1e-6, "{time:?}: {found} for {expected}");
-        }
-    }
-    let facts = open(&kept.1, &ModelChoice::default()).unwrap().facts.unwrap();
-    assert_eq!((facts.animations, facts.animation_length), (vec!["all".to_owned()], Some(2.0)));
-    // A time beyond them has no effect of its own, and that is told.
-    for (time, is_told) in [(9.0, true), (2.0, false), (0.5, false)] {
-        let choice = ModelChoice { at: Some(time), ..ModelChoice::default() };
-        let warnings = open(&kept.1, &choice).unwrap().warnings.join("; ");
-        assert_eq!(
-            warnings.contains(&format!("the animation ends at 2 s: {time} s shows its end")),
-            is_told,
-            "{warnings}"
-        );
-    }
-}
-
-/// A world that goes from moment to moment is the one that is loaded at the last: nodes, the camera, lights, skins and
-/// morph targets. What does not move is left alone.
-#[test]
-fn a_scene_goes_through_its_animations_without_being_read_again() {
-    let mut writer = animated();
-    let moves = writer.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 2.0, 0.0]);
-    let turns = writer.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
-    let times = writer.floats("SCALAR", &[0.0, 2.0]);
-    writer.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }]);
-    writer.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
-    writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
-        { "type": "spot", "intensity": 5.0, "spot": { "outerConeAngle": 0.5 } },
-        { "type": "point", "intensity": 3.0 },
-    ] } });
-    let nodes = writer.json["nodes"].as_array_mut().unwrap();
-    nodes.extend([
-        json!({ "name": "carrier", "children": [5, 6, 7] }),
-        json!({ "name": "plain", "mesh": 0, "translation": [1, 0, 0] }),
-        json!({ "name": "eye", "camera": 0, "translation": [0, 0, 9] }),
-        json!({ "name": "spot", "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
-        json!({ "name": "still", "mesh": 0, "translation": [7, 0, 0] }),
-        json!({ "name": "lamp", "extensions": { "KHR_lights_punctual": { "light": 1 } } }),
-    ]);
-    writer.json["scenes"] = json!([{ "nodes": [0, 1, 2, 4, 8, 9] }]);
-    let animation = &mut writer.json["animations"][0];
-    animation["samplers"]
-        .as_array_mut()
-        .unwrap()
-        .extend([json!({ "input": times, "output": moves }), json!({ "input": times, "output": turns })]);
-    animation["channels"].as_array_mut().unwrap().extend([
-        json!({ "sampler": 2, "target": { "node": 4, "path": "translation" } }),
-        json!({ "sampler": 3, "target": { "node": 4, "path": "rotation" } }),
-    ]);
-    let kept = keep("a.glb", &writer.glb());
-    let at = |seconds: f64| {
-        let scene = open(&kept.1, &ModelChoice { at: Some(seconds), ..ModelChoice::default() }).unwrap();
-        let mut world = bevy_ecs::world::World::new();
-        scene.spawn(&mut world);
-        (world, scene)
-    };
-    let (mut world, scene) = at(0.0);
-    let still =
-        SceneInputs::of(&mut world).objects.iter().find(|it| it.name.as_deref() == Some("still")).unwrap().entity;
-    for seconds in [0.5, 1.75, 0.25, 9.0] {
-        world.clear_trackers();
-        show_moment(&mut world, seconds);
-        let touched = world.entity(still).get_ref::<firstlight::scene::Placement>().unwrap();
-        assert!(!bevy_ecs::change_detection::DetectChanges::is_changed(&touched));
-        let (mut direct, loaded) = at(seconds);
-        let (here, there) = (SceneInputs::of(&mut world), SceneInputs::of(&mut direct));
-        // Its pivot is the middle of the boxes, of which skins and morph targets have those of the first moment.
-        let seen = |inputs: &SceneInputs| {
-            inputs.camera.map(|it| (it.view.eye, it.view.forward, it.view.up, it.projection.vfov_deg)).unwrap()
-        };
-        assert_eq!(seen(&here), seen(&there));
-        let lights = |inputs: &SceneInputs| inputs.lights.iter().map(|it| (it.light, it.placement)).collect::<Vec<_>>();
-        assert_eq!(lights(&here), lights(&there), "{seconds}");
-        // The light that is added is the same at every moment.
-        assert_eq!(here.objects.len(), there.objects.len());
-        let mut n_meshes = 0;
-        for (a, b) in here.objects.iter().zip(&there.objects) {
-            let (Shape::Mesh(mesh), Shape::Mesh(other)) = (&a.shape, &b.shape) else {
-                assert_eq!((&a.shape, a.placement), (&b.shape, b.placement));
-                continue;
-            };
-            n_meshes += 1;
-            assert_eq!((a.placement, &mesh.positions, &mesh.normals), (b.placement, &other.positions, &other.normals));
-        }
-        assert_eq!(n_meshes, 4);
-        // A scene file that is saved of it shows this moment.
-        let part = firstlight::scene::Description::of(&mut world, Some(&scene));
-        let expected = firstlight::scene::Description::of(&mut direct, Some(&loaded));
-        assert_eq!(part.file.objects, expected.file.objects);
-        assert_eq!(part.file.animation, Default::default());
-        // Without touching a world, all but the vertices.
-        let (mut base, _) = at(0.0);
-        let inputs = SceneInputs::of(&mut base);
-        let then = base.resource::<Animation>().inputs_at(&inputs, seconds);
-        assert_eq!((lights(&then), seen(&then)), (lights(&there), seen(&there)));
-        assert!(then.objects.iter().zip(&there.objects).all(|(a, b)| a.placement == b.placement));
-    }
-    let animation = world.resource::<Animation>();
-    assert_eq!((animation.length(), animation.n_frames()), (2.0, 48));
-    assert!(animation.is_moving_during(1.0..=1.1) && !animation.is_moving_during(2.0..=3.0));
-    // The stored pose is no moment.
-    let stored = open(&kept.1, &ModelChoice::default()).unwrap();
-    let mut world = bevy_ecs::world::World::new();
-    stored.spawn(&mut world);
-    assert!(world.get_resource::<Animation>().is_none());
-}
-
 #[test]
 fn cameras_are_chosen_by_name() {
     let mut writer = Writer::default();
@@ -639,26 +469,6 @@ fn a_saved_scene_and_its_model_say_the_same() {
     assert!(none.unwrap_err().contains("there is no camera `none`"));
     assert_eq!(again.content_fingerprint(), scene.content_fingerprint());
     assert_eq!(corners(&again), corners(&scene));
-}
-
-/// Of motion blur a scene file keeps nothing: that is told, where there is any.
-#[test]
-fn motion_blur_that_is_not_saved_is_told() {
-    let kept = keep("a.glb", &animated().glb());
-    for (at, shutter, is_told) in
-        [(1.0, Some(1.0), true), (1.0, None, false), (1.0, Some(0.0), false), (9.0, Some(1.0), false)]
-    {
-        let scene = open(&kept.1, &ModelChoice { at: Some(at), shutter, ..ModelChoice::default() }).unwrap();
-        let mut world = bevy_ecs::world::World::new();
-        scene.spawn(&mut world);
-        let saved = save_scene(&mut world, Some(&scene), &kept.0.path().join("b.ron")).unwrap();
-        let notes = saved.notes.join("; ");
-        assert_eq!(
-            notes.contains("the motion blur of the glTF model is left out"),
-            is_told,
-            "{at} {shutter:?}: {notes}"
-        );
-    }
 }
 
 #[test]

@@ -106,3 +106,46 @@ pub fn quad(writer: &mut Writer) -> &mut Writer {
     writer.mesh(json!({ "attributes": { "POSITION": position }, "indices": indices }));
     writer
 }
+
+/// A square whose upper corners follow a joint, and that has a morph target; both are animated from 0 to 2 seconds.
+pub fn animated() -> Writer {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let joints = writer.view(&[[0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]].concat(), None);
+    let joints = writer.accessor(json!({ "bufferView": joints, "componentType": 5121, "count": 4, "type": "VEC4" }));
+    let weights = writer.floats("VEC4", &[[1.0, 0.0, 0.0, 0.0]; 4].concat());
+    let target = writer.floats("VEC3", &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let primitive = &mut writer.json["meshes"][0]["primitives"][0];
+    primitive["targets"] = json!([{ "POSITION": target }]);
+    let morphed = writer.json["meshes"][0].clone();
+    let mut skinned = morphed.clone();
+    skinned["primitives"][0]["attributes"]["JOINTS_0"] = json!(joints);
+    skinned["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+    writer.json["meshes"] = json!([morphed, skinned]);
+    // The joint stands at (0, 1, 0) when the skin is bound.
+    let mut inverse = [0.0_f32; 32];
+    for i in [0, 5, 10, 15] {
+        (inverse[i], inverse[16 + i]) = (1.0, 1.0);
+    }
+    inverse[16 + 13] = -1.0;
+    let inverse = writer.floats("MAT4", &inverse);
+    writer.json["skins"] = json!([{ "joints": [2, 3], "inverseBindMatrices": inverse }]);
+    writer.json["nodes"] = json!([
+        { "name": "morphed", "mesh": 0, "weights": [0.25] },
+        { "name": "skinned", "mesh": 1, "skin": 0, "translation": [100, 0, 0] },
+        { "name": "root", "children": [3] },
+        { "name": "upper", "translation": [0, 1, 0] },
+    ]);
+    writer.json["scenes"] = json!([{ "nodes": [0, 1, 2] }]);
+    let times = writer.floats("SCALAR", &[0.0, 2.0]);
+    let weights = writer.floats("SCALAR", &[0.0, 1.0]);
+    let moves = writer.floats("VEC3", &[0.0, 1.0, 0.0, 0.0, 1.0, 4.0]);
+    writer.json["animations"] = json!([{ "name": "all", "samplers": [
+        { "input": times, "output": weights },
+        { "input": times, "output": moves },
+    ], "channels": [
+        { "sampler": 0, "target": { "node": 0, "path": "weights" } },
+        { "sampler": 1, "target": { "node": 3, "path": "translation" } },
+    ] }]);
+    writer
+}

@@ -7,6 +7,7 @@ mod draco;
 mod export;
 mod foreign_limits;
 mod gltf;
+mod gltf_motion;
 mod gltf_writer;
 mod input_files;
 mod layers;

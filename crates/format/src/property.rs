@@ -152,7 +152,7 @@ properties! {
         Turbidity = "turbidity": Number, "turbidity", [1.0, 10.0], "";
         /// factor of the light of the sun
         Sun = "sun": Number, "sun", [0.0, 1e6], "";
-        /// factor of the light of the sky without the sun
+        /// factor of the light of the clear sky without the sun
         Sky = "sky": Number, "sky", [0.0, 1e6], "";
         /// angle that the sun fills; it gives the same light
         SunSize = "sun_size": Number, "sun size", [0.1, 20.0], "°";

@@ -67,13 +67,13 @@ pub enum EnvironmentSource {
         /// Haze: 1 is pure air, 10 is hazy.
         #[serde(default = "usual_turbidity")]
         turbidity: f64,
-        /// Albedo of the ground, which brightens the sky.
+        /// Albedo of the ground, which brightens the clear sky.
         #[serde(default = "usual_ground")]
         ground: Rgb,
         /// Factor of the light of the sun.
         #[serde(default = "one", skip_serializing_if = "is_one")]
         sun: f64,
-        /// Factor of the light of the sky without the sun.
+        /// Factor of the light of the clear sky without the sun.
         #[serde(default = "one", skip_serializing_if = "is_one")]
         sky: f64,
         /// Angle that the sun fills, degrees; it gives the same light.

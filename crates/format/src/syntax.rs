@@ -58,6 +58,9 @@ fn wrong_brackets(error: &SpannedError, text: &str) -> Option<(usize, String)> {
                 format!("a scene is in round brackets: put `(` before `{word}`, and `)` at the end of the file");
             return Some((at, message));
         }
+        Error::ExpectedDifferentStructName { found, .. } if field_at(text, offset).is_none() && word == *found => {
+            return Some((at, format!("a scene starts with `(`: remove `{found}`")));
+        }
         Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier | Error::InvalidIdentifier(_) => {}
         _ => return None,
     }

@@ -9,7 +9,8 @@ use crate::gltf::mesh::BuiltMesh;
 use crate::gltf::surfaces::Surfaces;
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::model::imported::ModelNormals;
-use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture, read_picture_of_scene};
+use crate::model::projection::LightImages;
+use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
 use crate::read_scene::read_scene;
 use firstlight_files::limits::Limits;
 use firstlight_files::stamp::{Stamp, stamp};
@@ -101,8 +102,11 @@ impl Documents {
         if let Some(scene) = lock(&self.scenes).get(&key) {
             return Ok(scene.clone());
         }
-        let image = |path: &Path| read_picture(path).ok().map(|(image, _)| image);
-        let options = ForeignOptions { allow_outside: self.options.allow_outside, defines: key.1.clone(), image };
+        let budget = ImageBudget::default();
+        let light_images =
+            LightImages::new(move |path| read_picture_of_scene(path, &budget).ok().map(|(image, _)| image));
+        let options =
+            ForeignOptions { allow_outside: self.options.allow_outside, defines: key.1.clone(), light_images };
         let scene = Arc::new(read_scene(path, &options)?);
         Ok(lock(&self.scenes).entry(key).or_insert(scene).clone())
     }

@@ -73,7 +73,7 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
     }
 }
 
-/// The row of a property of an object, a light or the sky.
+/// The row of a property of an object, a light or the environment.
 ///
 /// - `value`: `None` for a rotation or a scale that a matrix defines.
 pub fn property_row(

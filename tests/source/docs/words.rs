@@ -1,7 +1,7 @@
 //! Length of lines and pages, and words that have a better one.
 
 use super::page::{Page, expect_none, pages, read};
-use crate::words::{retired_words, scene_names};
+use crate::words::{retired_words, retired_words_in, scene_names};
 
 const MAX_COLUMNS: usize = 120;
 const MAX_LINES: usize = 150;
@@ -43,7 +43,7 @@ fn words_are_those_of_the_field() {
     let mut problems = Vec::new();
     for page in pages_and_changelog().iter().filter(|page| page.path != GENERATED) {
         for (number, line) in page.prose() {
-            for (word, better) in retired_words(line, &scenes) {
+            for (word, better) in retired_words_in(&page.path, line, &scenes) {
                 problems.push(format!("{}:{number}: `{word}`: say {better}", page.path));
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::mitsuba::graph::Graph;
 use crate::mitsuba::meshes::MeshRequest;
-use crate::model::foreign::ReadImage;
+use crate::model::projection::LightImages;
 use firstlight_files::reference::References;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::names::Names;
@@ -84,7 +84,7 @@ pub(crate) struct Converter<'a> {
     pub folder: &'a Path,
     /// Names and values from the command line.
     pub defines: &'a [(String, String)],
-    pub image: ReadImage,
+    pub light_images: &'a LightImages,
     /// Of the scene in its folder.
     pub file_name: String,
     pub textures: HashMap<(usize, Reads), String>,

@@ -4,7 +4,7 @@ use crate::mitsuba::converter::{Converter, Reads};
 use crate::mitsuba::graph::Node;
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
-use crate::model::projection::{aspect_of, image_of, projection, stretched};
+use crate::model::projection::{projection, stretched};
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use firstlight_format::parts::{LightPart, TransformPart};
@@ -119,9 +119,9 @@ impl Converter<'_> {
         let (intensity, texture, aspect) = match irradiance {
             ColorValue::Rgb(rgb) => (rgb * scale, None, 1.0),
             ColorValue::Texture(texture) => {
-                let image =
-                    self.file.textures.get(&texture).and_then(|source| image_of(self.image, self.folder, source));
-                (Vec3::splat(scale), Some(texture), image.as_ref().map_or(1.0, aspect_of))
+                let source = self.file.textures.get(&texture);
+                let image = source.and_then(|source| self.light_images.of(self.folder, source));
+                (Vec3::splat(scale), Some(texture), image.map_or(1.0, |image| image.aspect))
             }
         };
         let half = (0.5 * self.horizontal_field(node, aspect)?.to_radians()).tan();

@@ -58,7 +58,7 @@ impl<'a> Converter<'a> {
             references,
             folder,
             defines: &options.defines,
-            image: options.image,
+            light_images: &options.light_images,
             file_name,
             textures: HashMap::new(),
             texture_depth: 0,

@@ -1,12 +1,12 @@
 //! A scene of another renderer, read: a scene file, and the meshes that stand inside of the foreign file.
 
+use crate::model::projection::LightImages;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_mesh::Mesh;
-use firstlight_render::ImageTexture;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Characters of a name that are kept: a name is stored with everything that uses it.
@@ -17,18 +17,14 @@ pub(crate) fn cut(name: &str) -> &str {
     name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
 }
 
-/// Reads an image; `None` if it cannot be read.
-pub(crate) type ReadImage = fn(&Path) -> Option<ImageTexture>;
-
 /// Options for reading.
-#[derive(Clone, Debug)]
 pub(crate) struct ForeignOptions {
     /// Whether files outside of the folder of the scene may be read.
     pub allow_outside: bool,
     /// Names and values of parameters that the scene leaves open.
     pub defines: Vec<(String, String)>,
-    /// For the images of lights, whose proportions and brightness matter.
-    pub image: ReadImage,
+    /// Whose proportions and brightness matter.
+    pub light_images: LightImages,
 }
 
 /// A scene with everything that its text says.

@@ -1,25 +1,75 @@
 //! Lights that project an image through a frustum, in the scenes of other renderers.
 
-use crate::model::foreign::ReadImage;
 use firstlight_files::relative::text_to_path;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::Rgb;
 use firstlight_render::{Falloff, ImageTexture};
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use std::collections::HashMap;
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// The image of a texture; `None` if it cannot be read, which is told when it is loaded.
-///
-/// - `folder`: of the scene.
-pub(crate) fn image_of(read: ReadImage, folder: &Path, source: &TextureSource) -> Option<ImageTexture> {
-    let TextureSource::Image { file, .. } = source else { return None };
-    read(&folder.join(text_to_path(file)))
+type ReadImage = dyn Fn(&Path) -> Option<ImageTexture> + Send + Sync;
+
+/// The images of the lights of a scene, each read once.
+pub(crate) struct LightImages {
+    read: Box<ReadImage>,
+    known: Mutex<HashMap<String, Option<Arc<LightImage>>>>,
 }
 
-/// Width over height.
-pub(crate) fn aspect_of(image: &ImageTexture) -> f64 {
-    f64::from(image.width) / f64::from(image.height)
+/// What a light needs to know of its image: a small one with the same light.
+pub(crate) struct LightImage {
+    /// Width over height.
+    pub aspect: f64,
+    columns: usize,
+    /// Share of each cell in the mean of the image, weighted by Rec. 709 luminance; from the first row on.
+    luminance: Vec<f64>,
+}
+
+impl LightImages {
+    /// - `read`: reads an image; `None` if it cannot be read.
+    pub fn new(read: impl Fn(&Path) -> Option<ImageTexture> + Send + Sync + 'static) -> Self {
+        Self { read: Box::new(read), known: Mutex::default() }
+    }
+
+    /// The image of a texture; `None` if it cannot be read, which is told when it is loaded.
+    ///
+    /// - `folder`: of the scene.
+    pub fn of(&self, folder: &Path, source: &TextureSource) -> Option<Arc<LightImage>> {
+        let TextureSource::Image { file, .. } = source else { return None };
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let read = || Some(Arc::new(LightImage::of(&(self.read)(&folder.join(text_to_path(file)))?)));
+        known.entry(file.clone()).or_insert_with(read).clone()
+    }
+}
+
+impl LightImage {
+    fn of(image: &ImageTexture) -> Self {
+        /// Cells along each side: within one, the angle from the axis is nearly the same.
+        const CELLS: usize = 128;
+        let (width, height) = (image.width as usize, image.height as usize);
+        let (columns, rows) = (width.min(CELLS), height.min(CELLS));
+        let mut luminance = vec![0.0; columns * rows];
+        for i in 0..image.len() {
+            let cell = i / width * rows / height * columns + i % width * columns / width;
+            luminance[cell] += image.linear(i).as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722)) / image.len() as f64;
+        }
+        Self { aspect: f64::from(image.width) / f64::from(image.height), columns, luminance }
+    }
+
+    /// Flux of the image as intensity, weighted by luminance.
+    ///
+    /// - `tangents`: of half the angles that it fills.
+    pub fn flux(&self, tangents: [f64; 2]) -> f64 {
+        let size = DVec2::new(self.columns as f64, (self.luminance.len() / self.columns) as f64);
+        let of_cell = |(i, luminance): (usize, &f64)| {
+            let at = DVec2::new((i % self.columns) as f64, (i / self.columns) as f64);
+            let on_wall = (2.0 * (at + 0.5) / size - 1.0) * DVec2::from(tangents);
+            luminance * (1.0 + on_wall.length_squared()).sqrt().recip().powi(3)
+        };
+        4.0 * tangents[0] * tangents[1] * self.luminance.iter().enumerate().map(of_cell).sum::<f64>()
+    }
 }
 
 /// Tangents of an image in the world, by those in the space of a light that shines along its Z.
@@ -49,5 +99,49 @@ pub(crate) fn projection(tangents: [f64; 2]) -> LightPart {
         image_height: height,
         even: false,
         transform: TransformPart::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    fn image(width: u32, height: u32) -> ImageTexture {
+        let texel = |i: u32| Vec3::splat((i * 7919 % 101 + 1) as f32);
+        ImageTexture::from_linear(width, height, (0..width * height).map(texel).collect())
+    }
+
+    #[test]
+    fn an_image_of_many_lights_is_read_once() {
+        static N_READ: AtomicU32 = AtomicU32::new(0);
+        let images = LightImages::new(|path| {
+            N_READ.fetch_add(1, Ordering::Relaxed);
+            path.ends_with("a.png").then(|| image(3, 2))
+        });
+        for _ in 0..3 {
+            let of = |name: &str| images.of(Path::new("scene"), &TextureSource::image(name.to_owned()));
+            assert_eq!(of("a.png").map(|image| image.aspect), Some(1.5));
+            assert!(of("missing.png").is_none());
+        }
+        assert_eq!(N_READ.load(Ordering::Relaxed), 2);
+    }
+
+    #[test]
+    fn the_flux_is_the_integral_over_all_texels() {
+        let tangents = [0.7, 0.4];
+        for (width, height) in [(1, 1), (5, 3), (300, 170)] {
+            let image = image(width, height);
+            let expected: f64 = (0..image.len() as u32)
+                .map(|i| {
+                    let at = DVec2::new((i % width).into(), (i / width).into()) + 0.5;
+                    let on_wall = (2.0 * at / DVec2::new(width.into(), height.into()) - 1.0) * DVec2::from(tangents);
+                    f64::from(image.linear(i as usize).x) * (1.0 + on_wall.length_squared()).powf(-1.5)
+                })
+                .sum();
+            let expected = 4.0 * 0.7 * 0.4 * expected / image.len() as f64;
+            let found = LightImage::of(&image).flux(tangents);
+            assert!((found / expected - 1.0).abs() < 1e-3, "{width} × {height}: {found} {expected}");
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
-use crate::model::foreign::{ForeignOptions, ReadImage, cut};
+use crate::model::foreign::{ForeignOptions, cut};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::model::placing::{is_placement, transform};
-use crate::model::projection::image_of;
+use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
 use crate::pbrt::lights::{Light, color, light};
 use crate::pbrt::params::{Param, Params};
@@ -67,7 +67,7 @@ pub(crate) struct Builder<'a> {
     pub(super) folder: &'a Path,
     pub(super) references: References,
     pub(super) allow_outside: bool,
-    image: ReadImage,
+    light_images: &'a LightImages,
     /// From the world of the file to ours.
     pub world: DMat3,
     pub warnings: Warnings,
@@ -113,7 +113,7 @@ pub(crate) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(crate) fn new(path: &'a Path, options: &ForeignOptions) -> Self {
+    pub(crate) fn new(path: &'a Path, options: &'a ForeignOptions) -> Self {
         let allow_outside = options.allow_outside;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self {
@@ -121,7 +121,7 @@ impl<'a> Builder<'a> {
             folder,
             references: References::of(path, allow_outside),
             allow_outside,
-            image: options.image,
+            light_images: &options.light_images,
             world: DMat3::IDENTITY,
             warnings: Warnings::default(),
             textures: Textures::default(),
@@ -487,7 +487,7 @@ impl<'a> Builder<'a> {
         let name = format!("{} {}", cut(kind), self.lights.len() + 1);
         let mut told = Vec::new();
         let file = |name: &str| self.named_file(name);
-        let image = |source: &TextureSource| image_of(self.image, self.folder, source);
+        let image = |source: &TextureSource| self.light_images.of(self.folder, source);
         let made = light(kind, params, &world, name, image, file, &mut |what| told.push(what));
         told.extend(params.complaints());
         told.into_iter().for_each(|what| self.tell(what));

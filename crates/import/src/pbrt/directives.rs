@@ -99,7 +99,7 @@ pub(crate) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    pub(crate) fn new(path: &'a Path, options: &ForeignOptions) -> Self {
+    pub(crate) fn new(path: &'a Path, options: &'a ForeignOptions) -> Self {
         Self {
             path,
             folder: path.parent().unwrap_or(Path::new("")),

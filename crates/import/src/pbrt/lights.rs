@@ -1,15 +1,16 @@
 //! The lights of pbrt that are no shapes.
 
-use crate::model::projection::{aspect_of, projection, stretched};
+use crate::model::projection::{LightImage, projection, stretched};
 use crate::pbrt::params::Params;
 use crate::pbrt::spectrum::UnknownSpectrum;
 use firstlight_files::printable;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource, TextureSource};
 use firstlight_format::value::Rgb;
-use firstlight_render::{Falloff, ImageTexture};
+use firstlight_render::Falloff;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// What a light becomes.
 pub(crate) enum Light {
@@ -37,14 +38,15 @@ fn rgb(color: DVec3) -> Rgb {
 
 /// A light.
 ///
-/// - `world`: from its space to our world; `image_of`: the image of a texture; `file`: the path of an image in the scene file for its
-///   name in pbrt's, `None` if it must not be read; `tell`: called with what is not shown.
+/// - `world`: from its space to our world; `image_of`: the image of a texture.
+/// - `file`: the path of an image in the scene file for its name in pbrt's, `None` if it must not be read.
+/// - `tell`: called with what is not shown.
 pub(crate) fn light(
     kind: &str,
     params: &Params,
     world: &DAffine3,
     name: String,
-    image_of: impl Fn(&TextureSource) -> Option<ImageTexture>,
+    image_of: impl Fn(&TextureSource) -> Option<Arc<LightImage>>,
     file: impl Fn(&str) -> Option<String>,
     tell: &mut impl FnMut(String),
 ) -> Light {
@@ -130,13 +132,12 @@ pub(crate) fn light(
                 }
             }
             let image = image_of(&source);
-            let aspect = image.as_ref().map_or(1.0, aspect_of);
+            let aspect = image.as_ref().map_or(1.0, |image| image.aspect);
             // The field of view is that of the shorter side.
             let half = (0.5 * params.number("fov").unwrap_or(90.0).to_radians()).tan().clamp(1e-6, 1e6);
             let tangents = if aspect > 1.0 { [half * aspect, half] } else { [half, half / aspect] };
             let tangents = stretched(&world.matrix3, tangents);
-            let power =
-                positive("power").map_or(1.0, |power| power / image.map_or(1.0, |image| flux(&image, tangents)));
+            let power = positive("power").map_or(1.0, |power| power / image.map_or(1.0, |image| image.flux(tangents)));
             let mut light = projection(tangents);
             if let LightPart::Spot { name: a, position: b, direction: c, intensity: d, up: e, .. } = &mut light {
                 let up = world.transform_vector3(DVec3::Y).try_normalize().unwrap_or(DVec3::Y);
@@ -150,22 +151,6 @@ pub(crate) fn light(
             Light::Nothing
         }
     }
-}
-
-/// Flux of an image as intensity, weighted by Rec. 709 luminance.
-///
-/// - `tangents`: of half the angles that it fills.
-fn flux(image: &ImageTexture, tangents: [f64; 2]) -> f64 {
-    let size = DVec2::new(image.width.into(), image.height.into());
-    let sum: f64 = (0..image.len())
-        .map(|i| {
-            let at = DVec2::new((i as u32 % image.width).into(), (i as u32 / image.width).into());
-            let on_wall = (2.0 * (at + 0.5) / size - 1.0) * DVec2::from(tangents);
-            let cos = (1.0 + on_wall.length_squared()).sqrt().recip();
-            image.linear(i).as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722)) * cos.powi(3)
-        })
-        .sum();
-    4.0 * tangents[0] * tangents[1] * sum / image.len() as f64
 }
 
 fn nowhere(tell: &mut impl FnMut(String)) -> Light {

@@ -6,3 +6,4 @@ pub(crate) mod features;
 pub(crate) mod path;
 pub(crate) mod phong;
 pub(crate) mod simd;
+pub(crate) mod visible_albedo;

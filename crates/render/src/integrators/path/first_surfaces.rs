@@ -8,10 +8,10 @@
 use crate::integrators::common::seen::Seen;
 use crate::integrators::simd::first_hits::{DiffuseHits, see_diffuse};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
+use crate::integrators::visible_albedo::visible_albedo;
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::lanes::DIFFUSE;
-use crate::shading::surface::albedo::visible_albedo;
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::{HitBatch, InstructionSet};
 use glam::Vec3;

@@ -1,6 +1,5 @@
 //! The BSDF of the material at a vertex: one lobe, or a blend.
 
-pub(crate) mod albedo;
 pub(crate) mod blend;
 
 use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId};

@@ -1,0 +1,153 @@
+//! glTF files that move: poses, animations, motion blur.
+
+use super::gltf::{keep, meshes, open};
+use super::gltf_writer::animated;
+use firstlight::scene::{Animation, ModelChoice, SceneInputs, Shape, save_scene, show_moment};
+use glam::DVec3;
+use serde_json::json;
+
+#[test]
+fn poses_are_those_of_the_moment() {
+    let kept = keep("a.glb", &animated().glb());
+    let at = |at: Option<f64>| {
+        let choice = ModelChoice { at, ..ModelChoice::default() };
+        let scene = open(&kept.1, &choice).unwrap();
+        let found = meshes(&scene);
+        let points = |i: usize| -> Vec<DVec3> {
+            let (_, mesh, world) = &found[i];
+            mesh.positions.iter().map(|p| world.transform_point3(p.as_dvec3() + mesh.center)).collect()
+        };
+        (points(0), points(1))
+    };
+    for (time, weight, z) in [(None, 0.25, 0.0), (Some(0.0), 0.0, 0.0), (Some(0.5), 0.25, 1.0), (Some(9.0), 1.0, 4.0)] {
+        let (morphed, skinned) = at(time);
+        assert!((morphed[0] - DVec3::new(0.0, 0.0, weight)).length() < 1e-6, "{time:?}: {}", morphed[0]);
+        let expected = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, z], [0.0, 1.0, z]].map(DVec3::from);
+        for (found, expected) in skinned.iter().zip(expected) {
+            assert!((found - expected).length() < 1e-6, "{time:?}: {found} for {expected}");
+        }
+    }
+    let facts = open(&kept.1, &ModelChoice::default()).unwrap().facts.unwrap();
+    assert_eq!((facts.animations, facts.animation_length), (vec!["all".to_owned()], Some(2.0)));
+    // A time beyond them has no effect of its own, and that is told.
+    for (time, is_told) in [(9.0, true), (2.0, false), (0.5, false)] {
+        let choice = ModelChoice { at: Some(time), ..ModelChoice::default() };
+        let warnings = open(&kept.1, &choice).unwrap().warnings.join("; ");
+        assert_eq!(
+            warnings.contains(&format!("the animation ends at 2 s: {time} s shows its end")),
+            is_told,
+            "{warnings}"
+        );
+    }
+}
+
+/// A world that goes from moment to moment is the one that is loaded at the last: nodes, the camera, lights, skins and
+/// morph targets. What does not move is left alone.
+#[test]
+fn a_scene_goes_through_its_animations_without_being_read_again() {
+    let mut writer = animated();
+    let moves = writer.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 2.0, 0.0]);
+    let turns = writer.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
+    let times = writer.floats("SCALAR", &[0.0, 2.0]);
+    writer.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }]);
+    writer.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": 5.0, "spot": { "outerConeAngle": 0.5 } },
+        { "type": "point", "intensity": 3.0 },
+    ] } });
+    let nodes = writer.json["nodes"].as_array_mut().unwrap();
+    nodes.extend([
+        json!({ "name": "carrier", "children": [5, 6, 7] }),
+        json!({ "name": "plain", "mesh": 0, "translation": [1, 0, 0] }),
+        json!({ "name": "eye", "camera": 0, "translation": [0, 0, 9] }),
+        json!({ "name": "spot", "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+        json!({ "name": "still", "mesh": 0, "translation": [7, 0, 0] }),
+        json!({ "name": "lamp", "extensions": { "KHR_lights_punctual": { "light": 1 } } }),
+    ]);
+    writer.json["scenes"] = json!([{ "nodes": [0, 1, 2, 4, 8, 9] }]);
+    let animation = &mut writer.json["animations"][0];
+    animation["samplers"]
+        .as_array_mut()
+        .unwrap()
+        .extend([json!({ "input": times, "output": moves }), json!({ "input": times, "output": turns })]);
+    animation["channels"].as_array_mut().unwrap().extend([
+        json!({ "sampler": 2, "target": { "node": 4, "path": "translation" } }),
+        json!({ "sampler": 3, "target": { "node": 4, "path": "rotation" } }),
+    ]);
+    let kept = keep("a.glb", &writer.glb());
+    let at = |seconds: f64| {
+        let scene = open(&kept.1, &ModelChoice { at: Some(seconds), ..ModelChoice::default() }).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        (world, scene)
+    };
+    let (mut world, scene) = at(0.0);
+    let still =
+        SceneInputs::of(&mut world).objects.iter().find(|it| it.name.as_deref() == Some("still")).unwrap().entity;
+    for seconds in [0.5, 1.75, 0.25, 9.0] {
+        world.clear_trackers();
+        show_moment(&mut world, seconds);
+        let touched = world.entity(still).get_ref::<firstlight::scene::Placement>().unwrap();
+        assert!(!bevy_ecs::change_detection::DetectChanges::is_changed(&touched));
+        let (mut direct, loaded) = at(seconds);
+        let (here, there) = (SceneInputs::of(&mut world), SceneInputs::of(&mut direct));
+        // Its pivot is the middle of the boxes, of which skins and morph targets have those of the first moment.
+        let seen = |inputs: &SceneInputs| {
+            inputs.camera.map(|it| (it.view.eye, it.view.forward, it.view.up, it.projection.vfov_deg)).unwrap()
+        };
+        assert_eq!(seen(&here), seen(&there));
+        let lights = |inputs: &SceneInputs| inputs.lights.iter().map(|it| (it.light, it.placement)).collect::<Vec<_>>();
+        assert_eq!(lights(&here), lights(&there), "{seconds}");
+        // The light that is added is the same at every moment.
+        assert_eq!(here.objects.len(), there.objects.len());
+        let mut n_meshes = 0;
+        for (a, b) in here.objects.iter().zip(&there.objects) {
+            let (Shape::Mesh(mesh), Shape::Mesh(other)) = (&a.shape, &b.shape) else {
+                assert_eq!((&a.shape, a.placement), (&b.shape, b.placement));
+                continue;
+            };
+            n_meshes += 1;
+            assert_eq!((a.placement, &mesh.positions, &mesh.normals), (b.placement, &other.positions, &other.normals));
+        }
+        assert_eq!(n_meshes, 4);
+        // A scene file that is saved of it shows this moment.
+        let part = firstlight::scene::Description::of(&mut world, Some(&scene));
+        let expected = firstlight::scene::Description::of(&mut direct, Some(&loaded));
+        assert_eq!(part.file.objects, expected.file.objects);
+        assert_eq!(part.file.animation, Default::default());
+        // Without touching a world, all but the vertices.
+        let (mut base, _) = at(0.0);
+        let inputs = SceneInputs::of(&mut base);
+        let then = base.resource::<Animation>().inputs_at(&inputs, seconds);
+        assert_eq!((lights(&then), seen(&then)), (lights(&there), seen(&there)));
+        assert!(then.objects.iter().zip(&there.objects).all(|(a, b)| a.placement == b.placement));
+    }
+    let animation = world.resource::<Animation>();
+    assert_eq!((animation.length(), animation.n_frames()), (2.0, 48));
+    assert!(animation.is_moving_during(1.0..=1.1) && !animation.is_moving_during(2.0..=3.0));
+    // The stored pose is no moment.
+    let stored = open(&kept.1, &ModelChoice::default()).unwrap();
+    let mut world = bevy_ecs::world::World::new();
+    stored.spawn(&mut world);
+    assert!(world.get_resource::<Animation>().is_none());
+}
+
+/// Of motion blur a scene file keeps nothing: that is told, where there is any.
+#[test]
+fn motion_blur_that_is_not_saved_is_told() {
+    let kept = keep("a.glb", &animated().glb());
+    for (at, shutter, is_told) in
+        [(1.0, Some(1.0), true), (1.0, None, false), (1.0, Some(0.0), false), (9.0, Some(1.0), false)]
+    {
+        let scene = open(&kept.1, &ModelChoice { at: Some(at), shutter, ..ModelChoice::default() }).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let saved = save_scene(&mut world, Some(&scene), &kept.0.path().join("b.ron")).unwrap();
+        let notes = saved.notes.join("; ");
+        assert_eq!(
+            notes.contains("the motion blur of the glTF model is left out"),
+            is_told,
+            "{at} {shutter:?}: {notes}"
+        );
+    }
+}
