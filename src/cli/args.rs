@@ -4,6 +4,8 @@ use crate::cli::console::{remark, tell};
 use crate::cli::failure::Failure;
 use crate::cli::number::{parse_define, parse_seconds, parse_shutter};
 use clap::{Args, ValueEnum};
+use firstlight::cluster::job_option::{JobOption, OptionName};
+use firstlight::cluster::pack::Opening;
 use firstlight::cluster::unpack::{UnpackError, Unpacked, is_archive, unpack};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
@@ -99,6 +101,25 @@ impl OpenArgs {
     }
 }
 
+/// The options for opening a scene like this.
+pub fn open_options(Opening { up, choice }: &Opening) -> impl Iterator<Item = JobOption> {
+    let up = up.map(|up| match up {
+        UpAxis::Y => "y",
+        UpAxis::Z => "z",
+    });
+    [
+        up.map(|up| OptionName::Up.with(up)),
+        choice.camera.as_ref().map(|camera| OptionName::Camera.with(camera)),
+        choice.at.map(|at| OptionName::At.with(at)),
+        choice.shutter.map(|share| OptionName::Shutter.with(share)),
+        choice.variant.as_ref().map(|variant| OptionName::Variant.with(variant)),
+        choice.allow_outside.then(|| OptionName::AllowOutside.flag()),
+    ]
+    .into_iter()
+    .flatten()
+    .chain(choice.defines.iter().map(|(name, value)| OptionName::Define.with(format!("{name}={value}"))))
+}
+
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum UpArg {
     Y,
@@ -145,11 +166,15 @@ impl From<FilterArg> for PixelFilter {
 }
 
 impl SceneArgs {
-    pub fn up(&self) -> Option<UpAxis> {
-        self.how.up.map(|up| match up {
+    /// What to open of it, and the up axis: as the options say, or else the archive.
+    pub fn opening(&self) -> Result<Opening, Failure> {
+        let path = Path::new(&self.scene);
+        let packed = if is_archive(path) && path.is_file() { unpacked(path)?.opening } else { Opening::default() };
+        let up = self.how.up.map(|up| match up {
             UpArg::Y => UpAxis::Y,
             UpArg::Z => UpAxis::Z,
-        })
+        });
+        Ok(Opening { up: up.or(packed.up), choice: self.how.choice().or(&packed.choice) })
     }
 
     /// Loads the scene; registers all files that are read in `files`, which rejects them if one of them is also an
@@ -168,10 +193,10 @@ impl SceneArgs {
         self.tell_ignored(&source);
         let environment = self.environment()?;
         let environment = environment.as_deref();
-        let choice = self.how.choice();
+        let Opening { up, choice } = self.opening()?;
         let told = |_, text: &str| progress(text);
         let (progress, choice): (Option<&(dyn Fn(_, &str) + Sync)>, _) = (Some(&told), Some(&choice));
-        let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
+        let options = LoadOptions { up, aspect, environment, progress, choice, ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;
         tell(&scene.warnings);

@@ -1,9 +1,10 @@
 //! `firstlight pack SCENE -o scene.zip`: packs a scene with all of its files, for other machines.
 
-use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
+use crate::cli::args::{OverwriteArgs, SceneArgs, open_options, replaced};
 use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
 use clap::Args;
+use firstlight::cluster::engine::shell_word;
 use firstlight::cluster::pack::{PackError, Package};
 use firstlight::scene::whole_file::Replace;
 use std::path::PathBuf;
@@ -46,15 +47,16 @@ pub fn run(args: &PackArgs) -> Result<(), Failure> {
     let mut files = OverwriteArgs::default().files();
     let out = files.claim(&args.output, Replace::AllButFilms)?;
     let scene = args.scene.load(None, &mut files, &|_| ())?;
-    let package = Package::of(&scene, &args.scene.source()?)?;
+    let mut package = Package::of(&scene, &args.scene.source()?)?;
+    package.opening = args.scene.opening()?;
     tell_outside(&package);
     package.write_zip(out)?;
     let (output, n) = (args.output.display(), package.names().count());
     let replaced = replaced(files.replaced());
-    let environment = package.environment.as_ref().map(|name| format!(" --env {name}")).unwrap_or_default();
-    inform(format_args!(
-        "{output}: {n} files{replaced}; open it, or unpack it and open {}{environment}",
-        package.scene
-    ));
+    let environment = package.environment.as_ref().map(|name| format!(" --env {}", shell_word(name)));
+    let options = open_options(&package.opening).map(|option| format!(" {}", shell_word(&String::from(option))));
+    let options = options.chain(environment);
+    let options = options.collect::<String>();
+    inform(format_args!("{output}: {n} files{replaced}; open it, or unpack it and open {}{options}", package.scene));
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `firstlight submit ENGINE SCENE --parts N`: creates the folder of a job with all of its files and submits its first
 //! round to an engine.
 
-use crate::cli::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
+use crate::cli::args::{FilterArg, IntegratorArg, SceneArgs, open_options};
 use crate::cli::console::inform;
 use crate::cli::failure::Failure;
 use crate::cli::frames::{FramesArg, parse_frames};
@@ -124,21 +124,6 @@ fn name_of(arg: impl ValueEnum) -> String {
     arg.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-/// The options for opening the scene, except the environment image.
-fn open_options(how: &OpenArgs) -> impl Iterator<Item = JobOption> {
-    [
-        how.up.map(|up| OptionName::Up.with(name_of(up))),
-        how.camera.as_ref().map(|camera| OptionName::Camera.with(camera)),
-        how.at.map(|at| OptionName::At.with(at)),
-        how.shutter.map(|share| OptionName::Shutter.with(share)),
-        how.variant.as_ref().map(|variant| OptionName::Variant.with(variant)),
-        how.allow_outside.then(|| OptionName::AllowOutside.flag()),
-    ]
-    .into_iter()
-    .flatten()
-    .chain(how.defines.iter().map(|(name, value)| OptionName::Define.with(format!("{name}={value}"))))
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum EngineArg {
     /// Array jobs of Slurm.
@@ -196,7 +181,7 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
             _ => this.unwrap_or_else(|| "firstlight".to_owned()),
         }),
         scene,
-        options: open_options(&args.scene.how)
+        options: open_options(&args.scene.opening()?)
             .chain(args.look.options())
             .chain(environment.map(|path| OptionName::Env.with(path)))
             .chain(args.fps.map(|fps| OptionName::Fps.with(fps)))

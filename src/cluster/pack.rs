@@ -14,11 +14,14 @@ use crate::cluster::names::{
 use crate::files::printable;
 use crate::files::whole_file::{WholeFile, unwritable, write_whole};
 use crate::format::SceneFile;
+use crate::format::choice::{ModelChoice, UpAxis};
 use crate::format::scene_format::SceneFormat;
 use crate::scene::{
     FileKind, ImageMetadata, ImageScene, InputFile, LoadedScene, ReadError, ReadFiles, SceneError, SceneSource,
     WriteError, builtin_text, each_path, path_to_text, text_to_path,
 };
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -32,6 +35,19 @@ pub const CHECKSUMS: &str = "SHA256SUMS";
 /// First words of the comment of an archive, before the name of the scene, and before that of the environment image.
 pub(super) const SCENE: &str = "scene: ";
 pub(super) const ENVIRONMENT: &str = "environment: ";
+/// Likewise, before an [`Opening`] as JSON.
+pub(super) const OPENING: &str = "options: ";
+
+/// How a scene was opened that was packed: so it is opened again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Opening {
+    /// The up axis of a model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<UpAxis>,
+    /// What was chosen of it. Files outside of its folder are in the package, and never read.
+    #[serde(flatten)]
+    pub choice: ModelChoice,
+}
 
 /// What is in a package.
 #[derive(Clone, Debug)]
@@ -40,6 +56,8 @@ pub struct Package {
     pub scene: String,
     /// The image that lights the scene instead of its own environment, likewise.
     pub environment: Option<String>,
+    /// How it is to be opened.
+    pub opening: Opening,
     /// By name, with `/` between the parts.
     files: BTreeMap<String, PackedContent>,
     /// Files from outside of the folder of what was opened, with their names in the package.
@@ -105,6 +123,9 @@ pub enum PackError {
         printable::name(.0)
     )]
     Unportable(String),
+    /// An archive has no place for so long options.
+    #[error("the values of `-D` are too long for an archive: write them into the scene")]
+    Options,
     /// A path is not UTF-8.
     #[error(transparent)]
     Name(#[from] NotUtf8),
@@ -189,7 +210,7 @@ impl Package {
         if let Some(PackedContent::File(path)) = files.get(CHECKSUMS) {
             return Err(PackError::Reserved(path.clone()));
         }
-        Ok(Self { scene: scene_name, environment, files, outside: names.outside })
+        Ok(Self { scene: scene_name, environment, opening: Opening::default(), files, outside: names.outside })
     }
 
     /// ArchiveNames of all files.
@@ -228,7 +249,13 @@ impl Package {
         zip.write_all(sums.as_bytes()).map_err(|error| unwritable(&path, error))?;
         // What `unpack` opens, and what other programs show.
         let environment = self.environment.iter().map(|name| format!("\n{ENVIRONMENT}{name}"));
-        zip.set_comment(format!("{SCENE}{}{}", self.scene, environment.collect::<String>())).map_err(failed)?;
+        let opening = (self.opening != Opening::default()).then(|| json!(self.opening));
+        let opening = opening.iter().map(|opening| format!("\n{OPENING}{opening}"));
+        let comment = format!("{SCENE}{}{}", self.scene, environment.chain(opening).collect::<String>());
+        if comment.len() > usize::from(u16::MAX) {
+            return Err(PackError::Options);
+        }
+        zip.set_comment(comment).map_err(failed)?;
         zip.finish().map_err(failed)?;
         Ok(out.finish()?)
     }

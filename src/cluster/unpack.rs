@@ -4,7 +4,7 @@
 //! named after the archive's own checksum; one in which a file has changed since is left alone, and another one is made.
 
 use crate::cluster::names::is_portable;
-use crate::cluster::pack::{CHECKSUMS, ENVIRONMENT, SCENE, hexadecimal};
+use crate::cluster::pack::{CHECKSUMS, ENVIRONMENT, OPENING, Opening, SCENE, hexadecimal};
 use crate::files::printable;
 use crate::files::whole_file::lock_file;
 use crate::format::model_format::ModelFormat;
@@ -36,12 +36,14 @@ const MOST_DEPTH: usize = 64;
 const PART: &str = ".part-";
 
 /// A scene from an archive.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Unpacked {
     /// What is to be opened.
     pub scene: PathBuf,
     /// The image that lights the scene instead of its own environment.
     pub environment: Option<PathBuf>,
+    /// How it is opened, where the user does not say otherwise.
+    pub opening: Opening,
 }
 
 /// Why an archive is not opened. The text follows the path of the archive.
@@ -53,6 +55,9 @@ pub enum UnpackError {
     /// It is no archive, or damaged.
     #[error("is not a readable archive: {0}")]
     Archive(#[from] zip::result::ZipError),
+    /// Its options are none.
+    #[error("has options that cannot be read ({0}): it was not made by `firstlight pack`")]
+    Options(#[from] serde_json::Error),
     /// A name leads out of the folder, or is none that all systems know.
     #[error("`{}` in the archive does not stay in its folder: it was not made by `firstlight pack`", printable::name(.0))]
     Name(String),
@@ -123,7 +128,8 @@ pub fn unpack(archive: &Path, cache: &Path) -> Result<Unpacked, UnpackError> {
             extract(&mut zip, &sums, cache, &folder)?;
         }
         let place = |name: &String| folder.join(text_to_path(name));
-        return Ok(Unpacked { scene: place(&scene.0), environment: scene.1.as_ref().map(place) });
+        let environment = scene.1.as_ref().map(place);
+        return Ok(Unpacked { scene: place(&scene.0), environment, opening: opening_in(zip.comment())? });
     }
     Err(UnpackError::NoScene)
 }
@@ -336,6 +342,13 @@ fn scene_in(comment: &[u8], sums: &BTreeMap<String, String>) -> Result<(String, 
     found.map(|scene| (scene, None)).ok_or(UnpackError::NoScene)
 }
 
+/// How the scene is opened, as the comment says.
+fn opening_in(comment: &[u8]) -> Result<Opening, UnpackError> {
+    let comment = String::from_utf8_lossy(comment);
+    let opening = comment.lines().find_map(|line| line.strip_prefix(OPENING));
+    Ok(opening.map(serde_json::from_str).transpose()?.unwrap_or_default())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -348,6 +361,10 @@ mod tests {
         assert_eq!(open("scene: a/b.obj", &["a/b.obj", "s.ron"]), only("a/b.obj"));
         let lit = open("scene: s.ron\nenvironment: e.hdr", &["e.hdr", "s.ron"]);
         assert_eq!(lit, Some(("s.ron".to_owned(), Some("e.hdr".to_owned()))));
+        let camera = |comment: &[u8]| opening_in(comment).map(|opening| opening.choice.camera);
+        assert_eq!(camera(b"scene: s.ron").unwrap(), None);
+        assert_eq!(camera(b"scene: s.ron\noptions: {\"camera\":\"a\",\"allow_outside\":true}").unwrap().unwrap(), "a");
+        assert!(camera(b"scene: s.ron\noptions: {").is_err());
         assert_eq!(open("scene: ../x.ron", &["m.glb", "s.ron"]), only("s.ron"));
         assert_eq!(open("", &["m.glb", "m.png"]), only("m.glb"));
         assert_eq!(open("", &["a.pbrt", "m.ply"]), only("a.pbrt"));

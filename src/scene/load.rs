@@ -1,7 +1,6 @@
 //! From a name or a path to everything that a scene needs: text, meshes, images, trees. Runs on any thread.
 
 use crate::files::input_file::{FileKind, InputFile};
-use crate::files::limits::has_room;
 use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
 use crate::files::stamp::Stamp;
@@ -34,6 +33,7 @@ use crate::scene::known_meshes::KnownMeshes;
 use crate::scene::load_meshes::{LostMesh, ObjectMeshes, load_meshes};
 use crate::scene::load_stage::LoadStage;
 use crate::scene::loaded::LoadedScene;
+use crate::scene::memory::check_memory;
 use crate::scene::model_light::{Model, light_as_in, light_model};
 use crate::scene::source::SceneSource;
 use crate::scene::thousands::thousands;
@@ -221,7 +221,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                 let file = SceneFile::parse(text, path)?;
                 let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
                 match source {
-                    source if scene.has_read(&source) => scene.source = source,
+                    source if scene.has_read(&source, &documents) => scene.source = source,
                     source => scene.warnings.push(format!(
                         "{}: {} is not its scene: what is saved in the image is shown",
                         path.display(),
@@ -380,15 +380,7 @@ pub(super) fn resolve(
         scene.warnings.push(format!("{place}`{name}`: not enough memory; an environment of one colour is shown"));
         lost.insert(file);
     }
-    let (n_objects, n_materials, n_textures) =
-        (scene.file.objects.len(), scene.file.materials.names().count(), scene.file.textures.names().count());
-    let bytes =
-        n_objects as u64 * OBJECT_BYTES + n_materials as u64 * MATERIAL_BYTES + n_textures as u64 * TEXTURE_BYTES;
-    if !has_room(bytes) {
-        let things = format!("{n_objects} objects, {n_materials} materials and {n_textures} textures");
-        let wanted = format!("its {things} take about {} MiB to render, more than is available", bytes >> 20);
-        return Err(SceneError::in_file(&title, wanted));
-    }
+    check_memory(&scene).map_err(|message| SceneError::in_file(&title, message))?;
     scene.leave_out_pictures(&lost);
     if let EnvironmentSource::Image { file, layout, axes, .. } = &scene.file.environment
         && (*layout != EnvironmentLayout::default() || axes.is_some())
@@ -410,13 +402,16 @@ pub(super) fn resolve(
 
 impl LoadedScene {
     /// Whether what an image names as its scene is one. A foreign image may name any file of the computer.
-    fn has_read(&self, source: &SceneSource) -> bool {
+    fn has_read(&self, source: &SceneSource, documents: &Documents) -> bool {
         match source {
             SceneSource::Builtin(_) | SceneSource::Picture(_) => true,
             SceneSource::Scene(path) => read_text(path).and_then(|text| SceneFile::parse(&text, path)).is_ok(),
             SceneSource::Foreign(path) | SceneSource::Model(path) => {
-                let path = absolute(path);
-                self.mesh_files().into_iter().any(|(file, _)| absolute(file) == path)
+                let wanted = absolute(path);
+                let is_mesh = self.mesh_files().into_iter().any(|(file, _)| absolute(file) == wanted);
+                // A scene of spheres alone has none.
+                let is_foreign = matches!(source, SceneSource::Foreign(_));
+                is_mesh || is_foreign && documents.scene(path, &self.choice.defines).is_ok()
             }
         }
     }
@@ -625,12 +620,6 @@ fn at(text: Option<&str>, title: &Path, path: &str) -> String {
 fn quoted(name: &str) -> String {
     format!("`{}`", printable::name(name))
 }
-
-/// Bytes that an object takes to be rendered, with its share of trees and tables; a material; and a texture without the
-/// pixels of its image. Measured by scenes of 60,000 spheres.
-const OBJECT_BYTES: u64 = 4_500;
-const MATERIAL_BYTES: u64 = 6_000;
-const TEXTURE_BYTES: u64 = 3_200;
 
 /// The text of a scene file, within its length limit.
 fn read_text(path: &Path) -> Result<String, SceneError> {

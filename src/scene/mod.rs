@@ -21,6 +21,7 @@ mod load_meshes;
 mod load_pictures;
 mod load_stage;
 mod loaded;
+mod memory;
 mod metadata_draft;
 mod model_light;
 mod open_shutter;

@@ -210,4 +210,27 @@ fn the_values_of_parameters_stay_with_the_shapes() {
     let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb8();
     assert!(pixels("narrow.png") != pixels("wide.png"));
     assert!(pixels("narrow.png") == pixels("saved.png") && pixels("narrow.png") == pixels("again.png"));
+    // An archive has the one mesh and its parameter; another value of it wins.
+    let said = does(path, "pack s.xml -D mesh=narrow.ply -o narrow.zip");
+    assert!(said.contains("open s.xml '--define=mesh=narrow.ply'"), "{said}");
+    does(path, &format!("render narrow.zip -o packed.png {how}"));
+    does(path, "pack narrow.zip -o twice.zip");
+    does(path, &format!("render twice.zip -o twice.png {how}"));
+    assert!(pixels("narrow.png") == pixels("packed.png") && pixels("narrow.png") == pixels("twice.png"));
+    let other = Outcome::of(program(path).args(["info", "narrow.zip", "-D", "mesh=wide.ply"]));
+    assert!(other.err.contains("wide.ply"), "{}", other.err);
+    does(path, "submit slurm narrow.zip --parts 2 --spp 4 --dry-run -o job");
+    assert!(std::fs::read_to_string(path.join("job/job.json")).unwrap().contains("--define=mesh=narrow.ply"));
+}
+
+#[test]
+fn an_image_of_a_foreign_scene_without_meshes_has_its_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "<scene version=\"3.0.0\"><emitter type=\"constant\"/><shape type=\"sphere\"/></scene>";
+    std::fs::write(path.join("s.xml"), scene).unwrap();
+    does(path, "render s.xml -o s.png --size 8x6 --spp 1");
+    let said = does(path, "info s.png");
+    assert!(!said.contains("is not its scene"), "{said}");
+    does(path, "pack s.png -o s.zip");
 }
