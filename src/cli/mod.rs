@@ -97,7 +97,7 @@ impl SimdArg {
 #[derive(Subcommand)]
 enum CliCommand {
     /// Render a scene to an image file, without a window.
-    #[command(after_help = render_args::EXAMPLES)]
+    #[command(after_help = render_args::EXAMPLES, mut_args = render_args::brief)]
     Render(Box<render_args::RenderCommand>),
     /// Measure error against time, and the benefit of each sampling technique.
     Report(report::ReportArgs),

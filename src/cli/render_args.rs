@@ -8,7 +8,7 @@ use crate::cli::layers::LayerArgs;
 use crate::cli::number::{
     at_least_one, between, parse_fps, parse_interval, parse_positive, parse_share, parse_size, parse_stops,
 };
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
 use std::ffi::{OsStr, OsString};
@@ -28,6 +28,15 @@ Examples:
   firstlight render image.png -o larger.png --scale 2
 
 `firstlight scenes` lists the built-in scenes.";
+
+/// Options with a heading of their own that `-h` lists too; the others are for `--help`.
+const OFTEN_ASKED: [&str; 6] = ["camera", "at", "scale", "layers", "frames", "film"];
+
+/// Leaves an option that few people need out of the short help.
+pub fn brief(arg: Arg) -> Arg {
+    let is_rare = arg.get_help_heading().is_some() && !OFTEN_ASKED.contains(&arg.get_id().as_str());
+    arg.hide_short_help(is_rare)
+}
 
 /// What is to be rendered, and where to.
 #[derive(Args, Clone, Debug)]

@@ -92,7 +92,7 @@ impl Settings {
         if source.path().is_some_and(|path| unpacked_folder(path).is_some()) {
             return;
         }
-        let name = name_of(source);
+        let name = scene_name(source);
         self.recent.retain(|other| *other != name);
         self.recent.insert(0, name);
         self.recent.truncate(Self::MAX_RECENT);
@@ -167,7 +167,7 @@ impl SettingsStore {
     /// Returns the bookmarks of a scene, empty if there are none, and the reason if a file could not be read.
     pub fn bookmarks(&self, source: &SceneSource) -> (SceneBookmarks, Option<String>) {
         let (bookmarks, trouble): (SceneBookmarks, _) = self.read(&bookmark_file(source));
-        (SceneBookmarks { scene: name_of(source), ..bookmarks }, trouble)
+        (SceneBookmarks { scene: scene_name(source), ..bookmarks }, trouble)
     }
 
     /// Writes the bookmarks of a scene.
@@ -175,7 +175,7 @@ impl SettingsStore {
     /// # Errors
     /// If the file cannot be written.
     pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), WriteError> {
-        let bookmarks = SceneBookmarks { scene: name_of(source), views: bookmarks.views.clone() };
+        let bookmarks = SceneBookmarks { scene: scene_name(source), views: bookmarks.views.clone() };
         self.write(&bookmark_file(source), &bookmarks)
     }
 
@@ -223,8 +223,8 @@ fn options() -> ron::Options {
     ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
 }
 
-/// Name of a scene that does not depend on the working directory.
-fn name_of(source: &SceneSource) -> String {
+/// Name of a scene that does not depend on the working directory: the built-in one, or an absolute path.
+pub fn scene_name(source: &SceneSource) -> String {
     match source {
         SceneSource::Builtin(name) => name.clone(),
         SceneSource::Scene(path)
@@ -236,7 +236,7 @@ fn name_of(source: &SceneSource) -> String {
 
 /// File name of a scene's bookmarks; scenes of the same name in different folders have different files.
 fn bookmark_file(source: &SceneSource) -> String {
-    let name = name_of(source);
+    let name = scene_name(source);
     let stem = Path::new(&name).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let plain: String =
         stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();

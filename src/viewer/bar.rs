@@ -7,16 +7,9 @@ use crate::viewer::overlay::{GLASS, TEXT, TEXT_SIZE};
 use egui::{Align, Button, Color32, Context, FontId, Frame, Layout, Margin, Pos2, TopBottomPanel, Ui};
 
 /// Points.
-pub const HEIGHT: f32 = 27.0;
+const HEIGHT: f32 = 27.0;
 /// Width of a window below which the buttons that the menu has too are left out, points.
 const NARROW: f32 = 360.0;
-
-/// Whether the bar is at this place of a window of this height, points.
-///
-/// - `own`: height of the bar, with what is above it.
-pub fn is_at(place: Pos2, height: f32, own: f32) -> bool {
-    place.y >= height - own
-}
 
 /// The texts of the bar.
 #[derive(Default, PartialEq, Eq)]
@@ -94,16 +87,5 @@ fn texts(ui: &mut Ui, left: &str, right: &[String]) {
         }
         (free, end) = (free - width, end - width);
         ui.painter().galley(Pos2::new(end + 20.0, top), galley, weak);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_bar_is_at_the_lower_edge() {
-        assert!(is_at(Pos2::new(1.0, 599.0), 600.0, HEIGHT) && !is_at(Pos2::new(1.0, 500.0), 600.0, HEIGHT));
-        assert!(is_at(Pos2::ZERO, 16.0, HEIGHT), "it fills a window without room");
     }
 }

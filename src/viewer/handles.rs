@@ -38,8 +38,10 @@ struct Grabbed {
 }
 
 impl Handles {
-    /// Updates to the current selection; `size`: of the window, points.
-    pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, size: DVec2) {
+    /// Updates to the current selection.
+    ///
+    /// - `size`: of the part of the window that the panel leaves free, points.
+    pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, projector: Projector, size: DVec2) {
         self.boxes.clear();
         let selected = session.world().resource::<Selection>().0.clone();
         for &entity in &selected {
@@ -49,7 +51,6 @@ impl Handles {
                 self.boxes.push((entity, own, is_point));
             }
         }
-        let projector = Projector::new(&session.status().rig, size);
         self.projector = Some(projector);
         self.gizmo = mode.and_then(|mode| self.gizmo_of(session, mode));
         self.out_of_view = match (self.boxes.last(), selected.last()) {

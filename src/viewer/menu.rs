@@ -5,15 +5,15 @@
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
 use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
-use crate::viewer::openable;
+use crate::viewer::openable::{self, Recent};
+use crate::viewer::thumbnails::Thumbnails;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
 
 /// What menus show.
 pub struct MenuInput<'a> {
     pub session: &'a Session,
     pub navigation: Navigation,
-    /// Recent scenes, the latest first.
-    pub recent: &'a [String],
+    pub recent: Recent<'a>,
 }
 
 /// The parts of the menu of the bar that are menus themselves.
@@ -26,7 +26,9 @@ const PARTS: [(&str, Menu); 6] = [
     ("Inspect", Menu::Inspect),
 ];
 /// Height of the longest menu, points; windows below it scroll.
-const TALL: f32 = 505.0;
+const TALL: f32 = 526.0;
+/// Width of the sphere of a material, points.
+const SPHERE: f32 = 20.0;
 
 /// The menu of the bar; returns the command that was clicked.
 pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
@@ -39,7 +41,9 @@ pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
                 ui.menu_button("Open recent", |ui| {
                     scrolled(ui, |ui| choose(openable::recent(ui, input.session, input.recent).map(Action::Send)));
                 });
-                ui.menu_button("Scenes", |ui| scrolled(ui, |ui| choose(openable::scenes(ui).map(Action::Send))));
+                ui.menu_button("Scenes", |ui| {
+                    scrolled(ui, |ui| choose(openable::scenes(ui, input.recent.thumbnails).map(Action::Send)))
+                });
             }
         }
         ui.separator();
@@ -79,9 +83,15 @@ fn built_in_mesh(ui: &mut Ui) -> Option<Action> {
     Some(Action::Send(Command::Edit(Edit::Add(NewThing::Mesh(source)))))
 }
 
-fn ready_material(ui: &mut Ui) -> Option<Action> {
-    let (name, _) = library().iter().find(|(name, _)| ui.button(name).clicked())?;
-    Some(dress(name))
+fn ready_material(ui: &mut Ui, thumbnails: &Thumbnails) -> Option<Action> {
+    let mut chosen = None;
+    for (i, (name, _)) in library().iter().enumerate() {
+        let sphere = thumbnails.material(ui.ctx(), i, SPHERE);
+        if ui.add(Button::image_and_text(sphere, name)).clicked() {
+            chosen = Some(dress(name));
+        }
+    }
+    chosen
 }
 
 fn dress(name: &str) -> Action {
@@ -174,7 +184,7 @@ impl HereMenu {
                     chosen = chosen.take().or(line(ui, input, item));
                 }
                 ui.menu_button("Material", |ui| {
-                    scrolled(ui, |ui| chosen = chosen.take().or(ready_material(ui)));
+                    scrolled(ui, |ui| chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails)));
                 });
                 ui.menu_button("Add", |ui| {
                     for item in menu(Menu::Add) {
@@ -206,7 +216,8 @@ pub fn all(input: &MenuInput) -> Vec<(String, String, String, Action)> {
     let scenes = BUILTIN_SCENES
         .iter()
         .map(|(name, about, _)| (format!("Scene: {name}"), (*about).to_owned(), String::new(), open(name)));
-    let files = input.recent.iter().map(|name| (format!("Open: {name}"), String::new(), String::new(), open(name)));
+    let files =
+        input.recent.names.iter().map(|name| (format!("Open: {name}"), String::new(), String::new(), open(name)));
     let materials = library().iter().map(|(name, _)| {
         (format!("Material: {name}"), "give it to the selection".to_owned(), String::new(), dress(name))
     });

@@ -19,10 +19,11 @@
 //! | `help` | the list of keys |
 //! | `time_line` | the strip of an animation |
 //! | `bar`, `menu`, `palette`, `openable` | what can be clicked: buttons, menus, the list of commands, scenes and files |
+//! | `thumbnails`, `previews` | small images of recent scenes; spheres of materials |
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
 //! | `order`, `order_form`, `renders` | images and frames that are rendered to files beside the window |
-//! | `dialog`, `browser` | file dialogs: of the desktop, or inside the window |
+//! | `dialog`, `browser`, `file_manager` | file dialogs, of the desktop or inside the window; the desktop's view of a folder |
 //! | `question`, `greeting` | questions before edits are lost; that of the first start |
 //! | [`display`] | detection of the display server |
 
@@ -33,6 +34,7 @@ mod camera_text;
 mod change;
 mod dialog;
 pub mod display;
+mod file_manager;
 mod grab;
 mod greeting;
 mod handles;
@@ -48,6 +50,7 @@ mod overlay;
 mod palette;
 mod panel;
 mod presenter;
+mod previews;
 mod question;
 mod reaction;
 mod region_tool;
@@ -55,6 +58,7 @@ mod renders;
 mod saver;
 mod status;
 mod story;
+mod thumbnails;
 mod time_line;
 mod toasts;
 

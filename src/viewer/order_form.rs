@@ -98,7 +98,9 @@ impl OrderForm {
         let scene = &session.status().scene;
         (self.of_scene, self.filter) = ((width, height), look.filter);
         if self.scene != *scene {
-            (self.scene, self.size, self.frames) = (scene.clone(), self.of_scene, None);
+            let picture = session.picture();
+            let size = larger(self.of_scene, (picture.width, picture.height));
+            (self.scene, self.size, self.frames) = (scene.clone(), size, None);
             self.denoised = look.denoising != Denoising::Raw;
             self.folder = folder.join(format!("{}-frames", file_stem(scene)));
         }
@@ -277,9 +279,22 @@ impl OrderForm {
     }
 }
 
+/// The size of the scene, or that of the window where it has more pixels: an image is not coarser than what is seen.
+fn larger(scene: (u32, u32), window: (u32, u32)) -> (u32, u32) {
+    let pixels = |size: (u32, u32)| u64::from(size.0) * u64::from(size.1);
+    if pixels(window) > pixels(scene) { window } else { scene }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_image_is_not_coarser_than_the_window() {
+        assert_eq!(larger((640, 360), (1280, 720)), (1280, 720));
+        assert_eq!(larger((3840, 2160), (1280, 720)), (3840, 2160));
+        assert_eq!(larger((640, 360), (0, 0)), (640, 360));
+    }
 
     #[test]
     fn the_name_and_the_format_agree() {

@@ -159,12 +159,11 @@ impl Outlines {
         }
     }
 
-    /// Draws the lines over the image, which fills the window.
-    pub fn draw(&self, context: &Context) {
+    /// Draws the lines over the image.
+    pub fn draw(&self, context: &Context, image: Rect) {
         let Some((view, map)) = &self.map else { return };
-        let screen = context.content_rect();
-        let points = screen.size() / egui::vec2(map.size().x as f32, map.size().y as f32);
-        let place = |pixel: UVec2| screen.min + egui::vec2(pixel.x as f32, pixel.y as f32) * points;
+        let points = image.size() / egui::vec2(map.size().x as f32, map.size().y as f32);
+        let place = |pixel: UVec2| image.min + egui::vec2(pixel.x as f32, pixel.y as f32) * points;
         let painter = context.layer_painter(LayerId::background());
         for line in self.lines.iter().flatten().filter(|line| line.view == *view) {
             let Some((texture, start, size)) = &line.drawn else { continue };

@@ -3,6 +3,7 @@
 use crate::files::printable;
 use crate::render::{Legend, scale_color};
 use crate::scene::LoadStage;
+use crate::viewer::keys::Action;
 use crate::viewer::toasts::{Toast, Tone};
 use egui::{Align2, Color32, Context, CornerRadius, Frame, Margin, Order, RichText, Stroke, Vec2};
 
@@ -75,20 +76,27 @@ pub fn progress(ui: &mut egui::Ui, width: f32, share: f32) {
     ui.painter().rect_filled(part, 3.0, ui.visuals().selection.bg_fill);
 }
 
-/// Draws messages in the upper left corner; they ignore the mouse.
-pub fn toasts(context: &Context, toasts: &[Toast]) {
-    egui::Area::new("toasts".into())
-        .order(Order::Foreground)
-        .interactable(false)
-        .fixed_pos(context.content_rect().left_top() + Vec2::splat(10.0))
-        .show(context, |ui| {
-            ui.set_max_width((context.content_rect().width() - 40.0).max(120.0));
-            for toast in toasts {
-                let color = if toast.tone == Tone::Problem { PROBLEM } else { TEXT };
-                glass().show(ui, |ui| ui.label(RichText::new(&toast.text).size(TEXT_SIZE + 1.0).color(color)));
-                ui.add_space(4.0);
-            }
+/// Draws messages in the upper left corner; they ignore the mouse, except for those that say where something was saved.
+/// Returns the command that was clicked.
+pub fn toasts(context: &Context, toasts: &[Toast]) -> Option<Action> {
+    let mut chosen = None;
+    let free = context.available_rect();
+    let mut corner = free.left_top() + Vec2::splat(10.0);
+    for (i, toast) in toasts.iter().enumerate() {
+        let area = egui::Area::new(egui::Id::new(("toast", i, toast.is_saved))).order(Order::Foreground);
+        let drawn = area.interactable(toast.is_saved).fixed_pos(corner).show(context, |ui| {
+            ui.set_max_width((free.width() - 40.0).max(120.0));
+            let color = if toast.tone == Tone::Problem { PROBLEM } else { TEXT };
+            glass().show(ui, |ui| {
+                ui.label(RichText::new(&toast.text).size(TEXT_SIZE + 1.0).color(color));
+                if toast.is_saved && ui.button("Show in its folder").clicked() {
+                    chosen = Some(Action::ShowSaved);
+                }
+            });
         });
+        corner.y = drawn.response.rect.bottom() + 4.0;
+    }
+    chosen
 }
 
 /// Draws the legend of an inspection in the lower left corner; it ignores the mouse.

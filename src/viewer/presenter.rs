@@ -108,7 +108,9 @@ impl Presenter {
     }
 
     /// Sets the image to show.
-    pub fn set_picture(&mut self, picture: &Picture) -> Result<(), PresentError> {
+    ///
+    /// - `aside`: how far it is moved to the left, pixels.
+    pub fn set_picture(&mut self, picture: &Picture, aside: u32) -> Result<(), PresentError> {
         let size = (picture.width, picture.height);
         if size.0 == 0 || size.1 == 0 || picture.rgba.len() != size.0 as usize * size.1 as usize * 4 {
             return Ok(());
@@ -118,7 +120,7 @@ impl Presenter {
             self.picture_size = size;
             self.fit_picture()?;
         }
-        self.pixels.frame_mut().copy_from_slice(&picture.rgba);
+        copy_aside(&picture.rgba, self.pixels.frame_mut(), size.0, aside);
         Ok(())
     }
 
@@ -192,5 +194,40 @@ impl Presenter {
             )) => Ok(false),
             Err(error) => Err(error.into()),
         }
+    }
+}
+
+/// Copies an image, moved to the left by `aside` pixels; what is uncovered at the right repeats its edge, so that the bar
+/// shows no seam.
+///
+/// - `width`: of both, pixels of four bytes.
+fn copy_aside(from: &[u8], to: &mut [u8], width: u32, aside: u32) {
+    let aside = aside.min(width.saturating_sub(1));
+    if aside == 0 {
+        return to.copy_from_slice(from);
+    }
+    let (row, left) = (4 * width as usize, 4 * aside as usize);
+    for (from, to) in from.chunks_exact(row).zip(to.chunks_exact_mut(row)) {
+        let (shown, uncovered) = to.split_at_mut(row - left);
+        shown.copy_from_slice(&from[left..]);
+        uncovered.as_chunks_mut::<4>().0.fill(from[row - 4..].try_into().expect("a pixel has four bytes"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_moves_to_the_left_by_whole_pixels() {
+        let image: Vec<u8> = (0..24).collect();
+        let moved = |aside| {
+            let mut to = vec![9; 24];
+            copy_aside(&image, &mut to, 3, aside);
+            to
+        };
+        assert_eq!(moved(0), image);
+        assert_eq!(moved(1), [&image[4..12], &image[8..12], &image[16..24], &image[20..24]].concat());
+        assert_eq!(moved(7), [image[8..12].repeat(3), image[20..24].repeat(3)].concat());
     }
 }

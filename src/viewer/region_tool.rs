@@ -57,11 +57,10 @@ impl RegionTool {
         Some(meant.then_some(rectangle))
     }
 
-    /// Draws the rectangle being dragged, or the one that gets the samples.
-    pub fn draw(&self, context: &Context, status: &Status) {
+    /// Draws the rectangle being dragged, or the one that gets the samples, over the image.
+    pub fn draw(&self, context: &Context, image: Rect, status: &Status) {
         let painter = context.layer_painter(egui::LayerId::background());
-        let screen = context.content_rect();
-        let at = |x: f64, y: f64| -> Pos2 { screen.min + egui::vec2(x as f32, y as f32) * screen.size() };
+        let at = |x: f64, y: f64| -> Pos2 { image.min + egui::vec2(x as f32, y as f32) * image.size() };
         let outline = |rect: Rect, stroke: f32| {
             painter.rect_stroke(
                 rect,
@@ -81,7 +80,7 @@ impl RegionTool {
         outline(rect, 1.5);
         let galley = painter.layout_no_wrap(format!("{spp} spp"), FontId::proportional(12.5), COLOR);
         let label = Align2::LEFT_BOTTOM.anchor_size(rect.left_top() + egui::vec2(2.0, -3.0), galley.size());
-        let label = label.translate(egui::vec2(0.0, (screen.top() + 2.0 - label.top()).max(0.0)));
+        let label = label.translate(egui::vec2(0.0, (image.top() + 2.0 - label.top()).max(0.0)));
         painter.rect_filled(label.expand2(egui::vec2(4.0, 1.0)), 2.0, GLASS);
         painter.galley(label.min, galley, COLOR);
     }

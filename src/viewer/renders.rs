@@ -9,6 +9,7 @@ use crate::viewer::order::{Advance, Order, Subject};
 use crate::viewer::overlay::{self, GLASS, TEXT_SIZE};
 use crate::viewer::status::percent;
 use egui::{Align2, Area, Context, CornerRadius, Frame, Margin, Order as Layer, Rect, RichText};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,8 +28,8 @@ pub enum Source {
     Frames(Box<Reel>, RenderSettings),
 }
 
-/// What became of an order: the message for the user.
-pub type Outcome = Result<String, String>;
+/// What became of an order: the file or the folder, and the message for the user.
+pub type Outcome = Result<(PathBuf, String), String>;
 
 /// Orders that are being carried out.
 pub struct Renders {
@@ -94,6 +95,7 @@ impl Renders {
         let path = std::path::absolute(&order.path).unwrap_or_else(|_| order.path.clone());
         let title = path.file_name().map_or_else(|| stem.clone(), |name| name.to_string_lossy().into_owned());
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
+        let saved = path.clone();
         let run = move || {
             let outcome = match worker_threads().num_threads(threads).build() {
                 Ok(pool) => pool.install(|| work.run(&Order { path, ..order }, source, &stem)),
@@ -101,6 +103,7 @@ impl Renders {
             };
             // If the window is gone, nobody is told.
             if let Some(outcome) = outcome.transpose() {
+                let outcome = outcome.map(|news| (saved, news));
                 let _ = sender.send(outcome.map_err(|reason| format!("the image was not saved: {reason}")));
             }
             waker();
@@ -289,7 +292,7 @@ mod tests {
         renders.begin(order.clone(), frames, "c".to_owned(), 1).unwrap();
         let outcome = loop {
             if let Some(outcome) = renders.finished().pop() {
-                break outcome.unwrap();
+                break outcome.unwrap().1;
             }
             std::thread::sleep(Duration::from_millis(5));
         };
@@ -305,7 +308,7 @@ mod tests {
         let reel = Reel::of(&mut session).unwrap();
         let long = Order { frames: Some(0..=100_000), path: folder.path().join("long"), ..order };
         renders.begin(long, Source::Frames(Box::new(reel), settings), "c".to_owned(), 1).unwrap();
-        let outcome = renders.finish().pop().unwrap().unwrap();
+        let outcome = renders.finish().pop().unwrap().unwrap().1;
         assert!(outcome.contains("of 100001 frames"), "{outcome}");
     }
 }

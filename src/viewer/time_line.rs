@@ -2,13 +2,12 @@
 
 use crate::frame::{Command, CurrentScene, Session};
 use crate::scene::{Animation, Moment};
-use crate::viewer::bar;
 use crate::viewer::keys::Action;
 use crate::viewer::overlay::{GLASS, KEY, TEXT, TEXT_SIZE};
 use egui::{Align, Align2, Color32, Context, FontId, Frame, Layout, Margin, Pos2, Rect, Sense, Stroke, TopBottomPanel};
 
 /// Points.
-pub const HEIGHT: f32 = 30.0;
+const HEIGHT: f32 = 30.0;
 /// Distance of two labels of frames, points.
 const LABELS: f64 = 56.0;
 
@@ -158,9 +157,6 @@ fn draw_track(painter: &egui::Painter, rect: Rect, strip: &Strip) {
         painter.vline(at, rect.top() + 3.0..=rect.bottom() - 3.0, Stroke::new(1.5, Color32::from_rgb(120, 180, 255)));
     }
 }
-
-/// Height of the strip together with the bar, points.
-pub const WITH_BAR: f32 = HEIGHT + bar::HEIGHT;
 
 #[cfg(test)]
 mod tests {

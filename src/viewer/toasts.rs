@@ -14,6 +14,8 @@ pub enum Tone {
 pub struct Toast {
     pub text: String,
     pub tone: Tone,
+    /// It says where something was saved.
+    pub is_saved: bool,
     until: Instant,
 }
 
@@ -21,6 +23,8 @@ pub struct Toast {
 #[derive(Debug, Default)]
 pub struct Toasts {
     shown: Vec<Toast>,
+    /// They have changed since they were asked last.
+    is_new: bool,
 }
 
 impl Toasts {
@@ -28,19 +32,42 @@ impl Toasts {
     pub const MOST_WARNINGS: usize = 2;
     /// Maximum number of messages; more would cover the image. The oldest is removed.
     const MAX_SHOWN: usize = 5;
+    /// Longest time that progress is shown.
+    const PROGRESS: Duration = Duration::from_secs(600);
 
     pub fn add(&mut self, tone: Tone, text: impl Into<String>, now: Instant) {
-        let text = printable::lines(&text.into());
+        self.show(tone, text.into(), false, now);
+    }
+
+    /// Says that something was saved; long enough to click it.
+    pub fn add_saved(&mut self, text: String, now: Instant) {
+        self.show(Tone::News, text, true, now);
+    }
+
+    /// Says that something is being done, until news of the same first word say what became of it, or it [ends](Self::end).
+    pub fn add_progress(&mut self, text: &str, now: Instant) {
+        self.show(Tone::News, text.to_owned(), false, now + Self::PROGRESS);
+    }
+
+    /// Removes news of this first word.
+    pub fn end(&mut self, topic: &str) {
+        self.keep(|toast| toast.tone != Tone::News || !toast.text.starts_with(topic));
+    }
+
+    fn show(&mut self, tone: Tone, text: String, is_saved: bool, now: Instant) {
+        let text = printable::lines(&text);
         // Long enough to read; for a problem, to read twice.
         let reading = Duration::from_millis(1500 + 40 * text.len() as u64);
-        let until = now + if tone == Tone::Problem { 2 * reading + Duration::from_secs(3) } else { reading };
+        let until =
+            now + if tone == Tone::Problem || is_saved { 2 * reading + Duration::from_secs(3) } else { reading };
         // The first word is the topic: a message replaces an older one of the same topic.
         let topic = |text: &str| text.split_whitespace().next().map(str::to_owned);
         if tone == Tone::News {
             self.shown.retain(|toast| toast.tone != Tone::News || topic(&toast.text) != topic(&text));
         }
         self.shown.retain(|toast| toast.text != text);
-        self.shown.push(Toast { text, tone, until });
+        self.is_new = true;
+        self.shown.push(Toast { text, tone, is_saved, until });
         if self.shown.len() > Self::MAX_SHOWN {
             self.shown.remove(0);
         }
@@ -49,17 +76,25 @@ impl Toasts {
     /// Removes a problem that exists no longer.
     pub fn withdraw(&mut self, text: &str) {
         let text = printable::lines(text);
-        self.shown.retain(|toast| toast.tone != Tone::Problem || toast.text != text);
+        self.keep(|toast| toast.tone != Tone::Problem || toast.text != text);
     }
 
     /// Returns the messages that are still visible.
     pub fn at(&mut self, now: Instant) -> &[Toast] {
-        self.shown.retain(|toast| toast.until > now);
+        self.keep(|toast| toast.until > now);
         &self.shown
     }
 
-    pub fn len(&self) -> usize {
-        self.shown.len()
+    fn keep(&mut self, which: impl Fn(&Toast) -> bool) {
+        let n = self.shown.len();
+        self.shown.retain(which);
+        self.is_new |= self.shown.len() != n;
+    }
+
+    /// Whether they have changed since the last call, so that they are to be drawn.
+    pub fn take_news(&mut self, now: Instant) -> bool {
+        self.at(now);
+        std::mem::take(&mut self.is_new)
     }
 
     /// When the next message disappears.
@@ -78,7 +113,9 @@ mod tests {
         toasts.add(Tone::News, "saved a.png", start);
         toasts.add(Tone::Problem, "no such file", start);
         assert_eq!(toasts.at(start).len(), 2);
+        assert!(toasts.take_news(start) && !toasts.take_news(start));
         let first = toasts.next_change().unwrap();
+        assert!(toasts.take_news(first), "one is gone");
         assert_eq!(toasts.at(first)[0].text, "no such file");
         let second = toasts.next_change().unwrap();
         assert!(second > first + Duration::from_secs(2));
@@ -102,6 +139,9 @@ mod tests {
         toasts.add(Tone::News, "speed 1.56", start);
         assert_eq!(toasts.at(start).len(), 1);
         assert_eq!(toasts.at(start)[0].text, "speed 1.56");
+        toasts.add_progress("saving: busy", start);
+        assert!(toasts.at(start + Duration::from_secs(100)).iter().any(|toast| toast.text == "saving: busy"));
+        toasts.end("saving:");
         for i in 0..50 {
             toasts.add(Tone::Problem, format!("problem {i}"), start);
         }

@@ -98,11 +98,15 @@ fn a_colour_of_a_scene_can_be_hexadecimal() {
 #[test]
 fn the_options_that_most_people_need_come_first() {
     let folder = tempfile::tempdir().unwrap();
-    let help = does(folder.path(), "render -h").out().to_owned();
+    let [brief, help] =
+        ["-h", "--help"].map(|option| does(folder.path(), &format!("render {option}")).out().to_owned());
     let at = |word: &str| help.find(word).unwrap_or_else(|| panic!("{word}: {help}"));
     let common = ["\nOptions:", "--output", "--size", "--spp", "--time", "--error ", "--denoise "].map(at);
     let others = ["\nScene:", "\nOutput:", "\nRendering:", "\nAnimation:", "\nFilms and parts:"].map(at);
     assert!(common.is_sorted() && others.is_sorted() && common[common.len() - 1] < others[0], "{help}");
+    assert!(brief.lines().count() < 62 && brief.contains("more with '--help'"), "{brief}");
+    assert!(["--output", "--frames", "--film"].iter().all(|option| brief.contains(option)), "{brief}");
+    assert!(["--part-by", "--error-metric"].iter().all(|option| help.contains(option) && !brief.contains(option)));
 }
 
 #[test]

@@ -12,6 +12,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
+mod clipboard;
 mod drop;
 mod loss;
 mod scale;
@@ -106,6 +107,11 @@ impl Desktop {
         let mut server = self.server.lock().expect("nobody else holds it");
         server.0.kill().expect("the server can be ended");
         server.0.wait().expect("it has ended");
+    }
+
+    /// The text on the clipboard of the desktop.
+    pub fn clipboard(&self) -> String {
+        clipboard::text(&self.display)
     }
 
     /// What programs that are opened from now on ask for the scale of the screen.

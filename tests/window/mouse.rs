@@ -73,7 +73,7 @@ fn title_is(program: &Program, expected: &str) {
 /// Saves the scene by the menu; returns what was written.
 fn saved(program: &Program, path: &Path) -> SceneFile {
     std::fs::remove_file(path).expect("the file of the scene");
-    choose_in_menu(program, 413);
+    choose_in_menu(program, 434);
     until("the scene to be saved", || SceneFile::parse(&std::fs::read_to_string(path).ok()?, path).ok())
 }
 
@@ -97,8 +97,8 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
     let undo = || click(&program, 1, (75, HEIGHT - 13));
     // Gold, the first of the ready materials: their menu ends beside its line.
     open(&program, 3, ball, frame);
-    open(&program, 1, place(material), (540, 128));
-    choose(&program, (530, 118), frame);
+    open(&program, 1, place(material), (620, 128));
+    choose(&program, (555, 83), frame);
     title_is(&program, "*room.ron");
     here(focus);
     let file = saved(&program, &path);
@@ -116,7 +116,7 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
     undo();
     title_is(&program, "room.ron");
     // A picture, and away.
-    choose_in_menu(&program, 371);
+    choose_in_menu(&program, 392);
     until("the picture", || desktop.folder().join("room-0001.png").is_file().then_some(()));
     open_menu(&program);
     click(&program, 1, (60, HEIGHT - 38));
@@ -135,7 +135,7 @@ fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
     seen(&program);
     open_menu(&program);
     let browser = (300, 450);
-    open(&program, 1, (60, HEIGHT - 476), browser);
+    open(&program, 1, (60, HEIGHT - 497), browser);
     until("the model to open", || {
         // Below the folder of the settings, once it has been read; and the button at the lower right.
         click(&program, 1, (230, 163));
@@ -143,15 +143,15 @@ fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
         (program.title() == "firstlight — a.obj").then_some(())
     });
     until("the browser to close", || (!is_dark(&program, browser)).then_some(()));
-    let other = (230, HEIGHT - 455);
+    let other = (230, HEIGHT - 476);
     open_menu(&program);
-    open(&program, 1, (60, HEIGHT - 455), other);
-    click(&program, 1, (260, HEIGHT - 455));
+    open(&program, 1, (60, HEIGHT - 476), other);
+    click(&program, 1, (260, HEIGHT - 476));
     title_is(&program, "room.ron");
     until("the menu to close", || (!is_dark(&program, MENU)).then_some(()));
     open_menu(&program);
-    open(&program, 1, (60, HEIGHT - 434), (230, HEIGHT - 434));
-    click(&program, 1, (290, HEIGHT - 408));
+    open(&program, 1, (60, HEIGHT - 455), (230, HEIGHT - 455));
+    click(&program, 1, (300, HEIGHT - 428));
     title_is(&program, "cornell");
     program.key("ctrl+q");
     assert!(program.ended().success());
@@ -175,7 +175,8 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
     title_is(&program, "room.ron");
     seen(&program);
-    let ball = (370, 200);
+    // The image has moved aside, out of the way of the panel.
+    let ball = (226, 200);
     let frame = (ball.0 + 4, ball.1 + 30);
     open(&program, 3, ball, frame);
     choose(&program, (ball.0 + 30, ball.1 + 43), frame);
@@ -202,28 +203,84 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     // An image with little noise, while the view goes on.
     let form = (300, 380);
     open_menu(&program);
-    choose_form(&program, form);
+    open(&program, 1, (60, HEIGHT - 328), form);
     click(&program, 1, (522, 380));
     program.hold("w", 300);
     let image = desktop.folder().join("room-0001.png");
     until("the image", || image.is_file().then_some(()));
-    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (160, 120));
+    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (800, 600));
     let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
     // The camera may still have glided a little; flying goes much farther.
     let moved = shot.camera.eye.distance(camera.eye);
     assert!(moved < 0.01 && shot.denoised.as_deref() == Some("own"), "as it was seen: {moved} m");
     until("its path", || {
-        (program.output() + &program.errors()).contains("room-0001.png (160 × 120, noise ").then_some(())
+        (program.output() + &program.errors()).contains("room-0001.png (800 × 600, noise ").then_some(())
     });
     program.key("ctrl+q");
     assert!(program.ended().success());
 }
 
-/// Chooses "Save image …" in the open menu of the bar, and waits for its form.
-fn choose_form(program: &Program, form: (i32, i32)) {
-    click(program, 1, (60, HEIGHT - 328));
-    until("the form", || is_dark(program, form).then_some(()));
+#[test]
+fn a_material_is_dropped_on_an_object_and_the_panel_keeps_clicks_from_what_is_behind() {
+    let Some(desktop) = Desktop::start() else { return };
+    let path = desktop.folder().join("room.ron");
+    let red = "materials: { \"red\": diffuse(albedo: (0.7, 0.1, 0.1)), ";
+    std::fs::write(&path, ROOM.replace("materials: { ", red)).expect("a file");
+    keep_panel(&desktop, &["Materials"]);
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    // A finger has no way to the panel, and what is behind it is no choice of anybody's.
+    program.point_at(100, 100);
     std::thread::sleep(Duration::from_millis(300));
+    program.drag(1, (760, 560), (0, 0));
+    program.key("Delete");
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(program.title(), "firstlight — room.ron", "the floor is not selected");
+    // The image has moved aside: the middle of the ball is that of what the panel leaves free.
+    let (row, ball) = ((585, 263), (256, 200));
+    program.drag(1, row, (ball.0 - row.0, ball.1 - row.1));
+    title_is(&program, "*room.ron");
+    let file = saved(&program, &path);
+    assert_eq!([0, 1].map(|i| file.objects[i].material()), [Some("red"), Some("grey")]);
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn what_is_copied_and_saved_is_there_for_other_programs() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let Some(desktop) = Desktop::start() else { return };
+    let folder = desktop.folder();
+    std::fs::write(folder.join("room.ron"), ROOM).expect("a file");
+    let manager = folder.join("xdg-open");
+    std::fs::write(&manager, "#!/bin/sh\necho \"$1\" > asked\n").expect("a file");
+    std::fs::set_permissions(&manager, std::fs::Permissions::from_mode(0o755)).expect("its mode");
+    let search = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default());
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[("PATH", &search)]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    let camera = crate::views::camera(&program);
+    until("the camera on the clipboard", || {
+        let text = desktop.clipboard();
+        let pasted = SceneFile::parse(&format!("({text})"), "clipboard").ok()?.camera;
+        (text.starts_with("camera:") && pasted == camera).then_some(())
+    });
+    program.key("k");
+    until("the image", || folder.join("room-0001.png").is_file().then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    program.key("slash");
+    std::thread::sleep(Duration::from_millis(500));
+    program.type_text("Show what was saved");
+    program.key("Return");
+    let asked = until("the folder to be shown", || std::fs::read_to_string(folder.join("asked")).ok());
+    assert_eq!(Path::new(asked.trim()), folder);
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+    // The next window shows it in the list of recent files.
+    let images = std::fs::read_dir(desktop.settings().join("thumbnails")).expect("the images of recent files");
+    let images: Vec<_> = images.map(|image| image::open(image.expect("a file").path())).collect();
+    assert!(matches!(&images[..], [Ok(image)] if image.width() == 140), "{images:?}");
 }
 
 #[test]

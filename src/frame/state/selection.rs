@@ -154,6 +154,11 @@ impl Projector {
         }
     }
 
+    /// The projection to an image whose centre is so far to the left of that of the window, in its units.
+    pub fn moved_aside(self, by: f64) -> Self {
+        Self { middle: self.middle - DVec2::new(by, 0.0), ..self }
+    }
+
     /// Projects a point; `None` if it is not in front of the camera.
     pub fn place(&self, point: DVec3) -> Option<DVec2> {
         let offset = point - self.eye;

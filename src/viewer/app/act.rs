@@ -8,10 +8,11 @@ use crate::render::{Inspection, Integrator};
 use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
+use crate::viewer::panel::DroppedMaterial;
 use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
 use crate::viewer::time_line::Ask;
 use crate::viewer::toasts::Tone;
-use crate::viewer::{camera_text, panel};
+use crate::viewer::{camera_text, file_manager, panel};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use winit::window::{CursorGrabMode, Fullscreen};
@@ -23,7 +24,8 @@ impl App {
             self.reaction.asked(now);
             self.needs_tick = true;
         }
-        for command in asked.commands {
+        let dropped = asked.dropped.map(|(material, place)| self.drop_material(material, place, now));
+        for command in dropped.into_iter().flatten().chain(asked.commands) {
             self.open(command, now);
         }
         if let Some(speed) = asked.speed {
@@ -64,6 +66,21 @@ impl App {
         if let Some(action) = asked.action {
             self.act(action);
         }
+    }
+
+    /// The commands that give a material to the object at a place of the window, points.
+    fn drop_material(&mut self, material: DroppedMaterial, place: egui::Pos2, now: Instant) -> Vec<Command> {
+        let pixel = [place.x, place.y].map(|points| f64::from(points) * self.scale());
+        let ([x, y], is_free) = (self.input.fractions(pixel), !self.has_widget_at(pixel));
+        let Some(object) = self.session.entity_at(x, y).filter(|_| is_free) else {
+            self.toasts.add(Tone::News, "there is no object: drop the material on one", now);
+            return Vec::new();
+        };
+        let give = match material {
+            DroppedMaterial::Ready(name) => Edit::Dress { name },
+            DroppedMaterial::Own(material) => Edit::Assign { id: object.to_bits(), material: material.to_bits() },
+        };
+        vec![Command::Edit(Edit::Select { id: object.to_bits(), add: false }), Command::Edit(give)]
     }
 
     /// Does what the time line asks for.
@@ -127,14 +144,15 @@ impl App {
             Action::Screenshot { linear } => self.screenshot(linear),
             Action::RenderTo { frames } => self.open_form(frames, now),
             Action::SaveScene { new } => self.save_scene(new),
-            Action::PrintView => {
+            Action::CopyView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
-                // Standard output may be closed; the window continues.
-                match console::print(console::lines(&text)) {
-                    Ok(()) => self.toasts.add(Tone::News, "camera printed to the terminal", now),
-                    Err(error) => self.toasts.add(Tone::Problem, format!("cannot print the camera: {error}"), now),
-                }
+                // Whoever started from a desktop has no terminal.
+                let _ = console::print(console::lines(&text));
+                self.copy(|context| context.copy_text(text));
+                self.toasts.add(Tone::News, "camera copied to the clipboard, for a scene file", now);
             }
+            Action::CopyImage => self.copy_image(now),
+            Action::ShowSaved => self.show_saved(now),
             Action::Explain => self.session.send(Command::ExplainAt { x, y }),
             Action::FocusHere => {
                 self.session.send(Command::FocusAt { x, y });
@@ -319,7 +337,7 @@ impl App {
 
     pub(super) fn screenshot(&mut self, linear: bool) {
         // The film arrives when the workers have time for it; the key press is acknowledged at once.
-        self.toasts.add(Tone::News, "screenshot: saving …", Instant::now());
+        self.toasts.add_progress("screenshot: saving …", Instant::now());
         if let Some(window) = &self.window {
             window.request_redraw();
         }
@@ -343,7 +361,7 @@ impl App {
     fn save_layers(&mut self, now: Instant) {
         let names = self.session.feature_names();
         let Some((names, (prepared, settings))) = names.zip(self.session.rendered()) else { return };
-        self.toasts.add(Tone::News, "screenshot: saving layers …", now);
+        self.toasts.add_progress("screenshot: saving layers …", now);
         let picture = self.session.picture();
         let size = (picture.width.max(1), picture.height.max(1));
         let status = self.session.status();
@@ -352,6 +370,43 @@ impl App {
         let filter = self.session.world().resource::<ViewMode>().0.filter;
         let shown = Shown { prepared, names, settings, filter, threads, size };
         self.saver.save_layers(self.session.keep_film(), shown, draft, display, &scene);
+    }
+
+    fn copy_image(&mut self, now: Instant) {
+        let picture = self.session.picture();
+        let size = [picture.width as usize, picture.height as usize];
+        if picture.rgba.is_empty() {
+            return;
+        }
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
+        self.copy(|context| context.copy_image(image));
+        self.toasts.add(Tone::News, "image copied to the clipboard", now);
+    }
+
+    /// Opens the folder of what was saved last; without a program for it, copies its path.
+    fn show_saved(&mut self, now: Instant) {
+        let Some(path) = self.last_saved.clone() else {
+            self.toasts.add(Tone::News, "nothing has been saved yet", now);
+            return;
+        };
+        if let Err(reason) = file_manager::show(&path) {
+            let text = path.display().to_string();
+            self.copy(|context| context.copy_text(text));
+            self.toasts.add(Tone::News, format!("{reason}: the path is on the clipboard"), now);
+        }
+    }
+
+    /// Has something copied to the clipboard when the window is drawn next.
+    fn copy(&mut self, what: impl FnOnce(&egui::Context)) {
+        if let Some(presenter) = &self.presenter {
+            what(presenter.egui_context());
+        }
+    }
+
+    /// Says that something was saved, and where.
+    pub(super) fn tell_saved(&mut self, path: PathBuf, news: String, now: Instant) {
+        self.toasts.add_saved(news, now);
+        self.last_saved = Some(path);
     }
 
     pub(super) fn report_saved(&mut self, saved: Saved) {
@@ -364,10 +419,11 @@ impl App {
                 let news = format!("saved {}{coarse}", path.display());
                 console::inform(&news);
                 // Replaces the message that saving has started.
-                self.toasts.add(Tone::News, format!("screenshot: {news}"), now);
+                self.tell_saved(path, format!("screenshot: {news}"), now);
             }
             Err(error) => {
                 console::remark(format_args!("error: {error}"));
+                self.toasts.end("screenshot:");
                 self.toasts.add(Tone::Problem, error, now);
             }
         }

@@ -1,6 +1,6 @@
 //! Drawing of the image and the overlays to the window.
 
-use crate::frame::{Explaining, Projector, SceneBounds, Selection, StopAt, ViewMode};
+use crate::frame::{Explaining, SceneBounds, Selection, StopAt, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
@@ -32,11 +32,12 @@ impl App {
 
     fn draw(&mut self, now: Instant) -> Result<(), PresentError> {
         let figures = self.figures();
+        let (projector, free) = self.projector();
         self.strip = Strip::of(&self.session);
         let (Some(presenter), Some(window)) = (&mut self.presenter, &self.window) else { return Ok(()) };
         let picture = self.session.picture();
         if self.shown_picture != Some(picture.number) {
-            presenter.set_picture(picture)?;
+            presenter.set_picture(picture, self.aside)?;
             tracing::debug!("image {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
@@ -47,15 +48,12 @@ impl App {
             _ => Some((wanted, now)),
         };
         let is_late = self.inspected_since.filter(|(_, since)| now >= *since + SLOW);
-        let scale = f64::from(presenter.pixels_per_point());
-        let size = window.inner_size();
-        let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
-        self.handles.update(&mut self.session, self.panel.gizmo, size);
+        self.handles.update(&mut self.session, self.panel.gizmo, projector, free);
+        let aside = self.aside as f32 / presenter.pixels_per_point();
         let selected = self.session.world().resource::<Selection>().0.clone();
         self.outlines.leave(self.session.status().restarts);
         self.outlines.update(presenter.egui_context(), &selected);
         let (outlines, grab) = (&self.outlines, &self.grab);
-        let projector = Projector::new(&self.session.status().rig, size);
         let active = self.session.world().resource::<Selection>().active().filter(|_| self.here.is_open());
         let chosen_name = active.and_then(|entity| self.panel.label_of(&self.session, entity));
         let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
@@ -88,6 +86,7 @@ impl App {
         let (form, renders, mut wish) = (&mut self.form, &self.renders, None);
         let window_size = (session.picture().width, session.picture().height);
         let chosen_name = chosen_name.as_deref();
+        let free_now = &mut self.free;
         let presented = presenter.present(|context| {
             if overlays {
                 if let Some(story) = &session.world().resource::<Explaining>().story {
@@ -99,12 +98,13 @@ impl App {
                         session.world().resource::<SceneBounds>().extent.radius,
                     );
                 }
-                outlines.draw(context);
+                let image = context.content_rect().translate(egui::vec2(-aside, 0.0));
+                outlines.draw(context, image);
                 handles.draw(context, |entity| outlines.has(entity));
                 if let Some(grab) = grab {
                     grab.draw(context);
                 }
-                brush.draw(context, session.status());
+                brush.draw(context, image, session.status());
                 clicked = bar::show(context, &menu_input, panel.shown, &figures);
                 if let Some(strip) = &strip {
                     on_strip = time_line::show(context, strip, playing);
@@ -121,7 +121,7 @@ impl App {
                 } else if picture.inspection != Inspection::Picture {
                     overlay::legend(context, picture.inspection.label(), picture.legend);
                 }
-                overlay::toasts(context, toasts);
+                clicked = clicked.take().or(overlay::toasts(context, toasts));
             }
             if let Some((stage, since)) = opening {
                 let text = session.status().loading.as_deref().unwrap_or_default();
@@ -141,6 +141,7 @@ impl App {
             if let Some(question) = question {
                 answer = question.show(context);
             }
+            *free_now = context.available_rect();
         })?;
         if !presented.again {
             let picture = self.session.picture();
@@ -162,6 +163,7 @@ impl App {
         self.repaint_at = repaint_at.into_iter().chain(late_at).min();
         (self.last_draw, self.unseen_since) = (Some(now), None);
         self.shown_figures = figures;
+        self.move_aside(now);
         // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.execute(asked, now);

@@ -44,9 +44,9 @@ impl ApplicationHandler<Wake> for App {
             self.needs_tick = true;
             return;
         }
-        let was_over_bar = self.over_bar;
+        let was_over_widgets = self.over_widgets;
         if let WindowEvent::CursorMoved { position, .. } = &event {
-            self.over_bar = self.is_bar_at([position.x, position.y]);
+            self.over_widgets = self.has_widget_at([position.x, position.y]);
         }
         let in_menu = self.in_menu();
         let Some(presenter) = &mut self.presenter else { return };
@@ -56,9 +56,12 @@ impl ApplicationHandler<Wake> for App {
             true => egui_winit::EventResponse::default(),
             false => presenter.on_window_event(&event),
         };
-        // Overlays know where the mouse was when they were drawn last.
-        response.consumed |= self.over_bar && matches!(event, WindowEvent::MouseInput { .. });
-        if response.repaint && (was_over_bar || self.has_widgets()) && !self.input.is_dragging() {
+        let is_at_mouse = matches!(
+            event,
+            WindowEvent::CursorMoved { .. } | WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. }
+        );
+        response.consumed |= self.over_widgets && is_at_mouse;
+        if response.repaint && (was_over_widgets || self.has_widgets()) && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
         self.needs_tick = true;
@@ -203,12 +206,11 @@ impl ApplicationHandler<Wake> for App {
 impl App {
     /// Outlines what is under the mouse; returns whether that is news.
     fn hover(&mut self, now: Instant) -> bool {
-        let is_elsewhere = self.over_bar
+        let is_elsewhere = self.over_widgets
             || self.input.is_dragging()
             || self.input.is_captured()
             || self.handles.is_grabbed()
-            || self.brush.is_armed()
-            || self.presenter.as_ref().is_some_and(|presenter| presenter.egui_context().is_pointer_over_area());
+            || self.brush.is_armed();
         self.outlines.mouse_at((!is_elsewhere && self.overlays).then(|| self.input.place()), now)
     }
 

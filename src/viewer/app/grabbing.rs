@@ -11,8 +11,8 @@ use winit::event::{MouseButton, WindowEvent};
 impl App {
     pub(super) fn begin_grab(&mut self, mode: Mode, now: Instant) {
         // The selection may be newer than what was drawn.
-        let size = glam::DVec2::from_array(self.input.size()) / self.scale();
-        self.handles.update(&mut self.session, self.panel.gizmo, size);
+        let (projector, free) = self.projector();
+        self.handles.update(&mut self.session, self.panel.gizmo, projector, free);
         let Some((gizmo, projector)) = self.handles.gizmo_of(&self.session, mode) else {
             self.toasts.add(Tone::News, format!("{}: select something in view first (click it)", mode.label()), now);
             return;

@@ -76,6 +76,9 @@ impl App {
         if matches!(command, Command::Open { .. }) && self.session.has_unsaved_edits() {
             return self.ask_to_leave(Some(command), now);
         }
+        if matches!(command, Command::Open { .. }) {
+            self.keep_thumbnail(true);
+        }
         self.session.send(command);
         self.needs_tick = true;
     }

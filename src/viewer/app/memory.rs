@@ -1,11 +1,13 @@
 //! State kept between runs: the bookmarks of each scene, recent files, the window's size, and its noise.
 
 use crate::frame::{
-    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Recovery, SceneBookmarks, Session,
-    SettingsStore, ViewMode,
+    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Picture, Recovery, SceneBookmarks, Session,
+    SettingsStore, ViewMode, scene_name,
 };
-use crate::scene::SceneSource;
+use crate::scene::{SceneSource, builtin_text};
+use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
+use crate::viewer::thumbnails::Thumbnails;
 
 /// The settings store, and its content as far as it is known here.
 pub struct Memory {
@@ -17,6 +19,9 @@ pub struct Memory {
     /// As they are in the store.
     bookmarks: Bookmarks,
     recent: Vec<String>,
+    thumbnails: Thumbnails,
+    /// The scene has an image of this session in the list of recent ones.
+    is_pictured: bool,
     /// As it is in the store.
     noise: (Denoising, DenoiseFilter),
 }
@@ -29,7 +34,9 @@ impl Memory {
     fn of(store: SettingsStore) -> Self {
         let settings = store.settings().0;
         let (recent, noise) = (settings.recent, (settings.denoising, settings.denoiser));
-        Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent, noise }
+        let thumbnails = Thumbnails::beside(store.folder());
+        let (scene, adopted, bookmarks) = (None, 0, Bookmarks::default());
+        Self { store, scene, adopted, bookmarks, recent, thumbnails, is_pictured: false, noise }
     }
 
     /// Has the image displayed with the noise that it had last; returns why it cannot be denoised by what denoised it
@@ -54,8 +61,24 @@ impl Memory {
     }
 
     /// Recently opened scenes, the latest first: built-in names and paths.
-    pub fn recent(&self) -> &[String] {
-        &self.recent
+    pub fn recent(&self) -> Recent<'_> {
+        Recent { names: &self.recent, thumbnails: &self.thumbnails }
+    }
+
+    /// Keeps an image of the open scene for the list of recent ones; it shows that scene.
+    ///
+    /// - `again`: also if there is one already.
+    pub fn keep_thumbnail(&mut self, picture: &Picture, again: bool) {
+        if self.is_pictured && !again {
+            return;
+        }
+        let name = self.scene.as_ref().map(scene_name);
+        // A scene without an entry has no image either.
+        let Some(name) = name.filter(|name| self.recent.contains(name)) else { return };
+        if builtin_text(&name).is_none() {
+            self.thumbnails.keep(&name, picture);
+        }
+        self.is_pictured = true;
     }
 
     /// Stores what has changed, and loads the bookmarks of a scene that was opened; returns errors.
@@ -81,7 +104,7 @@ impl Memory {
         if is_renamed && let Some(saved) = saved {
             // A saved scene is known by its new file and takes its bookmarks along.
             troubles.extend(self.remember(&saved));
-            self.scene = Some(saved);
+            (self.scene, self.is_pictured) = (Some(saved), false);
         }
         if let Some(source) = &self.scene
             && (bookmarks != self.bookmarks || is_renamed)
@@ -105,7 +128,7 @@ impl Memory {
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
         let troubles = trouble.into_iter().chain(self.remember(&source)).collect();
-        self.scene = Some(source);
+        (self.scene, self.is_pictured) = (Some(source), false);
         troubles
     }
 
@@ -116,6 +139,7 @@ impl Memory {
         settings.remember(source);
         let unkept = self.store.keep_settings(&settings).err().map(String::from);
         self.recent = settings.recent;
+        self.thumbnails.retain(&self.recent);
         unreadable.into_iter().chain(unkept).collect()
     }
 
@@ -207,11 +231,11 @@ mod tests {
         // Bookmarks survive opening another scene, and the next run.
         let mut session = Session::new(SessionOptions::default()).unwrap();
         let mut second = memory();
-        assert_eq!(second.recent(), ["ball", "cornell"]);
+        assert_eq!(second.recent, ["ball", "cornell"]);
         opened(&mut session, "cornell");
         follow(&mut session, &mut second);
         assert_eq!(*session.world().resource::<Bookmarks>(), kept);
-        assert_eq!(second.recent(), ["cornell", "ball"]);
+        assert_eq!(second.recent, ["cornell", "ball"]);
         // A saved scene takes its bookmarks along, and is among the recent ones.
         let path = folder.path().join("room.ron");
         session.send(Command::SaveScene { path: path.clone() });
@@ -223,7 +247,7 @@ mod tests {
             std::thread::sleep(Duration::from_millis(5));
         }
         follow(&mut session, &mut second);
-        assert!(second.recent()[0].ends_with("room.ron") && second.recent().len() == 3, "{:?}", second.recent());
+        assert!(second.recent[0].ends_with("room.ron") && second.recent.len() == 3, "{:?}", second.recent);
         let mut session = Session::new(SessionOptions::default()).unwrap();
         let mut third = memory();
         session.adopt(load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap());

@@ -30,12 +30,12 @@ mod orders;
 pub mod run;
 mod tick;
 
-use crate::frame::{Command, Explaining, Focus, FocusTarget, Session, SessionOptions, Target, Waker};
+use crate::frame::{Command, Explaining, Focus, FocusTarget, Projector, Session, SessionOptions, Target, Waker};
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
 use crate::viewer::app::options::{ViewerError, ViewerOptions};
-use crate::viewer::bar::{self, Figures};
+use crate::viewer::bar::Figures;
 use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
 use crate::viewer::grab::Grab;
@@ -48,14 +48,17 @@ use crate::viewer::outlines::Outlines;
 use crate::viewer::palette::Palette;
 use crate::viewer::panel::PanelState;
 use crate::viewer::presenter::Presenter;
+use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
 use crate::viewer::region_tool::RegionTool;
 use crate::viewer::renders::Renders;
 use crate::viewer::saver::Saver;
 use crate::viewer::story::PathFilter;
-use crate::viewer::time_line::{self, Strip};
+use crate::viewer::time_line::Strip;
 use crate::viewer::toasts::{Toasts, Tone};
 use bevy_ecs::prelude::Entity;
+use glam::DVec2;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -99,6 +102,8 @@ struct App {
     browser: Browser,
     input: Input,
     toasts: Toasts,
+    /// The file or the folder that was saved last, with its full path.
+    last_saved: Option<PathBuf>,
     help: Help,
     palette: Palette,
     here: HereMenu,
@@ -117,8 +122,12 @@ struct App {
     memory: Memory,
     reaction: Reaction,
     overlays: bool,
-    /// The mouse is on the bar, or was when it moved last.
-    over_bar: bool,
+    /// The mouse is on a widget, or was when it moved last.
+    over_widgets: bool,
+    /// What panels left free when the window was drawn last, points.
+    free: egui::Rect,
+    /// How far the image is moved to the left, out of the way of the panel, physical pixels.
+    aside: u32,
     // Before the window, so that the device is dropped before the display.
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
@@ -202,11 +211,12 @@ impl App {
             browser: Browser::default(),
             input: Input::new(options.width, options.height, memory.navigation()),
             toasts,
+            last_saved: None,
             help: Help::default(),
             palette: Palette::default(),
             here: HereMenu::default(),
             greeting: memory.is_new(),
-            panel: memory.panel(),
+            panel: PanelState { previews: Previews::new(waker.clone()), ..memory.panel() },
             handles: Handles::default(),
             grab: None,
             strip: None,
@@ -219,7 +229,9 @@ impl App {
             selected: None,
             reaction: Reaction::default(),
             overlays: true,
-            over_bar: false,
+            over_widgets: false,
+            free: egui::Rect::EVERYTHING,
+            aside: 0,
             presenter: None,
             window: None,
             title: String::new(),
@@ -274,7 +286,7 @@ impl App {
             || self.browser.is_open()
             || self.form.is_open()
             || !self.renders.is_empty()
-            || self.overlays && (self.panel.shown || explains || self.over_bar || self.in_menu())
+            || self.overlays && (self.panel.shown || explains || self.over_widgets || self.in_menu())
     }
 
     /// Whether a menu is open.
@@ -282,18 +294,43 @@ impl App {
         self.presenter.as_ref().is_some_and(|presenter| egui::Popup::is_any_open(presenter.egui_context()))
     }
 
-    /// Whether a place of the window, in physical pixels, is that of the bar.
-    fn is_bar_at(&self, place: [f64; 2]) -> bool {
-        let Some(presenter) = self.presenter.as_ref().filter(|_| self.overlays) else { return false };
-        let scale = presenter.pixels_per_point();
+    /// Whether a place of the window, in physical pixels, had a panel, a menu or another widget on it when it was drawn
+    /// last. Overlays themselves know where the mouse was then: not after a jump, as of a finger on a screen.
+    fn has_widget_at(&self, place: [f64; 2]) -> bool {
+        let Some(presenter) = self.presenter.as_ref() else { return false };
+        let (context, scale) = (presenter.egui_context(), presenter.pixels_per_point());
         let [x, y] = place.map(|pixels| pixels as f32 / scale);
-        let height = if self.strip.is_some() { time_line::WITH_BAR } else { bar::HEIGHT };
-        bar::is_at(egui::pos2(x, y), self.input.size()[1] as f32 / scale, height)
+        let place = egui::pos2(x, y);
+        let layer = context.layer_id_at(place);
+        layer.is_some_and(|layer| layer.order != egui::Order::Background) || !self.free.contains(place)
+    }
+
+    /// The projection to the window, in points, and the size of what the panel leaves free of it.
+    fn projector(&self) -> (Projector, DVec2) {
+        let scale = self.scale();
+        let (size, aside) = (DVec2::from_array(self.input.size()) / scale, f64::from(self.aside) / scale);
+        let projector = Projector::new(&self.session.status().rig, size).moved_aside(aside);
+        (projector, size - DVec2::new(2.0 * aside, 0.0))
+    }
+
+    /// Moves the image out of the way of the panel, as it was drawn last, so that its centre is that of the part of the
+    /// window that is free; draws again if that is news. Samples stay.
+    fn move_aside(&mut self, now: Instant) {
+        let Some(presenter) = &self.presenter else { return };
+        let context = presenter.egui_context();
+        let covered = context.content_rect().right() - self.free.right();
+        let aside = (0.5 * covered * presenter.pixels_per_point()).round() as u32;
+        if aside != self.aside {
+            self.aside = aside;
+            self.input.set_aside(aside);
+            self.shown_picture = None;
+            self.repaint_at = Some(now);
+        }
     }
 
     /// Whether focus follows the mouse, and the mouse is not in the panel.
     fn focus_follows(&self) -> bool {
         let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
-        follows && self.presenter.as_ref().is_some_and(|presenter| !presenter.egui_context().is_pointer_over_area())
+        follows && !self.over_widgets
     }
 }

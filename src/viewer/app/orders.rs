@@ -62,10 +62,16 @@ impl App {
 
     /// Takes the results of renders, and tells them whether the view moves.
     pub(super) fn follow_renders(&mut self, now: Instant) {
+        let moves = self.input.is_moving() || self.input.is_dragging() || now < self.steered_at + SETTLED;
+        self.panel.previews.set_moving(moves);
+        if let Some(presenter) = &self.presenter
+            && self.panel.previews.receive(presenter.egui_context())
+        {
+            self.repaint_at = Some(now);
+        }
         if self.renders.is_empty() {
             return;
         }
-        let moves = self.input.is_moving() || self.input.is_dragging() || now < self.steered_at + SETTLED;
         self.renders.set_moving(moves);
         for outcome in self.renders.finished() {
             self.report_outcome(outcome);
@@ -78,9 +84,9 @@ impl App {
     pub(super) fn report_outcome(&mut self, outcome: Outcome) {
         let now = Instant::now();
         match outcome {
-            Ok(news) => {
+            Ok((path, news)) => {
                 console::inform(&news);
-                self.toasts.add(Tone::News, news, now);
+                self.tell_saved(path, news, now);
             }
             Err(error) => {
                 console::remark(format_args!("error: {error}"));

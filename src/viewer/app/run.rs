@@ -1,6 +1,7 @@
 //! From the first window to the last file: the event loop is started here, and what outlives it is stored.
 
 use crate::frame::{LatencyHistogram, Waker};
+use crate::render::Inspection;
 use crate::viewer::app::options::{ViewerError, ViewerOptions};
 use crate::viewer::app::tick::title;
 use crate::viewer::app::{App, Wake};
@@ -17,6 +18,9 @@ use winit::window::Window;
 
 /// Exit status of a program that is stopped twice, by the convention of shells.
 const STOPPED: i32 = 130;
+/// Seconds of rendering after which an image has little enough noise for its size in a menu.
+const THUMBNAIL_SECONDS: f64 = 1.0;
+
 /// Opens a window and returns when it is closed.
 pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     let mut builder = EventLoop::<Wake>::with_user_event();
@@ -69,6 +73,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     app.session.end_record();
     app.keep_window_size();
     app.keep_panel();
+    app.keep_thumbnail(true);
     for outcome in app.renders.finish() {
         app.report_outcome(outcome);
     }
@@ -100,6 +105,17 @@ impl App {
         (self.window, self.presenter) = (Some(window), Some(presenter));
         self.resized();
         Ok(())
+    }
+
+    /// Keeps the image for the list of recent files, once it is one.
+    ///
+    /// - `again`: also if there is one already, as at the end.
+    pub(super) fn keep_thumbnail(&mut self, again: bool) {
+        let (status, picture) = (self.session.status(), self.session.picture());
+        let is_image = picture.inspection == Inspection::Picture && picture.divider == 1 && self.is_rendered();
+        if is_image && !status.scene.is_empty() && (status.done || status.seconds >= THUMBNAIL_SECONDS) {
+            self.memory.keep_thumbnail(picture, again);
+        }
     }
 
     /// Stores the state of the panel, at exit.

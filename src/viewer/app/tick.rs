@@ -4,7 +4,7 @@ use crate::frame::{MessageKind, Selection};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::toasts::{Toasts, Tone};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -49,10 +49,22 @@ impl App {
         if is_flood {
             self.toasts.add(Tone::Problem, format!("{n_warnings} warnings: see Messages in the panel (N)"), now);
         }
+        let mut saved = None;
         for message in new.filter(|message| !is_flood || message.kind != MessageKind::Warning) {
+            let is_saved = |path: &PathBuf| message.text.starts_with(&format!("saved {}", path.display()));
+            if let Some(path) =
+                self.session.scene_file().and_then(|path| std::path::absolute(path).ok()).filter(is_saved)
+            {
+                saved = Some((path, message.text.clone()));
+                continue;
+            }
             let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
             self.toasts.add(tone, message.text.clone(), now);
         }
+        if let Some((path, news)) = saved {
+            self.tell_saved(path, news, now);
+        }
+        let status = self.session.status();
         // Without a first scene there is no reason to stay open, and the terminal is where the name was typed.
         if status.scene.is_empty()
             && status.loading.is_none()
@@ -67,6 +79,7 @@ impl App {
         for saved in self.saver.finished() {
             self.report_saved(saved);
         }
+        self.keep_thumbnail(false);
         self.follow_renders(now);
         self.follow_outlines(now);
         self.tell_selection(now);
@@ -76,8 +89,9 @@ impl App {
             self.keep_window_size();
         }
         let title = title(&self.session.status().scene, self.session.has_unsaved_edits());
-        let n_toasts = self.toasts.len();
-        self.toasts.at(now);
+        if self.toasts.take_news(now) {
+            self.repaint_at = Some(now);
+        }
         let Some(window) = &self.window else { return };
         // Until the first scene is loaded, the title is that of the scene to be shown.
         if title != self.title && !self.session.status().scene.is_empty() {
@@ -87,7 +101,7 @@ impl App {
         let new_picture = self.shown_picture != Some(self.session.picture().number);
         let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES_INTERVAL);
         let new_figures = self.overlays && self.figures() != self.shown_figures;
-        let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
+        let repaint = self.repaint_at.is_some_and(|at| now >= at);
         // The image for the last change has priority: drawing an older one would only delay it.
         let unseen_since = self.unseen_since.filter(|_| !self.is_rendered());
         let comes = unseen_since.is_some_and(|since| now < since + MAX_WAIT);
@@ -126,7 +140,7 @@ impl App {
     }
 
     /// Whether there is an image of the current scene.
-    fn is_rendered(&self) -> bool {
+    pub(super) fn is_rendered(&self) -> bool {
         self.session.picture().generation >= self.session.status().restarts
     }
 

@@ -110,7 +110,12 @@ pub enum Action {
     SaveScene {
         new: bool,
     },
-    PrintView,
+    /// Copies the camera block of a scene file, and prints it to the terminal.
+    CopyView,
+    /// Copies the displayed image.
+    CopyImage,
+    /// Opens the folder of what was saved last.
+    ShowSaved,
     /// Toggles between this inspection and the image.
     Inspect(Inspection),
     /// Explains the pixel under the mouse.

@@ -119,6 +119,11 @@ pub const FILES: KeyGroup = KeyGroup {
             item("Screenshot, linear (EXR)", &[Menu::File], Action::Screenshot { linear: true })
         ),
         row!(
+            "copy the image as it is now to the clipboard",
+            ctrl("c", Action::CopyImage),
+            item("Copy the image", &[Menu::File], Action::CopyImage)
+        ),
+        row!(
             "render the image in any size and quality in the background, and save it",
             ctrl("e", Action::RenderTo { frames: false }),
             item("Save image …", &[Menu::File], Action::RenderTo { frames: false })
@@ -126,6 +131,10 @@ pub const FILES: KeyGroup = KeyGroup {
         row!(
             "render the frames of the animation to a folder in the background",
             item("Render frames …", &[Menu::File], Action::RenderTo { frames: true })
+        ),
+        row!(
+            "open the folder of the image, the frames or the scene that was saved last",
+            item("Show what was saved", &[], Action::ShowSaved)
         ),
     ],
 };

@@ -139,9 +139,9 @@ pub const VIEW: KeyGroup = KeyGroup {
             item("Turntable", &[Menu::View], Action::ToggleSpin)
         ),
         row!(
-            "print the view as the camera of a scene file",
-            text("v", Action::PrintView),
-            item("Print the camera", &[Menu::View], Action::PrintView)
+            "copy the view to the clipboard, as the camera of a scene file, and print it to the terminal",
+            text("v", Action::CopyView),
+            item("Copy the camera", &[Menu::View], Action::CopyView)
         ),
     ],
 };

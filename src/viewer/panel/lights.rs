@@ -25,7 +25,7 @@ impl Listed for LightEntry {
 pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
     let inventory = state.inventory(session);
     let selection = session.world().resource::<Selection>();
-    let which = Which { id: "lights", revision: session.revision(), chosen: selection.active() };
+    let which = Which { id: "lights", revision: session.revision(), chosen: selection.active(), height: 0.0 };
     list(ui, &mut state.light_list, &which, &inventory.lights, |ui, entry| {
         emission(ui, session, entry, asked);
         selectable(ui, entry, selection, asked);

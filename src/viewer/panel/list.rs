@@ -24,11 +24,13 @@ pub struct ListState {
     chosen: Option<Entity>,
 }
 
-/// Identity of a list, revision of the scene, and the item that is to be in view.
+/// Identity of a list, revision of the scene, the item that is to be in view, and the height of rows.
 pub struct Which {
     pub id: &'static str,
     pub revision: u64,
     pub chosen: Option<Entity>,
+    /// Of a row, points; at least that of its text.
+    pub height: f32,
 }
 
 /// Initial number of visible rows.
@@ -66,7 +68,7 @@ pub fn list<T: Listed>(
         ui.weak(if items.is_empty() { "none" } else { "no matches" });
         return;
     }
-    let text = ui.text_style_height(&egui::TextStyle::Body) + 4.0;
+    let text = (ui.text_style_height(&egui::TextStyle::Body) + 4.0).max(which.height);
     let full = text + ui.spacing().item_spacing.y;
     let all = found.len() as f32 * full;
     let height = state.height.unwrap_or(ROWS * full).clamp(3.0 * full, all.max(3.0 * full));
@@ -165,7 +167,7 @@ mod tests {
         chosen: Option<Entity>,
     ) -> Vec<Entity> {
         let mut made = Vec::new();
-        let which = Which { id: "list", revision: 1, chosen };
+        let which = Which { id: "list", revision: 1, chosen, height: 0.0 };
         let _ = context.run(egui::RawInput::default(), |context| {
             egui::CentralPanel::default().show(context, |ui| {
                 list(ui, state, &which, items, |_, item| made.push(item.0));

@@ -5,12 +5,16 @@ use crate::scene::thousands;
 use crate::scene::{Inventory, MaterialEntry, SurfaceMaterial};
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::material::{editor, shared_by};
-use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::state::{Asked, DroppedMaterial, PanelState};
 use crate::viewer::panel::swatch::swatch;
 use crate::viewer::panel::widgets::{choice, name_field};
+use crate::viewer::previews::Previews;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
-use egui::{RichText, Ui};
+use egui::{Image, RichText, Sense, Ui, vec2};
+
+/// Width of the sphere of a material, points.
+const SPHERE: f32 = 26.0;
 
 impl Listed for MaterialEntry {
     fn listed(&self) -> (Entity, &str, &str) {
@@ -21,16 +25,21 @@ impl Listed for MaterialEntry {
 pub fn materials(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
     let inventory = state.inventory(session);
     let chosen = state.material;
-    let which = Which { id: "materials", revision: session.revision(), chosen };
+    let which = Which { id: "materials", revision: session.revision(), chosen, height: SPHERE };
     let mut clicked = None;
+    let previews = &mut state.previews;
     list(ui, &mut state.material_list, &which, &inventory.materials, |ui, entry| {
-        swatch(ui, session.world(), entry.entity);
+        sphere(ui, session, previews, entry.entity);
         let kind = kind_of(session, entry.entity);
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let text = format!("{kind}, {}", uses(entry.users.len()));
             ui.label(RichText::new(text).size(11.0).weak());
             let row = choice(ui, chosen == Some(entry.entity), &entry.label);
-            if row.on_hover_text(shared_by(entry)).clicked() {
+            let row = row.interact(Sense::drag());
+            let image =
+                previews.of(session, entry.entity).map(|sphere| Image::new((sphere.id(), vec2(SPHERE, SPHERE))));
+            asked.drag(&row, image, || DroppedMaterial::Own(entry.entity));
+            if row.on_hover_text(format!("{}; drag it to an object", shared_by(entry))).clicked() {
                 clicked = Some(entry.entity);
             }
         });
@@ -40,18 +49,25 @@ pub fn materials(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: 
         state.material = Some(clicked).filter(|_| chosen != Some(clicked));
     }
     match state.material.and_then(|entity| inventory.material(entity)) {
-        Some(entry) => open(ui, session, &inventory, entry, asked),
+        Some(entry) => open(ui, session, &inventory, &mut state.previews, entry, asked),
         None => state.material = None,
     }
 }
 
 /// The editor of one material, and actions on the objects that use it.
-fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialEntry, asked: &mut Asked) {
+fn open(
+    ui: &mut Ui,
+    session: &Session,
+    inventory: &Inventory,
+    previews: &mut Previews,
+    entry: &MaterialEntry,
+    asked: &mut Asked,
+) {
     let id = entry.entity.to_bits();
     egui::Frame::group(ui.style()).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.horizontal(|ui| {
-            swatch(ui, session.world(), entry.entity);
+            sphere(ui, session, previews, entry.entity);
             name_field(ui, id, session.world().get::<Name>(entry.entity).map(|name| name.as_str()), asked);
         });
         ui.weak(shared_by(entry));
@@ -74,6 +90,14 @@ fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialE
         });
         editor(ui, session, inventory, entry.entity, asked);
     });
+}
+
+/// A rendered sphere of a material; until there is one, its colour.
+fn sphere(ui: &mut Ui, session: &Session, previews: &mut Previews, material: Entity) {
+    match previews.of(session, material) {
+        Some(texture) => drop(ui.add(Image::new((texture.id(), vec2(SPHERE, SPHERE))))),
+        None => swatch(ui, session.world(), material, SPHERE),
+    }
 }
 
 fn kind_of(session: &Session, entity: Entity) -> &'static str {

@@ -39,7 +39,7 @@ mod texture;
 mod widgets;
 
 pub use sections::SECTIONS;
-pub use state::{Around, Asked, PanelState};
+pub use state::{Around, Asked, DroppedMaterial, PanelState};
 
 use crate::frame::{Command, Edit, Session};
 use egui::{Context, RichText, Ui};
@@ -48,7 +48,8 @@ const WIDTH: f32 = 288.0;
 
 /// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
-    let frame = egui::Frame::NONE.fill(crate::viewer::overlay::PANE).inner_margin(egui::Margin {
+    // Opaque: the image has moved aside, and ends below it.
+    let frame = egui::Frame::NONE.fill(crate::viewer::overlay::PANE.to_opaque()).inner_margin(egui::Margin {
         left: 10,
         right: 4,
         top: 8,
@@ -79,7 +80,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, display, false, &mut |ui| picture::display(ui, session, asked));
             // Above the sections that change with the selection, so that its buttons do not move.
             section(ui, add, false, &mut |ui| scene::add(ui, &mut state.mesh_path, asked));
-            section(ui, selected, true, &mut |ui| selected::selected(ui, state, session, asked));
+            section(ui, selected, true, &mut |ui| selected::selected(ui, state, session, around, asked));
             section(ui, mesh, true, &mut |ui| mesh::mesh(ui, state, session, asked));
             let [.., objects, materials, lights, sky, open, statistics, messages] = SECTIONS;
             section(ui, objects, true, &mut |ui| scene::objects(ui, state, session, asked));

@@ -97,20 +97,20 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("Save PNG").on_hover_text("save the image as displayed, in a new file (K)").clicked() {
+        let larger = "render the image in any size and quality in the background, and save it (Ctrl+E)";
+        if ui.button("Save image …").on_hover_text(larger).clicked() {
+            asked.action = Some(Action::RenderTo { frames: false });
+        }
+        if ui.button("PNG").on_hover_text("save the image as it is displayed now, in a new file (K)").clicked() {
             asked.screenshot = Some(false);
         }
-        if ui.button("Save EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
+        if ui.button("EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
             asked.screenshot = Some(true);
         }
         let layers =
             "save linear light with layers in a new EXR: albedo, normal, depth, position, masks, samples, error";
-        if ui.button("Save layers").on_hover_text(layers).clicked() {
+        if ui.button("Layers").on_hover_text(layers).clicked() {
             asked.save_layers = true;
-        }
-        let larger = "render the image in any size and quality in the background, and save it (Ctrl+E)";
-        if ui.button("Save …").on_hover_text(larger).clicked() {
-            asked.action = Some(Action::RenderTo { frames: false });
         }
     });
 }

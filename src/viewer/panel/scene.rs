@@ -3,7 +3,7 @@
 use crate::frame::{Edit, NewThing, Selection, Session};
 use crate::scene::{MeshSource, ObjectEntry};
 use crate::viewer::dialog::DialogPurpose;
-use crate::viewer::openable;
+use crate::viewer::openable::{self, Recent};
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::selectable;
@@ -19,14 +19,14 @@ impl Listed for ObjectEntry {
 pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
     let inventory = state.inventory(session);
     let selection = session.world().resource::<Selection>();
-    let which = Which { id: "objects", revision: session.revision(), chosen: selection.active() };
+    let which = Which { id: "objects", revision: session.revision(), chosen: selection.active(), height: 0.0 };
     list(ui, &mut state.object_list, &which, &inventory.objects, |ui, entry| {
         selectable(ui, entry, selection, asked);
     });
 }
 
 /// Opening of a file by dialog, recent files, and the built-in scenes.
-pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
+pub fn open(ui: &mut Ui, session: &Session, recent: Recent, asked: &mut Asked) {
     if ui.button("File …").on_hover_text("open a scene, a model or a saved image (Ctrl+O)").clicked() {
         asked.dialog = Some(DialogPurpose::Open);
     }
@@ -35,7 +35,7 @@ pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked
         asked.send(command);
     }
     ui.collapsing("Built-in scenes", |ui| {
-        if let Some(command) = openable::scenes(ui) {
+        if let Some(command) = openable::scenes(ui, recent.thumbnails) {
             asked.send(command);
         }
     });

@@ -5,12 +5,12 @@ use crate::scene::animation::{LightProperty, ObjectProperty, PropertyInfo, Quant
 use crate::scene::{LightInput, Shape};
 use crate::viewer::panel::material;
 use crate::viewer::panel::ready::library_of_materials;
-use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::state::{Around, Asked, PanelState};
 use crate::viewer::panel::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
 use egui::Ui;
 use glam::DVec3;
 
-pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
+pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
     let selection = session.world().resource::<Selection>();
     let Some(active) = selection.active() else {
         ui.weak("nothing selected: click an object");
@@ -57,7 +57,7 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
                 });
             }
         });
-        ui.collapsing("Material library", |ui| library_of_materials(ui, &mut state.spheres, asked))
+        ui.collapsing("Material library", |ui| library_of_materials(ui, around.recent.thumbnails, asked))
             .header_response
             .on_hover_text("ready materials: gold, glass, porcelain …");
         let inventory = state.inventory(session);

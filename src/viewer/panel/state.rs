@@ -5,10 +5,13 @@ use crate::scene::Inventory;
 use crate::viewer::change::PictureChange;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
+use crate::viewer::openable::Recent;
 use crate::viewer::panel::list::ListState;
 use crate::viewer::panel::sections::SECTIONS;
+use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
 use bevy_ecs::prelude::Entity;
+use egui::{Area, Image, Order, Pos2, Response, vec2};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -32,8 +35,7 @@ pub struct PanelState {
     pub object_list: ListState,
     pub material_list: ListState,
     pub light_list: ListState,
-    /// The spheres of the library of materials, once they have been shown.
-    pub spheres: Option<egui::TextureHandle>,
+    pub previews: Previews,
     /// The material whose editor is open in the list.
     pub material: Option<Entity>,
 }
@@ -79,8 +81,7 @@ pub struct Around<'a> {
     pub memory: Option<u64>,
     /// Whether the next drag selects a rectangle.
     pub brush: bool,
-    /// Recent scenes, the latest first.
-    pub recent: &'a [String],
+    pub recent: Recent<'a>,
 }
 
 /// Requests of the panel.
@@ -101,6 +102,16 @@ pub struct Asked {
     pub toggle_brush: bool,
     /// A file dialog to show, with its purpose.
     pub dialog: Option<DialogPurpose>,
+    /// A material that was dropped at this place of the window, points.
+    pub dropped: Option<(DroppedMaterial, Pos2)>,
+}
+
+/// A material that is dragged to an object.
+pub enum DroppedMaterial {
+    /// A ready one, by its name.
+    Ready(String),
+    /// One of the scene.
+    Own(Entity),
 }
 
 impl Asked {
@@ -110,5 +121,23 @@ impl Asked {
 
     pub fn edit(&mut self, edit: Edit) {
         self.commands.push(Command::Edit(edit));
+    }
+
+    /// Lets a sphere be dragged to an object: it follows the mouse, and is dropped where the button is released.
+    ///
+    /// - `sphere`: what is dragged, which senses drags; `image`: what follows the mouse.
+    pub fn drag(&mut self, sphere: &Response, image: Option<Image>, material: impl FnOnce() -> DroppedMaterial) {
+        let Some(place) = sphere.interact_pointer_pos().filter(|place| !sphere.rect.contains(*place)) else { return };
+        if sphere.drag_stopped() {
+            self.dropped = Some((material(), place));
+        } else if sphere.dragged() {
+            let area = Area::new(sphere.id.with("dragged")).order(Order::Tooltip).interactable(false);
+            area.fixed_pos(place + vec2(6.0, 6.0)).show(&sphere.ctx, |ui| {
+                match image {
+                    Some(image) => ui.add(image),
+                    None => ui.label("material"),
+                };
+            });
+        }
     }
 }

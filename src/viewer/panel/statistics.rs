@@ -6,12 +6,12 @@ use crate::scene::thousands;
 use crate::viewer::panel::state::Around;
 use crate::viewer::panel::widgets::{row, rows};
 use crate::viewer::status::{bytes, percent, seconds};
-use egui::Ui;
+use egui::{Label, Ui};
 
 pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
     let status = session.status();
     rows(ui, "statistics", |ui| {
-        let mut figure = |name: &str, text: String| row(ui, name, |ui| drop(ui.label(text)));
+        let mut figure = |name: &str, text: String| row(ui, name, |ui| drop(ui.add(Label::new(text).wrap())));
         figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
         let coarse = if status.divider > 1 { format!(", 1/{} of the window", status.divider) } else { String::new() };
         figure("resolution", format!("{} × {}{coarse}", status.film_width, status.film_height));

@@ -5,15 +5,15 @@ use bevy_ecs::prelude::{Entity, World};
 use egui::{Color32, Sense, Stroke, Ui, vec2};
 use glam::Vec3;
 
-/// Width and height, that of a letter, points.
-const SIDE: f32 = 13.0;
 /// Blends nested deeper than this are not followed.
 const MAX_NESTING: usize = 4;
 
 /// Draws one colour, or two for a blend or a checker.
-pub fn swatch(ui: &mut Ui, world: &World, material: Entity) {
+///
+/// - `side`: width and height, points.
+pub fn swatch(ui: &mut Ui, world: &World, material: Entity, side: f32) {
     let [a, b] = colors(world, material, 0);
-    let (rect, _) = ui.allocate_exact_size(vec2(SIDE, SIDE), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
     let painter = ui.painter();
     painter.rect_filled(rect, 2.0, srgb(a));
     if a != b {
