@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use firstlight::render::{
-    ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, Prepared, RenderSettings,
-    SurfaceGuides, advance, denoise_film, gather_features, gather_guides, smooth_film,
+    ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, MovingImage, Prepared,
+    RenderSettings, SurfaceGuides, advance, denoise_film, gather_features, gather_guides, relight, smooth_film,
 };
 use glam::{UVec2, Vec3};
 
@@ -199,6 +199,28 @@ fn a_coarse_film_is_smoothed_from_its_first_sample_on() {
             "a film that is cleared notes nothing"
         );
     }
+}
+
+/// An image of a moving camera: light of a quarter of the resolution on surfaces of all of it.
+#[test]
+fn coarse_light_is_put_on_surfaces_of_the_full_resolution() {
+    let scene = room();
+    let settings = RenderSettings::default();
+    let mut reference = Film::new(SIZE.0, SIZE.1);
+    advance(&scene, &RenderSettings { seed: 99, ..settings }, &mut reference, 512, &|| false);
+    let (width, height) = (SIZE.0.div_ceil(4), SIZE.1.div_ceil(4));
+    let mut film = Film::new(width, height);
+    film.note_surfaces();
+    advance(&scene, &settings, &mut film, 16, &|| false);
+    let mut image = MovingImage::default();
+    let coarse = smooth_film(&mut image.filter, &scene, &settings, &film, &|| false).expect("surfaces are noted");
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| y / 4 * width + x / 4));
+    let enlarged: Vec<Vec3> = pixels.map(|i| coarse[i as usize]).collect();
+    let size = (SIZE.into(), 1.0);
+    assert_eq!(relight(&mut image, &scene, &settings, &film, size, &|| true), None);
+    let relit = relight(&mut image, &scene, &settings, &film, size, &|| false).expect("nothing stops it");
+    let [coarse, error] = [&enlarged[..], relit].map(|colors| relative_mse(colors, &reference.means()));
+    assert!(error < 0.4 * coarse, "{error} of {coarse}");
 }
 
 /// The same samples in other tiles, in two films, and by other threads.

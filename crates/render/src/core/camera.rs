@@ -154,6 +154,18 @@ impl Camera {
         }
     }
 
+    /// Returns the point at a depth that a film position shows through the middle of the lens.
+    ///
+    /// - `film`: pixels from the upper left corner; `depth`: metres along `forward`.
+    #[inline(always)]
+    pub(crate) fn points<R: Real>(&self, film: [R; 2], size: Vec2, depth: R) -> Vector3<R> {
+        let (eye, forward) = (Vector3::in_all(depth, self.eye), Vector3::in_all(depth, self.forward));
+        match self.orthographic {
+            None => eye + (forward + self.across(self.film_offsets(film, size, self.tan_half_vfov))) * depth,
+            Some(half) => eye + forward * depth + self.across(self.film_offsets(film, size, half)),
+        }
+    }
+
     /// Offsets along `right` and `up`, in units of `half`, which is half the height of the film.
     #[inline(always)]
     fn film_offsets<R: Real>(&self, [x, y]: [R; 2], size: Vec2, half: f32) -> [R; 2] {
@@ -210,6 +222,19 @@ impl Camera {
         let focus = self.focus_distance.recip();
         let far = if focus > tolerance { (focus - tolerance).recip() } else { f32::INFINITY };
         ((focus + tolerance).recip(), far)
+    }
+
+    /// Returns the diameter of the circle of confusion of points, in units of [`Self::pixel_size`]; see
+    /// [`Self::sharp_zone`].
+    ///
+    /// - `depth`: metres along `forward`, may be infinite.
+    #[inline(always)]
+    pub(crate) fn confusion<R: Real>(&self, depth: R) -> R {
+        let off = match self.orthographic {
+            None => depth.all(1.0) / depth - self.focus_distance.recip(),
+            Some(_) => depth / self.focus_distance - 1.0,
+        };
+        off.abs() * (2.0 * self.lens_radius)
     }
 
     /// Returns a lens position as its offset from the camera along `right` and `up`, metres.

@@ -22,6 +22,7 @@ mod risk;
 
 pub use denoised::Denoised;
 pub use input::{DenoiseInput, Guides};
+pub(crate) use moving::{APART, MARGIN, SmoothRow, divided_by};
 pub use moving::{MovingFilter, MovingInput};
 
 use glam::Vec3;

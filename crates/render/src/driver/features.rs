@@ -11,7 +11,7 @@ use crate::core::settings::RenderSettings;
 use crate::driver::wave::pixels_in_blocks;
 use crate::film::features::{FeatureBuffers, IdCounts, IdShares};
 use crate::integrators::common::seen::Seen;
-use crate::integrators::features::FeatureWave;
+use crate::integrators::features::{FeatureUse, FeatureWave};
 use crate::integrators::path::CameraPath;
 use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::prepare::prepared::Prepared;
@@ -81,7 +81,7 @@ fn gather(
     let media = snapshot.camera_media();
     let mut buffers = FeatureBuffers::new(size.x, size.y, samples, with_ids);
     let done = bands_of(&mut buffers).into_par_iter().map_init(
-        || FeatureWorker { tracer: PartTracer::begin(snapshot, &media, false), ..FeatureWorker::default() },
+        || FeatureWorker { tracer: PartTracer::begin(snapshot, &media, FeatureUse::Saved), ..FeatureWorker::default() },
         |worker, mut band| {
             Part::of_band(band.first_row, size).all(|part| worker.look_at(&look, samples, &mut band, &part, stop))
         },
@@ -104,8 +104,13 @@ impl<'a> Look<'a> {
         settings.check().unwrap_or_else(|error| panic!("{error}"));
         snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
         let (camera, even_samples) = (&snapshot.camera, settings.techniques.even_samples);
-        let lens = CameraRays { camera, size, filter, seed: settings.seed, even_samples };
+        let lens = CameraRays { camera, size, filter, seed: settings.seed, even_samples, in_middle: false };
         Self { snapshot, settings, lens }
+    }
+
+    /// The same with rays through the middle of pixels and of the lens.
+    pub fn in_middle(self) -> Self {
+        Self { lens: CameraRays { in_middle: true, ..self.lens }, ..self }
     }
 }
 
@@ -261,11 +266,9 @@ pub(super) struct PartTracer {
 
 impl PartTracer {
     /// - `media`: in which camera paths start.
-    /// - `for_denoiser`: see [`FeatureWave::for_denoiser`].
-    pub fn begin(snapshot: &Prepared, media: &[u32], for_denoiser: bool) -> Self {
+    pub fn begin(snapshot: &Prepared, media: &[u32], purpose: FeatureUse) -> Self {
         let mut tracer = Self::default();
-        tracer.wave.begin_in(snapshot, media);
-        tracer.wave.for_denoiser = for_denoiser;
+        tracer.wave.begin_in(snapshot, media, purpose);
         tracer
     }
 

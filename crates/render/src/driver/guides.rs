@@ -11,6 +11,7 @@ use crate::core::settings::RenderSettings;
 use crate::denoise::Guides;
 use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, PART_PIXELS, Part, PartTracer};
 use crate::integrators::common::seen::Seen;
+use crate::integrators::features::FeatureUse;
 use crate::integrators::simd::camera::Pixels;
 use crate::prepare::prepared::Prepared;
 use bytemuck::{Zeroable, zeroed_vec};
@@ -149,7 +150,7 @@ impl GuideGatherer {
         };
         let add = |sums: &mut GuideSums, seen: &Seen| sums.add(seen, is_emitter(seen));
         let done = self.bands((size.x * BAND) as usize).enumerate().map_init(
-            || PartTracer::begin(snapshot, &media, true),
+            || PartTracer::begin(snapshot, &media, FeatureUse::Denoiser),
             |tracer, (number, mut band)| {
                 let first_row = number as u32 * BAND;
                 if of_all.start == 0 {

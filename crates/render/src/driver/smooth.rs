@@ -29,5 +29,9 @@ pub fn smooth_film<'a>(
     };
     let (width, height) = (film.width() as usize, film.height() as usize);
     let input = MovingInput { width, height, read: &read, eye: snapshot.camera.eye };
-    filter.smooth(&input, settings.simd.unwrap_or(InstructionSet::Portable), stop)
+    filter.smooth(&input, set_of(settings), stop)
+}
+
+pub(super) fn set_of(settings: &RenderSettings) -> InstructionSet {
+    settings.simd.unwrap_or(InstructionSet::Portable)
 }

@@ -221,7 +221,8 @@ impl<'a> Pass<'a> {
 
     pub fn lens(&self) -> CameraRays<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
-        CameraRays { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
+        let (camera, filter) = (&self.snapshot.camera, &self.filter);
+        CameraRays { camera, size: self.size, filter, seed, even_samples, in_middle: false }
     }
 }
 

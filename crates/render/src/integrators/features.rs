@@ -46,6 +46,21 @@ struct FeatureBranch {
     share: f32,
 }
 
+/// What features are for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum FeatureUse {
+    /// Feature buffers that are saved.
+    #[default]
+    Saved,
+    /// The denoiser: free of the noise of glass as far as possible, with emitted light, and with the material of the
+    /// surface that is seen, in mirrors and through glass too, instead of that which the camera ray hits; an emitter's if
+    /// there is one.
+    Denoiser,
+    /// Light that is put on surfaces: as for the denoiser, with the albedo of what scatters light alone, so black where an
+    /// emitter or the environment is seen.
+    Relighting,
+}
+
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct FeatureWave {
@@ -60,16 +75,19 @@ pub(crate) struct FeatureWave {
     way: Vec<(f32, f32)>,
     /// The second paths of slots, in slots of their own.
     branches: Vec<FeatureBranch>,
-    /// Whether the features are for the denoiser: free of the noise of glass as far as possible, with emitted light, and
-    /// with the material of the surface that is seen, in mirrors and through glass too, instead of that which the camera
-    /// ray hits; an emitter's if there is one.
-    pub for_denoiser: bool,
+    purpose: FeatureUse,
 }
 
 impl FeatureWave {
     /// Sets the media in which the paths of an image start; must be called first.
-    pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32]) {
+    pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32], purpose: FeatureUse) {
         self.camera = self.sets.start(scene, camera_media);
+        self.purpose = purpose;
+    }
+
+    /// Whether they are not saved, but make an image.
+    fn for_denoiser(&self) -> bool {
+        self.purpose != FeatureUse::Saved
     }
 
     /// Traces the paths that `start` pushes, one per slot, with throughput 1, and returns the features of each slot.
@@ -102,7 +120,7 @@ impl FeatureWave {
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
-            let most_next = if depth == 1 && self.for_denoiser { 2 * self.paths.len() } else { self.paths.len() };
+            let most_next = if depth == 1 && self.for_denoiser() { 2 * self.paths.len() } else { self.paths.len() };
             self.next.start(most_next, glass, false);
             self.see(scene, settings, depth, depth == most);
             std::mem::swap(&mut self.paths, &mut self.next);
@@ -135,9 +153,12 @@ impl FeatureWave {
                     let slot = self.paths.slot[i] as usize;
                     let seen = &mut self.seen[slot];
                     seen.albedo = self.paths.throughput_of(i);
-                    if self.for_denoiser {
+                    if self.purpose != FeatureUse::Saved {
                         let dir = self.paths.rays.get(i).dir;
                         seen.emitted = seen.albedo * scene.shading.environment.radiance(dir);
+                    }
+                    if self.purpose == FeatureUse::Relighting {
+                        seen.albedo = Vec3::ZERO;
                     }
                 } else {
                     self.see_one(scene, depth, is_last, i);
@@ -178,18 +199,18 @@ impl FeatureWave {
             }
             return;
         }
-        let albedo = path.throughput * visible_albedo(scene, vertex, material);
+        let emission = scene.tables.emission[material as usize].filter(|light| vertex.front || light.two_sided);
+        let albedo = match self.purpose {
+            FeatureUse::Relighting if emission.is_some() => Vec3::ZERO,
+            _ => path.throughput * visible_albedo(scene, vertex, material),
+        };
+        let for_denoiser = self.for_denoiser();
         let seen = &mut self.seen[slot];
         (seen.albedo, seen.normal, seen.position) = (albedo, vertex.normal, vertex.position);
         seen.depth = along;
-        if self.for_denoiser {
+        if for_denoiser {
             seen.material = material;
-            seen.emitted = match scene.tables.emission[material as usize] {
-                Some(emission) if vertex.front || emission.two_sided => {
-                    path.throughput * vertex.emitted(scene, &emission)
-                }
-                _ => Vec3::ZERO,
-            };
+            seen.emitted = emission.map_or(Vec3::ZERO, |emission| path.throughput * vertex.emitted(scene, &emission));
         }
     }
 
@@ -222,7 +243,7 @@ impl FeatureWave {
         {
             return None;
         }
-        let lobes = match (self.for_denoiser, depth) {
+        let lobes = match (self.for_denoiser(), depth) {
             (false, _) => Lobes::AsInImage,
             (true, 1) => Lobes::Both,
             (true, _) => Lobes::MoreProbable,

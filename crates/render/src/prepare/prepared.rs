@@ -153,6 +153,11 @@ impl Prepared {
         Self { snapshot, surfaces, tables: self.tables.clone(), moments: None }
     }
 
+    /// Whether both are the same scene but for the camera.
+    pub fn has_scene_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.geometry, &other.geometry) && Arc::ptr_eq(&self.shading, &other.shading)
+    }
+
     /// Returns the same scene with another camera.
     pub fn with_camera(&self, camera: Camera) -> Self {
         let mut seen = self.with_moments(None);

@@ -13,8 +13,10 @@
 mod kernel;
 mod planes;
 
+pub use planes::{APART, MARGIN};
+
 use crate::denoise::moving::kernel::{Job, N_LIGHT, smooth_light, smooth_moments};
-use crate::denoise::moving::planes::{MARGIN, Planes};
+use crate::denoise::moving::planes::Planes;
 use crate::film::surfaces::PixelSurface;
 use firstlight_simd::{InstructionSet, dispatch};
 use glam::Vec3;
@@ -36,12 +38,13 @@ pub struct MovingInput<'a> {
 
 /// Distances of the taps, pixels.
 const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
+/// The last of those for light that is mixed with that of images before: these take off the noise that is left, and
+/// wider taps would blur shadows.
+const NARROW: usize = 4;
 /// Of the taps by which variance is estimated: as far as 7 × 7 pixels.
 const VARIANCE_STEPS: [usize; 2] = [1, 2];
 /// No channel is divided by less, so that what dark surfaces reflect without it is not blown up.
 const LEAST_ALBEDO: f32 = 0.04;
-/// A normal that is unlike all others, of what takes no part.
-const APART: f32 = 1e4;
 /// Light over albedo from which a pixel takes no part: its square would not be finite.
 const TOO_BRIGHT: f32 = 1e18;
 /// Planes of a row: normal and position.
@@ -54,6 +57,12 @@ pub struct MovingFilter {
     light: Planes,
     /// What a level is written to, before it takes the place of `light`.
     next: Planes,
+    /// Light that is smoothed by narrow taps alone, if the latest image has it.
+    narrow: Planes,
+    has_narrow: bool,
+    keeps_narrow: bool,
+    /// Pixels.
+    width: usize,
     /// Number of pixels.
     n: usize,
     /// What light was divided by; 0 of pixels that take no part. At least as many as there are pixels.
@@ -76,6 +85,7 @@ impl MovingFilter {
         set: InstructionSet,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<&[Vec3]> {
+        self.has_narrow = self.keeps_narrow;
         self.fill(input, stop);
         for step in VARIANCE_STEPS {
             self.level(set, step, input.width, Weigh::Surfaces, stop);
@@ -83,17 +93,15 @@ impl MovingFilter {
         self.fill_light(input.width, stop);
         for step in STEPS {
             self.level(set, step, input.width, Weigh::Light, stop);
+            if step == NARROW && self.has_narrow {
+                self.narrow.copy(&self.light);
+            }
         }
         if stop() {
             return None;
         }
         self.finish(input.width);
-        Some(self.latest())
-    }
-
-    /// The result of the latest image that was not stopped, if no other has been begun since.
-    pub fn latest(&self) -> &[Vec3] {
-        &self.colors[..self.n]
+        Some(&self.colors[..self.n])
     }
 
     /// Reads the image: guides, and moments of light.
@@ -103,7 +111,7 @@ impl MovingFilter {
         self.guides.fit(width, height, N_GUIDES);
         self.light.fit(width, height, N_LIGHT);
         self.next.fit(width, height, N_LIGHT);
-        self.n = width * height;
+        (self.width, self.n) = (width, width * height);
         for list in [&mut self.divisors, &mut self.colors] {
             if list.len() < self.n {
                 *list = vec![Vec3::ZERO; self.n];
@@ -205,9 +213,57 @@ impl MovingFilter {
     }
 }
 
+impl MovingFilter {
+    /// Whether images keep light that is smoothed by narrow taps alone, too.
+    pub fn keep_narrow(&mut self, keeps: bool) {
+        self.keeps_narrow = keeps;
+    }
+
+    /// Width and height of the latest image, pixels.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.light.height())
+    }
+
+    /// A row of the latest image.
+    pub fn row(&self, y: usize) -> SmoothRow<'_> {
+        SmoothRow {
+            light: self.light.row(y),
+            narrow: if self.has_narrow { self.narrow.row(y) } else { self.light.row(y) },
+            guides: self.guides.row(y),
+            stride: self.light.stride(),
+            colors: &self.colors[y * self.width..][..self.width],
+        }
+    }
+
+    /// Whether a pixel of the latest image has light that is smoothed.
+    pub fn takes_part(&self, x: usize, y: usize) -> bool {
+        self.divisors[y * self.width + x] != Vec3::ZERO
+    }
+}
+
+/// A row of a smoothed image. Planes begin with [`MARGIN`] pixels that take no part.
+#[derive(Clone, Copy)]
+pub struct SmoothRow<'a> {
+    /// Planes of light over albedo.
+    pub light: &'a [f32],
+    /// The same, smoothed by narrow taps alone if that was kept.
+    pub narrow: &'a [f32],
+    /// Planes of normals and of positions relative to the camera; [`APART`] and 0 of pixels that take no part.
+    pub guides: &'a [f32],
+    /// Numbers of a plane.
+    pub stride: usize,
+    /// Radiance.
+    pub colors: &'a [Vec3],
+}
+
+/// What light is divided by to take the albedo off it.
+pub fn divided_by(albedo: Vec3) -> Vec3 {
+    albedo.max(Vec3::splat(LEAST_ALBEDO))
+}
+
 /// What the light of a pixel is divided by; 0 if it takes no part.
 fn divisor_of(surface: &PixelSurface, color: Vec3) -> Vec3 {
-    let divisor = surface.albedo.max(Vec3::splat(LEAST_ALBEDO));
+    let divisor = divided_by(surface.albedo);
     let is_usual = (color / divisor).abs().max_element() < TOO_BRIGHT;
     let takes_part = !surface.is_bright
         && is_usual

@@ -6,6 +6,9 @@ use rayon::prelude::*;
 /// Margin on both sides of a row, pixels: as far as a tap reaches.
 pub const MARGIN: usize = 16;
 
+/// A normal that is unlike all others, of what takes no part.
+pub const APART: f32 = 1e4;
+
 /// Numbers of a plane of a row of so many pixels.
 pub fn stride_of(width: usize) -> usize {
     width.next_multiple_of(LANES) + 2 * MARGIN
@@ -31,6 +34,13 @@ impl Planes {
             // Memory that is zero already is touched by the workers first.
             self.numbers = vec![0.0; needed];
         }
+    }
+
+    /// Takes size and numbers of other planes.
+    pub fn copy(&mut self, other: &Self) {
+        (self.stride, self.height, self.n) = (other.stride, other.height, other.n);
+        self.numbers.clear();
+        self.numbers.extend_from_slice(&other.numbers[..other.height * other.stride * other.n]);
     }
 
     /// Numbers of a plane of a row.
