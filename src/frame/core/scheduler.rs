@@ -28,6 +28,12 @@ const AIM: f64 = 0.7;
 /// resolution.
 const SMOOTHING: f64 = 0.002;
 
+/// Part of the aimed time that finding surfaces at a finer resolution may take: edges and textures are as sharp as they are,
+/// and the light on them as fine as the rest allows.
+const SURFACES: f64 = 0.5;
+/// Assumed time for a surface over that for a path before the first measurement.
+const GUESSED_SURFACE: f64 = 0.35;
+
 /// Time after the last restart at which motion is considered to have ended, and the image gets finer. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
 const QUIET: Duration = Duration::from_millis(120);
@@ -104,8 +110,12 @@ pub struct Scheduler {
     showing: f64,
     /// Seconds per pixel of smoothing a coarse image; 0 if they are raw.
     smoothing: f64,
+    /// Seconds per pixel of finding surfaces and putting light on them, once it is known.
+    relighting: Option<f64>,
     /// Divider of coarse images; kept across restarts.
     coarse: u32,
+    /// Divider of the surfaces that their light is put on; the same where finer ones do not fit.
+    surfaces: u32,
     phase: Phase,
     restarted_at: Duration,
     /// Render time at full resolution since the restart, seconds.
@@ -140,7 +150,9 @@ impl Scheduler {
             rate: None,
             showing: 0.0,
             smoothing: 0.0,
+            relighting: None,
             coarse: 1,
+            surfaces: 1,
             phase: Phase::Full,
             restarted_at: Duration::ZERO,
             spent: 0.0,
@@ -201,6 +213,22 @@ impl Scheduler {
         let measured = seconds / self.pixels(divider);
         let is_known = self.smoothing > 0.0 && measured > 0.0;
         self.smoothing = if is_known { self.smoothing + 0.2 * (measured - self.smoothing) } else { measured };
+    }
+
+    /// Reports how many seconds it took to put the light of a coarse image on surfaces of this divider.
+    pub fn relit(&mut self, divider: u32, seconds: f64) {
+        let measured = seconds / self.pixels(divider);
+        self.relighting = Some(self.relighting.map_or(measured, |known| known + 0.2 * (measured - known)));
+    }
+
+    /// Divider of the surfaces that the light of an image of this divider is to be put on; `divider` for its own.
+    pub fn surfaces(&self, divider: u32) -> u32 {
+        if divider == 1 { 1 } else { self.surfaces.min(divider) }
+    }
+
+    /// Number of coarse images that one of this divider counts as: it is finer, but has as few samples per pixel.
+    pub fn weight(&self, divider: u32) -> f32 {
+        self.coarse as f32 / divider as f32
     }
 
     /// Render time at full resolution since the last restart, seconds.
@@ -297,16 +325,35 @@ impl Scheduler {
         (self.spp, self.error) = (0, None);
     }
 
-    /// Keeps the coarse divider while its time lies in the hysteresis band, otherwise chooses the finest that fits.
+    /// Keeps the coarse dividers while their time lies in the hysteresis band, otherwise chooses the finest that fit.
     fn choose_coarse(&mut self) {
         let slowest = self.slowest();
-        let finer = DIVIDERS.iter().rev().find(|&&divider| divider < self.coarse).copied();
-        let too_slow = self.seconds_until_shown(self.coarse) > slowest;
-        let finer_fits = finer.is_some_and(|divider| self.seconds_until_shown(divider) < FASTEST * slowest);
-        if too_slow || finer_fits {
-            let fits = |divider: &u32| self.seconds_until_shown(*divider) <= AIM * slowest;
-            self.coarse = DIVIDERS.into_iter().find(fits).unwrap_or(DIVIDERS[DIVIDERS.len() - 1]);
+        let finer = |divider: u32| DIVIDERS.iter().rev().find(|&&finer| finer < divider).copied();
+        let before = (self.coarse, self.surfaces);
+        let too_slow = self.seconds_until_shown(before) > slowest;
+        let finer_fits = finer(self.coarse)
+            .is_some_and(|coarse| self.seconds_until_shown((coarse, self.surfaces.min(coarse))) < FASTEST * slowest);
+        let finer_surfaces_fit = self.smoothing > 0.0
+            && finer(self.surfaces)
+                .is_some_and(|finer| self.seconds_for_surfaces(finer) < SURFACES * FASTEST * slowest);
+        let are_raw = self.smoothing == 0.0 && self.surfaces < self.coarse;
+        if too_slow || finer_fits || finer_surfaces_fit || are_raw {
+            (self.coarse, self.surfaces) = self.finest_within(AIM * slowest);
         }
+    }
+
+    /// Dividers of coarse images and of their surfaces that take this many seconds.
+    fn finest_within(&self, seconds: f64) -> (u32, u32) {
+        let finest = |fits: &dyn Fn(u32) -> bool| {
+            DIVIDERS.into_iter().find(|&divider| fits(divider)).unwrap_or(DIVIDERS[DIVIDERS.len() - 1])
+        };
+        let alone = finest(&|divider| self.seconds_until_shown((divider, divider)) <= seconds);
+        let surfaces = finest(&|divider| self.seconds_for_surfaces(divider) <= SURFACES * seconds);
+        if self.smoothing == 0.0 || surfaces >= alone {
+            return (alone, alone);
+        }
+        let coarse = finest(&|divider| self.seconds_until_shown((divider, surfaces.min(divider))) <= seconds);
+        (coarse, surfaces.min(coarse))
     }
 
     /// Maximum render time of a coarse image in seconds: an input may arrive while the previous image is being
@@ -324,9 +371,16 @@ impl Scheduler {
         self.pixels(divider) / self.speed()
     }
 
-    /// Seconds for one sample per pixel, and what smoothing takes beyond [`SMOOTHING`].
-    fn seconds_until_shown(&self, divider: u32) -> f64 {
-        self.seconds_for(divider) + (self.smoothing * self.pixels(divider) - SMOOTHING).max(0.0)
+    /// Seconds for one sample per pixel, for what smoothing takes beyond [`SMOOTHING`], and for finer surfaces.
+    fn seconds_until_shown(&self, (divider, surfaces): (u32, u32)) -> f64 {
+        let smoothing = (self.smoothing * self.pixels(divider) - SMOOTHING).max(0.0);
+        let relighting = if surfaces < divider { self.seconds_for_surfaces(surfaces) } else { 0.0 };
+        self.seconds_for(divider) + smoothing + relighting
+    }
+
+    /// Seconds to find surfaces and to put light on them.
+    fn seconds_for_surfaces(&self, divider: u32) -> f64 {
+        self.pixels(divider) * self.relighting.unwrap_or(GUESSED_SURFACE / self.speed())
     }
 
     fn pixels(&self, divider: u32) -> f64 {
@@ -449,6 +503,27 @@ mod tests {
         };
         // 640 × 360 pixels take 6 ms to render; the second smoothing takes 2 ms more, the third one 12 ms.
         assert_eq!((choice(0.0), choice(8e-9), choice(50e-9)), (2, 2, 3));
+    }
+
+    #[test]
+    fn light_is_coarser_than_the_surfaces_that_it_is_put_on() {
+        let mut scheduler = Scheduler::new(1280, 720, Target::default());
+        let mut choice = |rate: f64, smoothing: f64, surfaces_per_second: f64| {
+            scheduler.rate = Some(rate);
+            (scheduler.smoothing, scheduler.relighting) = (smoothing, Some(1.0 / surfaces_per_second));
+            // Inside the band, the choice before would stay.
+            (scheduler.coarse, scheduler.surfaces) = (32, 32);
+            scheduler.restart(Duration::ZERO);
+            let chosen = (scheduler.coarse, scheduler.surfaces);
+            assert!(scheduler.seconds_until_shown(chosen) <= AIM * SLOWEST, "{chosen:?}");
+            chosen
+        };
+        // Raw images, and surfaces that are no faster than paths, have the resolution of their film.
+        assert_eq!((choice(4e6, 0.0, 14e6), choice(4e6, 1e-9, 4e6)), ((6, 6), (6, 6)));
+        assert_eq!(choice(4e6, 1e-9, 14e6), (8, 4));
+        assert_eq!(choice(4e5, 1e-9, 14e6), (24, 4));
+        // With many processors, the surfaces have the full resolution.
+        assert_eq!(choice(8e7, 1e-9, 3e8), (2, 1));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::frame::worker::shared::lock;
 use crate::frame::worker::thread::Loop;
 use crate::frame::worker::views::{Settled, ViewKey};
 use crate::render::{
-    DenoiseSource, Film, Inspection, MovingFilter, develop, develop_colors, guide_samples, smooth_film,
+    DenoiseSource, Film, Inspection, MovingImage, develop, develop_colors, guide_samples, relight, smooth_film,
 };
 use glam::UVec2;
 use std::sync::atomic::Ordering;
@@ -54,7 +54,8 @@ impl Loop<'_> {
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             self.views.settled = Some(settled);
             // This view will not be smoothed any more. Coarse images need little memory.
-            (self.filter, self.views.smooth_again) = (MovingFilter::default(), None);
+            self.moving.forget_image();
+            self.views.smooth_again = None;
             if let Some((_, film)) = &mut self.film {
                 film.forget_surfaces();
             }
@@ -132,10 +133,10 @@ impl Loop<'_> {
 
     /// Develops the image as it is wanted and can be had now; `None` if another view or job has arrived meanwhile.
     ///
-    /// - `filter`: smooths what is not denoised.
+    /// - `moving`: smooths what is not denoised.
     pub(super) fn develop_wanted(
         &self,
-        filter: &mut MovingFilter,
+        moving: &mut MovingImage,
         (divider, film): (u32, &Film),
         key: ViewKey,
         (width, height): (u32, u32),
@@ -159,17 +160,35 @@ impl Loop<'_> {
             let denoised = &settled.denoised.color;
             colors.iter_mut().zip(denoised).for_each(|(raw, denoised)| *raw = denoised.lerp(*raw, share));
             develop_colors(&colors, key.size.into(), &self.display, (width, height), rgba);
-            return Some(Developed { denoising: wanted, settled: of_settled, is_mixed: true, smoothing: None });
+            return Some(Developed { settled: of_settled, is_mixed: true, ..Developed::as_is(wanted) });
         }
-        let start = Instant::now();
-        let (smoothed, smoothing) = match settled {
-            Some(_) => (None, None),
+        let surfaces = self.scheduler.surfaces(divider);
+        let size = match settled {
+            Some(_) => key.size,
+            None => UVec2::new(job.width.div_ceil(surfaces), job.height.div_ceil(surfaces)),
+        };
+        let (mut smoothing, mut relighting) = (None, None);
+        let smoothed = match settled {
+            Some(_) => None,
             // Only the display has changed.
-            None if self.is_smoothed(key) => (Some(filter.latest()), None),
+            None if self.is_smoothed(key) => Some(moving.latest()),
             None => {
-                let smoothed = smooth_film(filter, &job.prepared, &job.settings, film, &stop);
-                let took = smoothed.is_some().then(|| start.elapsed());
-                (smoothed, took)
+                let start = Instant::now();
+                let is_smooth = smooth_film(&mut moving.filter, &job.prepared, &job.settings, film, &stop).is_some();
+                smoothing = is_smooth.then(|| start.elapsed());
+                let weight = film.spp() as f32 * self.scheduler.weight(divider);
+                let relit = match is_smooth {
+                    true => relight(moving, &job.prepared, &job.settings, film, (size, weight), &stop),
+                    false => None,
+                };
+                if relit.is_some() {
+                    let took = start.elapsed();
+                    match surfaces == divider {
+                        true => smoothing = Some(took),
+                        false => relighting = Some((surfaces, took.saturating_sub(smoothing.unwrap_or_default()))),
+                    }
+                }
+                relit
             }
         };
         let colors = settled.map(|settled| settled.denoised.color.as_slice()).or(smoothed);
@@ -180,13 +199,13 @@ impl Loop<'_> {
             develop_raw(rgba);
             return Some(Developed::raw());
         };
-        develop_colors(colors, key.size.into(), &self.display, (width, height), rgba);
+        develop_colors(colors, size.into(), &self.display, (width, height), rgba);
         if wanted == Denoising::Split {
             let mut raw = Vec::new();
             develop_raw(&mut raw);
             split(rgba, &raw, width as usize);
         }
-        Some(Developed { denoising: wanted, settled: of_settled, is_mixed: false, smoothing })
+        Some(Developed { denoising: wanted, settled: of_settled, is_mixed: false, smoothing, relighting })
     }
 
     /// Share of the raw image in a mix with one that was denoised from fewer samples; `None` unless the raw image has
@@ -240,6 +259,8 @@ pub struct Developed {
     pub is_mixed: bool,
     /// How long it was smoothed.
     pub smoothing: Option<Duration>,
+    /// Divider of the finer surfaces that light was put on, and how long that took.
+    pub relighting: Option<(u32, Duration)>,
 }
 
 /// A denoised image, for the status.
@@ -253,7 +274,11 @@ pub struct OfSettled {
 
 impl Developed {
     pub fn raw() -> Self {
-        Self { denoising: Denoising::Raw, settled: None, is_mixed: false, smoothing: None }
+        Self::as_is(Denoising::Raw)
+    }
+
+    fn as_is(denoising: Denoising) -> Self {
+        Self { denoising, settled: None, is_mixed: false, smoothing: None, relighting: None }
     }
 }
 

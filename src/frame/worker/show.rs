@@ -3,19 +3,19 @@
 use crate::frame::core::denoising::Denoising;
 use crate::frame::worker::denoised::Developed;
 use crate::frame::worker::shared::{Stats, lock};
-use crate::frame::worker::thread::Loop;
+use crate::frame::worker::thread::{Loop, MOST_IMAGES};
 use crate::frame::worker::views::ViewKey;
 use crate::render::{Inspected, Inspection, depths, inspect, tint_sharp_zone};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 impl Loop<'_> {
     /// Develops the film and hands the image over, unless the previous image has not been taken yet and `last` is
-    /// false.
-    pub(super) fn show(&mut self, last: bool) {
+    /// false. Returns how long it took to put its light on finer surfaces.
+    pub(super) fn show(&mut self, last: bool) -> Duration {
         let film = self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref());
-        let (Some(job), Some((divider, film))) = (&self.job, film) else { return };
+        let (Some(job), Some((divider, film))) = (&self.job, film) else { return Duration::ZERO };
         let key = ViewKey {
             generation: job.generation,
             inspection: self.look.inspection,
@@ -37,12 +37,13 @@ impl Loop<'_> {
             let waits = outbox.fresh && outbox.picture.generation == job.generation;
             outbox.stats = stats;
             if waits && !last && !self.redraw && outbox.stats.divider == outbox.picture.divider {
-                return;
+                return Duration::ZERO;
             }
         }
         if !last && !self.redraw && self.is_displayed(*divider, key) {
             // The figures beside it are new.
-            return self.wake();
+            self.wake();
+            return Duration::ZERO;
         }
         let start = Instant::now();
         let pool = lock(&self.shared.pool).clone();
@@ -54,21 +55,28 @@ impl Loop<'_> {
         let mut legend = None;
         let mut developed = Developed::raw();
         if self.look.inspection == Inspection::Picture {
-            let mut filter = std::mem::take(&mut self.filter);
-            let develop = || self.develop_wanted(&mut filter, (*divider, film), key, (width, height), &mut rgba);
+            let mut moving = std::mem::take(&mut self.moving);
+            if self.views.relit != Some((job.generation, *divider)) {
+                self.views.relit = Some((job.generation, *divider));
+                moving.start_view(std::mem::replace(&mut self.kept_images, MOST_IMAGES));
+            }
+            let develop = || self.develop_wanted(&mut moving, (*divider, film), key, (width, height), &mut rgba);
             let done = pool.install(develop);
-            self.filter = filter;
-            let Some(done) = done else { return };
+            self.moving = moving;
+            let Some(done) = done else { return Duration::ZERO };
             developed = done;
             if *divider > 1 {
                 self.scheduler.smoothed(*divider, developed.smoothing.unwrap_or_default().as_secs_f64());
+                if let Some((surfaces, took)) = developed.relighting {
+                    self.scheduler.relit(surfaces, took.as_secs_f64());
+                }
             }
         } else {
             let known = self.views.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
             let view = known
                 .map(|(_, view)| view)
                 .or_else(|| pool.install(|| inspect(key.inspection, &job.prepared, &job.settings, film, &stop)));
-            let Some(view) = view else { return };
+            let Some(view) = view else { return Duration::ZERO };
             enlarge(&view, width, height, &mut rgba);
             legend = view.legend;
             self.views.inspected = Some((key, view));
@@ -77,7 +85,7 @@ impl Loop<'_> {
             let key = ViewKey { inspection: Inspection::Depth, ..key };
             let known = self.views.depths.take().filter(|(of, _)| *of == key).map(|(_, depths)| depths);
             let Some(depths) = known.or_else(|| pool.install(|| depths(&job.prepared, key.size, &stop))) else {
-                return;
+                return Duration::ZERO;
             };
             let camera = &job.prepared.camera;
             let zone = camera.sharp_zone(height);
@@ -85,7 +93,7 @@ impl Loop<'_> {
             pool.install(|| tint_sharp_zone(&mut rgba, size, &depths, key.size, zone, camera.focus_distance));
             self.views.depths = Some((key, depths));
         }
-        let Developed { denoising, settled, is_mixed, smoothing } = developed;
+        let Developed { denoising, settled, is_mixed, smoothing, relighting } = developed;
         let denoised_error = settled.map(|settled| settled.error);
         self.n_pictures += 1;
         self.pictured = job.generation;
@@ -116,6 +124,7 @@ impl Loop<'_> {
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;
         self.wake();
+        relighting.map_or(Duration::ZERO, |(_, took)| took)
     }
 }
 

@@ -11,7 +11,7 @@ use crate::frame::worker::shared::{
 };
 use crate::frame::worker::views::Views;
 use crate::render::{
-    Display, Film, MovingFilter, Region, SampleAllocation, advance_region, explain, known_caustic_choice, seen_surface,
+    Display, Film, MovingImage, Region, SampleAllocation, advance_region, explain, known_caustic_choice, seen_surface,
 };
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,6 +22,10 @@ use std::time::{Duration, Instant};
 
 /// How long the workers wait for a coarse image to be displayed before they continue.
 const LONGEST_DRAW: Duration = Duration::from_millis(33);
+
+/// Images before that the light of a moving image is the mean of, at most: what light changes with the camera lags by as
+/// many.
+pub(super) const MOST_IMAGES: f32 = 12.0;
 
 /// State of the render thread.
 pub struct Loop<'a> {
@@ -35,7 +39,9 @@ pub struct Loop<'a> {
     pub(super) views: Views,
     pub(super) denoiser: Denoiser,
     /// Smooths images of a moving camera; has memory only once it did.
-    pub(super) filter: MovingFilter,
+    pub(super) moving: MovingImage,
+    /// As how many images those before the next one count: few if the scene has changed since.
+    pub(super) kept_images: f32,
     /// Region that gets all samples, in fractions of the image.
     region: Option<[f64; 4]>,
     /// Whether the film has tiles that are ahead because of a region.
@@ -70,7 +76,8 @@ impl<'a> Loop<'a> {
             look: ViewOptions::default(),
             views: Views::default(),
             denoiser,
-            filter: MovingFilter::default(),
+            moving: MovingImage::default(),
+            kept_images: MOST_IMAGES,
             region: None,
             is_uneven: false,
             question: None,
@@ -156,6 +163,10 @@ impl<'a> Loop<'a> {
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
             self.restarted_at = Instant::now();
+            let has_same_scene = |old: &Job| old.prepared.has_scene_of(&job.prepared);
+            if !self.job.as_ref().is_some_and(has_same_scene) {
+                self.kept_images = 1.0;
+            }
             let is_as_large = self.job.as_ref().is_some_and(|old| (old.width, old.height) == size);
             self.job = Some(job);
             let films = [self.previous.take(), self.film.take()];
@@ -284,6 +295,7 @@ impl<'a> Loop<'a> {
         }
         let region = self.active_region();
         self.is_uneven |= region.is_some();
+        let is_raw = self.wanted_denoising() == Denoising::Raw;
         let Some((_, film)) = &mut self.film else { return };
         if divider == 1 && !self.to_keep.is_empty() && !self.is_uneven {
             // A saved image must be reproducible from its sample count, so all pixels get the same number of samples.
@@ -295,6 +307,10 @@ impl<'a> Loop<'a> {
         if divider > 1 {
             // Coarse films are short-lived: an allocation does not pay.
             settings.allocation = SampleAllocation::Uniform;
+            if !is_raw {
+                // Other noise than that of the image before, with which it is mixed.
+                settings.seed = settings.seed.wrapping_add(job.generation as u32);
+            }
         }
         let interrupt = &self.shared.interrupt;
         let stop = || interrupt.load(Ordering::Relaxed) || at_most.is_some_and(|limit| start.elapsed() >= limit);
@@ -349,9 +365,9 @@ impl<'a> Loop<'a> {
         }
         if !replaced && (self.redraw || (is_due && self.previous.is_none())) {
             let finished = Instant::now();
-            self.show(false);
+            let relighting = self.show(false);
             if divider > 1 {
-                self.let_it_be_seen(finished);
+                self.let_it_be_seen(finished + relighting);
             }
         }
     }
@@ -359,7 +375,7 @@ impl<'a> Loop<'a> {
     /// Pauses the workers until a coarse image is displayed: if the processors draw the window too, more samples for a
     /// coarse film would delay the image or the next input.
     ///
-    /// - `finished`: when its samples were complete.
+    /// - `finished`: when its samples were complete, later by what its surfaces took.
     fn let_it_be_seen(&mut self, finished: Instant) {
         let number = self.n_pictures;
         let seen = || self.shared.seen.load(Ordering::Acquire);

@@ -16,6 +16,8 @@ pub struct Views {
     pub settled: Option<Settled>,
     /// When the film may be denoised again: samples come first.
     pub settle_again: Option<Instant>,
+    /// Generation and divider of the image whose light is taken over by the next one.
+    pub relit: Option<(u64, u32)>,
     /// When a film at full resolution may be smoothed again.
     pub smooth_again: Option<(ViewKey, Instant)>,
 }
