@@ -7,6 +7,7 @@ use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::ior;
 use crate::mitsuba::spectrum::Use;
+use crate::model::foreign::tinted;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::parts::MaterialPart;
@@ -157,7 +158,7 @@ impl Converter<'_> {
 
     fn conductor(&mut self, node: Node) -> Result<Surface, SceneError> {
         let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
-        let material = node.text("material")?.unwrap_or(if node.plugin() == "conductor" { "none" } else { "Cu" });
+        let material = node.text("material")?.unwrap_or("none");
         let (eta, k) = if !node.has("eta") && !node.has("k") && material != "none" {
             ior::conductor(material).ok_or_else(|| {
                 let hint = suggestion(material, ior::conductor_names());
@@ -313,8 +314,15 @@ impl Converter<'_> {
             self.tell(node, &format!("two sides of more than {MAX_LOBES} lobes are not modelled: both are the first"));
             return Ok(Some(Surface { two_sided: true, ..front }));
         }
-        let [a, b] = [(nested[0], front), (back, other)].map(|(node, side)| self.add_material(node, side.part));
-        Ok(Some(Surface::two_sided(by_side(a, b))))
+        let mut whole = by_side(String::new(), String::new());
+        let is_told = !self.share_own(&mut whole, [&front.part, &other.part]);
+        if is_told {
+            self.tell(node, "normal maps that differ between two sides are not modelled: that of the first is on both");
+            exchange_own(&mut front.part.clone(), &mut whole);
+        }
+        let sides =
+            [(nested[0], front), (back, other)].map(|(node, side)| self.add_material(node, without_own(side.part)));
+        Ok(Some(Surface::two_sided(with_parts(whole, sides))))
     }
 
     fn mask(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
@@ -322,9 +330,49 @@ impl Converter<'_> {
         let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
         let mut part = self.whole(node, surface.part);
         if let Material::Principled { opacity, .. } | Material::Blend { opacity, .. } = &mut part {
-            *opacity = wanted;
+            *opacity = self.coverage(node, opacity.clone(), wanted);
         }
         Ok(Some(Surface { part, ..surface }))
+    }
+
+    /// The opacity of a mask in another one: their product.
+    fn coverage(&mut self, node: Node, inner: ScalarValue, outer: ScalarValue) -> ScalarValue {
+        let (factor, name) = match (inner, outer) {
+            (ScalarValue::Number(a), ScalarValue::Number(b)) => return ScalarValue::Number(a * b),
+            (ScalarValue::Number(factor), ScalarValue::Texture(name))
+            | (ScalarValue::Texture(name), ScalarValue::Number(factor)) => (factor, name),
+            (inner @ ScalarValue::Texture(_), ScalarValue::Texture(_)) => {
+                self.tell(node, "a textured mask in another one is not modelled: only the inner one is");
+                return inner;
+            }
+        };
+        if factor == 1.0 {
+            return ScalarValue::Texture(name);
+        }
+        ScalarValue::Texture(self.tinted(&name, factor).unwrap_or(name))
+    }
+
+    /// The texture of this name with a factor; `None` if there is none.
+    pub(crate) fn tinted(&mut self, name: &str, factor: f32) -> Option<String> {
+        let source = self.file.textures.get(name).and_then(|source| tinted(source, Vec3::splat(factor)))?;
+        let new = self.names.free(&format!("{name}, tinted"));
+        if let Some(attribute) = self.attributes.get(name).cloned() {
+            self.attributes.insert(new.clone(), attribute);
+        }
+        if let Some(&(_, node)) = self.numbers.iter().find(|(number, _)| number == name) {
+            self.numbers.push((new.clone(), node));
+        }
+        self.file.textures.0.insert(new.clone(), source);
+        Some(new)
+    }
+
+    /// Moves holes and normals of two parts to the whole, if they are the same; returns whether they are.
+    fn share_own(&self, whole: &mut MaterialPart, [a, b]: [&MaterialPart; 2]) -> bool {
+        let is_same = own(a) == own(b);
+        if is_same {
+            exchange_own(&mut a.clone(), whole);
+        }
+        is_same
     }
 
     /// A surface that can have holes and normals of its own.
@@ -353,12 +401,13 @@ impl Converter<'_> {
             self.tell(node, &format!("a blend of more than {MAX_LOBES} lobes is not modelled: it is the first part"));
             return Ok(Some(a));
         }
-        if [&a, &b].into_iter().any(|surface| has_own(&surface.part)) {
+        let mut whole = Material::blend(weight, String::new(), String::new());
+        if !self.share_own(&mut whole, [&a.part, &b.part]) {
             self.tell(node, "holes and normal maps of the parts of a blend are not modelled: they have none");
         }
         let two_sided = a.two_sided && b.two_sided;
-        let [a, b] = [(first, a), (second, b)].map(|(node, surface)| self.add_material(node, surface.part));
-        Ok(Some(Surface { part: Material::blend(weight, a, b), two_sided }))
+        let parts = [(first, a), (second, b)].map(|(node, side)| self.add_material(node, without_own(side.part)));
+        Ok(Some(Surface { part: with_parts(whole, parts), two_sided }))
     }
 
     /// Gives a surface a map of its normals.
@@ -367,6 +416,9 @@ impl Converter<'_> {
         let turns_over = node.boolean_or("flip_invalid_normals", true)?;
         if has_shadowing != turns_over {
             self.tell(node, "use_shadowing_function and flip_invalid_normals are modelled together: there is neither");
+        }
+        if own(&part).1 != own(&grey()).1 {
+            self.tell(node, "a map of normals in another one is not modelled: only the outer one is");
         }
         let mut part = match part {
             // It has no shadowing of its own.
@@ -403,12 +455,15 @@ impl Converter<'_> {
             }
         }
         let name = self.names.free(&format!("{heights} as relief"));
+        if let Some(&(_, node)) = self.numbers.iter().find(|(number, _)| *number == heights) {
+            self.numbers.push((name.clone(), node));
+        }
         self.file.textures.0.extend(source.map(|source| (name.clone(), source)));
         let part = self.mapped(node, surface.part, ColorValue::Texture(name))?;
         Ok(Some(Surface { part, ..surface }))
     }
 
-    fn n_lobes(&self, part: &MaterialPart) -> usize {
+    pub(crate) fn n_lobes(&self, part: &MaterialPart) -> usize {
         match part {
             Material::Blend { a, b, .. } => {
                 [a, b].into_iter().filter_map(|name| self.file.materials.get(name)).map(|part| self.n_lobes(part)).sum()
@@ -449,14 +504,35 @@ fn elongation(along: f32, across: f32) -> f32 {
     if across >= 1.0 { 0.0 } else { ((along - across) / (1.0 - across)).clamp(0.0, 1.0).sqrt() }
 }
 
-/// Whether a surface has holes or normals of its own, which parts of others have not.
-fn has_own(part: &MaterialPart) -> bool {
+/// Holes and normals of a surface, which parts of others have not: its opacity, its map, and whether that has
+/// shadowing.
+fn own(part: &MaterialPart) -> (ScalarValue, ColorValue, bool) {
     match part {
-        Material::Principled { opacity, normal_map, .. } | Material::Blend { opacity, normal_map, .. } => {
-            *opacity != ScalarValue::Number(1.0) || matches!(normal_map, ColorValue::Texture(_))
+        Material::Principled { opacity, normal_map, .. } => (opacity.clone(), normal_map.clone(), false),
+        Material::Blend { opacity, normal_map, normal_shadowing, .. } => {
+            (opacity.clone(), normal_map.clone(), *normal_shadowing)
         }
-        _ => false,
+        _ => own(&Material::principled(ColorValue::grey(0.0))),
     }
+}
+
+/// Whether a surface has holes or normals of its own.
+fn has_own(part: &MaterialPart) -> bool {
+    own(part) != own(&grey())
+}
+
+/// The same surface without holes and normals of its own.
+pub(crate) fn without_own(mut part: MaterialPart) -> MaterialPart {
+    exchange_own(&mut part, &mut Material::blend(ScalarValue::Number(0.0), String::new(), String::new()));
+    part
+}
+
+/// A blend of two other materials.
+pub(crate) fn with_parts(mut blend: MaterialPart, parts: [String; 2]) -> MaterialPart {
+    if let Material::Blend { a, b, .. } = &mut blend {
+        [*a, *b] = parts;
+    }
+    blend
 }
 
 /// Exchanges holes and normals of two surfaces, if both can have them.

@@ -10,7 +10,7 @@ use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use glam::{DMat2, DMat4, DVec2};
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a plugin reads a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,6 +66,8 @@ pub(crate) struct PlacedMaterial {
     /// Whether texture coordinates matter.
     pub is_textured: bool,
     pub needs_tangents: bool,
+    /// Whether its back is seen through the front of a closed shape.
+    pub has_holes: bool,
     /// Name of the mesh attribute that it reads, as in Mitsuba.
     pub attribute: Option<String>,
     /// Whether the back is like the front.
@@ -88,6 +90,8 @@ pub(crate) struct Converter<'a> {
     /// Of the scene in its folder.
     pub file_name: String,
     pub textures: HashMap<(usize, Reads), String>,
+    /// Names of images that are read as numbers, with the index of their plugin.
+    pub numbers: Vec<(String, usize)>,
     /// Of the textures that are being converted.
     pub texture_depth: u32,
     /// By the index of their BSDF.
@@ -102,12 +106,15 @@ pub(crate) struct Converter<'a> {
     pub requests: HashMap<MeshRequest, u32>,
     /// Objects of meshes from files whose back is black in Mitsuba.
     pub one_sided: Vec<usize>,
+    /// Whether the file of a mesh lacks normals.
+    pub without_normals: HashMap<PathBuf, bool>,
     /// By the name of a material: the one that has a black back as well.
     pub backed: HashMap<String, String>,
     /// Attributes by the name of the texture that reads them.
     pub attributes: HashMap<String, String>,
     /// Meshes that need an attribute, and the shape of each.
     pub colored: HashMap<u32, usize>,
+    pub has_environment: bool,
     pub names: Names,
     pub material_names: Names,
 }

@@ -22,6 +22,12 @@ impl Converter<'_> {
             return Ok(());
         }
         node.ignore(&["sampling_weight"]);
+        if matches!(node.plugin(), "constant" | "envmap" | "sunsky" | "sky" | "sun") {
+            if self.has_environment {
+                self.tell(node, "a second environment is not modelled: it takes the place of the one before it");
+            }
+            self.has_environment = true;
+        }
         let name = Some(self.names.free(node.called()));
         match node.plugin() {
             "constant" => {

@@ -6,6 +6,7 @@ use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::obj::load_obj_with;
 use crate::ply::load_ply_colored;
 use crate::ply::vertices::ColourSource;
+use firstlight_files::warnings::Warnings;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_mesh::{Mesh, NormalWeight};
 use glam::{DVec3, Vec2, Vec3};
@@ -65,7 +66,8 @@ impl MeshRequest {
     ///
     /// # Errors
     /// A sentence about the file.
-    pub(crate) fn make(&self, room: &UnpackedBytes) -> Result<Mesh, String> {
+    pub(crate) fn make(&self, room: &UnpackedBytes) -> Result<(Mesh, Warnings), String> {
+        let mut warnings = Warnings::default();
         let mut mesh = match &self.geometry {
             Geometry::Model(format, path) => {
                 // Mitsuba smooths every edge of a file without normals.
@@ -78,6 +80,7 @@ impl MeshRequest {
                     ModelFormat::Obj => load_obj_with(path, &options).map_err(|error| error.to_string())?,
                     _ => load_ply_colored(path, &options, self.colors()).map_err(|error| error.to_string())?,
                 };
+                warnings = model.warnings;
                 Mesh { slots: Vec::new(), ..model.mesh }
             }
             Geometry::Serialized(path, index) => {
@@ -105,7 +108,7 @@ impl MeshRequest {
             // The bitangent is normal × tangent, also where the texture is mirrored.
             mesh.tangents.iter_mut().for_each(|tangent| tangent.w = 1.0);
         }
-        Ok(mesh)
+        Ok((mesh, warnings))
     }
 }
 
@@ -221,7 +224,7 @@ mod tests {
                 tangents: false,
                 attribute: Some(attribute.to_owned()),
             };
-            let mesh = request.make(&UnpackedBytes::new(0)).unwrap();
+            let (mesh, _) = request.make(&UnpackedBytes::new(0)).unwrap();
             // Of the corners of both triangles.
             let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| color.truncate());
             mesh.triangles.iter().flatten().filter_map(|&vertex| color(vertex)).collect::<Vec<Vec3>>()

@@ -20,6 +20,8 @@ pub(crate) mod serialized;
 pub(crate) mod shape;
 pub(crate) mod spectrum;
 mod sunsky;
+#[cfg(test)]
+mod tests;
 pub(crate) mod texture;
 pub(crate) mod transform;
 pub(crate) mod words;

@@ -303,6 +303,19 @@ impl Reader<'_> {
             self.spectra.insert(path, read.clone());
             return Ok(Some(Value::Spectrum(read)));
         }
+        // Of version 0.x.
+        if tag == "blackbody" {
+            let text = self.required(element, place, "temperature")?;
+            let scale = element.attribute("scale").map(|text| self.substitute(text, place)).transpose()?;
+            let positive = |name: &str, text: &str| {
+                let expected =
+                    || self.graph.error(place, format!("`{name}` of a `<blackbody>` must be a number above 0"));
+                number(text).filter(|number| *number > 0.0).ok_or_else(expected)
+            };
+            let kelvin = positive("temperature", text.trim().trim_end_matches(['K', 'k']))?;
+            let scale = scale.map_or(Ok(1.0), |text| positive("scale", &text))?;
+            return Ok(Some(Value::Spectrum(spectrum::blackbody(kelvin).scaled(scale))));
+        }
         if !matches!(tag, "float" | "integer" | "boolean" | "string" | "rgb" | "color" | "srgb" | "spectrum") {
             return Ok(None);
         }

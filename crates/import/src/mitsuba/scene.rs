@@ -61,6 +61,7 @@ impl<'a> Converter<'a> {
             light_images: &options.light_images,
             file_name,
             textures: HashMap::new(),
+            numbers: Vec::new(),
             texture_depth: 0,
             surfaces: HashMap::new(),
             n_shapes: 0,
@@ -69,8 +70,10 @@ impl<'a> Converter<'a> {
             requests: HashMap::new(),
             one_sided: Vec::new(),
             backed: HashMap::new(),
+            without_normals: HashMap::new(),
             attributes: HashMap::new(),
             colored: HashMap::new(),
+            has_environment: false,
             names: Names::default(),
             material_names: Names::default(),
         }
@@ -93,6 +96,7 @@ impl<'a> Converter<'a> {
         for emitter in emitters {
             self.emitter(emitter)?;
         }
+        self.settle_numbers();
         let has_camera = self.sensors(&sensors)?;
         // Definitions that nothing uses are no loss.
         for tag in ["bsdf", "texture", "medium", "volume", "sampler", "phase", "film"] {
@@ -213,12 +217,15 @@ impl<'a> Converter<'a> {
             _ => None,
         });
         let room = UnpackedBytes::of_files(serialized.collect::<HashSet<_>>().into_iter());
-        let made: Vec<(u32, Result<Mesh, String>)> =
+        let made: Vec<(u32, Result<(Mesh, Warnings), String>)> =
             requests.par_iter().map(|(request, number)| (*number, request.make(&room))).collect();
         let (mut parts, mut lost) = (HashMap::new(), HashSet::new());
         for (number, mesh) in made {
             match mesh {
-                Ok(mesh) => drop(parts.insert(number, Arc::new(mesh))),
+                Ok((mesh, of_file)) => {
+                    self.warnings.append(&of_file);
+                    parts.insert(number, Arc::new(mesh));
+                }
                 Err(why) => {
                     lost.insert(number);
                     self.warnings.push(format!("{why}; the shape is left out"));

@@ -1,6 +1,6 @@
 //! Shapes as objects, with the lights that they are.
 
-use crate::mitsuba::bsdf::{by_side, exchange_own, grey};
+use crate::mitsuba::bsdf::{by_side, exchange_own, grey, with_parts, without_own};
 use crate::mitsuba::converter::Surface;
 use crate::mitsuba::converter::{Converter, PlacedMaterial};
 use crate::mitsuba::graph::Node;
@@ -8,7 +8,10 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
+use crate::model::foreign::LIGHT_SHARE;
 use crate::model::placing;
+use crate::ply::has_normals;
+use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
 use firstlight_format::material_textures::texture_names;
@@ -16,8 +19,10 @@ use firstlight_format::model_format::ModelFormat;
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{MeshShading, MeshSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
-use firstlight_render::Material;
+use firstlight_render::{MAX_LOBES, Material};
 use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
 
 /// Objects of a scene; instances of instances multiply.
 const MAX_OBJECTS: usize = 1 << 20;
@@ -67,8 +72,9 @@ impl Converter<'_> {
         let is_flipped = node.boolean_or("flip_normals", false)?;
         node.ignore(&["silhouette_sampling_weight"]);
         let name = Some(self.names.free(node.called()));
-        // Nobody sees the back of a closed shape.
-        if !material.two_sided && matches!(node.plugin(), "rectangle" | "disk" | "cylinder") {
+        // Nobody sees the back of a closed shape without holes.
+        let is_open = matches!(node.plugin(), "rectangle" | "disk" | "cylinder");
+        if !material.two_sided && (is_open || material.has_holes) {
             material.name = self.with_black_back(&material.name);
         }
         match node.plugin() {
@@ -112,6 +118,14 @@ impl Converter<'_> {
         let Some(front) = self.file.materials.get(name).cloned() else { return name.to_owned() };
         // The back of these is black already.
         if matches!(front, Material::Emissive { .. }) {
+            return name.to_owned();
+        }
+        if self.n_lobes(&front) == MAX_LOBES {
+            let (scene, shown) = (self.graph.files[0].path.display(), printable::name(name));
+            self.warnings.push(format!(
+                "{scene}: the black back of `{shown}`, a blend of {MAX_LOBES} lobes, is not modelled: it is like the front"
+            ));
+            self.backed.insert(name.to_owned(), name.to_owned());
             return name.to_owned();
         }
         let mut add = |wanted: &str, part: MaterialPart| {
@@ -161,10 +175,14 @@ impl Converter<'_> {
         material: PlacedMaterial,
     ) -> Result<(), SceneError> {
         let is_obj = matches!(geometry, Geometry::Model(ModelFormat::Obj, _));
+        let face_normals = node.boolean_or("face_normals", false)?;
+        // Mitsuba has the vertices of a file in the world: without normals, a mirrored mesh is turned inside out.
+        let is_mirrored = node.transform("to_world")?.determinant() < 0.0;
+        let is_turned = is_mirrored && (face_normals || self.lacks_normals(&geometry));
         let request = MeshRequest {
             flip_v: node.boolean_or("flip_tex_coords", is_obj)?,
-            face_normals: node.boolean_or("face_normals", false)?,
-            flip_normals,
+            face_normals,
+            flip_normals: flip_normals != (is_turned && geometry.file().is_some()),
             tangents: material.needs_tangents,
             attribute: material.attribute.clone(),
             geometry,
@@ -173,7 +191,7 @@ impl Converter<'_> {
         let next = self.requests.len() as u32;
         let is_file = request.geometry.file().is_some();
         let shape = *self.requests.entry(request).or_insert(next);
-        if is_file && !material.two_sided {
+        if is_file && !material.two_sided && !material.has_holes {
             self.one_sided.push(self.file.objects.len());
         }
         if material.attribute.is_some() {
@@ -184,6 +202,16 @@ impl Converter<'_> {
         let (shading, simplify, materials) = (MeshShading::Auto, None, None);
         self.file.objects.push(ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform });
         Ok(())
+    }
+
+    /// Whether it is a file of a mesh without normals.
+    fn lacks_normals(&mut self, geometry: &Geometry) -> bool {
+        let Geometry::Model(format, path) = geometry else { return false };
+        let lacks = || match format {
+            ModelFormat::Obj => !has_obj_normals(path),
+            _ => has_normals(path) == Some(false),
+        };
+        *self.without_normals.entry(path.clone()).or_insert_with(lacks)
     }
 
     fn sphere(
@@ -290,6 +318,7 @@ impl Converter<'_> {
         let placed = surface.map(|surface| {
             let is_textured = self.is_textured(&surface.part);
             let needs_tangents = needs_tangents(&surface.part);
+            let has_holes = has_holes(&surface.part);
             let mut attributes = Vec::new();
             self.attributes_of(&surface.part, &mut attributes);
             if attributes.get(1..).unwrap_or_default().iter().any(|other| *other != attributes[0]) {
@@ -297,7 +326,7 @@ impl Converter<'_> {
             }
             let attribute = attributes.into_iter().next();
             let name = self.add_material(bsdf.or(emitter).unwrap_or(node), surface.part);
-            PlacedMaterial { name, is_textured, needs_tangents, attribute, two_sided: surface.two_sided }
+            PlacedMaterial { name, is_textured, needs_tangents, has_holes, attribute, two_sided: surface.two_sided }
         });
         self.materials.insert(key, placed.clone());
         Ok(placed)
@@ -313,9 +342,10 @@ impl Converter<'_> {
             return Ok(surface);
         }
         let radiance = self.color(emitter, "radiance", 1.0, Use::Emission)?;
-        let part = match surface.part {
+        let Surface { part: reflecting, two_sided } = surface;
+        let part = match reflecting.clone() {
             Material::Diffuse { albedo: ColorValue::Rgb(albedo) } if albedo.max_element() <= 0.0 => {
-                Material::Emissive { radiance }
+                return Ok(Surface::one_sided(Material::Emissive { radiance }));
             }
             // Without the reflection of a dielectric, its base is diffuse.
             Material::Diffuse { albedo } => {
@@ -331,12 +361,42 @@ impl Converter<'_> {
                 }
                 part
             }
-            _ => {
-                self.tell(emitter, "what a light of this kind reflects is not modelled: it only emits");
-                Material::Emissive { radiance }
+            part => {
+                let part = self.share_of_light(emitter, part, &radiance).unwrap_or_else(|| {
+                    self.tell(emitter, "what a light of this kind reflects is not modelled: it only emits");
+                    Material::Emissive { radiance }
+                });
+                return Ok(Surface { part, two_sided });
             }
         };
-        Ok(Surface { part, two_sided: false })
+        if !two_sided {
+            return Ok(Surface::one_sided(part));
+        }
+        // Only the front emits.
+        let (mut front, mut whole) = (part, by_side(String::new(), String::new()));
+        exchange_own(&mut front, &mut whole);
+        let sides = [front, without_own(reflecting)].map(|part| self.add_material(emitter, part));
+        Ok(Surface::two_sided(with_parts(whole, sides)))
+    }
+
+    /// A surface of which a share is a light that is as much brighter; `None` if it cannot have one.
+    fn share_of_light(&mut self, node: Node, mut part: MaterialPart, radiance: &ColorValue) -> Option<MaterialPart> {
+        if self.n_lobes(&part) >= MAX_LOBES || self.has_textured_weight(&part) {
+            return None;
+        }
+        let radiance = match radiance {
+            ColorValue::Rgb(rgb) => ColorValue::Rgb(*rgb / LIGHT_SHARE),
+            ColorValue::Texture(name) => ColorValue::Texture(self.tinted(name, LIGHT_SHARE.recip())?),
+        };
+        let mut whole = Material::blend(LIGHT_SHARE.into(), String::new(), String::new());
+        exchange_own(&mut part, &mut whole);
+        Some(with_parts(whole, [part, Material::Emissive { radiance }].map(|part| self.add_material(node, part))))
+    }
+
+    fn has_textured_weight(&self, part: &MaterialPart) -> bool {
+        let Material::Blend { weight, a, b, .. } = part else { return false };
+        let mut parts = [a, b].into_iter().filter_map(|name| self.file.materials.get(name));
+        matches!(weight, ScalarValue::Texture(_)) || parts.any(|part| self.has_textured_weight(part))
     }
 
     /// Adds the mesh attributes that a material and its parts read.
@@ -361,6 +421,17 @@ impl Converter<'_> {
 
 fn black() -> Surface {
     Surface { part: Material::Diffuse { albedo: ColorValue::grey(0.0) }, two_sided: false }
+}
+
+fn has_holes(part: &MaterialPart) -> bool {
+    matches!(part, Material::Principled { opacity, .. } | Material::Blend { opacity, .. }
+        if *opacity != ScalarValue::Number(1.0))
+}
+
+/// Whether an OBJ file has normals; also if it cannot be read, which is told when it is loaded.
+fn has_obj_normals(path: &Path) -> bool {
+    let Ok(file) = InputFile::open(path, FileKind::Model) else { return true };
+    BufReader::new(file).split(b'\n').any(|line| line.is_ok_and(|line| line.trim_ascii_start().starts_with(b"vn")))
 }
 
 fn needs_tangents(part: &MaterialPart) -> bool {

@@ -73,6 +73,14 @@ pub(crate) fn blackbody(kelvin: f64) -> Spectrum {
 }
 
 impl Spectrum {
+    /// The same times a number.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        match self {
+            Self::Uniform(value) => Self::Uniform(factor * value),
+            Self::Sampled(samples) => Self::Sampled(samples.iter().map(|(nm, value)| (*nm, factor * value)).collect()),
+        }
+    }
+
     /// Linear Rec. 709.
     pub(crate) fn rgb(&self, of: Use) -> DVec3 {
         match self {

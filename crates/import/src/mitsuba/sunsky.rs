@@ -34,11 +34,16 @@ impl Converter<'_> {
             self.tell(node, "the sun is below the horizon: the sky is that of sunrise, without the sun");
             sun = 0.0;
         }
+        let wanted = node.float_or("turbidity", 3.0)?;
+        let turbidity = wanted.clamp(1.0, 10.0);
+        if turbidity != wanted {
+            self.tell(node, &format!("a turbidity beyond 1 to 10 is not modelled: it is {turbidity}"));
+        }
         let albedo = self.constant_color(node, "albedo", 0.3, Use::Reflectance)?;
         self.file.environment = EnvironmentSource::Sky {
             elevation: elevation.max(0.0),
             azimuth: to_sun.x.atan2(-to_sun.z).to_degrees(),
-            turbidity: node.float_or("turbidity", 3.0)?.clamp(1.0, 10.0),
+            turbidity,
             ground: Rgb(albedo),
             sun,
             sky,

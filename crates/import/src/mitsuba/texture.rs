@@ -8,13 +8,16 @@ use crate::mitsuba::graph::{Node, Spectrum, Value};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::{Use, blackbody, sampled};
 use crate::mitsuba::words::numbers;
+use crate::picture::{ImageBudget, read_picture_of_scene};
 use firstlight_files::printable;
-use firstlight_files::relative::path_to_text;
+use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_format::error::SceneError;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Encoding, Wrap};
+use firstlight_render::{Channel, Encoding, ImageTexture, Wrap};
 use glam::{DMat2, DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Depth of textures in textures.
 const MAX_DEPTH: u32 = 16;
@@ -120,6 +123,9 @@ impl Converter<'_> {
             None => format!("{} {}", node.plugin(), node.index),
         };
         let name = self.names.free(&wanted);
+        if reads == Reads::Number && matches!(source, TextureSource::Image { channel: None, .. }) {
+            self.numbers.push((name.clone(), node.index));
+        }
         self.file.textures.0.insert(name.clone(), source);
         self.attributes.extend(read_attribute.map(|attribute| (name.clone(), attribute)));
         self.textures.insert((node.index, reads), name.clone());
@@ -175,7 +181,7 @@ impl Converter<'_> {
     /// `None` for an image that must not be read, which is told.
     fn bitmap(&mut self, node: Node, reads: Reads) -> Result<Option<TextureSource>, SceneError> {
         let name = node.text("filename")?.ok_or_else(|| node.error("a bitmap needs a `filename`"))?;
-        node.ignore(&["format", "accel", "max_anisotropy", "gamma", "cache", "channel"]);
+        node.ignore(&["format", "accel", "max_anisotropy", "cache"]);
         let file = match find_file(&self.references, &self.graph.folders, name) {
             Ok(path) => self.file_path(&path),
             Err(why) => match self.references.resolve(self.folder, name) {
@@ -198,7 +204,24 @@ impl Converter<'_> {
             }
         };
         let smooth = node.text("filter_type")? != Some("nearest");
-        let encoding = if node.boolean_or("raw", false)? { Encoding::Linear } else { Encoding::Auto };
+        // The last two are of version 0.x, where a gamma of 0 is that of the file, and −1 sRGB.
+        let (is_raw, gamma, channel) = (node.boolean_or("raw", false)?, node.float("gamma")?, node.text("channel")?);
+        let is_linear = is_raw || gamma == Some(1.0);
+        if !is_linear && gamma.is_some_and(|gamma| gamma > 0.0) {
+            self.tell(node, "a gamma other than 1 is not modelled: the image is read as sRGB");
+        }
+        let encoding = if is_linear { Encoding::Linear } else { Encoding::Auto };
+        let channel = match channel {
+            Some("r") => Some(Channel::R),
+            Some("g") => Some(Channel::G),
+            Some("b") => Some(Channel::B),
+            Some("a") => Some(Channel::A),
+            None => None,
+            Some(_) => {
+                self.tell(node, "a channel other than r, g, b and a is not modelled: the whole image is read");
+                None
+            }
+        };
         let (matrix, offset) = self.uv_transform(node, reads)?;
         // Over the middle of the image: its top is at v = 1.
         let flip = DMat2::from_diagonal(DVec2::new(1.0, -1.0));
@@ -216,13 +239,41 @@ impl Converter<'_> {
             wrap: e,
             smooth: f,
             encoding: g,
+            channel: h,
             ..
         } = &mut image
         {
             (*a, *b, *c, *d) = (stretch, repeat, offset, rotate);
-            (*e, *f, *g) = (wrap, smooth, encoding);
+            (*e, *f, *g, *h) = (wrap, smooth, encoding, channel);
         }
         Ok(Some(image))
+    }
+
+    /// Has the images of numbers that have colours read by their green channel, and tells it: in Mitsuba such a number
+    /// is the luminance, of which most is green.
+    pub(crate) fn settle_numbers(&mut self) {
+        let mut numbers = std::mem::take(&mut self.numbers);
+        numbers.sort_by_key(|(_, node)| *node);
+        let file_of = |name: &str| match self.file.textures.get(name) {
+            Some(TextureSource::Image { file, .. }) => Some(file.clone()),
+            _ => None,
+        };
+        let files: BTreeSet<String> = numbers.iter().filter_map(|(name, _)| file_of(name)).collect();
+        let files: Vec<String> = files.into_iter().collect();
+        let (folder, budget) = (self.folder, ImageBudget::default());
+        let is_coloured = |file: &&String| {
+            read_picture_of_scene(&folder.join(text_to_path(file)), &budget).is_ok_and(|(image, _)| has_colours(&image))
+        };
+        let coloured: BTreeSet<String> = files.par_iter().filter(is_coloured).cloned().collect();
+        for (name, index) in numbers {
+            if let Some(TextureSource::Image { file, channel, .. }) = self.file.textures.0.get_mut(&name)
+                && coloured.contains(file)
+            {
+                *channel = Some(Channel::G);
+                let node = Node { graph: self.graph, index };
+                self.tell(node, "the luminance of a colour image is not modelled as a number: it is the green channel");
+            }
+        }
     }
 
     fn checkerboard(&mut self, node: Node, of: Use, reads: Reads) -> Result<TextureSource, SceneError> {
@@ -283,6 +334,13 @@ impl Placed {
         let stretch = if (stretch.y - 1.0).abs() < 1e-12 { DVec2::ONE } else { stretch };
         Some(Self { stretch, repeat, offset, rotate: tangent.atan().to_degrees() })
     }
+}
+
+fn has_colours(image: &ImageTexture) -> bool {
+    (0..image.len()).any(|i| {
+        let Vec3 { x, y, z } = image.linear(i);
+        x != y || y != z
+    })
 }
 
 /// The colour of a parameter that is one.

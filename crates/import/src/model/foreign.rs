@@ -1,10 +1,13 @@
 //! A scene of another renderer, read: a scene file, and the meshes that stand inside of the foreign file.
 
 use crate::model::projection::LightImages;
+use firstlight_files::printable;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::scene_file::SceneFile;
+use firstlight_format::sources::TextureSource;
 use firstlight_mesh::Mesh;
+use glam::Vec3;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,6 +18,30 @@ const MOST_OF_A_NAME: usize = 256;
 /// The start of a long name.
 pub(crate) fn cut(name: &str) -> &str {
     name.char_indices().nth(MOST_OF_A_NAME).map_or(name, |(end, _)| &name[..end])
+}
+
+/// What is told of a name that is longer.
+pub(crate) fn told_of_long(name: &str) -> Option<String> {
+    let is_long = name.chars().nth(MOST_OF_A_NAME).is_some();
+    let told =
+        || format!("names are told apart by their first {MOST_OF_A_NAME} characters: `{}`", printable::name(name));
+    is_long.then(told)
+}
+
+/// Share of a surface that is a light where it emits and reflects otherwise than `principled` can: the rest reflects,
+/// a thousandth less than it should, and the share is as many times brighter. A power of two, so that the product is
+/// exact.
+pub(crate) const LIGHT_SHARE: f32 = 1.0 / 1024.0;
+
+/// A texture times a colour; `None` if it cannot have a factor.
+pub(crate) fn tinted(source: &TextureSource, factor: Vec3) -> Option<TextureSource> {
+    let mut source = source.clone();
+    match &mut source {
+        TextureSource::Checker { a, b, .. } => (a.0, b.0) = (a.0 * factor, b.0 * factor),
+        TextureSource::Image { tint, invert: false, .. } | TextureSource::VertexColors { tint, .. } => tint.0 *= factor,
+        TextureSource::Image { .. } => return None,
+    }
+    Some(source)
 }
 
 /// Options for reading.

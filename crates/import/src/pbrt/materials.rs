@@ -20,7 +20,7 @@ use firstlight_files::printable;
 use firstlight_format::parts::{InFile, MaterialPart};
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Encoding, Fresnel};
+use firstlight_render::Fresnel;
 use glam::{DVec3, Vec3};
 
 /// Where the values of a material come from: textures become names, and what is not shown is told.
@@ -37,6 +37,8 @@ pub(crate) trait MaterialScope {
     fn image(&mut self, name: &str) -> Option<ColorValue>;
     /// The name of a material of the scene, for a mixture.
     fn material(&mut self, name: &str) -> Option<String>;
+    /// The map of normals of a material of ours with its factor, if it has one, and the name of the same without it.
+    fn without_normals(&mut self, name: String) -> (Option<(ColorValue, f32)>, String);
     /// Adds a material that another one refers to; returns its name.
     fn add(&mut self, part: MaterialPart) -> String;
     /// Something about this material that is not shown.
@@ -173,7 +175,7 @@ fn conductor(scope: &mut impl MaterialScope, params: &Params, prefix: &str) -> C
     }
 }
 
-fn principled(base_color: ColorValue) -> MaterialPart {
+pub(crate) fn principled(base_color: ColorValue) -> MaterialPart {
     MaterialPart::principled(base_color)
 }
 
@@ -257,7 +259,13 @@ pub(crate) fn material(
             let parts: Vec<String> =
                 params.strings("materials").iter().take(2).filter_map(|name| scope.material(name)).collect();
             match <[String; 2]>::try_from(parts) {
-                Ok([a, b]) => MaterialPart::blend(scope.scalar_value(amount), a, b),
+                Ok(parts) => {
+                    let [(first, a), (second, b)] = parts.map(|name| scope.without_normals(name));
+                    if first != second {
+                        scope.tell("normal maps of one of its `materials` alone are not modelled: both have that map");
+                    }
+                    with_normals(MaterialPart::blend(scope.scalar_value(amount), a, b), first.or(second))
+                }
                 Err(_) => {
                     scope.tell("its two `materials` are not there: grey is shown");
                     MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
@@ -290,27 +298,9 @@ fn normals(scope: &mut impl MaterialScope, params: &Params) -> Option<ColorValue
         return scope.image(name);
     }
     match scope.number(params, "displacement")? {
-        Texture::Varying(TextureSource::Image {
-            file,
-            stretch,
-            repeat,
-            offset,
-            rotate,
-            wrap,
-            wrap_v,
-            tint,
-            invert,
-            ..
-        }) => {
-            let mut source = TextureSource::image(file);
-            if let TextureSource::Image { relief, encoding, .. } = &mut source {
-                (*relief, *encoding) = (Some(1.0), Encoding::Linear);
-            }
-            if let TextureSource::Image { stretch: s, repeat: r, offset: o, rotate: a, .. } = &mut source {
-                (*s, *r, *o, *a) = (stretch, repeat, offset, rotate);
-            }
-            if let TextureSource::Image { wrap: u, wrap_v: v, tint: t, invert: i, .. } = &mut source {
-                (*u, *v, *t, *i) = (wrap, wrap_v, tint, invert);
+        Texture::Varying(mut source @ TextureSource::Image { .. }) => {
+            if let TextureSource::Image { relief, .. } = &mut source {
+                *relief = Some(1.0);
             }
             Some(scope.color_value(Texture::Varying(source)))
         }
@@ -321,6 +311,14 @@ fn normals(scope: &mut impl MaterialScope, params: &Params) -> Option<ColorValue
         // The same height everywhere.
         Texture::Constant(_) => None,
     }
+}
+
+/// The same blend with a map of normals and its factor.
+pub(crate) fn with_normals(mut blend: MaterialPart, normals: Option<(ColorValue, f32)>) -> MaterialPart {
+    if let (Some(normals), MaterialPart::Blend { normal_map, normal_scale, .. }) = (normals, &mut blend) {
+        (*normal_map, *normal_scale) = normals;
+    }
+    blend
 }
 
 /// The same surface as `principled`, which has what other kinds lack; `None` if it is not the same.
@@ -335,54 +333,5 @@ pub(crate) fn with_layers(part: &MaterialPart) -> Option<MaterialPart> {
             Some(layered)
         }
         _ => None,
-    }
-}
-
-/// A surface that emits light as well.
-pub(crate) struct LightSurface {
-    pub part: MaterialPart,
-    /// Another material that `part` refers to by this name, once for each.
-    pub others: Vec<MaterialPart>,
-}
-
-/// A material that emits; what it reflects stays as far as it can.
-///
-/// - `names`: names for up to two further materials.
-pub(crate) fn emissive(
-    part: Option<&MaterialPart>,
-    radiance: ColorValue,
-    is_two_sided: bool,
-    names: [String; 2],
-) -> LightSurface {
-    let plain = |part| LightSurface { part, others: Vec::new() };
-    if is_two_sided {
-        let black = || principled(ColorValue::grey(0.0));
-        let reflects = part.and_then(with_layers);
-        let is_black = reflects.is_none();
-        let mut layered = reflects.unwrap_or_else(black);
-        if let MaterialPart::Principled { emission, specular, .. } = &mut layered {
-            *emission = radiance;
-            if is_black {
-                *specular = 0.0.into();
-            }
-        }
-        return plain(layered);
-    }
-    let emitter = |radiance| MaterialPart::Emissive { radiance };
-    match (part, &radiance) {
-        (Some(MaterialPart::Diffuse { albedo: ColorValue::Rgb(albedo) }), ColorValue::Rgb(light))
-            if *albedo != Vec3::ZERO && albedo.max_element() < 1.0 =>
-        {
-            // A share of a brighter emitter, and the rest of a brighter surface: the same emission and reflection.
-            let diffuse = albedo.max_element();
-            let weight = ScalarValue::Number(1.0 - diffuse);
-            let others = vec![
-                MaterialPart::Diffuse { albedo: ColorValue::Rgb((*albedo / diffuse).min(Vec3::ONE)) },
-                emitter(ColorValue::Rgb(*light / (1.0 - diffuse))),
-            ];
-            let [a, b] = names;
-            LightSurface { part: MaterialPart::blend(weight, a, b), others }
-        }
-        _ => plain(emitter(radiance)),
     }
 }

@@ -21,6 +21,8 @@ mod state;
 mod strands;
 mod subdivision;
 mod surfaces;
+#[cfg(test)]
+mod tests;
 mod textures;
 mod tokens;
 mod transforms;
@@ -42,6 +44,7 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
     reader.read()?;
     let (view, mut builder, mut files) = reader.finish()?;
     builder.finish_strands();
+    builder.add_missing_uvs();
     builder.check_any()?;
     builder.keep_used_materials();
     files.extend(builder.files);

@@ -6,11 +6,15 @@
 use crate::model::assemble::{Indexed, assemble};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::pbrt::params::Params;
+use crate::ply::header::Header;
+use firstlight_files::gzip::start_of_decompressed;
+use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_mesh::Mesh;
 use glam::{DVec2, DVec3, Vec2};
 use std::f64::consts::{PI, TAU};
+use std::io::Read;
 use std::path::Path;
 
 /// Segments of a full turn of a sphere, disk or cylinder.
@@ -92,6 +96,31 @@ pub(crate) fn oriented(mut mesh: Mesh, is_reversed: bool) -> Mesh {
         }
     }
     mesh
+}
+
+/// Whether a PLY file has texture coordinates, by its header; also if it has no good one.
+pub(crate) fn has_uvs(path: &Path) -> bool {
+    /// Longer headers are rare, and not read for this.
+    const MOST: u64 = 1 << 16;
+    let mut start = Vec::new();
+    let read = InputFile::open(path, FileKind::Model).map(|file| file.take(MOST).read_to_end(&mut start));
+    let header = Header::parse(&start_of_decompressed(start, MOST));
+    let (Ok(Ok(_)), Ok(header)) = (read, header) else { return true };
+    let is_u = |name: &str| matches!(name, "u" | "s" | "texture_u" | "texture_s" | "texcoord");
+    header.elements.iter().flat_map(|element| &element.properties).any(|property| is_u(&property.name))
+}
+
+/// The mesh with three vertices of its own for each triangle, and the texture coordinates that pbrt gives them: (0, 0),
+/// (1, 0) and (1, 1).
+pub(crate) fn with_own_uvs(mesh: &Mesh) -> Mesh {
+    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|&vertex| vertex as usize).collect();
+    let positions = corners.iter().map(|&corner| mesh.positions[corner]).collect();
+    let normals = corners.iter().filter_map(|&corner| mesh.normals.get(corner).copied()).collect();
+    let colors = corners.iter().filter_map(|&corner| mesh.colors.get(corner).copied()).collect();
+    let uvs = [Vec2::ZERO, Vec2::X, Vec2::ONE].into_iter().cycle().take(corners.len()).collect();
+    let triangles = (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let (uvs2, tangents) = (Vec::new(), Vec::new());
+    Mesh { positions, center: mesh.center, triangles, normals, uvs, uvs2, colors, tangents, slots: mesh.slots.clone() }
 }
 
 /// Vertices with what pbrt gives them.

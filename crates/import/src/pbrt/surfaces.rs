@@ -1,20 +1,24 @@
 //! Materials and textures of a scene: described under their names, and converted when a shape has them.
 
-use crate::model::foreign::cut;
+use crate::model::foreign::{LIGHT_SHARE, cut, tinted, told_of_long};
 use crate::pbrt::build::Builder;
-use crate::pbrt::materials::{MaterialScope, emissive, material, with_layers};
+use crate::pbrt::materials::{MaterialScope, material, principled, with_layers, with_normals};
 use crate::pbrt::params::Params;
+use crate::pbrt::shapes::{has_uvs, with_own_uvs};
+use crate::pbrt::spectrum::UnknownSpectrum;
 use crate::pbrt::state::{Described, MaterialRef, State};
-use crate::pbrt::textures::Texture;
+use crate::pbrt::textures::{Texture, unknown_spectrum};
 use firstlight_files::printable;
 use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_format::material_textures::texture_names;
-use firstlight_format::parts::MaterialPart;
-use firstlight_format::sources::TextureSource;
+use firstlight_format::parts::{MaterialPart, ObjectPart};
+use firstlight_format::sources::{MeshSource, TextureSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::{Encoding, MAX_LOBES};
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Materials inside of one another.
 const MAX_DEPTH: u32 = 8;
@@ -31,11 +35,13 @@ impl Builder<'_> {
         textures.define(cut(name), is_number, class, params, |name| self.named_file(name), |what| told.push(what));
         self.textures = textures;
         told.extend(params.complaints());
+        told.extend(told_of_long(name));
         told.into_iter().for_each(|what| self.tell(what));
     }
 
     /// Describes a material with a name.
     pub(crate) fn describe_material(&mut self, name: &str, params: Params) {
+        told_of_long(name).into_iter().for_each(|what| self.tell(what));
         let kind = params.string("type").unwrap_or("diffuse").to_owned();
         let described = self.described(cut(name), kind, params);
         self.named.insert(cut(name).to_owned(), described);
@@ -50,6 +56,12 @@ impl Builder<'_> {
     /// A medium: only one that absorbs and does not scatter is modelled, inside of glass.
     pub(crate) fn describe_medium(&mut self, name: &str, params: &Params) {
         let quantity = |name: &str| params.spectrum(name).and_then(|spectrum| spectrum.quantity().ok());
+        for coefficient in ["sigma_a", "sigma_s"] {
+            if let Some(Err(UnknownSpectrum(spectrum))) = params.spectrum(coefficient).map(|it| it.quantity()) {
+                let (name, spectrum) = (printable::name(name), printable::name(&spectrum));
+                self.tell(format!("medium `{name}`: the spectrum `{spectrum}` of `{coefficient}` is not known"));
+            }
+        }
         let scale = params.number("scale").unwrap_or(1.0);
         let is_clear = params.string("type") == Some("homogeneous")
             && quantity("sigma_s") == Some(DVec3::ZERO)
@@ -60,6 +72,7 @@ impl Builder<'_> {
         if absorption.is_none() {
             self.tell(format!("medium `{}` scatters light or emits it, which is not modelled", printable::name(name)));
         }
+        told_of_long(name).into_iter().for_each(|what| self.tell(what));
         self.media.insert(cut(name).to_owned(), absorption);
     }
 
@@ -95,34 +108,121 @@ impl Builder<'_> {
             return known.clone();
         }
         let base_name = base.clone().unwrap_or_else(|| "light".to_owned());
-        let mut part = base.and_then(|name| self.part(&name));
-        let mut others = Vec::new();
-        if let Some((radiance, is_two_sided)) = light.clone() {
-            let names = ["surface", "emitter"].map(|end| self.material_names.free(&format!("{base_name}: {end}")));
-            let surface = emissive(part.as_ref(), radiance, is_two_sided, names.clone());
-            others.extend(names.into_iter().zip(surface.others));
-            part = Some(surface.part);
-        }
-        let mut part = part?;
+        let mut part = match light {
+            Some((radiance, is_two_sided)) => self.glowing(base.as_deref(), radiance, is_two_sided, shape),
+            None => self.part(&base?)?,
+        };
         if let Some(value) = opacity {
-            part = match with_layers(&part) {
-                Some(layered) => layered,
-                None if light.is_none() => MaterialPart::blend(0.0.into(), base_name.clone(), base_name.clone()),
-                None => part,
+            part = match (with_layers(&part), &part) {
+                (Some(layered), _) => layered,
+                // Holes of a blend are its own.
+                (None, MaterialPart::Blend { .. }) => part,
+                (None, _) => {
+                    let name = self.add_free(&base_name, part);
+                    let other = self.add_free("black", MaterialPart::Diffuse { albedo: ColorValue::grey(0.0) });
+                    MaterialPart::blend(0.0.into(), name, other)
+                }
             };
             if let MaterialPart::Principled { opacity, .. } | MaterialPart::Blend { opacity, .. } = &mut part {
                 *opacity = value;
-            } else {
-                self.tell(format!("`alpha` of `{}` is not modelled with its material", printable::name(shape)));
             }
         }
         let name = self.material_names.free(&base_name);
-        for (name, part) in others {
-            self.add_material(name, part);
-        }
         self.add_material(name.clone(), part);
         self.material_of.insert(key, Some(name.clone()));
         Some(name)
+    }
+
+    /// A material that emits; what the one of the name `base` reflects stays as far as it can.
+    fn glowing(&mut self, base: Option<&str>, radiance: ColorValue, is_two_sided: bool, shape: &str) -> MaterialPart {
+        let part = base.and_then(|name| self.part(name));
+        let black = || {
+            let mut part = principled(ColorValue::grey(0.0));
+            if let MaterialPart::Principled { specular, .. } = &mut part {
+                *specular = 0.0.into();
+            }
+            part
+        };
+        let emitter = |radiance: ColorValue, surface: Option<MaterialPart>| match is_two_sided {
+            false => MaterialPart::Emissive { radiance },
+            true => {
+                let mut surface = surface.unwrap_or_else(black);
+                if let MaterialPart::Principled { emission, .. } = &mut surface {
+                    *emission = radiance;
+                }
+                surface
+            }
+        };
+        let (Some(name), Some(part)) = (base, part) else { return emitter(radiance, None) };
+        match (&part, &radiance) {
+            (MaterialPart::Diffuse { albedo: ColorValue::Rgb(Vec3::ZERO) }, _) => return emitter(radiance, None),
+            (part, _) if is_two_sided && with_layers(part).is_some() => return emitter(radiance, with_layers(part)),
+            (MaterialPart::Diffuse { albedo: ColorValue::Rgb(albedo) }, ColorValue::Rgb(light))
+                if albedo.max_element() < 1.0 =>
+            {
+                // A share of a brighter emitter, and the rest of a brighter surface: the same emission and reflection.
+                let diffuse = albedo.max_element();
+                let albedo = ColorValue::Rgb((*albedo / diffuse).min(Vec3::ONE));
+                let emitter = emitter(ColorValue::Rgb(*light / (1.0 - diffuse)), None);
+                let a = self.add_free(&format!("{name}: surface"), MaterialPart::Diffuse { albedo });
+                let b = self.add_free(&format!("{name}: emitter"), emitter);
+                return MaterialPart::blend(ScalarValue::Number(1.0 - diffuse), a, b);
+            }
+            _ => {}
+        }
+        let bright = match &radiance {
+            ColorValue::Rgb(rgb) => Some(ColorValue::Rgb(*rgb / LIGHT_SHARE)),
+            ColorValue::Texture(name) => {
+                let source = self.used_textures.iter().find(|(used, _)| used == name).map(|(_, source)| source);
+                let bright = source.and_then(|source| tinted(source, Vec3::splat(LIGHT_SHARE.recip())));
+                bright.map(|source| ColorValue::Texture(self.texture_name("light", source)))
+            }
+        };
+        let emitter_of = |radiance| emitter(radiance, None);
+        let lobes = self.lobes.get(name).copied().unwrap_or(1);
+        match bright.map(emitter_of).filter(|emitter| lobes + emitter.n_lobes() <= MAX_LOBES) {
+            Some(bright) if !self.has_textured_weight(&part) => {
+                let (normals, a) = self.without_normals(name.to_owned());
+                let b = self.add_free(&format!("{name}: emitter"), bright);
+                with_normals(MaterialPart::blend(LIGHT_SHARE.into(), a, b), normals)
+            }
+            _ => {
+                let shape = printable::name(shape);
+                self.tell(format!("`{shape}`: what a light of its material reflects is not modelled: it only emits"));
+                emitter(radiance, None)
+            }
+        }
+    }
+
+    fn has_textured_weight(&self, part: &MaterialPart) -> bool {
+        let MaterialPart::Blend { weight, a, b, .. } = part else { return false };
+        let mut parts = [a, b].into_iter().filter_map(|name| self.part(name));
+        matches!(weight, ScalarValue::Texture(_)) || parts.any(|part| self.has_textured_weight(&part))
+    }
+
+    /// The map of normals of a material with its factor, if it has one, and the name of the same without it.
+    fn without_normals(&mut self, name: String) -> (Option<(ColorValue, f32)>, String) {
+        match self.part(&name) {
+            Some(
+                MaterialPart::Principled { normal_map: map @ ColorValue::Texture(_), normal_scale, .. }
+                | MaterialPart::Blend { normal_map: map @ ColorValue::Texture(_), normal_scale, .. },
+            ) => {
+                // What has only been made a blend for its map is a plain material again.
+                let plain = match self.part(&name) {
+                    Some(MaterialPart::Blend { a, b, .. }) if a == b => a,
+                    _ => name,
+                };
+                (Some((map, normal_scale)), plain)
+            }
+            _ => (None, name),
+        }
+    }
+
+    /// Adds a material under a name that is like this one; returns its name.
+    fn add_free(&mut self, wanted: &str, part: MaterialPart) -> String {
+        let name = self.material_names.free(wanted);
+        self.add_material(name.clone(), part);
+        name
     }
 
     fn add_material(&mut self, name: String, part: MaterialPart) {
@@ -183,6 +283,31 @@ impl Builder<'_> {
         name
     }
 
+    /// Gives meshes without texture coordinates those of pbrt, where a texture of their material needs them.
+    pub(crate) fn add_missing_uvs(&mut self) {
+        let mut with_uvs: HashMap<String, bool> = HashMap::new();
+        for index in 0..self.objects.len() {
+            let ObjectPart::Mesh { source, material: Some(material), .. } = &self.objects[index] else { continue };
+            if !self.with_textures.contains(material) {
+                continue;
+            }
+            match source {
+                MeshSource::Part { shape, .. } => {
+                    let bare = self.parts.get_mut(shape).filter(|mesh| mesh.uvs.is_empty());
+                    bare.into_iter().for_each(|mesh| *mesh = Arc::new(with_own_uvs(mesh)));
+                }
+                MeshSource::Ply(file) => {
+                    let path = self.folder.join(text_to_path(file));
+                    let name = printable::name(file).into_owned();
+                    if !*with_uvs.entry(file.clone()).or_insert_with(|| has_uvs(&path)) {
+                        self.tell(format!("`{name}` has no texture coordinates: its textures are of one colour"));
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// The name of a texture, which is added on its first use.
     pub(super) fn texture_name(&mut self, wanted: &str, source: TextureSource) -> String {
         let key = format!("{source:?}");
@@ -215,6 +340,9 @@ impl Scope<'_, '_> {
             && let Some(texture) = params.texture(name)
         {
             self.tell(&format!("there is no texture `{}`", printable::name(texture)));
+        }
+        if !is_number && let Some(spectrum) = unknown_spectrum(params, name) {
+            self.tell(&spectrum);
         }
         found
     }
@@ -256,10 +384,12 @@ impl MaterialScope for Scope<'_, '_> {
         self.builder.converted(&described, Vec3::ZERO)
     }
 
+    fn without_normals(&mut self, name: String) -> (Option<(ColorValue, f32)>, String) {
+        self.builder.without_normals(name)
+    }
+
     fn add(&mut self, part: MaterialPart) -> String {
-        let name = self.builder.material_names.free(&self.name);
-        self.builder.add_material(name.clone(), part);
-        name
+        self.builder.add_free(&self.name.clone(), part)
     }
 
     fn tell(&mut self, what: &str) {

@@ -1,6 +1,8 @@
 //! Textures: what of pbrt's graph of textures is one colour, one image or one checkerboard with factors.
 
+use crate::model::foreign::tinted;
 use crate::pbrt::params::Params;
+use crate::pbrt::spectrum::UnknownSpectrum;
 use firstlight_files::printable;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::Rgb;
@@ -62,6 +64,9 @@ impl Textures {
         let part = |name: &str, default: f32| {
             self.parameter(is_number, params, name).unwrap_or(Texture::Constant(Vec3::splat(default)))
         };
+        for name in ["value", "tex", "scale", "tex1", "tex2"] {
+            unknown_spectrum(params, name).filter(|_| !is_number).into_iter().for_each(&mut tell);
+        }
         match class {
             "constant" => part("value", 1.0),
             "scale" => {
@@ -160,6 +165,13 @@ impl Textures {
     }
 }
 
+/// That a spectrum is not known, by which the default is used.
+pub(crate) fn unknown_spectrum(params: &Params, name: &str) -> Option<String> {
+    let UnknownSpectrum(spectrum) = params.spectrum(name)?.albedo().err()?;
+    let spectrum = printable::name(&spectrum).into_owned();
+    Some(format!("the spectrum `{spectrum}` of `{}` is not known: the default is used", printable::name(name)))
+}
+
 /// Factors of u and v and what is added to them; `None` for other mappings. Factors of 0 have no pattern.
 fn mapping(params: &Params) -> Option<(DVec2, DVec2)> {
     if !matches!(params.string("mapping"), None | Some("uv")) {
@@ -176,15 +188,7 @@ fn product(a: &Texture, b: &Texture) -> Option<Texture> {
     match (a, b) {
         (Texture::Constant(a), Texture::Constant(b)) => Some(Texture::Constant(*a * *b)),
         (Texture::Constant(factor), Texture::Varying(source))
-        | (Texture::Varying(source), Texture::Constant(factor)) => {
-            let mut source = source.clone();
-            match &mut source {
-                TextureSource::Checker { a, b, .. } => (a.0, b.0) = (a.0 * *factor, b.0 * *factor),
-                TextureSource::Image { tint, invert: false, .. } => tint.0 *= *factor,
-                _ => return None,
-            }
-            Some(Texture::Varying(source))
-        }
+        | (Texture::Varying(source), Texture::Constant(factor)) => tinted(source, *factor).map(Texture::Varying),
         _ => None,
     }
 }

@@ -1,0 +1,248 @@
+//! What the importer shows, or tells, where Mitsuba's rules differ from ours.
+
+use crate::mitsuba::read_scene;
+use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
+use crate::model::projection::LightImages;
+use firstlight_format::parts::MaterialPart;
+use firstlight_format::scene_file::SceneFile;
+use firstlight_format::sources::{EnvironmentSource, TextureSource};
+use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
+use firstlight_render::{Channel, Encoding, Material};
+use glam::Vec3;
+use std::fmt::Write;
+
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+/// The scene of these elements, with images and meshes beside it; a scene file can say it.
+fn read(version: &str, body: &str) -> ForeignScene {
+    let folder = tempfile::tempdir().unwrap();
+    let save = |name: &str, color: [u8; 4]| {
+        image::RgbaImage::from_pixel(2, 2, image::Rgba(color)).save(folder.path().join(name)).unwrap();
+    };
+    save("red.png", [255, 0, 0, 255]);
+    save("grey.png", [100, 100, 100, 255]);
+    save("n.png", [128, 128, 255, 255]);
+    save("m.png", [100, 128, 250, 255]);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("bare.ply", PLY);
+    let normals = "property float nx\nproperty float ny\nproperty float nz\nelement face";
+    write("full.ply", &PLY.replace("element face", normals).replace(" 0\n", " 0 0 0 1\n"));
+    write("cut.ply", &PLY.replace("face 1", "face 2"));
+    write("bare.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("nan.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 nan 0\nf 1 2 3\nf 1 2 4\n");
+    let path = folder.path().join("a.xml");
+    std::fs::write(&path, format!("<scene version=\"{version}\">\n{body}\n</scene>\n")).unwrap();
+    let light_images = LightImages::new(|_| None);
+    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+    let scene = read_scene(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+    SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));
+    scene
+}
+
+/// What is told of a scene, without the lack of a camera.
+fn told(scene: &ForeignScene) -> Vec<String> {
+    scene.warnings.iter().map(|it| it.to_string()).filter(|it| !it.contains("has no sensor")).collect()
+}
+
+/// Whether exactly one thing is told, which has these words.
+fn tells_only(scene: &ForeignScene, words: &[&str]) {
+    let told = told(scene);
+    assert!(told.len() == 1 && words.iter().all(|word| told[0].contains(word)), "{told:#?}");
+}
+
+fn named<'a>(scene: &'a ForeignScene, name: &str) -> &'a MaterialPart {
+    scene.file.materials.get(name).unwrap()
+}
+
+/// The material of an object.
+fn part(scene: &ForeignScene, object: usize) -> &MaterialPart {
+    named(scene, scene.file.objects[object].material().unwrap())
+}
+
+/// A rectangle with this surface.
+fn surface(inside: &str) -> ForeignScene {
+    read("3.0.0", &format!("<shape type=\"rectangle\">{inside}</shape>"))
+}
+
+fn image(name: &str, file: &str, more: &str) -> String {
+    format!("<texture type=\"bitmap\" name=\"{name}\"><string name=\"filename\" value=\"{file}\"/>{more}</texture>")
+}
+
+fn normal_map(file: &str, inside: &str) -> String {
+    format!(
+        "<bsdf type=\"normalmap\">{}{inside}</bsdf>",
+        image("normalmap", file, "<boolean name=\"raw\" value=\"true\"/>")
+    )
+}
+
+const DIFFUSE: &str = "<bsdf type=\"diffuse\"/>";
+
+#[test]
+fn a_colour_image_as_a_number_is_its_green_channel_and_told() {
+    let channel = |scene: &ForeignScene| match scene.file.textures.0.values().next() {
+        Some(TextureSource::Image { channel, .. }) => *channel,
+        other => panic!("{other:?}"),
+    };
+    let masked = |file: &str| surface(&format!("<bsdf type=\"mask\">{}{DIFFUSE}</bsdf>", image("opacity", file, "")));
+    let coloured = masked("red.png");
+    tells_only(&coloured, &["`bitmap`", "luminance"]);
+    assert_eq!(channel(&coloured), Some(Channel::G));
+    let grey = masked("grey.png");
+    assert_eq!((channel(&grey), told(&grey)), (None, Vec::new()));
+    // As a colour, it is one.
+    let colour = surface(&format!("<bsdf type=\"diffuse\">{}</bsdf>", image("reflectance", "red.png", "")));
+    assert_eq!((channel(&colour), told(&colour)), (None, Vec::new()));
+    let relief = image("heights", "red.png", "");
+    let bumpy = surface(&format!("<bsdf type=\"bumpmap\">{relief}{DIFFUSE}</bsdf>"));
+    tells_only(&bumpy, &["luminance"]);
+    let is_green = |it: &TextureSource| matches!(it, TextureSource::Image { channel: Some(Channel::G), .. });
+    assert!(bumpy.file.textures.0.values().all(is_green));
+}
+
+#[test]
+fn gamma_and_channel_of_old_images_count() {
+    let read_as = |more: &str| {
+        let image = image("opacity", "red.png", more);
+        let scene =
+            read("0.6.0", &format!("<shape type=\"sphere\"><bsdf type=\"mask\">{image}{DIFFUSE}</bsdf></shape>"));
+        match scene.file.textures.0.values().next() {
+            Some(&TextureSource::Image { channel, encoding, .. }) => (channel, encoding, told(&scene).len()),
+            other => panic!("{other:?}"),
+        }
+    };
+    let gamma =
+        |value: &str| format!("<float name=\"gamma\" value=\"{value}\"/><string name=\"channel\" value=\"a\"/>");
+    assert_eq!(read_as(&gamma("1.0")), (Some(Channel::A), Encoding::Linear, 0));
+    assert_eq!(read_as(&gamma("-1")), (Some(Channel::A), Encoding::Auto, 0));
+    assert_eq!(read_as(&gamma("2.2")), (Some(Channel::A), Encoding::Auto, 1));
+    assert_eq!(read_as("<string name=\"channel\" value=\"x\"/>").2, 2);
+}
+
+#[test]
+fn the_back_of_a_twosided_light_reflects() {
+    let light = "<emitter type=\"area\"><rgb name=\"radiance\" value=\"2\"/></emitter>";
+    let scene = surface(&format!("<bsdf type=\"twosided\">{DIFFUSE}</bsdf>{light}"));
+    let Material::Blend { a, b, by_side: true, .. } = part(&scene, 0) else { panic!("{:?}", part(&scene, 0)) };
+    let Material::Principled { emission, .. } = named(&scene, a) else { panic!("{:?}", named(&scene, a)) };
+    assert_eq!((emission, told(&scene)), (&ColorValue::grey(2.0), Vec::new()));
+    assert_eq!(named(&scene, b), &Material::Diffuse { albedo: ColorValue::grey(0.5) });
+    // What `principled` cannot say is a share of a brighter light.
+    let scene = surface(&format!("<bsdf type=\"twosided\"><bsdf type=\"plastic\"/></bsdf>{light}"));
+    let Material::Blend { weight, a, b, by_side: false, .. } = part(&scene, 0) else { panic!("{:?}", part(&scene, 0)) };
+    assert!(matches!(named(&scene, a), Material::Plastic { .. }) && told(&scene).is_empty());
+    assert_eq!(*weight, ScalarValue::Number(LIGHT_SHARE));
+    assert_eq!(named(&scene, b), &Material::Emissive { radiance: ColorValue::grey(2.0 / LIGHT_SHARE) });
+}
+
+#[test]
+fn maps_of_normals_that_cannot_be_shown_are_told() {
+    let map_of = |scene: &ForeignScene| match part(scene, 0) {
+        Material::Blend { normal_map: ColorValue::Texture(name), .. } => match scene.file.textures.get(name) {
+            Some(TextureSource::Image { file, .. }) => file.clone(),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    let (n, m) = (normal_map("n.png", DIFFUSE), normal_map("m.png", DIFFUSE));
+    let scene = surface(&format!("<bsdf type=\"twosided\">{n}{m}</bsdf>"));
+    tells_only(&scene, &["`twosided`", "differ between two sides"]);
+    assert_eq!(map_of(&scene), "n.png");
+    let scene = surface(&format!("<bsdf type=\"twosided\">{}</bsdf>", normal_map("m.png", &n)));
+    tells_only(&scene, &["`normalmap`", "in another one"]);
+    assert_eq!(map_of(&scene), "m.png");
+    // Two parts with one map.
+    let named = |body: &str| {
+        read("3.0.0", &format!("{}{body}", image("map", "n.png", "").replace(" name=\"map\"", " id=\"map\"")))
+    };
+    let by_name =
+        |inside: &str| format!("<bsdf type=\"normalmap\"><ref name=\"normalmap\" id=\"map\"/>{inside}</bsdf>");
+    let (a, b) = (by_name(DIFFUSE), by_name("<bsdf type=\"plastic\"/>"));
+    let scene = named(&format!("<shape type=\"sphere\"><bsdf type=\"blendbsdf\">{a}{b}</bsdf></shape>"));
+    assert_eq!((map_of(&scene), told(&scene)), ("n.png".to_owned(), Vec::new()));
+}
+
+#[test]
+fn masks_multiply_and_show_the_black_back_of_closed_shapes() {
+    let mask = |opacity: &str, inside: &str| format!("<bsdf type=\"mask\">{opacity}{inside}</bsdf>");
+    let half = "<float name=\"opacity\" value=\"0.5\"/>";
+    let shapes = |bsdf: &str| format!("<shape type=\"sphere\">{bsdf}</shape><shape type=\"cube\">{bsdf}</shape>");
+    let scene = read("3.0.0", &shapes(&mask(half, &mask(half, DIFFUSE))));
+    for object in 0..2 {
+        let Material::Blend { opacity, b, by_side: true, .. } = part(&scene, object) else { panic!() };
+        assert_eq!(*opacity, ScalarValue::Number(0.25));
+        assert_eq!(named(&scene, b), &Material::Diffuse { albedo: ColorValue::grey(0.0) });
+    }
+    let textured = image("opacity", "grey.png", "");
+    let scene = surface(&mask(half, &mask(&textured, DIFFUSE)));
+    let Material::Blend { opacity: ScalarValue::Texture(name), .. } = part(&scene, 0) else { panic!() };
+    let Some(TextureSource::Image { tint, .. }) = scene.file.textures.get(name) else { panic!() };
+    assert_eq!((*tint, told(&scene)), (Rgb(Vec3::splat(0.5)), Vec::new()));
+    tells_only(&surface(&mask(&textured, &mask(&textured, DIFFUSE))), &["`mask`", "in another one"]);
+}
+
+#[test]
+fn a_mirrored_mesh_without_normals_is_turned_inside_out() {
+    let fronts = |plugin: &str, file: &str, more: &str| {
+        let shape = |x: &str| {
+            format!(
+                "<shape type=\"{plugin}\"><string name=\"filename\" value=\"{file}\"/>{more}\
+                 <transform name=\"to_world\"><scale x=\"{x}\"/></transform></shape>"
+            )
+        };
+        let scene = read("3.0.0", &(shape("1") + &shape("-1")));
+        let mut shapes: Vec<u32> = scene.parts.keys().copied().collect();
+        shapes.sort_unstable();
+        shapes.iter().map(|shape| scene.parts[shape].doubled_area_normal(0).z.signum()).collect::<Vec<f64>>()
+    };
+    assert_eq!(fronts("ply", "bare.ply", ""), [1.0, -1.0]);
+    assert_eq!(fronts("obj", "bare.obj", ""), [1.0, -1.0]);
+    // Its normals say where the front is: one mesh.
+    assert_eq!(fronts("ply", "full.ply", ""), [1.0]);
+    assert_eq!(fronts("ply", "full.ply", "<boolean name=\"face_normals\" value=\"true\"/>"), [1.0, -1.0]);
+    assert_eq!(fronts("cube", "bare.ply", "").len(), 1);
+}
+
+#[test]
+fn broken_meshes_are_told() {
+    for (plugin, file, word) in
+        [("ply", "cut.ply", "what comes before is shown"), ("obj", "nan.obj", "not three finite")]
+    {
+        let shape = format!("<shape type=\"{plugin}\"><string name=\"filename\" value=\"{file}\"/></shape>");
+        let scene = read("3.0.0", &shape);
+        tells_only(&scene, &[file, word]);
+        assert_eq!(scene.parts.len(), 1);
+    }
+}
+
+#[test]
+fn a_blend_of_many_lobes_opens_on_an_open_shape() {
+    let mut blend = DIFFUSE.to_owned();
+    for weight in 0..7 {
+        let mut outer = format!("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.{weight}\"/>");
+        write!(outer, "{DIFFUSE}{blend}</bsdf>").unwrap();
+        blend = outer;
+    }
+    tells_only(&surface(&blend), &["the black back of `blendbsdf", "8 lobes"]);
+}
+
+#[test]
+fn a_rough_conductor_without_a_material_reflects_everything() {
+    let Material::Blend { a, .. } = part(&surface("<bsdf type=\"roughconductor\"/>"), 0).clone() else { panic!() };
+    let scene = surface("<bsdf type=\"roughconductor\"/>");
+    let Material::Conductor { eta, k, .. } = named(&scene, &a) else { panic!() };
+    assert_eq!((eta.0, k.0), (Vec3::ZERO, Vec3::ONE));
+}
+
+#[test]
+fn old_black_bodies_open_and_environments_and_turbidities_are_told() {
+    let body = "<emitter type=\"constant\"><blackbody name=\"radiance\" temperature=\"3000K\"/></emitter><shape type=\"sphere\"/>";
+    let scene = read("0.6.0", body);
+    let EnvironmentSource::Constant(Rgb(light)) = scene.file.environment else { panic!() };
+    assert!(light.x > light.y && light.y > light.z && told(&scene).is_empty(), "{light}");
+    let twice =
+        read("3.0.0", "<emitter type=\"constant\"/><emitter type=\"constant\" id=\"b\"/><shape type=\"sphere\"/>");
+    tells_only(&twice, &["`b`", "second environment"]);
+    let hazy = "<emitter type=\"sunsky\"><float name=\"turbidity\" value=\"20\"/></emitter><shape type=\"sphere\"/>";
+    tells_only(&read("3.0.0", hazy), &["`sunsky`", "turbidity"]);
+}

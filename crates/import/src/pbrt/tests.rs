@@ -1,0 +1,203 @@
+//! What the importer shows, or tells, where pbrt's rules differ from ours.
+
+use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
+use crate::model::projection::LightImages;
+use firstlight_format::parts::MaterialPart;
+use firstlight_format::scene_file::SceneFile;
+use firstlight_format::sources::TextureSource;
+use firstlight_format::value::{ColorValue, ScalarValue};
+use firstlight_render::Encoding;
+use glam::Vec2;
+use std::fmt::Write;
+
+const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
+const TRIANGLES: &str =
+    "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] \"integer indices\" [0 1 2 0 2 3]\n";
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+/// The scene of this world, with images and meshes beside it; a scene file can say it.
+fn read(world: &str) -> ForeignScene {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["n.png", "m.png"] {
+        image::RgbImage::from_pixel(2, 2, image::Rgb([128, 128, 255])).save(folder.path().join(name)).unwrap();
+    }
+    std::fs::write(folder.path().join("bare.ply"), PLY).unwrap();
+    let path = folder.path().join("a.pbrt");
+    std::fs::write(&path, format!("WorldBegin\n{world}")).unwrap();
+    let light_images = LightImages::new(|_| None);
+    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+    let scene = super::read(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+    SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));
+    scene
+}
+
+fn told(scene: &ForeignScene) -> Vec<String> {
+    scene.warnings.iter().map(|it| it.to_string()).collect()
+}
+
+/// Whether exactly one thing is told, which has these words.
+fn tells_only(scene: &ForeignScene, words: &[&str]) {
+    let told = told(scene);
+    assert!(told.len() == 1 && words.iter().all(|word| told[0].contains(word)), "{told:#?}");
+}
+
+fn named<'a>(scene: &'a ForeignScene, name: &str) -> &'a MaterialPart {
+    scene.file.materials.get(name).unwrap()
+}
+
+/// The material of the first object.
+fn part(scene: &ForeignScene) -> &MaterialPart {
+    named(scene, scene.file.objects[0].material().unwrap())
+}
+
+#[test]
+fn a_mixture_has_the_normal_map_of_its_parts() {
+    let mixed = |a: &str, b: &str| {
+        read(&format!(
+            "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" {a}\n\
+             MakeNamedMaterial \"b\" \"string type\" \"coateddiffuse\" {b}\n\
+             Material \"mix\" \"string materials\" [\"a\" \"b\"]\n{SQUARE}"
+        ))
+    };
+    let (n, m) = ("\"string normalmap\" \"n.png\"", "\"string normalmap\" \"m.png\"");
+    let scene = mixed(n, n);
+    let MaterialPart::Blend { a, b, normal_map, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!((normal_map, told(&scene)), (&ColorValue::Texture("n".to_owned()), Vec::new()));
+    // Without a blend of its own, which only the map needed.
+    assert!(matches!(named(&scene, a), MaterialPart::Diffuse { .. }));
+    assert!(matches!(named(&scene, b), MaterialPart::Plastic { .. }));
+    for (scene, name) in [(mixed(n, m), "n"), (mixed("", m), "m")] {
+        tells_only(&scene, &["material `mix`", "normal maps"]);
+        let MaterialPart::Blend { normal_map, .. } = part(&scene) else { panic!() };
+        assert_eq!(*normal_map, ColorValue::Texture(name.to_owned()));
+    }
+}
+
+#[test]
+fn spectra_that_are_not_known_are_told() {
+    let unknown = |name: &str| format!("\"spectrum {name}\" \"foo.spd\"");
+    for (world, name) in [
+        (format!("Material \"diffuse\" {}\n", unknown("reflectance")), "material `diffuse`"),
+        (format!("Material \"diffusetransmission\" {}\n", unknown("transmittance")), "`transmittance`"),
+        (
+            format!(
+                "Texture \"t\" \"spectrum\" \"checkerboard\" {}\nMaterial \"diffuse\" \"texture reflectance\" \"t\"\n",
+                unknown("tex1")
+            ),
+            "texture `t`",
+        ),
+        (
+            format!(
+                "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb sigma_s\" [0 0 0] {}\n",
+                unknown("sigma_a")
+            ),
+            "medium `m`",
+        ),
+    ] {
+        tells_only(&read(&format!("{world}{SQUARE}")), &[name, "the spectrum `foo.spd`", "not known"]);
+    }
+}
+
+#[test]
+fn heights_have_the_encoding_of_their_image() {
+    let encoding = |given: &str| {
+        let scene = read(&format!(
+            "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"n.png\" {given}\n\
+             Material \"diffuse\" \"texture displacement\" \"t\"\n{SQUARE}"
+        ));
+        let relief = scene.file.textures.0.values().find_map(|source| match source {
+            TextureSource::Image { relief: Some(_), encoding, .. } => Some(*encoding),
+            _ => None,
+        });
+        relief.unwrap()
+    };
+    assert_eq!(encoding("\"string encoding\" \"linear\""), Encoding::Linear);
+    assert_eq!(encoding(""), Encoding::Auto);
+}
+
+#[test]
+fn a_light_reflects_like_its_material() {
+    let light = |sides: &str, rest: &str| {
+        read(&format!("AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] \"bool twosided\" {sides}\n{rest}{SQUARE}"))
+    };
+    let image = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"n.png\"\n";
+    let textured = format!("{image}Material \"diffuse\" \"texture reflectance\" \"t\"\n");
+    for rest in ["Material \"conductor\"\n", "Material \"coateddiffuse\"\n", &textured] {
+        let scene = light("false", rest);
+        let MaterialPart::Blend { weight, a, b, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+        assert_eq!((weight, told(&scene)), (&ScalarValue::Number(LIGHT_SHARE), Vec::new()));
+        assert_ne!(named(&scene, a), named(&scene, b));
+        let bright = ColorValue::grey(2.0 / LIGHT_SHARE);
+        assert_eq!(named(&scene, b), &MaterialPart::Emissive { radiance: bright });
+    }
+    let scene = light("true", "Material \"conductor\"\n");
+    let MaterialPart::Blend { b, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    let MaterialPart::Principled { emission, two_sided: true, .. } = named(&scene, b) else { panic!() };
+    assert_eq!(*emission, ColorValue::grey(2.0 / LIGHT_SHARE));
+    // An emissive part allows no texture of weights.
+    let mixed = "Texture \"w\" \"float\" \"imagemap\" \"string filename\" \"n.png\"\n\
+        MakeNamedMaterial \"a\" \"string type\" \"conductor\"\nMaterial \"mix\" \"string materials\" [\"a\" \"a\"] \
+        \"texture amount\" \"w\"\n";
+    tells_only(&light("false", mixed), &["`bilinearmesh 1`", "it only emits"]);
+}
+
+#[test]
+fn curves_have_their_alpha() {
+    let curve = |alpha: &str| {
+        read(&format!("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float width\" 0.1 {alpha}\n"))
+    };
+    let scene = curve("\"float alpha\" 0.25");
+    let MaterialPart::Principled { opacity, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!(*opacity, ScalarValue::Number(0.25));
+    assert!(matches!(part(&curve("")), MaterialPart::Diffuse { .. }));
+}
+
+#[test]
+fn triangles_without_texture_coordinates_have_those_of_pbrt() {
+    let image = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"n.png\"\n\
+        Material \"diffuse\" \"texture reflectance\" \"t\"\n";
+    let scene = read(&format!("{image}{TRIANGLES}"));
+    let mesh = &scene.parts[&0];
+    let corners: Vec<Vec2> = mesh.triangles.iter().flatten().map(|&vertex| mesh.uvs[vertex as usize]).collect();
+    assert_eq!(corners, [Vec2::ZERO, Vec2::X, Vec2::ONE].repeat(2));
+    assert_eq!(told(&scene), Vec::<String>::new());
+    // Without a texture its vertices stay shared.
+    assert_eq!(read(TRIANGLES).parts[&0].positions.len(), 4);
+    let ply = "Shape \"plymesh\" \"string filename\" \"bare.ply\"\n";
+    tells_only(&read(&format!("{image}{ply}{ply}")), &["`bare.ply`", "no texture coordinates"]);
+    assert!(told(&read(ply)).is_empty());
+}
+
+#[test]
+fn long_names_are_told() {
+    let name = "n".repeat(256);
+    let world = |name: &str| {
+        format!("MakeNamedMaterial \"{name}\" \"string type\" \"diffuse\"\nNamedMaterial \"{name}\"\n{SQUARE}")
+    };
+    assert!(told(&read(&world(&name))).is_empty());
+    tells_only(&read(&world(&format!("{name}a"))), &["first 256 characters", "`nnn"]);
+}
+
+#[test]
+fn a_mixture_of_five_has_holes() {
+    let mut world = String::new();
+    for i in 0..5 {
+        writeln!(world, "MakeNamedMaterial \"m{i}\" \"string type\" \"diffuse\" \"rgb reflectance\" [0.{i} 0 0]")
+            .unwrap();
+    }
+    let mut last = "m0".to_owned();
+    for i in 1..5 {
+        writeln!(
+            world,
+            "MakeNamedMaterial \"x{i}\" \"string type\" \"mix\" \"string materials\" [\"{last}\" \"m{i}\"]"
+        )
+        .unwrap();
+        last = format!("x{i}");
+    }
+    let scene =
+        read(&format!("{world}NamedMaterial \"x4\"\n{}", SQUARE.replace("\"point3", "\"float alpha\" 0.5 \"point3")));
+    let MaterialPart::Blend { opacity, a, b, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!((opacity, told(&scene)), (&ScalarValue::Number(0.5), Vec::new()));
+    assert_ne!(a, b);
+}
