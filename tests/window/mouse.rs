@@ -146,12 +146,11 @@ fn files_and_scenes_are_opened_by_mouse_where_the_desktop_has_no_dialog() {
     let other = (230, HEIGHT - 476);
     open_menu(&program);
     open(&program, 1, (60, HEIGHT - 476), other);
-    click(&program, 1, (260, HEIGHT - 476));
+    choose(&program, (260, HEIGHT - 476), MENU);
     title_is(&program, "room.ron");
-    until("the menu to close", || (!is_dark(&program, MENU)).then_some(()));
     open_menu(&program);
     open(&program, 1, (60, HEIGHT - 455), (230, HEIGHT - 455));
-    click(&program, 1, (300, HEIGHT - 428));
+    choose(&program, (300, HEIGHT - 428), MENU);
     title_is(&program, "cornell");
     program.key("ctrl+q");
     assert!(program.ended().success());
@@ -269,8 +268,9 @@ fn what_is_copied_and_saved_is_there_for_other_programs() {
     program.key("k");
     until("the image", || folder.join("room-0001.png").is_file().then_some(()));
     std::thread::sleep(Duration::from_millis(500));
+    let list = (450, 400);
     program.key("slash");
-    std::thread::sleep(Duration::from_millis(500));
+    until("the list of commands", || is_dark(&program, list).then_some(()));
     program.type_text("Show what was saved");
     program.key("Return");
     let asked = until("the folder to be shown", || std::fs::read_to_string(folder.join("asked")).ok());
