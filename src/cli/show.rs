@@ -9,7 +9,6 @@ use crate::cli::render;
 use crate::cli::render_args::{RenderArgs, free_name};
 use crate::cli::stop::Stop;
 use clap::Args;
-use firstlight::cluster::pack::Opening;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
 use firstlight::scene::ImageSamples;
@@ -96,15 +95,15 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     if !folder.is_dir() {
         return Err(Failure::Problems(vec![format!("{}: there is no such folder for --save-to", folder.display())]));
     }
-    let Opening { up, choice } = args.scene.opening()?;
+    let opening = args.scene.opening()?;
     let options = ViewerOptions {
         source,
         width,
         height,
         threads,
         seed: args.seed.unwrap_or(0),
-        up,
-        choice,
+        up: opening.up,
+        choice: opening.choice,
         environment: args.scene.environment()?,
         folder,
         record: args.record.clone(),
