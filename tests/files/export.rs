@@ -381,3 +381,165 @@ fn materials_and_textures_keep_apart_whose_names_are_written_alike() {
         }
     }
 }
+
+/// A view that a sphere fills, at all angles, in uniform light.
+fn furnace(material: &str) -> String {
+    format!(
+        r#"(camera: (eye: (0, 0, 1.4), look_at: (0, 0, 0), vfov: 65), film: (width: 64, height: 48), max_depth: 2,
+            environment: constant(1), textures: {{ "t": image(file: "t.png") }}, materials: {{ "m": {material} }},
+            objects: [ sphere(center: (0, 0, 0), radius: 1, material: "m") ])"#
+    )
+}
+
+/// Their coat loses light in both formats, and the metal does: as much as two thirds.
+#[test]
+fn layered_surfaces_are_as_bright_as_they_were() {
+    let folder = tempfile::tempdir().unwrap();
+    let white = |x: u32, y: u32| image::Rgb([255 * (x / 64 % 2) as u8, 255 * (y / 64 % 2) as u8, 128]);
+    image::RgbImage::from_fn(512, 256, white).save(folder.path().join("t.png")).unwrap();
+    let mut surfaces = Vec::new();
+    for roughness in [0.15, 0.35, 0.6, 1.0] {
+        for base in ["(0.6, 0.3, 0.05)", "0.95", "\"t\""] {
+            surfaces.push((0, format!("principled(base_color: {base}, roughness: {roughness})")));
+        }
+        surfaces.push((1, format!("principled(base_color: (0.6, 0.3, 0.2), roughness: {roughness}, metallic: 1)")));
+        surfaces.push((
+            1,
+            format!("metal(reflectance: (0.5, 0.3, 0.2), alpha: {roughness}, fresnel: schlick, compensate: true)"),
+        ));
+    }
+    surfaces.push((0, "principled(base_color: 0.5, roughness: 0.8, specular: 0.3, ior: 1.8)".into()));
+    for (is_metal, surface) in surfaces {
+        let from = written(folder.path(), &furnace(&surface));
+        let (mut world, scene) = open(from.clone());
+        let wanted = quarters(&mut world, &scene).iter().sum::<Vec3>();
+        for format in SceneFormat::ALL {
+            // The reader returns what metals of Mitsuba lose.
+            if format == SceneFormat::Mitsuba && is_metal == 1 {
+                continue;
+            }
+            let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
+            let ratio = quarters(&mut world, &scene).iter().sum::<Vec3>() / wanted;
+            assert!(told.is_empty(), "{told:?}");
+            // It cuts texels above 1, too.
+            let most = match format {
+                SceneFormat::Mitsuba if surface.contains("\"t\"") => 0.1,
+                SceneFormat::Mitsuba => 0.08,
+                SceneFormat::Pbrt => 0.03,
+            };
+            assert!((ratio - 1.0).abs().max_element() < most, "{format:?}, {surface}: {ratio}");
+        }
+    }
+}
+
+/// A quad whose texture is placed in some way, seen from the front.
+fn placed_texture(texture: &str, material: &str) -> String {
+    format!(
+        r#"(camera: (eye: (0, 0, 4), look_at: (0, 0, 0), vfov: 26), film: (width: 64, height: 48), max_depth: 2,
+            environment: constant(0.1), textures: {{ "t": {texture} }},
+            materials: {{ "grey": diffuse(albedo: 0.7), "m": {material} }},
+            lights: [ directional(direction: (1, -2, -1.5), irradiance: (2, 3, 4)) ],
+            objects: [ quad(corner: (-1, -1, 0), edge_u: (2, 0, 0), edge_v: (0, 2, 0), material: "m") ])"#
+    )
+}
+
+/// pbrt places neither the image of a light nor a normal map: what a quad shows of them is an image.
+#[test]
+fn images_of_lights_and_normals_stay_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let colors = image::RgbImage::from_fn(4, 4, |x, y| image::Rgb([60 * x as u8 + 40, 60 * y as u8 + 40, 200]));
+    colors.save(folder.path().join("t.png")).unwrap();
+    for texture in [
+        "checker(a: (0.9, 0.4, 0.6), b: (0.3, 0.5, 0.9), squares: (1, 2), offset: (0.25, 0))",
+        r#"image(file: "t.png", repeat: (1.5, 0.5), offset: (0.3, 0.1))"#,
+        r#"image(file: "t.png", rotate: 90, tint: 0.9)"#,
+        r#"image(file: "t.png", encoding: linear, repeat: (2, 2), wrap: clamp)"#,
+    ] {
+        for material in [r#"emissive(radiance: "t")"#, r#"blend(weight: 0, a: "grey", b: "grey", normal_map: "t")"#] {
+            let from = written(folder.path(), &placed_texture(texture, material));
+            let (mut world, scene) = open(from.clone());
+            let wanted = quarters(&mut world, &scene);
+            let (mut world, scene, told) = there_and_back(from, SceneFormat::Pbrt, folder.path());
+            for (k, (wanted, found)) in wanted.iter().zip(&quarters(&mut world, &scene)).enumerate() {
+                let ratio = *found / *wanted;
+                let of = format!("{texture}, {material}, quarter {k}");
+                assert!((ratio - 1.0).abs().max_element() < 0.03, "{of}: {ratio}, told {told:?}");
+            }
+        }
+    }
+}
+
+/// Mitsuba's second tangent is that of a texture that is not mirrored.
+#[test]
+fn normal_maps_of_mirrored_meshes_stay_upright() {
+    let folder = tempfile::tempdir().unwrap();
+    let slanted = image::RgbImage::from_pixel(4, 4, image::Rgb([128, 215, 215]));
+    slanted.save(folder.path().join("n.png")).unwrap();
+    std::fs::write(
+        folder.path().join("s.obj"),
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n",
+    )
+    .unwrap();
+    let texture = r#"image(file: "n.png", encoding: linear)"#;
+    let scene = placed_texture(texture, r#"blend(weight: 0, a: "grey", b: "grey", normal_map: "t")"#);
+    let quad = r#"quad(corner: (-1, -1, 0), edge_u: (2, 0, 0), edge_v: (0, 2, 0), material: "m")"#;
+    let mesh = r#"mesh(source: obj("s.obj"), material: "m", transform: (scale: (-1, 1, 1)))"#;
+    assert!(scene.contains(quad));
+    let from = written(folder.path(), &scene.replace(quad, mesh));
+    let (mut world, scene) = open(from.clone());
+    let wanted = quarters(&mut world, &scene)[0];
+    for format in SceneFormat::ALL {
+        let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
+        let ratio = quarters(&mut world, &scene)[0] / wanted;
+        assert!((ratio - 1.0).abs().max_element() < 0.03, "{format:?}: {ratio}, told {told:?}");
+    }
+}
+
+#[test]
+fn scenes_that_cannot_be_opened_again_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for (n, is_told) in [(10, false), (110, true)] {
+        let text = format!(
+            "(camera: (eye: (0, 0, 900), look_at: (0, 0, 0)), materials: {{ \"w\": diffuse(albedo: 0.6) }}, objects: [
+              ball_grid(first: (0, 0, 0), steps: [({n}, (1, 0, 0)), (100, (0, 1, 0)), (100, (0, 0, 1))], radius: 0.3,
+                        material: \"w\") ])"
+        );
+        let (mut world, scene) = open(written(folder.path(), &text));
+        let whole = whole_scene(&mut world, &scene);
+        let exported = export(&whole, SceneFormat::Mitsuba, &folder.path().join("g.xml"), true).unwrap();
+        assert_eq!(exported.warnings.iter().any(|told| told.contains("firstlight opens 4194304")), is_told);
+    }
+}
+
+/// A hidden folder would not be read again, nor one that lies elsewhere.
+#[test]
+fn folders_lie_beside_their_scenes_where_they_can_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("deep")).unwrap();
+    let (mut world, scene) = open(written(
+        folder.path(),
+        r#"(camera: (eye: (0, 0, 3), look_at: (0, 0, 0)), materials: { "m": diffuse(albedo: 0.5) },
+            objects: [ mesh(source: builtin("cube"), material: "m") ])"#,
+    ));
+    let whole = whole_scene(&mut world, &scene);
+    let is_whole = |path: std::path::PathBuf| {
+        !open(SceneSource::Foreign(path)).1.warnings.iter().any(|told| told.contains("left out"))
+    };
+    for format in SceneFormat::ALL {
+        let extension = format.file_extension();
+        let [hidden, link, target] =
+            [".x", "link", "deep/scene"].map(|name| folder.path().join(format!("{name}.{extension}")));
+        let exported = export(&whole, format, &hidden, false).unwrap();
+        assert_eq!(exported.folder, Some(folder.path().canonicalize().unwrap().join(format!("x-{extension}"))));
+        assert!(is_whole(hidden));
+        #[cfg(unix)]
+        {
+            std::fs::write(&target, "").unwrap();
+            std::os::unix::fs::symlink(&target, &link).unwrap();
+            let told = export(&whole, format, &link, true).unwrap().warnings;
+            assert!(told.iter().any(|told| told.contains("is a link")));
+            assert!(folder.path().join(format!("deep/scene-{extension}")).is_dir());
+            assert!(is_whole(target));
+        }
+    }
+}

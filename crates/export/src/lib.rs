@@ -12,7 +12,8 @@ pub(crate) mod pbrt;
 pub use common::scene::{WholeScene, WholeTexture};
 
 use crate::common::folder::Folder;
-use firstlight_files::relative::path_to_text;
+use firstlight_files::printable;
+use firstlight_files::relative::{absolute, path_to_text};
 use firstlight_files::warnings::Warnings;
 use firstlight_files::whole_file::{write_new, write_whole};
 use firstlight_files::write_error::WriteError;
@@ -39,20 +40,40 @@ pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: b
     if !overwrite && path.exists() {
         return Err(WriteError::Exists(path.to_path_buf()));
     }
-    let mut folder = Folder::beside(path);
-    let mut warnings = scene.losses.clone();
-    let text = match format {
-        SceneFormat::Pbrt => {
-            let image = path.file_stem().map(|stem| path_to_text(stem.as_ref())).unwrap_or_default() + ".exr";
-            pbrt::text(scene, &mut folder, &mut warnings, &image)?
+    /// Other processes may take the name of the folder, which the text has as well.
+    const ATTEMPTS: u32 = 16;
+    let mut attempts = 0;
+    let (folder, warnings, text) = loop {
+        attempts += 1;
+        let mut folder = Folder::beside(path);
+        let mut warnings = scene.losses.clone();
+        if let Some(target) = elsewhere(path) {
+            let [link, target] = [path, &target].map(|path| printable::name(&path_to_text(path)).to_string());
+            warnings.push(format!("`{link}` is a link: the scene opens as `{target}`, which has the folder beside it"));
         }
-        SceneFormat::Mitsuba => mitsuba::text(scene, &mut folder, &mut warnings)?,
+        let text = match format {
+            SceneFormat::Pbrt => {
+                let image = path.file_stem().map(|stem| path_to_text(stem.as_ref())).unwrap_or_default() + ".exr";
+                pbrt::text(scene, &mut folder, &mut warnings, &image)?
+            }
+            SceneFormat::Mitsuba => mitsuba::text(scene, &mut folder, &mut warnings)?,
+        };
+        match folder.finish() {
+            Err(WriteError::Exists(_)) if attempts < ATTEMPTS => {}
+            folder => break (folder?, warnings, text),
+        }
     };
-    let folder = folder.finish()?;
     let write = if overwrite { write_whole } else { write_new };
     write(path, text.as_bytes()).inspect_err(|_| {
         // Nothing names its files.
         folder.iter().for_each(|folder| drop(std::fs::remove_dir_all(folder)));
     })?;
     Ok(Exported { folder, warnings })
+}
+
+/// Where a scene is written, if that is another folder than its path says.
+fn elsewhere(path: &Path) -> Option<PathBuf> {
+    let target = absolute(path);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    (target.parent() != Some(&absolute(folder))).then_some(target)
 }

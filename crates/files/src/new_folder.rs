@@ -75,7 +75,10 @@ impl NewFolder {
     /// # Errors
     /// If there is something of this name, or the folder cannot be renamed.
     pub fn finish(self, last: &OsStr) -> Result<(), WriteError> {
-        let failed = |error| unwritable(&self.path, error);
+        let failed = |error: io::Error| match error.kind() {
+            ErrorKind::AlreadyExists | ErrorKind::DirectoryNotEmpty => WriteError::Exists(self.path.clone()),
+            _ => unwritable(&self.path, error),
+        };
         self.in_progress.check().map_err(failed)?;
         let result = if self.part().parent() == Some(&self.target) {
             self.empty_into_target(last)
@@ -198,7 +201,7 @@ mod tests {
             std::fs::write(first.part().join("job.json"), "first").unwrap();
             std::fs::write(first.part().join("parts/film"), "").unwrap();
             first.finish(OsStr::new("job.json")).unwrap();
-            assert!(second.finish(OsStr::new("job.json")).is_err());
+            assert!(matches!(second.finish(OsStr::new("job.json")), Err(WriteError::Exists(_))));
             assert_eq!(std::fs::read(path.join("job.json")).unwrap(), b"first");
             assert_eq!(
                 (names(&path), names(root.path())),

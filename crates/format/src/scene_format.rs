@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+/// Number of elements of a scene of Mitsuba, with those of included files: a file may be included again and again.
+pub const MAX_XML_ELEMENTS: usize = 1 << 22;
+
 /// A format of scenes that can be opened, besides our own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SceneFormat {

@@ -6,7 +6,7 @@ use crate::common::scene::WholeScene;
 use crate::common::surface::Use;
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::new_folder::NewFolder;
-use firstlight_files::relative::{path_to_text, text_to_path};
+use firstlight_files::relative::{absolute, path_to_text, text_to_path};
 use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
 use firstlight_format::names::Names;
@@ -34,13 +34,17 @@ pub(crate) type MeshKey = (usize, Option<u16>, bool);
 impl Folder {
     /// The folder of a scene, named after it: `kitchen-xml` of `kitchen.xml`, or `kitchen-xml-2` if there is one.
     pub(crate) fn beside(scene: &Path) -> Self {
+        // A link leads to where the scene will be.
+        let scene = &absolute(scene);
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| path_to_text(part.as_ref())).unwrap_or_default();
         // Other marks mean something in one of the grammars.
         let plain = |c: char| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' };
         let stem =
             format!("{}-{}", text(scene.file_stem()), text(scene.extension())).chars().map(plain).collect::<String>();
+        // Hidden folders are never meant.
+        let stem = stem.trim_start_matches('.');
         let parent = scene.parent().unwrap_or(Path::new(""));
-        let mut names = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") });
+        let mut names = (1..).map(|n| if n == 1 { stem.to_owned() } else { format!("{stem}-{n}") });
         // A link that leads nowhere is there, too.
         let is_free = |name: &String| parent.join(text_to_path(name)).symlink_metadata().is_err();
         let name = names.find(is_free).expect("numbers do not end");
@@ -134,6 +138,23 @@ impl Folder {
         };
         self.pictures.insert(key, made.clone());
         Ok(made)
+    }
+
+    /// What a square with surface coordinates from 0 to 1 shows of a texture: its image, if that is the same.
+    pub(crate) fn square(&mut self, scene: &WholeScene, wanted: &Use, formats: &[&str]) -> Result<String, WriteError> {
+        let texture = &scene.textures[&wanted.name].texture;
+        if picture::is_placed_as_image(texture) {
+            return Ok(self.picture(scene, wanted, false, formats)?.file);
+        }
+        let key = format!("square {wanted:?}");
+        if let Some(known) = self.pictures.get(&key) {
+            return Ok(known.file.clone());
+        }
+        let image = picture::over_square(texture, wanted.change);
+        let (extension, bytes) = image.bytes().map_err(|error| unwritable(&self.path, error))?;
+        let file = self.add(&wanted.name, extension, &bytes)?;
+        self.pictures.insert(key, Picture { file: file.clone(), is_linear: image.is_linear });
+        Ok(file)
     }
 
     /// A copy of a file.

@@ -1,5 +1,6 @@
 //! What both formats share: surfaces, images, meshes and the files beside the text.
 
+pub(crate) mod albedo;
 pub(crate) mod environment;
 pub(crate) mod folder;
 pub(crate) mod identifiers;

@@ -44,6 +44,22 @@ impl Placed {
     pub(crate) fn is_part_of(&self, other: &Self) -> bool {
         self.group.is_some() && self.object == other.object
     }
+
+    /// The areas in the image on which textures are as they are, and on which they are mirrored.
+    pub(crate) fn areas_by_handedness(&self) -> (f32, f32) {
+        let Geometry::Mesh(mesh, slot) = &self.geometry else { return (1.0, 0.0) };
+        let side = if self.world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let mut areas = (0.0, 0.0);
+        for (i, triangle) in mesh.triangles.iter().enumerate() {
+            let is_of_slot = slot.is_none_or(|slot| mesh.slots.get(i).copied().unwrap_or(0) == slot);
+            let corners = triangle.map(|vertex| mesh.uvs.get(vertex as usize).copied().unwrap_or_default());
+            let area = side * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
+            if is_of_slot {
+                areas = (areas.0 + area.max(0.0), areas.1 + (-area).max(0.0));
+            }
+        }
+        areas
+    }
 }
 
 /// All objects, part by part; those of one object follow each other.

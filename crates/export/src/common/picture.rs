@@ -3,8 +3,8 @@
 use crate::common::surface::{Change, Use};
 use exr::prelude::{AnyChannel, AnyChannels, Encoding as ExrEncoding, FlatSamples, Image, Layer, LayerAttributes};
 use exr::prelude::{WritableImage, f16};
-use firstlight_render::{Channel, Encoding, ImageTexture, Texels, Texture, TexturePattern};
-use glam::Vec3;
+use firstlight_render::{Channel, Encoding, ImageTexture, Texels, Texture, TexturePattern, Wrap};
+use glam::{Mat2, Vec2, Vec3};
 use std::io::{self, Cursor};
 
 /// An image file of a scene.
@@ -64,6 +64,44 @@ pub(crate) fn baked(texture: &Texture, wanted: &Use, is_number: bool) -> Baked {
     let at = |i: usize| if is_number { Vec3::splat(at(i).x) } else { at(i) };
     let pixels = ImageTexture::from_linear(width, height, (0..image.len()).map(at).collect());
     Baked { pixels, is_linear: true }
+}
+
+/// The part of a texture that a square with surface coordinates from 0 to 1 shows.
+pub(crate) fn over_square(texture: &Texture, change: Change) -> Baked {
+    /// Pixels per side of a square of a checker, and the least and the most per side of an image.
+    const SQUARE: f32 = 64.0;
+    const SIDES: [f32; 2] = [256.0, 4096.0];
+    let texels = match &texture.pattern {
+        TexturePattern::White => Vec2::ZERO,
+        TexturePattern::Checker { .. } => Vec2::splat(SQUARE),
+        TexturePattern::Image { image, .. } => Vec2::new(image.width as f32, image.height as f32),
+    };
+    let matrix = texture.uv_matrix;
+    let [width, height] = [matrix.x_axis, matrix.y_axis]
+        .map(|axis| (2.0 * (axis * texels).length()).ceil().clamp(SIDES[0], SIDES[1]) as u32);
+    let at = |i: u32| {
+        let (x, y) = ((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        change.of(texture.eval(Vec2::new(x / width as f32, 1.0 - y / height as f32)))
+    };
+    let pixels = ImageTexture::from_linear(width, height, (0..width * height).map(at).collect());
+    Baked { pixels, is_linear: true }
+}
+
+/// Whether a texture is the same in each square between whole surface coordinates.
+pub(crate) fn is_periodic(texture: &Texture) -> bool {
+    let axes = [texture.uv_matrix.x_axis, texture.uv_matrix.y_axis];
+    let is_whole = axes.iter().all(|axis| *axis == axis.round());
+    match &texture.pattern {
+        TexturePattern::White => true,
+        TexturePattern::Checker { .. } => is_whole && axes.iter().all(|axis| axis.element_sum() % 2.0 == 0.0),
+        TexturePattern::Image { wrap, .. } => is_whole && *wrap == [Wrap::Repeat; 2],
+    }
+}
+
+/// Whether a texture is its image, in each square between whole surface coordinates.
+pub(crate) fn is_placed_as_image(texture: &Texture) -> bool {
+    matches!(texture.pattern, TexturePattern::Image { .. })
+        && (texture.uv_matrix, texture.uv_offset) == (Mat2::IDENTITY, Vec2::ZERO)
 }
 
 /// The same integers, or those of one channel; `None` for floating point.

@@ -1,19 +1,29 @@
 //! Materials taken apart into what other renderers have as well: plain surfaces, their mixtures, what they emit, where
 //! they have holes, and their normals.
 //!
-//! `principled` becomes a mixture of metal, glass and a coated diffuse surface, `phong` one of diffuse, mirror and
-//! glass. Start reading at [`Surface::of`].
+//! `principled` becomes a mixture of metal, glass and an opaque base, `phong` one of diffuse, mirror and glass. Metals
+//! and bases return as much light as here, although single scattering loses some. Start reading at [`Surface::of`].
 
+use crate::common::albedo::{Base, Metallic, Renderer};
 use crate::common::scene::WholeScene;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::parts::{InFile, MaterialPart};
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Fresnel, MapParams, Material, Param, Params};
-use glam::Vec3;
+use firstlight_render::{Fresnel, MapParams, Material, Param, Params, Texture, TexturePattern};
+use glam::{Mat2, Vec2, Vec3};
 
 /// Depth of blends in blends.
 const MAX_DEPTH: u32 = 32;
+
+/// GGX widths below these are mirrors.
+const SMOOTH: f32 = 1e-4;
+
+/// GGX widths up to which a coat and the base below it lose a hundredth of the light.
+const LOSSLESS: f32 = 0.04;
+
+/// GGX widths up to which highlights of a coat are sharp enough to show how they increase at grazing angles.
+const GLOSSY: f32 = 0.17;
 
 /// What is done to the values of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,10 +34,13 @@ pub(crate) enum Change {
     /// The inverse.
     Root,
     Times(f32),
+    /// The albedo of a base that colours light at every bounce below its coat, for one that does once; the coat
+    /// reflects this share inwards.
+    BelowCoat(f32),
     /// 1 from this value on, else 0.
     From(f32),
-    /// Normals with a slope multiplied by this.
-    Slope(f32),
+    /// Normals with slopes multiplied by these.
+    Slope(Vec2),
 }
 
 impl Change {
@@ -37,10 +50,11 @@ impl Change {
             Self::Squared => value * value,
             Self::Root => value.max(Vec3::ZERO).map(f32::sqrt),
             Self::Times(factor) => factor * value,
+            Self::BelowCoat(inwards) => value.map(|albedo| albedo / (1.0 - inwards + albedo * inwards)),
             Self::From(least) => value.map(|value| if value >= least { 1.0 } else { 0.0 }),
             Self::Slope(factor) => {
                 let normal = 2.0 * value - 1.0;
-                let steeper = Vec3::new(factor * normal.x, factor * normal.y, normal.z);
+                let steeper = Vec3::new(factor.x * normal.x, factor.y * normal.y, normal.z);
                 0.5 + 0.5 * steeper.normalize_or(Vec3::Z)
             }
         }
@@ -77,6 +91,19 @@ impl From<Vec3> for Color {
 impl From<f32> for Scalar {
     fn from(number: f32) -> Self {
         Self::Number(number)
+    }
+}
+
+impl Color {
+    /// With a factor, but for one of less than a hundredth of a texture, whose file stays as it is.
+    fn times(self, factor: f32) -> Self {
+        match self {
+            Self::Rgb(rgb) => Self::Rgb(factor * rgb),
+            Self::Texture(Use { name, change: Change::Nothing }) if (factor - 1.0).abs() >= 0.01 => {
+                Self::Texture(Use { name, change: Change::Times(factor) })
+            }
+            same => same,
+        }
     }
 }
 
@@ -207,16 +234,31 @@ impl Bsdf {
     }
 }
 
+/// The largest value of any channel that a texture shows; vertex colours count as white.
+fn largest(texture: &Texture) -> f32 {
+    match &texture.pattern {
+        TexturePattern::White => texture.tint.max_element(),
+        TexturePattern::Checker { a, b } => a.max(*b).max_element(),
+        TexturePattern::Image { image, .. } => {
+            let (width, height) = (image.width, image.height);
+            let straight = Texture { uv_matrix: Mat2::IDENTITY, uv_offset: Vec2::ZERO, ..texture.clone() };
+            let center = |i: u32| Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+            let at = |i| straight.eval(center(i) / Vec2::new(width as f32, height as f32)).max_element();
+            (0..width * height).map(at).fold(0.0, f32::max)
+        }
+    }
+}
+
+/// GGX width below which microfacets lose a thousandth.
+const LEAST_LOSS: f32 = 0.05;
+
 /// Whether the energy that single scattering loses is returned, which other renderers do not.
 pub(crate) fn loses_light(material: &Material<Written>) -> bool {
-    let (Material::Metal { alpha, compensate, .. }
-    | Material::Conductor { alpha, compensate, .. }
-    | Material::RoughGlass { alpha, compensate, .. }) = material
+    let (Material::Conductor { alpha, compensate, .. } | Material::RoughGlass { alpha, compensate, .. }) = material
     else {
         return false;
     };
-    // Below, a thousandth is lost.
-    *compensate && !matches!(alpha, Scalar::Number(alpha) if *alpha < 0.05)
+    *compensate && !matches!(alpha, Scalar::Number(alpha) if *alpha < LEAST_LOSS)
 }
 
 /// Normals from an image.
@@ -244,8 +286,10 @@ pub(crate) struct Surface {
 
 impl Surface {
     /// The surface of a material of the scene; grey if there is none of this name.
-    pub(crate) fn of(scene: &WholeScene, name: &str, warnings: &mut Warnings) -> Self {
-        let mut taking = Taking { scene, name, warnings, absorption: Vec3::ZERO, emits_behind: false };
+    ///
+    /// - `renderer`: whose materials have to return as much light.
+    pub(crate) fn of(scene: &WholeScene, name: &str, renderer: Renderer, warnings: &mut Warnings) -> Self {
+        let mut taking = Taking { scene, name, renderer, warnings, absorption: Vec3::ZERO, emits_behind: false };
         let grey = MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) };
         let part = scene.file.materials.get(name).unwrap_or(&grey);
         let (bsdf, radiance) = taking.apart(part, 0);
@@ -271,6 +315,7 @@ impl Surface {
 struct Taking<'a> {
     scene: &'a WholeScene,
     name: &'a str,
+    renderer: Renderer,
     warnings: &'a mut Warnings,
     absorption: Vec3,
     emits_behind: bool,
@@ -294,7 +339,8 @@ impl Taking<'_> {
             Color::Rgb(_) => None,
             Color::Texture(map) => {
                 let is_relief = self.scene.textures.get(&map.name).is_some_and(|map| map.texture.relief.is_some());
-                let change = if *normal_scale == 1.0 { Change::Nothing } else { Change::Slope(*normal_scale) };
+                let change =
+                    if *normal_scale == 1.0 { Change::Nothing } else { Change::Slope(Vec2::splat(*normal_scale)) };
                 let heights = Change::Times(*normal_scale);
                 let change = if is_relief && change != Change::Nothing { heights } else { change };
                 Some(Normals { map: Use { change, ..map }, is_relief })
@@ -317,12 +363,93 @@ impl Taking<'_> {
                 plain(Bsdf::mix(Scalar::Number(transparency), opaque, Bsdf::Plain(glass)))
             }
             Material::Principled { .. } => self.principled(written),
+            Material::Metal { alpha, reflectance, fresnel, compensate: true } => {
+                plain(self.compensated(alpha, reflectance, fresnel))
+            }
             Material::Glass { absorption, dispersion, .. } | Material::RoughGlass { absorption, dispersion, .. } => {
                 self.absorb(absorption, dispersion);
                 plain(Bsdf::Plain(written))
             }
             other => plain(Bsdf::Plain(other)),
         }
+    }
+
+    /// Its mean, if it is a texture.
+    fn width(&self, alpha: &Scalar) -> f32 {
+        match alpha {
+            Scalar::Number(alpha) => *alpha,
+            Scalar::Texture(Use { name, change }) => change.of(self.scene.textures[name].texture.mean()).x,
+        }
+    }
+
+    /// A metal without compensation that returns as much light as one with it.
+    fn compensated(&mut self, alpha: Scalar, reflectance: Color, fresnel: Fresnel) -> Bsdf {
+        let width = self.width(&alpha);
+        // Conductors of pbrt reflect more at grazing angles, however smooth they are.
+        if width < LEAST_LOSS && self.renderer == Renderer::Mitsuba {
+            return Bsdf::Plain(Material::Metal { alpha, reflectance, fresnel, compensate: false });
+        }
+        let reflectance = match reflectance {
+            Color::Rgb(color) => {
+                let brighter = self.renderer.metal(width, fresnel, color);
+                if width >= LEAST_LOSS && brighter.max_element() >= self.renderer.most_of_metal() {
+                    self.tell("the light that its microfacets scatter several times is lost in part");
+                }
+                Color::Rgb(brighter)
+            }
+            Color::Texture(Use { name, change }) => {
+                let mean = Vec3::splat(change.of(self.scene.textures[&name].texture.mean()).element_sum() / 3.0);
+                let factor = if mean.x > 0.0 { self.renderer.metal(width, fresnel, mean).x / mean.x } else { 1.0 };
+                Color::Texture(Use { name, change }).times(factor)
+            }
+        };
+        Bsdf::Plain(Material::Metal { alpha, reflectance, fresnel, compensate: false })
+    }
+
+    /// The diffuse base of `principled` below its dielectric surface.
+    ///
+    /// - `ior`: of a coat that reflects `facing` at normal incidence.
+    fn base(&mut self, alpha: Scalar, albedo: Color, ior: f32, [facing, grazing]: [f32; 2]) -> Bsdf {
+        if (ior - 1.0).abs() < 1e-4 {
+            return Bsdf::Plain(Material::Diffuse { albedo });
+        }
+        let width = self.width(&alpha);
+        let coated = |diffuse: Color, alpha: Scalar| {
+            let specular = 1.0.into();
+            Bsdf::Plain(Material::Plastic { diffuse, alpha, ior, specular, nonlinear: false, beckmann: false })
+        };
+        if width < SMOOTH {
+            return coated(albedo, alpha);
+        }
+        let base = Base::new(self.renderer, width, facing, grazing);
+        if width <= GLOSSY {
+            match &albedo {
+                Color::Rgb(rgb) => {
+                    let diffuse = base.below_coat(ior, *rgb);
+                    if diffuse.max_element() <= 1.0 {
+                        return coated(diffuse.into(), alpha);
+                    }
+                }
+                // Texels may be above 1 there.
+                Color::Texture(_) if self.renderer == Renderer::Mitsuba => {
+                    let factor = 2.0 * base.below_coat(ior, Vec3::splat(0.5)).x;
+                    return coated(albedo.times(factor), alpha);
+                }
+                Color::Texture(_) => {}
+            }
+        }
+        if width <= LOSSLESS {
+            return coated(albedo, alpha);
+        }
+        let most = match &albedo {
+            Color::Rgb(rgb) => rgb.max_element(),
+            Color::Texture(Use { name, .. }) => largest(&self.scene.textures[name].texture),
+        };
+        let Metallic { share, metal, diffuse } = base.metallic(most.clamp(0.0, 1.0));
+        let (reflectance, compensate) = (Vec3::splat(metal).into(), false);
+        let metal = Material::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, compensate };
+        let diffuse = Material::Diffuse { albedo: albedo.times(diffuse) };
+        Bsdf::mix(Scalar::Number(share), Bsdf::Plain(diffuse), Bsdf::Plain(metal))
     }
 
     fn absorb(&mut self, Rgb(absorption): Rgb, dispersion: f32) {
@@ -398,12 +525,6 @@ impl Taking<'_> {
             }
         }
         let alpha = roughness.changed(Change::Squared);
-        let metal = Bsdf::Plain(Material::Metal {
-            alpha: alpha.clone(),
-            reflectance: base_color.clone(),
-            fresnel: Fresnel::Schlick,
-            compensate: true,
-        });
         // The index of a dielectric that reflects as much at normal incidence.
         let normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
         let factor = match (&specular, &specular_color) {
@@ -420,17 +541,19 @@ impl Taking<'_> {
         };
         let root = (normal * factor).clamp(0.0, 0.98).sqrt();
         let coat = if factor == 1.0 { ior } else { (1.0 + root) / (1.0 - root) };
-        let opaque = Bsdf::Plain(match (coat - 1.0).abs() < 1e-4 {
-            true => Material::Diffuse { albedo: base_color.clone() },
-            false => Material::Plastic {
-                diffuse: base_color.clone(),
-                alpha: alpha.clone(),
-                ior: coat,
-                specular: 1.0.into(),
-                nonlinear: false,
-                beckmann: false,
-            },
-        });
+        let grazing = if let Scalar::Number(share) = specular { share } else { 1.0 };
+        let full = Scalar::Number(1.0);
+        // What nothing is seen of needs no words.
+        let metal = if metallic == zero {
+            Bsdf::black()
+        } else {
+            self.compensated(alpha.clone(), base_color.clone(), Fresnel::Schlick)
+        };
+        let opaque = if metallic == full || transmission == full {
+            Bsdf::black()
+        } else {
+            self.base(alpha.clone(), base_color.clone(), coat, [root * root, grazing])
+        };
         let glass = match (thin_walled, &alpha) {
             (true, alpha) => {
                 if *alpha != zero {

@@ -137,17 +137,15 @@ impl Writer<'_> {
                 self.factor("specular_reflectance", reflectance)?;
             }
             Material::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, .. } => {
-                self.tell_of_loss(material, name);
                 open(self, "principled");
-                self.color("base_color", reflectance)?;
+                self.metal_color("base_color", reflectance)?;
                 self.xml.float("metallic", 1.0);
                 self.scalar("roughness", &alpha.root())?;
             }
             Material::Metal { alpha, reflectance, .. } => {
-                self.tell_of_loss(material, name);
                 open(self, if smooth(alpha) { "conductor" } else { "roughconductor" });
                 self.xml.value("string", "material", "none");
-                self.factor("specular_reflectance", reflectance)?;
+                self.metal_color("specular_reflectance", reflectance)?;
                 if !smooth(alpha) {
                     self.width(alpha, false)?;
                 }
@@ -255,6 +253,20 @@ impl Writer<'_> {
     /// A factor, which is 1 if it is not given.
     fn factor(&mut self, name: &str, color: &Color) -> Result {
         if *color == Color::Rgb(Vec3::ONE) { Ok(()) } else { self.color(name, color) }
+    }
+
+    /// A colour that may be above 1, where it makes up for what microfacets lose.
+    fn metal_color(&mut self, name: &str, color: &Color) -> Result {
+        match color {
+            Color::Rgb(rgb) if rgb.max_element() > 1.0 => {
+                self.xml.open("texture", &[("name", name), ("type", "srgb")]);
+                self.xml.rgb("color", *rgb);
+                self.xml.value("boolean", "unbounded", "true");
+                self.xml.close();
+                Ok(())
+            }
+            color => self.color(name, color),
+        }
     }
 
     pub(crate) fn color(&mut self, name: &str, color: &Color) -> Result {

@@ -6,6 +6,7 @@ mod bsdf;
 mod view;
 mod xml;
 
+use crate::common::albedo::Renderer;
 use crate::common::environment::{FINE, round_image};
 use crate::common::folder::Folder;
 use crate::common::identifiers::Identifiers;
@@ -14,7 +15,7 @@ use crate::common::objects::{Geometry, Placed, placed, radiance_of};
 use crate::common::picture::exr;
 use crate::common::projected::Projected;
 use crate::common::scene::WholeScene;
-use crate::common::surface::{Color, Surface};
+use crate::common::surface::{Change, Color, Normals, Surface, Use};
 use crate::mitsuba::xml::Xml;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
@@ -22,9 +23,10 @@ use firstlight_files::whole_file::unwritable;
 use firstlight_files::write_error::WriteError;
 use firstlight_format::light::{ImageFrame, LightKind};
 use firstlight_format::parts::LightPart;
+use firstlight_format::scene_format::MAX_XML_ELEMENTS;
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
 use firstlight_render::{Environment, Falloff};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::PI;
 use std::f64::consts::FRAC_PI_2;
@@ -58,6 +60,10 @@ pub(crate) fn text(scene: &WholeScene, folder: &mut Folder, warnings: &mut Warni
     writer.xml.open("scene", &[("version", "3.0.0")]);
     writer.scene()?;
     writer.xml.close();
+    if writer.xml.n_elements > MAX_XML_ELEMENTS {
+        let told = format!("the scene has {} elements: firstlight opens {MAX_XML_ELEMENTS}", writer.xml.n_elements);
+        writer.warnings.push(told);
+    }
     Ok(writer.xml.text)
 }
 
@@ -65,7 +71,7 @@ impl Writer<'_> {
     fn scene(&mut self) -> Result<(), WriteError> {
         let names = self.scene.used_materials();
         for name in &names {
-            let surface = Surface::of(self.scene, name, self.warnings);
+            let surface = Surface::of(self.scene, name, Renderer::Mitsuba, self.warnings);
             self.surfaces.insert(name.clone(), surface);
         }
         let emits = |name: &str| self.surfaces.get(name).is_some_and(|surface| surface.radiance.is_some());
@@ -100,6 +106,9 @@ impl Writer<'_> {
                     self.shape(&Placed { world: DAffine3::IDENTITY, ..part.clone() })?;
                 }
                 self.xml.close();
+            }
+            if placed.world.matrix3.determinant() < 0.0 && self.has_normal_map(&all[i..]) {
+                self.tell(&placed.name, "its normal map is upside down on a mirrored copy");
             }
             self.xml.open("shape", &[("type", "instance")]);
             self.xml.transform("to_world", &placed.world);
@@ -145,8 +154,13 @@ impl Writer<'_> {
             }
         }
         let surface = self.surfaces.get(&placed.material).cloned();
-        if let Some(id) = self.ids.get(&placed.material) {
-            self.xml.leaf("ref", &[("id", id)]);
+        match surface.as_ref().and_then(|surface| self.with_turned_normals(surface, placed)) {
+            Some(turned) => self.surface(&turned, "", &placed.material)?,
+            None => {
+                if let Some(id) = self.ids.get(&placed.material) {
+                    self.xml.leaf("ref", &[("id", id)]);
+                }
+            }
         }
         if let Some(Surface { radiance, absorption, .. }) = surface {
             if absorption != Vec3::ZERO {
@@ -165,6 +179,29 @@ impl Writer<'_> {
         }
         self.xml.close();
         Ok(())
+    }
+
+    /// Whether a part of the first object has one.
+    fn has_normal_map(&self, all: &[Placed]) -> bool {
+        let parts = all.iter().take_while(|part| part.is_part_of(&all[0]));
+        parts.filter_map(|part| self.surfaces.get(&part.material)?.normals.as_ref()).any(|normals| !normals.is_relief)
+    }
+
+    /// The surface where textures are mirrored on it: Mitsuba's second tangent is normal × tangent there, too.
+    fn with_turned_normals(&mut self, surface: &Surface, placed: &Placed) -> Option<Surface> {
+        let normals = surface.normals.as_ref().filter(|normals| !normals.is_relief)?;
+        let (right, mirrored) = placed.areas_by_handedness();
+        if mirrored > 0.0 && right > 0.0 {
+            let told = "its normal map is upside down where its texture is mirrored, or where it is not";
+            self.tell(&placed.name, told);
+        }
+        let change = match normals.map.change {
+            Change::Slope(slope) => Change::Slope(slope * Vec2::new(1.0, -1.0)),
+            _ => Change::Slope(Vec2::new(1.0, -1.0)),
+        };
+        let map = Use { change, ..normals.map.clone() };
+        let normals = Some(Normals { map, is_relief: false });
+        (mirrored > right).then(|| Surface { normals, ..surface.clone() })
     }
 
     fn light(&mut self, light: &LightPart) -> Result<(), WriteError> {

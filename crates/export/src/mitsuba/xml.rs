@@ -6,11 +6,13 @@ use glam::{DAffine3, DVec3, Vec3};
 #[derive(Default)]
 pub(crate) struct Xml {
     pub text: String,
+    pub n_elements: usize,
     open: Vec<String>,
 }
 
 impl Xml {
     fn begin(&mut self, tag: &str, attributes: &[(&str, &str)]) {
+        self.n_elements += 1;
         self.text += &"    ".repeat(self.open.len());
         self.text.push('<');
         self.text += tag;

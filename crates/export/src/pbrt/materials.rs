@@ -9,6 +9,8 @@
 //! | `translucent` | `diffusetransmission` |
 //! | `blend` | `mix` |
 
+use crate::common::albedo::inner_reflectance;
+use crate::common::picture::is_periodic;
 use crate::common::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use crate::pbrt::text::List;
 use crate::pbrt::{FORMATS, Writer, inside_of};
@@ -71,8 +73,11 @@ impl Writer<'_> {
                 Ok(list.texture("displacement", &self.texture(&map, true)?))
             }
             Some(Normals { map, .. }) => {
-                let picture = self.folder.picture(self.scene, map, false, &FORMATS)?;
-                Ok(list.string("normalmap", &picture.file))
+                if !is_periodic(&self.scene.textures[&map.name].texture) {
+                    self.tell(&map.name, "its part between 0 and 1 repeats: pbrt does not place normal maps");
+                }
+                let file = self.folder.square(self.scene, map, &FORMATS)?;
+                Ok(list.string("normalmap", &file))
             }
         }
     }
@@ -86,15 +91,12 @@ impl Writer<'_> {
                 if *specular != Scalar::Number(1.0) {
                     self.tell(name, "the reflection of its coat has its full strength");
                 }
+                let width = if let Scalar::Number(alpha) = alpha { *alpha } else { 0.0 };
+                let below = Change::BelowCoat(inner_reflectance(*ior, width));
                 let diffuse = match diffuse {
-                    // The albedo of a base that colours light once, for one that does at every bounce below the coat.
-                    Color::Rgb(albedo) if !nonlinear => {
-                        let inside = inner_reflectance(*ior);
-                        Color::Rgb(albedo.map(|albedo| albedo / (1.0 - inside + albedo * inside)))
-                    }
-                    texture @ Color::Texture(_) if !nonlinear => {
-                        self.tell(name, "the texture below its coat is more saturated");
-                        texture.clone()
+                    Color::Rgb(albedo) if !nonlinear => Color::Rgb(below.of(*albedo)),
+                    Color::Texture(Use { name, change: Change::Nothing }) if !nonlinear => {
+                        Color::Texture(Use { name: name.clone(), change: below })
                     }
                     same => same.clone(),
                 };
@@ -116,7 +118,6 @@ impl Writer<'_> {
                 if *fresnel == Fresnel::Constant {
                     self.tell(name, "its reflectance rises at grazing angles, as that of a metal");
                 }
-                self.tell_of_loss(material, name);
                 let list = self.color(list("conductor"), "reflectance", reflectance)?;
                 self.width(list, alpha)
             }
@@ -247,34 +248,5 @@ impl Writer<'_> {
         self.text.directive("Texture", &[&name, if is_number { "float" } else { "spectrum" }, class], list);
         self.textures.insert(key, name.clone());
         Ok(name)
-    }
-}
-
-/// The share of uniform light inside of a dielectric that its surface reflects back.
-fn inner_reflectance(ior: f32) -> f32 {
-    const STEPS: u32 = 1024;
-    let reflectance = |cos: f64| {
-        let n = f64::from(ior);
-        let sin2 = n * n * (1.0 - cos * cos);
-        if sin2 >= 1.0 {
-            return 1.0;
-        }
-        let outside = (1.0 - sin2).sqrt();
-        let (s, p) = ((n * cos - outside) / (n * cos + outside), (cos - n * outside) / (cos + n * outside));
-        0.5 * (s * s + p * p)
-    };
-    let cos = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
-    ((0..STEPS).map(|i| 2.0 * cos(i) * reflectance(cos(i))).sum::<f64>() / f64::from(STEPS)) as f32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn glass_reflects_most_of_the_light_inside() {
-        // Duderstadt's value for 1.5 is 0.596; a surface that is none reflects nothing.
-        assert!((inner_reflectance(1.5) - 0.5963).abs() < 1e-3, "{}", inner_reflectance(1.5));
-        assert!(inner_reflectance(1.0).abs() < 1e-6);
     }
 }

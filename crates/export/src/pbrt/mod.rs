@@ -6,6 +6,7 @@ mod materials;
 mod text;
 mod view;
 
+use crate::common::albedo::Renderer;
 use crate::common::environment::square_image;
 use crate::common::folder::Folder;
 use crate::common::identifiers::Identifiers;
@@ -76,7 +77,7 @@ impl Writer<'_> {
     fn world(&mut self) -> Result<(), WriteError> {
         let names = self.scene.used_materials();
         for name in &names {
-            let surface = Surface::of(self.scene, name, self.warnings);
+            let surface = Surface::of(self.scene, name, Renderer::Pbrt, self.warnings);
             self.surfaces.insert(name.clone(), surface);
         }
         let emits = |name: &str| self.surfaces.get(name).is_some_and(|surface| surface.radiance.is_some());
@@ -184,8 +185,8 @@ impl Writer<'_> {
             self.tell(&placed.name, "the texture of its light becomes its mean");
             return Ok(List::default().rgb("L", mean));
         }
-        let picture = self.folder.picture(self.scene, wanted, false, &FORMATS)?;
-        Ok(List::default().string("filename", &picture.file))
+        let file = self.folder.square(self.scene, wanted, &FORMATS)?;
+        Ok(List::default().string("filename", &file))
     }
 
     fn light(&mut self, light: &LightPart) -> Result<(), WriteError> {

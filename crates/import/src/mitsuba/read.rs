@@ -18,6 +18,7 @@ use firstlight_files::relative::text_to_path;
 use firstlight_files::stamp::stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
+use firstlight_format::scene_format::MAX_XML_ELEMENTS;
 use glam::{DMat4, DVec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -28,8 +29,6 @@ const MAX_DEPTH: u32 = 100;
 const MAX_INCLUDE_DEPTH: u32 = 15;
 /// Number of files of a scene.
 const MAX_FILES: usize = 1000;
-/// Number of elements of all files: a file may be included again and again.
-const MAX_ELEMENTS: usize = 1 << 22;
 /// Folders in which each file is looked for.
 const MAX_FOLDERS: usize = 16;
 
@@ -145,10 +144,10 @@ impl Reader<'_> {
             None => Ok(None),
         };
         self.n_elements += 1;
-        if self.n_elements > MAX_ELEMENTS {
+        if self.n_elements > MAX_XML_ELEMENTS {
             return Err(self
                 .graph
-                .error(place, format!("a scene may have {MAX_ELEMENTS} elements, with those included")));
+                .error(place, format!("a scene may have {MAX_XML_ELEMENTS} elements, with those included")));
         }
         if depth > MAX_DEPTH {
             return Err(self.graph.error(place, format!("elements are nested more than {MAX_DEPTH} deep")));
