@@ -116,6 +116,42 @@ def principled(
     """
 
 
+def disney(
+    *,
+    base_color: Union[Color, Texture] = 0.5,
+    metallic: Union[float, Texture] = 0.0,
+    roughness: Union[float, Texture] = 0.5,
+    anisotropic: Union[float, Texture] = 0.0,
+    ior: float = 1.5,
+    specular_tint: Union[float, Texture] = 0.0,
+    transmission: Union[float, Texture] = 0.0,
+    thin_walled: bool = False,
+    diffuse_transmission: Union[float, Texture] = 0.0,
+    flatness: Union[float, Texture] = 0.0,
+    sheen: Union[float, Texture] = 0.0,
+    sheen_tint: Union[float, Texture] = 0.0,
+    clearcoat: Union[float, Texture] = 0.0,
+    clearcoat_gloss: Union[float, Texture] = 0.0,
+) -> Material:
+    """The BSDF of Disney as Mitsuba 3 evaluates it in `principled` and `principledthin`; see `shading/disney`.
+
+    - `base_color`: albedo, reflectance of metal, tint of transmitted light; must lie between 0 and 1: it is a share of light
+    - `metallic`: fraction of metal: 0 is a dielectric, 1 metal; must lie between 0 and 1
+    - `roughness`: square root of the GGX width α, which is at least 0.001; must lie between 0 and 1
+    - `anisotropic`: length of highlights along u: α / √(1 − 0.9 anisotropic), and times it across; must lie between 0 and 1
+    - `ior`: index of refraction of the dielectric; must be finite and positive: 1.5 is glass
+    - `specular_tint`: share of the dielectric's reflection that has the hue of `base_color`; must lie between 0 and 1
+    - `transmission`: fraction of the dielectric that transmits: 0 is opaque, 1 glass; must lie between 0 and 1
+    - `thin_walled`: a sheet without thickness: `principledthin`, without metal and coat; must be one of the known words
+    - `diffuse_transmission`: twice the fraction of a sheet's diffuse light that goes to the far side; must be finite and not negative
+    - `flatness`: share of the base that is a thin subsurface layer; must lie between 0 and 1
+    - `sheen`: strength of the light that is added at grazing angles; must lie between 0 and 1
+    - `sheen_tint`: share of the sheen that has the hue of `base_color`; must lie between 0 and 1
+    - `clearcoat`: strength of a coat, of which a quarter is added; must lie between 0 and 1
+    - `clearcoat_gloss`: its width: 0 is 0.1, 1 is 0.001; must lie between 0 and 1
+    """
+
+
 def mirror(
     *,
     reflectance: Union[Color, Texture] = 1.0,

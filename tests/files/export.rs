@@ -4,8 +4,9 @@ use bevy_ecs::prelude::World;
 use firstlight::export::export;
 use firstlight::format::property::SkyProperty;
 use firstlight::format::scene_format::SceneFormat;
+use firstlight::format::value::{ColorValue, ScalarValue};
 use firstlight::frame::{Target, render_offline};
-use firstlight::render::Film;
+use firstlight::render::{Film, Material};
 use firstlight::scene::file::{MaterialPart, SceneFile};
 use firstlight::scene::{
     BUILTIN_SCENES, Extraction, LoadOptions, LoadedScene, Rendering, SceneInputs, SceneSource, load, whole_scene,
@@ -79,6 +80,10 @@ const SURFACES: [&[&str]; 3] = [
         "mirror(reflectance: (0.9, 0.8, 0.7))",
         "thin_glass(ior: 1.6, reflectance: 0.5, transmittance: (0.5, 0.25, 1))",
         "emissive(radiance: (3, 2, 1))",
+        "disney(base_color: (0.5, 0.25, 0.125), metallic: 0.25, roughness: 0.375, anisotropic: 0.5, ior: 1.75, \
+         specular_tint: 0.75, flatness: 0.25, sheen: 0.5, sheen_tint: 1, clearcoat: 0.75, clearcoat_gloss: 0.5)",
+        "disney(transmission: 0.5, ior: 1.25)",
+        "disney(thin_walled: true, diffuse_transmission: 1.5, transmission: 0.5, ior: 1.25)",
     ],
     &[
         "translucent(reflectance: (0.2, 0.3, 0.4), transmittance: 0.25)",
@@ -111,6 +116,30 @@ fn surfaces_come_back_with_all_their_numbers() {
             assert!(format!("{wanted:?}") == format!("{found:?}"), "{format:?}, {surface}: {found:?}");
         }
     }
+}
+
+/// Mitsuba has no surface that scatters diffusely to both sides: half of a leaf is diffuse, the other only transmits.
+#[test]
+fn a_translucent_surface_is_a_blend_in_mitsuba() {
+    let text = "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), materials: {\"leaf\": \
+                translucent(reflectance: (0.25, 0.125, 0.5), transmittance: 0.5)}, objects: [sphere(center: (0, 1, 0), \
+                radius: 0.25, material: \"leaf\")])";
+    let folder = tempfile::tempdir().unwrap();
+    let from = written(folder.path(), text);
+    let (_, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+    assert!(told.is_empty(), "{told:?}");
+    let part = |name: &str| after.file.materials.get(name).unwrap();
+    let Material::Blend { weight: ScalarValue::Number(0.5), a, b, .. } =
+        part(after.file.objects[0].material().unwrap())
+    else {
+        panic!("{:?}", after.file.materials)
+    };
+    assert_eq!(*part(a), Material::Diffuse { albedo: ColorValue::Rgb(Vec3::new(0.5, 0.25, 1.0)) });
+    let Material::Disney { base_color, thin_walled: true, diffuse_transmission, transmission, .. } = part(b) else {
+        panic!("{:?}", part(b))
+    };
+    assert_eq!(*base_color, ColorValue::grey(1.0));
+    assert_eq!([diffuse_transmission, transmission], [&ScalarValue::Number(2.0), &ScalarValue::Number(0.0)]);
 }
 
 /// Mean radiance of the four quarters of an image of 64 × 48 pixels.

@@ -267,6 +267,24 @@ fn materials_are_those_of_the_docs() {
     };
     assert_eq!((alpha, alpha_v), (&ScalarValue::Number(0.25), &ScalarValue::Number(0.05)));
     assert!(warnings.is_empty(), "{warnings:?}");
+    let layered = r#"<bsdf type="principled"><rgb name="base_color" value="0.5, 0.25, 0.125"/>
+        <float name="roughness" value="0.25"/><float name="anisotropic" value="0.5"/><float name="spec_tint" value="0.75"/>
+        <float name="specular" value="0.5"/><float name="sheen" value="0.375"/><float name="clearcoat" value="1"/>
+        <float name="flatness" value="0.625"/></bsdf>"#;
+    let (part, warnings) = material(layered);
+    let wanted = "(materials: { \"m\": disney(base_color: (0.5, 0.25, 0.125), roughness: 0.25, anisotropic: 0.5, \
+                  specular_tint: 0.75, sheen: 0.375, clearcoat: 1, flatness: 0.625) })";
+    let wanted = SceneFile::parse(wanted, "wanted.ron").unwrap().materials.get("m").unwrap().clone();
+    // `specular` of 1/2 is an index of 1.5.
+    assert!((part == wanted) && warnings.is_empty(), "{part:?} {warnings:?}");
+    let (part, warnings) = material(r#"<bsdf type="principledthin"><float name="diff_trans" value="1.5"/></bsdf>"#);
+    let Material::Disney { thin_walled: true, diffuse_transmission, .. } = &part else { panic!("{part:?}") };
+    assert!(*diffuse_transmission == ScalarValue::Number(1.5) && warnings.is_empty(), "{warnings:?}");
+    // Without polarisation, a filter lets half of the light pass, straight on.
+    let (part, warnings) = material(r#"<bsdf type="polarizer"><rgb name="transmittance" value="0.5, 1, 1"/></bsdf>"#);
+    let Material::ThinGlass { ior: 1.0, transmittance, .. } = &part else { panic!("{part:?}") };
+    assert_eq!(*transmittance, ColorValue::Rgb(Vec3::new(0.25, 0.5, 0.5)));
+    assert!(warnings.len() == 1 && warnings[0].contains("loses half"), "{warnings:?}");
     let mapped = r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant">
         <vector name="value" value="0.5, 0.7, 1"/></texture><bsdf type="principled"/></bsdf>"#;
     let (part, _) = material(mapped);

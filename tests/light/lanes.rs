@@ -186,8 +186,8 @@ fn layered() -> [Material; 4] {
     [plastic, mapped, rich, colored]
 }
 
-/// Plastics, conductors, a leaf and a plastic with holes; they use textures 1 and 3 to 5 of the room.
-fn shiny() -> [Material; 10] {
+/// Plastics, conductors, a leaf, surfaces of Disney, and a plastic with holes; they use textures 1 and 3 to 5 of the room.
+fn shiny() -> [Material; 13] {
     let plastic = |diffuse, alpha, beckmann, nonlinear| Material::Plastic {
         diffuse,
         alpha,
@@ -207,6 +207,22 @@ fn shiny() -> [Material; 10] {
     };
     let [none, narrow, wide] = [0.0, 0.1, 0.3].map(ScalarInput::Constant);
     let white = ColorInput::Constant(Vec3::ONE);
+    let disney = |base_color, anisotropic, transmission| Material::Disney {
+        base_color,
+        metallic: ScalarInput::Texture(4),
+        roughness: ScalarInput::Constant(0.4),
+        anisotropic,
+        ior: 1.6,
+        specular_tint: ScalarInput::Constant(0.3),
+        transmission,
+        thin_walled: false,
+        diffuse_transmission: none,
+        flatness: wide,
+        sheen: ScalarInput::Texture(3),
+        sheen_tint: wide,
+        clearcoat: ScalarInput::Constant(0.8),
+        clearcoat_gloss: ScalarInput::Texture(4),
+    };
     let mut with_holes = Material::blend(ScalarInput::Constant(0.0), 19, 19);
     if let Material::Blend { opacity, .. } = &mut with_holes {
         *opacity = ScalarInput::Texture(4);
@@ -221,6 +237,9 @@ fn shiny() -> [Material; 10] {
         gold([none, none], false, ColorInput::Texture(1), false),
         gold([ScalarInput::Texture(3), narrow], true, white, false),
         Material::Translucent { reflectance: ColorInput::Texture(1), transmittance: ColorInput::Texture(5) },
+        disney(ColorInput::Texture(1), none, none),
+        disney(ColorInput::Constant(Vec3::new(0.1, 0.6, 0.3)), ScalarInput::Texture(3), none),
+        disney(ColorInput::Texture(5), narrow, wide),
         with_holes,
     ]
 }

@@ -69,6 +69,7 @@ fn every_word_of_the_scene_file_is_described() {
         "scene-textures",
         "scene-materials",
         "scene-principled",
+        "scene-disney",
         "scene-glass",
         "scene-objects",
         "scene-sky",

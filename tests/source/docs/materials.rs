@@ -40,6 +40,7 @@ fn every_property_of_a_material_has_its_row() {
     for &kind in MaterialKind::ALL {
         let (page, heading) = match kind {
             MaterialKind::Principled => ("docs/scene-principled.md", "# ".to_owned()),
+            MaterialKind::Disney => ("docs/scene-disney.md", "# ".to_owned()),
             MaterialKind::Glass | MaterialKind::RoughGlass | MaterialKind::ThinGlass => {
                 ("docs/scene-glass.md", format!("### {}\n", kind.name()))
             }

@@ -184,6 +184,9 @@ impl Bsdf {
     /// Whether no light passes it.
     pub(crate) fn is_opaque(&self) -> bool {
         match self {
+            Self::Plain(Material::Disney { transmission, thin_walled, .. }) => {
+                !thin_walled && *transmission == Scalar::Number(0.0)
+            }
             Self::Plain(
                 Material::Glass { .. }
                 | Material::ThinGlass { .. }
@@ -366,6 +369,7 @@ impl Taking<'_> {
             Material::Metal { alpha, reflectance, fresnel, compensate: true } => {
                 plain(self.compensated(alpha, reflectance, fresnel))
             }
+            Material::Disney { .. } if self.renderer != Renderer::Mitsuba => self.disney(written),
             Material::Glass { absorption, dispersion, .. } | Material::RoughGlass { absorption, dispersion, .. } => {
                 self.absorb(absorption, dispersion);
                 plain(Bsdf::Plain(written))
@@ -487,6 +491,51 @@ impl Taking<'_> {
             _ => Bsdf::mix(Scalar::Number(share), a, b),
         };
         (bsdf, radiance)
+    }
+
+    /// The principled material that is closest.
+    fn disney(&mut self, material: Material<Written>) -> (Bsdf, Option<Color>) {
+        let Material::Disney {
+            base_color,
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            thin_walled,
+            diffuse_transmission,
+            sheen,
+            clearcoat,
+            anisotropic,
+            ..
+        } = material
+        else {
+            unreachable!("it is of Disney")
+        };
+        self.tell("the brighter rim, hues of reflections and flatness of Disney's model are left out");
+        if thin_walled && diffuse_transmission != Scalar::Number(0.0) {
+            self.tell("it transmits no diffuse light");
+        }
+        let (of_sheen, of_coat, of_highlights) = (sheen, clearcoat, anisotropic);
+        let mut closest = Material::<Written>::principled(base_color);
+        if let Material::Principled {
+            metallic: a,
+            roughness: b,
+            ior: c,
+            transmission: d,
+            thin_walled: e,
+            sheen_color,
+            clearcoat,
+            anisotropy,
+            ..
+        } = &mut closest
+        {
+            (*a, *b, *c, *d, *e) = (metallic, roughness, ior, transmission, thin_walled);
+            (*clearcoat, *anisotropy) = (of_coat, of_highlights);
+            if of_sheen != Scalar::Number(0.0) {
+                *sheen_color = Color::Rgb(Vec3::ONE);
+            }
+        }
+        self.principled(closest)
     }
 
     fn principled(&mut self, material: Material<Written>) -> (Bsdf, Option<Color>) {

@@ -7,13 +7,14 @@
 //! | `metal` | `roughconductor`; `principled` for the Fresnel term of Schlick |
 //! | `conductor` | `conductor`, `roughconductor` |
 //! | `glass`, `rough_glass`, `thin_glass` | `dielectric`, `roughdielectric`, `thindielectric` |
-//! | `translucent` | `principledthin`, told |
+//! | `translucent` | a `blendbsdf` of `diffuse` and a `principledthin` that only transmits |
+//! | `disney` | `principled`, `principledthin` |
 //! | `blend` | `blendbsdf`; by side two BSDFs of `twosided` |
 
 use crate::common::surface::{Bsdf, Change, Color, Normals, Scalar, Surface, Use, Written, loses_light};
 use crate::mitsuba::{FORMATS, Writer};
 use firstlight_files::write_error::WriteError;
-use firstlight_render::{Fresnel, Material, TexturePattern, Wrap};
+use firstlight_render::{Fresnel, Material, Param, TexturePattern, Wrap};
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3, Mat2, Vec3};
 
 type Result<T = ()> = std::result::Result<T, WriteError>;
@@ -128,8 +129,25 @@ impl Writer<'_> {
                 }
             }
             Material::Translucent { reflectance, transmittance } => {
-                self.tell(name, "diffuse transmission becomes that of Disney's model, which depends on the angle");
-                return self.translucent(reflectance, transmittance, attributes, name);
+                return self.translucent(reflectance, transmittance, attributes);
+            }
+            Material::Disney { thin_walled, ior, .. } => {
+                open(self, if *thin_walled { "principledthin" } else { "principled" });
+                let of_solids = ["metallic", "clearcoat", "clearcoat_gloss"];
+                for (property, param) in material.params() {
+                    match (property.name, param) {
+                        (name, _) if *thin_walled && of_solids.contains(&name) => {}
+                        ("base_color", Param::Color(color)) => self.color("base_color", color)?,
+                        (_, Param::Scalar(scalar)) if *scalar == Scalar::Number(0.0) => {}
+                        ("diffuse_transmission", _) if !thin_walled => {}
+                        ("specular_tint", Param::Scalar(scalar)) => self.scalar("spec_tint", scalar)?,
+                        ("transmission", Param::Scalar(scalar)) => self.scalar("spec_trans", scalar)?,
+                        ("diffuse_transmission", Param::Scalar(scalar)) => self.scalar("diff_trans", scalar)?,
+                        (name, Param::Scalar(scalar)) => self.scalar(name, scalar)?,
+                        _ => {}
+                    }
+                }
+                self.xml.float("eta", *ior);
             }
             Material::Mirror { reflectance } => {
                 open(self, "conductor");
@@ -202,39 +220,32 @@ impl Writer<'_> {
         }
     }
 
-    /// Two shares of a surface of Disney: one reflects, the other transmits.
-    fn translucent(
-        &mut self,
-        reflectance: &Color,
-        transmittance: &Color,
-        attributes: &[(&str, &str)],
-        name: &str,
-    ) -> Result {
-        let mean = |writer: &Self, color: &Color| match color {
-            Color::Rgb(rgb) => *rgb,
-            Color::Texture(Use { name, .. }) => writer.scene.textures[name].texture.mean(),
+    /// Two shares of a surface: one reflects, the other is a thin surface of Disney, whose diffuse transmission is even.
+    fn translucent(&mut self, reflectance: &Color, transmittance: &Color, attributes: &[(&str, &str)]) -> Result {
+        let strength = |color: &Color| match color {
+            Color::Rgb(rgb) => rgb.max_element(),
+            Color::Texture(Use { name, .. }) => self.scene.textures[name].texture.mean().max_element(),
         };
-        let [back, through] = [reflectance, transmittance].map(|color| mean(self, color).max_element());
+        let [back, through] = [reflectance, transmittance].map(strength);
         let share = if back + through > 0.0 { through / (back + through) } else { 0.5 };
-        let part = |writer: &mut Self, color: &Color, share: f32, diff_trans: f32| {
-            writer.xml.open("bsdf", &[("type", "principledthin")]);
-            let color = match color {
-                Color::Rgb(rgb) => Color::Rgb(if share > 0.0 { (*rgb / share).min(Vec3::ONE) } else { *rgb }),
-                Color::Texture(Use { name, .. }) => {
-                    Color::Texture(Use { name: name.clone(), change: Change::Times(1.0 / share.max(1e-3)) })
-                }
-            };
-            writer.color("base_color", &color)?;
-            writer.xml.float("eta", 1.0);
-            writer.xml.float("diff_trans", diff_trans);
-            writer.xml.close();
-            Ok(())
+        let of_part = |color: &Color, share: f32| match color {
+            Color::Rgb(rgb) => Color::Rgb(if share > 0.0 { (*rgb / share).min(Vec3::ONE) } else { *rgb }),
+            Color::Texture(Use { name, .. }) => {
+                Color::Texture(Use { name: name.clone(), change: Change::Times(1.0 / share.max(1e-3)) })
+            }
         };
-        let _ = name;
         self.xml.open("bsdf", &[&[("type", "blendbsdf")], attributes].concat());
         self.xml.float("weight", share);
-        part(self, reflectance, 1.0 - share, 0.0)?;
-        part(self, transmittance, share, 2.0)?;
+        self.xml.open("bsdf", &[("type", "twosided")]);
+        self.xml.open("bsdf", &[("type", "diffuse")]);
+        self.color("reflectance", &of_part(reflectance, 1.0 - share))?;
+        self.xml.close();
+        self.xml.close();
+        self.xml.open("bsdf", &[("type", "principledthin")]);
+        self.color("base_color", &of_part(transmittance, share))?;
+        self.xml.float("eta", 1.0);
+        self.xml.float("diff_trans", 2.0);
+        self.xml.close();
         self.xml.close();
         Ok(())
     }

@@ -147,6 +147,7 @@ impl Writer<'_> {
                 Ok(list("thindielectric").float("eta", *ior))
             }
             Material::Principled { .. }
+            | Material::Disney { .. }
             | Material::Phong { .. }
             | Material::Emissive { .. }
             | Material::Blend { .. } => unreachable!("it was taken apart"),

@@ -54,8 +54,8 @@ impl Converter<'_> {
                 self.tell(node, "polarisation is not modelled: the surface is a roughplastic");
                 self.plastic(node)?
             }
-            "principled" => self.principled(node)?,
-            "principledthin" => self.principled_thin(node)?,
+            "principled" | "principledthin" => self.principled(node)?,
+            "polarizer" | "circular" | "retarder" => self.polarizing_filter(node)?,
             "twosided" => return self.both_sides(node, depth),
             "mask" => return self.mask(node, depth),
             "blendbsdf" => return self.blend(node, depth),
@@ -156,6 +156,17 @@ impl Converter<'_> {
         Ok(Surface::two_sided(Material::ThinGlass { ior, reflectance, transmittance }))
     }
 
+    /// A filter of polarised light: as in Mitsuba's variants without polarisation, light passes it straight on.
+    fn polarizing_filter(&mut self, node: Node) -> Result<Surface, SceneError> {
+        let plugin = node.plugin();
+        let (share, lost) = if plugin == "retarder" { (1.0, "nothing") } else { (0.5, "half") };
+        self.tell(node, &format!("polarisation is not modelled: light that passes a {plugin} loses {lost}"));
+        node.ignore(&["theta", "delta", "left_handed", "polarizing"]);
+        let transmittance = self.constant_color(node, "transmittance", 1.0, Use::Reflectance)?;
+        let (transmittance, reflectance) = ((share * transmittance).into(), Vec3::ZERO.into());
+        Ok(Surface::two_sided(Material::ThinGlass { ior: 1.0, reflectance, transmittance }))
+    }
+
     fn conductor(&mut self, node: Node) -> Result<Surface, SceneError> {
         let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
         let material = node.text("material")?.unwrap_or("none");
@@ -190,102 +201,63 @@ impl Converter<'_> {
         Ok(Surface::one_sided(Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann }))
     }
 
-    /// Whether something of `principled` is there and not 0.
-    fn is_given(&mut self, node: Node, name: &str) -> Result<bool, SceneError> {
-        Ok(node.has(name) && self.scalar(node, name, 0.0)? != ScalarValue::Number(0.0))
-    }
-
+    /// `principled` and `principledthin`.
     fn principled(&mut self, node: Node) -> Result<Surface, SceneError> {
-        let base = self.color(node, "base_color", 0.5, Use::Reflectance)?;
-        let transmits = self.is_given(node, "spec_trans")?;
-        let wanted_ior = match node.float("eta")? {
-            Some(eta) => eta,
-            None => {
-                let specular = node.float_or("specular", 0.5)?.clamp(if transmits { 1e-3 } else { 0.0 }, 12.0);
-                2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
-            }
-        };
-        node.ignore(&["diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate"]);
-        for (name, what) in [
-            ("sheen", "the sheen of Disney's model is not modelled: there is none"),
-            ("flatness", "flatness is not modelled: the base is diffuse"),
-            ("spec_tint", "tinted reflections of dielectrics are not modelled: they are white"),
-            ("clearcoat", "the clear coat of Disney's model is not that of ours, which is narrower at its foot"),
-        ] {
-            if self.is_given(node, name)? {
-                self.tell(node, what);
-            }
-        }
-        self.scalar(node, "sheen_tint", 0.0)?;
-        let rough = self.scalar(node, "roughness", 0.5)?;
-        let (metal, trans) = (self.scalar(node, "metallic", 0.0)?, self.scalar(node, "spec_trans", 0.0)?);
-        let (coat, gloss) = (self.scalar(node, "clearcoat", 0.0)?, self.constant_scalar(node, "clearcoat_gloss", 0.0)?);
-        let anisotropic = self.scalar(node, "anisotropic", 0.0)?;
-        let mut part = Material::principled(base);
-        let Material::Principled {
-            metallic,
-            roughness,
-            ior,
-            transmission,
-            clearcoat,
-            clearcoat_roughness,
-            anisotropy,
-            ..
-        } = &mut part
-        else {
-            unreachable!("it is principled")
-        };
-        (*metallic, *transmission) = (within_share(metal), within_share(trans));
-        *ior = (wanted_ior as f32).clamp(1e-3, 1e3);
-        // A quarter of the strength, by definition.
-        *clearcoat = match coat {
-            ScalarValue::Number(coat) => ScalarValue::Number((0.25 * coat).clamp(0.0, 1.0)),
-            texture => texture,
-        };
-        *clearcoat_roughness = ScalarValue::Number((0.1 + (0.001 - 0.1) * gloss.clamp(0.0, 1.0)).sqrt() as f32);
-        *roughness = within_share(rough.clone());
-        match (&rough, &anisotropic) {
-            (_, ScalarValue::Number(0.0)) => {}
-            (ScalarValue::Number(rough), ScalarValue::Number(amount)) => {
-                let aspect = (1.0 - 0.9 * amount.clamp(0.0, 1.0)).sqrt();
-                let (along, across) = (rough * rough / aspect, rough * rough * aspect);
-                (*roughness, *anisotropy) = (across.clamp(0.0, 1.0).sqrt().into(), elongation(along, across).into());
-            }
-            _ => self.tell(node, "textured anisotropy is not modelled: the surface is isotropic"),
-        }
-        self.tell(node, "the diffuse base of Disney's model brightens at grazing angles; ours does not");
-        Ok(Surface { part, two_sided: transmits })
-    }
-
-    fn principled_thin(&mut self, node: Node) -> Result<Surface, SceneError> {
-        let base = self.color(node, "base_color", 0.5, Use::Reflectance)?;
         node.ignore(&[
+            "clearcoat_sampling_rate",
             "diffuse_reflectance_sampling_rate",
             "diffuse_transmittance_sampling_rate",
+            "main_specular_sampling_rate",
             "spec_reflectance_sampling_rate",
+            "spec_trans_sampling_rate",
             "specular_reflectance_sampling_rate",
             "specular_transmittance_sampling_rate",
         ]);
-        for (name, what) in [
-            ("sheen", "the sheen of Disney's model is not modelled: there is none"),
-            ("flatness", "flatness is not modelled: the base is diffuse"),
-            ("spec_tint", "tinted reflections of dielectrics are not modelled: they are white"),
-            ("diff_trans", "diffuse transmission is not modelled: all diffuse light is reflected"),
-            ("anisotropic", "the anisotropy of thin surfaces is not modelled: they are isotropic"),
-        ] {
-            if self.is_given(node, name)? {
-                self.tell(node, what);
+        let thin_walled = node.plugin() == "principledthin";
+        let base_color = self.color(node, "base_color", 0.5, Use::Reflectance)?;
+        let mut share = |name: &str, default: f64| self.scalar(node, name, default).map(within_share);
+        let transmission = share("spec_trans", 0.0)?;
+        let (roughness, anisotropic) = (share("roughness", 0.5)?, share("anisotropic", 0.0)?);
+        let (specular_tint, flatness) = (share("spec_tint", 0.0)?, share("flatness", 0.0)?);
+        let (sheen, sheen_tint) = (share("sheen", 0.0)?, share("sheen_tint", 0.0)?);
+        let [mut metallic, mut clearcoat, mut clearcoat_gloss] = [0.0; 3].map(ScalarValue::Number);
+        let mut diffuse_transmission = ScalarValue::Number(0.0);
+        let ior = if thin_walled {
+            diffuse_transmission = match self.scalar(node, "diff_trans", 0.0)? {
+                ScalarValue::Number(number) => ScalarValue::Number(number.clamp(0.0, 2.0)),
+                texture => texture,
+            };
+            self.constant_scalar(node, "eta", 1.5)?
+        } else {
+            (metallic, clearcoat) = (share("metallic", 0.0)?, share("clearcoat", 0.0)?);
+            clearcoat_gloss = share("clearcoat_gloss", 0.0)?;
+            match node.float("eta")? {
+                Some(eta) => eta,
+                None => {
+                    let transmits = transmission != ScalarValue::Number(0.0);
+                    let specular = node.float_or("specular", 0.5)?.clamp(if transmits { 1e-3 } else { 0.0 }, 12.0);
+                    2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
+                }
             }
-        }
-        self.scalar(node, "sheen_tint", 0.0)?;
-        let (rough, trans) = (self.scalar(node, "roughness", 0.5)?, self.scalar(node, "spec_trans", 0.0)?);
-        let eta = node.float_or("eta", 1.5)?;
-        let mut part = Material::principled(base);
-        if let Material::Principled { roughness, ior, transmission, thin_walled, .. } = &mut part {
-            (*roughness, *transmission, *thin_walled) = (within_share(rough), within_share(trans), true);
-            *ior = (eta as f32).clamp(1e-3, 1e3);
-        }
-        Ok(Surface::two_sided(part))
+        };
+        let two_sided = thin_walled || transmission != ScalarValue::Number(0.0);
+        let part = Material::Disney {
+            base_color,
+            metallic,
+            roughness,
+            anisotropic,
+            ior: (ior as f32).clamp(1e-3, 1e3),
+            specular_tint,
+            transmission,
+            thin_walled,
+            diffuse_transmission,
+            flatness,
+            sheen,
+            sheen_tint,
+            clearcoat,
+            clearcoat_gloss,
+        };
+        Ok(Surface { part, two_sided })
     }
 
     /// The nested BSDFs of an adapter, which has at least one.
@@ -496,12 +468,6 @@ fn within_share(value: ScalarValue) -> ScalarValue {
         ScalarValue::Number(number) => ScalarValue::Number(number.clamp(0.0, 1.0)),
         texture @ ScalarValue::Texture(_) => texture,
     }
-}
-
-/// The anisotropy of `principled` with these widths: α along is α across + (1 − α across) · anisotropy².
-fn elongation(along: f32, across: f32) -> f32 {
-    let (along, across) = (along.clamp(0.0, 1.0), across.clamp(0.0, 1.0));
-    if across >= 1.0 { 0.0 } else { ((along - across) / (1.0 - across)).clamp(0.0, 1.0).sqrt() }
 }
 
 /// Holes and normals of a surface, which parts of others have not: its opacity, its map, and whether that has

@@ -7,7 +7,7 @@ use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{EnvironmentSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Channel, Encoding, Material};
+use firstlight_render::{Channel, Encoding, ImageTexture, Material};
 use glam::Vec3;
 use std::fmt::Write;
 
@@ -33,7 +33,11 @@ fn read(version: &str, body: &str) -> ForeignScene {
     write("nan.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 nan 0\nf 1 2 3\nf 1 2 4\n");
     let path = folder.path().join("a.xml");
     std::fs::write(&path, format!("<scene version=\"{version}\">\n{body}\n</scene>\n")).unwrap();
-    let light_images = LightImages::new(|_| None);
+    let light_images = LightImages::new(|path| {
+        let image = image::open(path).ok()?.into_rgb32f();
+        let texels = image.pixels().map(|pixel| Vec3::from(pixel.0)).collect();
+        Some(ImageTexture::from_linear(image.width(), image.height(), texels))
+    });
     let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
     let scene = read_scene(&path, &options).unwrap_or_else(|error| panic!("{error}"));
     SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));

@@ -8,13 +8,12 @@ use crate::mitsuba::graph::{Node, Spectrum, Value};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::{Use, blackbody, sampled};
 use crate::mitsuba::words::numbers;
-use crate::picture::{ImageBudget, read_picture_of_scene};
 use firstlight_files::printable;
-use firstlight_files::relative::{path_to_text, text_to_path};
+use firstlight_files::relative::path_to_text;
 use firstlight_format::error::SceneError;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Channel, Encoding, ImageTexture, Wrap};
+use firstlight_render::{Channel, Encoding, Wrap};
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -260,10 +259,8 @@ impl Converter<'_> {
         };
         let files: BTreeSet<String> = numbers.iter().filter_map(|(name, _)| file_of(name)).collect();
         let files: Vec<String> = files.into_iter().collect();
-        let (folder, budget) = (self.folder, ImageBudget::default());
-        let is_coloured = |file: &&String| {
-            read_picture_of_scene(&folder.join(text_to_path(file)), &budget).is_ok_and(|(image, _)| has_colours(&image))
-        };
+        let (folder, images) = (self.folder, self.light_images);
+        let is_coloured = |file: &&String| images.has_colours(folder, file);
         let coloured: BTreeSet<String> = files.par_iter().filter(is_coloured).cloned().collect();
         for (name, index) in numbers {
             if let Some(TextureSource::Image { file, channel, .. }) = self.file.textures.0.get_mut(&name)
@@ -334,13 +331,6 @@ impl Placed {
         let stretch = if (stretch.y - 1.0).abs() < 1e-12 { DVec2::ONE } else { stretch };
         Some(Self { stretch, repeat, offset, rotate: tangent.atan().to_degrees() })
     }
-}
-
-fn has_colours(image: &ImageTexture) -> bool {
-    (0..image.len()).any(|i| {
-        let Vec3 { x, y, z } = image.linear(i);
-        x != y || y != z
-    })
 }
 
 /// The colour of a parameter that is one.

@@ -33,6 +33,15 @@ impl LightImages {
         Self { read: Box::new(read), known: Mutex::default() }
     }
 
+    /// Whether an image is not grey; `false` if it cannot be read, which is told when it is loaded.
+    ///
+    /// - `folder`: of the scene.
+    pub fn has_colours(&self, folder: &Path, file: &str) -> bool {
+        let is_coloured = |Vec3 { x, y, z }| x != y || y != z;
+        let image = (self.read)(&folder.join(text_to_path(file)));
+        image.is_some_and(|image| (0..image.len()).any(|i| is_coloured(image.linear(i))))
+    }
+
     /// The image of a texture; `None` if it cannot be read, which is told when it is loaded.
     ///
     /// - `folder`: of the scene.

@@ -116,6 +116,38 @@ materials! {
         two_sided: bool, Flag(Choice) = true, "two-sided";
     }
 
+    /// The BSDF of Disney as Mitsuba 3 evaluates it in `principled` and `principledthin`; see `shading/disney`.
+    Disney "disney" (base_color) {
+        /// albedo, reflectance of metal, tint of transmitted light
+        base_color: P::Color, Color(Reflectance) = Vec3::splat(0.5), "colour";
+        /// fraction of metal: 0 is a dielectric, 1 metal
+        metallic: P::Scalar, Scalar(Share) = 0.0, "metallic";
+        /// square root of the GGX width α, which is at least 0.001
+        roughness: P::Scalar, Scalar(Share) = 0.5, "roughness";
+        /// length of highlights along u: α / √(1 − 0.9 anisotropic), and times it across
+        anisotropic: P::Scalar, Scalar(Share) = 0.0, "anisotropy";
+        /// index of refraction of the dielectric
+        ior: f32, Number(Ior) = 1.5, "IOR";
+        /// share of the dielectric's reflection that has the hue of `base_color`
+        specular_tint: P::Scalar, Scalar(Share) = 0.0, "specular tint";
+        /// fraction of the dielectric that transmits: 0 is opaque, 1 glass
+        transmission: P::Scalar, Scalar(Share) = 0.0, "transmission";
+        /// a sheet without thickness: `principledthin`, without metal and coat
+        thin_walled: bool, Flag(Choice) = false, "thin walled";
+        /// twice the fraction of a sheet's diffuse light that goes to the far side
+        diffuse_transmission: P::Scalar, Scalar(Factor) = 0.0, "diffuse transmission";
+        /// share of the base that is a thin subsurface layer
+        flatness: P::Scalar, Scalar(Share) = 0.0, "flatness";
+        /// strength of the light that is added at grazing angles
+        sheen: P::Scalar, Scalar(Share) = 0.0, "sheen";
+        /// share of the sheen that has the hue of `base_color`
+        sheen_tint: P::Scalar, Scalar(Share) = 0.0, "sheen tint";
+        /// strength of a coat, of which a quarter is added
+        clearcoat: P::Scalar, Scalar(Share) = 0.0, "clearcoat";
+        /// its width: 0 is 0.1, 1 is 0.001
+        clearcoat_gloss: P::Scalar, Scalar(Share) = 0.0, "coat gloss";
+    }
+
     /// Perfect mirror with the same reflectance at every angle.
     Mirror "mirror" (reflectance) {
         /// reflected share, the same at every angle

@@ -10,7 +10,9 @@ impl Material {
         match self {
             Self::Glass { .. } | Self::RoughGlass { .. } => true,
             Self::Phong { transparency, .. } => *transparency > 0.0,
-            Self::Principled { transmission, thin_walled, .. } => !thin_walled && can_be_above_zero(transmission),
+            Self::Principled { transmission, thin_walled, .. } | Self::Disney { transmission, thin_walled, .. } => {
+                !thin_walled && can_be_above_zero(transmission)
+            }
             _ => false,
         }
     }
@@ -75,7 +77,7 @@ impl Material {
             }
             // The weak reflections of a coat and of a pane, which does not bend light, are left to camera paths.
             Self::Plastic { .. } | Self::ThinGlass { .. } => false,
-            Self::Diffuse { .. } | Self::Translucent { .. } | Self::Emissive { .. } => false,
+            Self::Diffuse { .. } | Self::Translucent { .. } | Self::Disney { .. } | Self::Emissive { .. } => false,
         }
     }
 
@@ -88,7 +90,9 @@ impl Material {
                 let part = &materials[if *weight < 1.0 { *a } else { *b } as usize];
                 let is_plain = match part {
                     Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => true,
-                    Self::Conductor { .. } | Self::Translucent { .. } => !part.asks_for_tangents(),
+                    Self::Conductor { .. } | Self::Translucent { .. } | Self::Disney { .. } => {
+                        !part.asks_for_tangents()
+                    }
                     _ => false,
                 };
                 if is_plain { part } else { self }
@@ -115,6 +119,9 @@ impl Material {
         match self {
             Self::RoughGlass { .. } | Self::Translucent { .. } => true,
             Self::Principled { transmission, .. } => can_be_above_zero(transmission),
+            Self::Disney { transmission, thin_walled, diffuse_transmission, .. } => {
+                can_be_above_zero(transmission) || (*thin_walled && can_be_above_zero(diffuse_transmission))
+            }
             _ => false,
         }
     }
@@ -130,7 +137,9 @@ impl Material {
             Self::Principled { clearcoat_normal_map, anisotropy, .. } => {
                 clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
             }
-            Self::Conductor { alpha_v, .. } => can_be_above_zero(alpha_v),
+            Self::Conductor { alpha_v: width, .. } | Self::Disney { anisotropic: width, .. } => {
+                can_be_above_zero(width)
+            }
             _ => false,
         };
         of_layers || self.normal_map().is_some()

@@ -290,6 +290,7 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
         | Material::RoughGlass { ior, absorption, dispersion, .. }
         | Material::Principled { ior, absorption, dispersion, .. } => row(*ior, *dispersion, *absorption),
         Material::Phong { ior, absorption, .. } => row(*ior, 0.0, *absorption),
+        Material::Disney { ior, .. } => row(*ior, 0.0, Vec3::ZERO),
         _ => Vec::new(),
     }
 }

@@ -180,7 +180,7 @@ fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
     match &touched.materials[touched.geometry.material_of(hit) as usize] {
         Material::Glass { .. } => ContactKind::Glass,
         Material::RoughGlass { .. } => ContactKind::RoughGlass,
-        Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. }
+        Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Disney { .. }
             if touched.bodies.is_transparent(hit.object) =>
         {
             ContactKind::PartlyClear

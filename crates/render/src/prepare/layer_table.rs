@@ -1,4 +1,4 @@
-//! Inputs of layered and translucent materials, metals and plastics, as a table for SIMD.
+//! Inputs of layered and translucent materials, metals, plastics and Disney's, as a table for SIMD.
 
 use crate::core::fresnel::reflectance_of;
 use crate::core::material::{ColorInput, Material, MaterialId, MaterialKind, ScalarInput};
@@ -28,9 +28,20 @@ pub(crate) mod input {
     /// Of translucent materials.
     pub const TRANSMITTANCE: usize = 3;
 
-    /// From here on of layers.
+    /// Of layers and Disney's from here on.
     pub const METALLIC: usize = 3;
     pub const ROUGHNESS: usize = 4;
+    pub const COAT: usize = 18;
+    pub const ANISOTROPY: usize = 20;
+
+    /// Of Disney's, which have an index of refraction too.
+    pub const SPECULAR_TINT: usize = 5;
+    pub const FLATNESS: usize = 6;
+    pub const SHEEN: usize = 7;
+    pub const SHEEN_TINT: usize = 8;
+    pub const COAT_GLOSS: usize = 19;
+
+    /// Of layers.
     pub const SPECULAR: usize = 5;
     pub const SPECULAR_COLOR: usize = 6;
     /// Factor of the specular colour: the reflectance at normal incidence.
@@ -39,9 +50,7 @@ pub(crate) mod input {
     pub const NORMAL_SCALE: usize = 13;
     pub const SHEEN_COLOR: usize = 14;
     pub const SHEEN_ROUGHNESS: usize = 17;
-    pub const COAT: usize = 18;
     pub const COAT_ROUGHNESS: usize = 19;
-    pub const ANISOTROPY: usize = 20;
     pub const ANISOTROPY_MAP: usize = 21;
     /// Cosine and sine of the angle of anisotropy.
     pub const TURN: usize = 24;
@@ -80,6 +89,7 @@ impl LayerTable {
         match material {
             Material::Metal { .. } | Material::Conductor { .. } => return Some(MaterialKind::Metal as usize),
             Material::Plastic { .. } | Material::Translucent { .. } => return Some(material.kind() as usize),
+            Material::Disney { .. } if !material.scatters_through() => return Some(material.kind() as usize),
             _ => {}
         }
         let Material::Principled {
@@ -152,6 +162,36 @@ impl Row {
             Material::Translucent { reflectance, transmittance } => {
                 self.color(input::COLOR, reflectance);
                 self.color(input::TRANSMITTANCE, transmittance);
+            }
+            Material::Disney {
+                base_color,
+                metallic,
+                roughness,
+                anisotropic,
+                ior,
+                specular_tint,
+                flatness,
+                sheen,
+                sheen_tint,
+                clearcoat,
+                clearcoat_gloss,
+                ..
+            } => {
+                self.color(input::COLOR, base_color);
+                self.values[input::IOR] = *ior;
+                for (place, value) in [
+                    (input::METALLIC, metallic),
+                    (input::ROUGHNESS, roughness),
+                    (input::ANISOTROPY, anisotropic),
+                    (input::SPECULAR_TINT, specular_tint),
+                    (input::FLATNESS, flatness),
+                    (input::SHEEN, sheen),
+                    (input::SHEEN_TINT, sheen_tint),
+                    (input::COAT, clearcoat),
+                    (input::COAT_GLOSS, clearcoat_gloss),
+                ] {
+                    self.scalar(place, value);
+                }
             }
             _ => self.fill_layers(material),
         }

@@ -102,6 +102,7 @@ impl MaterialTable {
                 // The SIMD code supports one pair of texture coordinates: materials that need more are shaded like
                 // blends of many parts.
                 kind if kind != MaterialKind::Emissive && asks_for_more(id) => MaterialKind::Blend as usize,
+                MaterialKind::Disney if with_inputs.is_none() => MaterialKind::Blend as usize,
                 _ if parts[0].1 > 0.0 => COATED,
                 kind => kind as usize,
             };

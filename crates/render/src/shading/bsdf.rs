@@ -3,6 +3,7 @@
 use crate::core::color::luminance;
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
+use crate::shading::disney::surface::Disney;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::metal::Metal;
 use crate::shading::microfacets::Microfacets;
@@ -24,6 +25,7 @@ pub(crate) enum Lobe<'a> {
     },
     Metal(Metal),
     Plastic(Plastic<'a>),
+    Disney(Disney),
     /// With the media on both sides.
     Translucent(Translucent, MediumId),
     /// A pane without thickness.
@@ -55,6 +57,7 @@ impl Lobe<'_> {
             Self::Mirror { reflectance } => reflectance,
             Self::Metal(metal) => metal.tint.at(1.0).into(),
             Self::Plastic(plastic) => plastic.albedo().into(),
+            Self::Disney(disney) => disney.albedo(),
             Self::Translucent(translucent, _) => translucent.albedo().into(),
             Self::ThinGlass { transmittance, .. } => transmittance,
             Self::Glass(_) | Self::RoughGlass { .. } => Vec3::ONE,
@@ -71,7 +74,11 @@ impl Lobe<'_> {
 
     /// Whether [`Scatter::through`] leads into the medium of the path itself, as it does for all such parts of a blend.
     pub fn is_thin(&self) -> bool {
-        matches!(self, Self::Translucent(..))
+        match self {
+            Self::Translucent(..) => true,
+            Self::Disney(disney) => disney.is_thin(),
+            _ => false,
+        }
     }
 }
 
@@ -79,7 +86,7 @@ impl Scatter for Lobe<'_> {
     #[inline]
     fn has_non_specular(&self) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent(..) => true,
+            Self::Diffuse { .. } | Self::RoughGlass { .. } | Self::Translucent(..) | Self::Disney(_) => true,
             Self::Metal(metal) => !metal.facets.is_smooth(),
             Self::Plastic(plastic) => plastic.non_specular(),
             Self::Mirror { .. } | Self::Glass(_) | Self::ThinGlass { .. } => false,
@@ -93,6 +100,9 @@ impl Scatter for Lobe<'_> {
                 if normal.dot(wo) < 0.0 { (-normal, interface.reversed()) } else { (normal, interface) };
             let (value, pdf) = RoughGlass::new(normal, wo, facets, interface, compensate).eval(wi);
             return (Vec3::splat(value), pdf);
+        }
+        if let Self::Disney(disney) = self {
+            return disney.eval(wo, wi, normal);
         }
         let cos = normal.dot(wi);
         if let Self::Translucent(translucent, _) = self {
@@ -119,6 +129,7 @@ impl Scatter for Lobe<'_> {
         match self {
             Self::RoughGlass { interface, .. } => Some(*interface),
             Self::Translucent(_, here) => Some(Interface::thin(*here)),
+            Self::Disney(disney) => disney.through(),
             _ => None,
         }
     }
@@ -144,6 +155,7 @@ impl Scatter for Lobe<'_> {
             Self::Plastic(plastic) => {
                 plastic.seen(wo.into(), normal.into()).sample(u_choice(), u.to_array()).reflected()
             }
+            Self::Disney(disney) => disney.sample(wo, normal, u_choice, u),
             Self::RoughGlass { interface, facets, compensate } => {
                 let surface = RoughGlass::new(normal, wo, facets, interface, compensate);
                 surface.sample(u_choice(), u).map(|RoughGlassSample { wi, weight, pdf, passes }| BsdfSample {
@@ -198,6 +210,7 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use crate::shading::disney::surface::tests::{opaque, sheet, solid};
     use crate::shading::metal::Tint;
     use crate::shading::surface::blend::{Blend, Part};
 
@@ -278,6 +291,8 @@ mod tests {
         same_mean(8, &anisotropic());
         let (interface, facets) = (Interface { eta: 1.5, radiance_eta: 1.5, beyond: MediumId::OUTSIDE }, BECKMANN);
         same_mean(9, &Lobe::RoughGlass { interface, facets, compensate: false });
+        let disneys = [opaque(), solid(true), solid(false), sheet()];
+        (10..).zip(disneys).for_each(|(case, disney)| same_mean(case, &Lobe::Disney(disney)));
         let leaf = leaf(Vec3::new(0.1, 0.4, 0.1), Vec3::new(0.3, 0.5, 0.05));
         same_mean(6, &leaf);
         let waxed = [(Part::Lobe(leaf), 0.8), (Part::Lobe(metal(0.3, false)), 0.2)];
@@ -327,6 +342,8 @@ mod tests {
             conductor_of(0.3, false),
             anisotropic(),
             leaf(Vec3::splat(0.3), Vec3::splat(0.6)),
+            Lobe::Disney(opaque()),
+            Lobe::Disney(sheet()),
         ];
         for lobe in lobes {
             let forth = lobe.eval(a, b, Vec3::Z).0 / b.z;

@@ -7,6 +7,7 @@ pub(crate) mod conductor;
 pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
+pub(crate) mod disney;
 pub(crate) mod ggx;
 pub(crate) mod glass_loss;
 pub(crate) mod guided;

@@ -19,7 +19,9 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
-use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance};
+use crate::shading::simd::lanes::{
+    DIFFUSE, DISNEY, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance,
+};
 use crate::shading::simd::scatter::{LobeLanes, eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
@@ -48,7 +50,8 @@ pub(crate) struct LightHits<'a> {
 
 /// Whether [`scatter`] handles a hit on a material of this kind.
 pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
-    knows(kind) && kind <= COATED && kind != TRANSLUCENT && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
+    let is_here = kind <= COATED && kind != TRANSLUCENT && kind != DISNEY;
+    knows(kind) && is_here && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
 }
 
 /// Connects the vertices to the lens, and continues the paths.

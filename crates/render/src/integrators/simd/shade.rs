@@ -15,7 +15,9 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
-use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance};
+use crate::shading::simd::lanes::{
+    DIFFUSE, DISNEY, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance,
+};
 use crate::shading::simd::scatter::{LobeLanes, layered_surface_of, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
@@ -51,12 +53,12 @@ pub(crate) struct KindHits<'a> {
 
 /// Whether [`shade`] supports hits on materials of a kind.
 pub(crate) fn knows(kind: usize) -> bool {
-    [DIFFUSE, MIRROR, GLASS, METAL, PLASTIC, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
+    [DIFFUSE, MIRROR, GLASS, METAL, PLASTIC, DISNEY, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Whether light sampling contributes to hits on materials of a kind.
 pub(crate) fn scatters(kind: usize) -> bool {
-    [DIFFUSE, METAL, PLASTIC, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
+    [DIFFUSE, METAL, PLASTIC, DISNEY, TRANSLUCENT, COATED, LAYERED, LAYERED_RICHLY].contains(&kind)
 }
 
 /// Shades hits on materials of one [`MaterialKind`](crate::core::material::MaterialKind).
@@ -67,6 +69,7 @@ pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
         GLASS => dispatch!(set, shade_kind::<_, GLASS>(group: KindHits)),
         METAL => dispatch!(set, shade_kind::<_, METAL>(group: KindHits)),
         PLASTIC => dispatch!(set, shade_kind::<_, PLASTIC>(group: KindHits)),
+        DISNEY => dispatch!(set, shade_kind::<_, DISNEY>(group: KindHits)),
         TRANSLUCENT => dispatch!(set, shade_kind::<_, TRANSLUCENT>(group: KindHits)),
         COATED => dispatch!(set, shade_kind::<_, COATED>(group: KindHits)),
         // Both kinds of layers share one copy of a large function.

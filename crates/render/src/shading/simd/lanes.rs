@@ -10,6 +10,7 @@ pub(crate) const MIRROR: usize = MaterialKind::Mirror as usize;
 pub(crate) const GLASS: usize = MaterialKind::Glass as usize;
 pub(crate) const METAL: usize = MaterialKind::Metal as usize;
 pub(crate) const PLASTIC: usize = MaterialKind::Plastic as usize;
+pub(crate) const DISNEY: usize = MaterialKind::Disney as usize;
 pub(crate) const TRANSLUCENT: usize = MaterialKind::Translucent as usize;
 
 #[inline(always)]

@@ -1,8 +1,10 @@
-//! Metals and plastics at sixteen points; see [`crate::shading::metal`] and [`crate::shading::plastic`].
+//! Metals, plastics and Disney's materials at sixteen points; see [`crate::shading::metal`],
+//! [`crate::shading::plastic`] and [`crate::shading::disney`].
 
 use crate::prepare::layer_table::input;
 use crate::prepare::material_table::{BECKMANN, COMPENSATE, NONLINEAR, SCHLICK};
 use crate::shading::coat::{Coat, entries};
+use crate::shading::disney::layers::{DisneyInputs, DisneyLayers, SeenLayers};
 use crate::shading::metal::{Metal, SeenMetal, Tint};
 use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::{Plastic, SeenPlastic};
@@ -50,4 +52,27 @@ pub(crate) fn plastics_of<'a, S: Simd>(at: &HitGroup<'a, S>, place: &SurfaceLane
     let nonlinear = flags.has(NONLINEAR);
     Plastic::new(inputs.shares(input::COLOR), nonlinear, inputs.share(input::SPECULAR), coat)
         .seen(place.wo, place.normal)
+}
+
+#[inline(always)]
+pub(crate) fn disneys_of<S: Simd>(at: &HitGroup<S>, place: &SurfaceLanes<S>) -> SeenLayers<Float<S>> {
+    let inputs = InputLanes::of(at, place);
+    let mut layers = DisneyLayers::solid(&DisneyInputs {
+        color: inputs.shares(input::COLOR),
+        metallic: inputs.share(input::METALLIC),
+        roughness: inputs.share(input::ROUGHNESS),
+        anisotropic: inputs.share(input::ANISOTROPY),
+        ior: inputs.scalar(input::IOR),
+        specular_tint: inputs.share(input::SPECULAR_TINT),
+        transmission: inputs.scalar(input::IOR) * 0.0,
+        flatness: inputs.share(input::FLATNESS),
+        sheen: inputs.share(input::SHEEN),
+        sheen_tint: inputs.share(input::SHEEN_TINT),
+        clearcoat: inputs.share(input::COAT),
+        clearcoat_gloss: inputs.share(input::COAT_GLOSS),
+    });
+    if let Some(TangentLanes { along_u, handedness, .. }) = place.tangent {
+        layers.tangent = Some(tangent_axes(along_u, handedness, place.normal)[0]);
+    }
+    layers.seen(place.wo, place.normal)
 }

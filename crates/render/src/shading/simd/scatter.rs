@@ -6,6 +6,7 @@ use crate::sampling::warp::cosine_hemisphere;
 use crate::sampling::{SamplerLanes, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
+use crate::shading::disney::layers::SeenLayers;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::metal::SeenMetal;
@@ -16,9 +17,9 @@ use crate::shading::simd::coat::Coat;
 use crate::shading::simd::glass::GlassLanes;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::inputs::InputLanes;
-use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, PLASTIC, TRANSLUCENT};
+use crate::shading::simd::lanes::{DIFFUSE, DISNEY, GLASS, METAL, PLASTIC, TRANSLUCENT};
 use crate::shading::simd::layers::{EvalLayers, layers_of};
-use crate::shading::simd::metals::{metals_of, plastics_of};
+use crate::shading::simd::metals::{disneys_of, metals_of, plastics_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::translucent::Translucent;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
@@ -37,6 +38,7 @@ pub(crate) enum LobeLanes<'a, S: Simd> {
     Glass(GlassLanes<S>),
     Metal(SeenMetal<Float<S>>),
     Plastic(SeenPlastic<'a, Float<S>>),
+    Disney(SeenLayers<Float<S>>),
     Translucent(Translucent<Float<S>>),
     Coated(Coat<S>),
     Layers(Seen<Float<S>>),
@@ -64,6 +66,7 @@ pub(crate) fn surface_of<'a, S: Simd, const KIND: usize>(
             let non_specular = plastic.non_specular();
             (LobeLanes::Plastic(plastic), non_specular)
         }
+        DISNEY => (LobeLanes::Disney(disneys_of(at, place)), Mask::MAX),
         TRANSLUCENT => {
             let inputs = InputLanes::of(at, place);
             let surface = Translucent::new(inputs.color(input::COLOR), inputs.color(input::TRANSMITTANCE));
@@ -108,6 +111,7 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
         LobeLanes::Coated(coat) if KIND == COATED => coat.eval(place.normal, wi),
         LobeLanes::Metal(metal) if KIND == METAL => metal.eval(wi),
         LobeLanes::Plastic(plastic) if KIND == PLASTIC => plastic.eval(wi),
+        LobeLanes::Disney(layers) if KIND == DISNEY => layers.eval(wi),
         LobeLanes::Translucent(surface) if KIND == TRANSLUCENT => {
             surface.eval(place.normal.dot(place.wo), place.normal.dot(wi))
         }
@@ -140,6 +144,7 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
         }
         LobeLanes::Metal(metal) if KIND == METAL => metal.sample(u).into(),
         LobeLanes::Plastic(plastic) if KIND == PLASTIC => plastic.sample(hints.u_lobe(sampler, dimension), u).into(),
+        LobeLanes::Disney(layers) if KIND == DISNEY => layers.sample(hints.u_lobe(sampler, dimension), u).into(),
         LobeLanes::Translucent(surface) if KIND == TRANSLUCENT => {
             let (sampled, transmitted) = surface.sample(normal, hints.u_lobe(sampler, dimension), u);
             Bounce { transmitted, ..sampled.into() }

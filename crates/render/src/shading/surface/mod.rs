@@ -6,6 +6,7 @@ use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::coat::Coat;
+use crate::shading::disney::at::disney_at;
 use crate::shading::interface::MediumId;
 use crate::shading::metal::{Metal, Tint};
 use crate::shading::microfacets::Microfacets;
@@ -101,6 +102,11 @@ fn collect<'a>(
                 parts.push_layers(layers, weight);
             }
         }
+        Material::Disney { .. } => {
+            if let Some(disney) = disney_at(scene, id, vertex, sides, leaf) {
+                parts.push(Lobe::Disney(disney), weight);
+            }
+        }
         Material::Glass { .. } => parts.push(clear_lobe(scene, sides, leaf), weight),
         Material::RoughGlass { alpha, compensate, beckmann, .. } => {
             let alpha = alpha.eval(scene, vertex.texture_point);
@@ -185,6 +191,7 @@ pub(crate) fn lobe_at<'a>(
             transmittance: transmittance.eval(scene, uv),
             here,
         }),
+        Material::Disney { .. } => disney_at(scene, id, vertex, &mut sides, 0).map(Lobe::Disney),
         Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
         Material::RoughGlass { alpha, compensate, beckmann, .. } => {
             Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *beckmann, *compensate))
