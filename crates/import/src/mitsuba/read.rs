@@ -368,7 +368,7 @@ impl Reader<'_> {
                 let axis = self.vector(element, place, Some(0.0))?;
                 let angle = self.required(element, place, "angle")?;
                 let angle = number(&angle).ok_or_else(|| self.graph.error(place, "`angle` must be a number"))?;
-                transform::rotation(axis, angle)
+                transform::rotation(axis, angle, self.old)
             }
             "lookat" | "lookAt" => {
                 let (origin, target) = (text(self, "origin")?, text(self, "target")?);

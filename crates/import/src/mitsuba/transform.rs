@@ -4,9 +4,13 @@
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-/// A rotation about an axis of any length, degrees.
-pub(crate) fn rotation(axis: DVec3, degrees: f64) -> Result<DMat4, String> {
-    let axis = axis.try_normalize().ok_or("the axis of a rotation is zero")?;
+/// A rotation about an axis, degrees.
+///
+/// - `old`: the file is of version 0.x, which scales axes to unit length. Mitsuba 3 does not: about an axis of another
+///   length, cos · I + sin · [a]ₓ + (1 − cos) · a aᵀ is no rotation.
+pub(crate) fn rotation(axis: DVec3, degrees: f64, old: bool) -> Result<DMat4, String> {
+    let unit = axis.try_normalize().ok_or("the axis of a rotation is zero")?;
+    let axis = if old { unit } else { axis };
     // Quarter turns are exact: walls of boxes stay where they are.
     let (sin, cos) = match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),
@@ -66,11 +70,19 @@ mod tests {
 
     #[test]
     fn rotations_are_counter_clockwise_and_quarters_exact() {
-        let quarter = rotation(DVec3::new(0.0, 0.0, 7.0), 90.0).unwrap();
+        let quarter = rotation(DVec3::new(0.0, 0.0, 7.0), 90.0, true).unwrap();
         assert_eq!(quarter.transform_vector3(DVec3::X), DVec3::Y);
-        let some = rotation(DVec3::new(1.0, 2.0, -0.5), 33.0).unwrap();
+        let some = rotation(DVec3::new(1.0, 2.0, -0.5), 33.0, true).unwrap();
         let expected = DMat4::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 33_f64.to_radians());
         assert!(some.abs_diff_eq(expected, 1e-15));
-        assert!(rotation(DVec3::ZERO, 1.0).is_err());
+        assert!(rotation(DVec3::ZERO, 1.0, true).is_err());
+        // `ScalarTransform4f().rotate([0, 1, 1], 15)` of Mitsuba 3.9.1.
+        let rows = [
+            [0.9659258, -0.258_819_04, 0.258_819_04],
+            [0.258_819_04, 1.0, 0.034_074_19],
+            [-0.258_819_04, 0.034_074_19, 1.0],
+        ];
+        let found = DMat3::from_mat4(rotation(DVec3::new(0.0, 1.0, 1.0), 15.0, false).unwrap());
+        assert!(found.transpose().abs_diff_eq(DMat3::from_cols_array_2d(&rows), 1e-7), "{found}");
     }
 }
