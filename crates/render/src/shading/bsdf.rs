@@ -3,7 +3,7 @@
 use crate::core::color::luminance;
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
-use crate::shading::disney::surface::Disney;
+use crate::shading::disney::Disney;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::metal::Metal;
 use crate::shading::microfacets::Microfacets;
@@ -210,7 +210,7 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
-    use crate::shading::disney::surface::tests::{opaque, sheet, solid};
+    use crate::shading::disney::tests::{opaque, sheet, solid};
     use crate::shading::metal::Tint;
     use crate::shading::surface::blend::{Blend, Part};
 

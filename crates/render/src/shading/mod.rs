@@ -8,6 +8,8 @@ pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
 pub(crate) mod disney;
+pub(crate) mod disney_at;
+pub(crate) mod disney_layers;
 pub(crate) mod ggx;
 pub(crate) mod glass_loss;
 pub(crate) mod guided;

@@ -4,7 +4,7 @@
 use crate::prepare::layer_table::input;
 use crate::prepare::material_table::{BECKMANN, COMPENSATE, NONLINEAR, SCHLICK};
 use crate::shading::coat::{Coat, entries};
-use crate::shading::disney::layers::{DisneyInputs, DisneyLayers, SeenLayers};
+use crate::shading::disney_layers::{DisneyInputs, DisneyLayers, SeenLayers};
 use crate::shading::metal::{Metal, SeenMetal, Tint};
 use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::{Plastic, SeenPlastic};

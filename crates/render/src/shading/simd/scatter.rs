@@ -6,7 +6,7 @@ use crate::sampling::warp::cosine_hemisphere;
 use crate::sampling::{SamplerLanes, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
-use crate::shading::disney::layers::SeenLayers;
+use crate::shading::disney_layers::SeenLayers;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::metal::SeenMetal;

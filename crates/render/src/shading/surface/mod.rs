@@ -6,7 +6,7 @@ use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::coat::Coat;
-use crate::shading::disney::at::disney_at;
+use crate::shading::disney_at::disney_at;
 use crate::shading::interface::MediumId;
 use crate::shading::metal::{Metal, Tint};
 use crate::shading::microfacets::Microfacets;

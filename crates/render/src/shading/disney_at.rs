@@ -2,8 +2,8 @@
 
 use crate::core::material::{Material, MaterialId, ScalarInput};
 use crate::prepare::prepared::Prepared;
-use crate::shading::disney::layers::{DisneyInputs, DisneyLayers};
-use crate::shading::disney::surface::{Disney, Through};
+use crate::shading::disney::{Disney, Through};
+use crate::shading::disney_layers::{DisneyInputs, DisneyLayers};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lookups::Lookups;
 use crate::shading::sides::Sides;

@@ -1,4 +1,7 @@
-//! Disney's BSDF at one point: what it reflects, and what passes it.
+//! Disney's BSDF at one point: what it reflects, and what passes it, as Mitsuba 3 evaluates it in `principled` and
+//! `principledthin` (Burley 2012, "Physically Based Shading at Disney", and 2015, "Extending the Disney BRDF to a BSDF
+//! with Integrated Subsurface Scattering"). Its parts are a plain sum: unlike `principled` it neither conserves energy
+//! nor is it limited to it. What it reflects, also at sixteen points, is [`crate::shading::disney_layers`].
 //!
 //! A solid refracts at the microfacets of its reflection, tinted by the root of its colour at each passage. A thin sheet
 //! scatters what passes about the straight direction, as if it were reflected on the far side, by GGX of a roughness of
@@ -7,7 +10,7 @@
 use crate::core::color::luminance;
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
-use crate::shading::disney::layers::{DisneyLayers, SeenLayers};
+use crate::shading::disney_layers::{DisneyLayers, SeenLayers};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::microfacets::{Microfacets, SeenMicrofacets};
 use crate::shading::rough_glass::{self, RoughGlass};
