@@ -3,6 +3,7 @@
 use crate::mitsuba::read_scene;
 use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
 use crate::model::projection::LightImages;
+use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{EnvironmentSource, TextureSource};
@@ -34,7 +35,8 @@ fn read(version: &str, body: &str) -> ForeignScene {
     let path = folder.path().join("a.xml");
     std::fs::write(&path, format!("<scene version=\"{version}\">\n{body}\n</scene>\n")).unwrap();
     let light_images = LightImages::new(|path| {
-        let image = image::open(path).ok()?.into_rgb32f();
+        let bytes = InputFile::open(path, FileKind::Image).and_then(InputFile::bytes).ok()?;
+        let image = image::load_from_memory(&bytes).ok()?.into_rgb32f();
         let texels = image.pixels().map(|pixel| Vec3::from(pixel.0)).collect();
         Some(ImageTexture::from_linear(image.width(), image.height(), texels))
     });
