@@ -272,8 +272,9 @@ fn materials_are_those_of_the_docs() {
         <float name="specular" value="0.5"/><float name="sheen" value="0.375"/><float name="clearcoat" value="1"/>
         <float name="flatness" value="0.625"/></bsdf>"#;
     let (part, warnings) = material(layered);
-    let wanted = "(materials: { \"m\": disney(base_color: (0.5, 0.25, 0.125), roughness: 0.25, anisotropic: 0.5, \
-                  specular_tint: 0.75, sheen: 0.375, clearcoat: 1, flatness: 0.625) })";
+    let wanted = "(camera: (eye: (0, 0, 4), look_at: (0, 0, 0)), materials: { \"m\": disney(base_color: \
+                  (0.5, 0.25, 0.125), roughness: 0.25, anisotropic: 0.5, specular_tint: 0.75, sheen: 0.375, \
+                  clearcoat: 1, flatness: 0.625) })";
     let wanted = SceneFile::parse(wanted, "wanted.ron").unwrap().materials.get("m").unwrap().clone();
     // `specular` of 1/2 is an index of 1.5.
     assert!((part == wanted) && warnings.is_empty(), "{part:?} {warnings:?}");
