@@ -264,6 +264,33 @@ fn shapes_of_formulas_end_where_their_bytes_do() {
     assert!(said.contains("there are too many shapes like it") && said.contains("FIRSTLIGHT_LIMITS"), "{said}");
 }
 
+/// A file of a mesh is read again for each attribute that textures read: all but the first have a limit together.
+#[test]
+fn attributes_of_meshes_end_where_their_bytes_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\nproperty float z\n\
+                  element face 20000\nproperty list uchar int vertex_indices\nend_header\n";
+    let vertices = (0..40_000).map(|i| format!("{} {} 0\n", i % 200, i / 200));
+    let faces = (0..20_000).map(|i| format!("3 {} {} {}\n", i, i + 1, i + 200));
+    let mesh: String = std::iter::once(header.to_owned()).chain(vertices).chain(faces).collect();
+    std::fs::write(folder.path().join("m.ply"), mesh).unwrap();
+    let shape = |i| {
+        format!(
+            "<shape type=\"ply\"><string name=\"filename\" value=\"m.ply\"/><bsdf type=\"diffuse\">\
+             <texture type=\"mesh_attribute\" name=\"reflectance\"><string name=\"name\" value=\"vertex_a{i}\"/>\
+             </texture></bsdf></shape>\n"
+        )
+    };
+    let shapes: String = (0..12).map(shape).collect();
+    let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>{shapes}</scene>");
+    std::fs::write(folder.path().join("many.xml"), scene).unwrap();
+    let mut command = program(folder.path());
+    let outcome = Outcome::of(command.args(["info", "--json", "many.xml"]).env("FIRSTLIGHT_LIMITS", "0.01"));
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
+    let said = format!("{}{}", outcome.err, outcome.out());
+    assert!(said.contains("too much is read of one file of a mesh"), "{said}");
+}
+
 /// What a scene takes beyond the memory of the process is refused or left out, with its size; nothing is aborted.
 #[cfg(target_os = "linux")]
 #[test]
@@ -283,10 +310,20 @@ fn a_scene_beyond_the_memory_of_the_process_is_told() {
     let own = format!("({camera}, environment: constant(1), materials: {{ {materials} }}, objects: [{own}])");
     std::fs::write(folder.path().join("spheres.ron"), spheres).unwrap();
     std::fs::write(folder.path().join("materials.ron"), own).unwrap();
+    let grid = "ball_grid(first: (0, 0, 0), steps: [(100, (1, 0, 0)), (100, (0, 1, 0)), (100, (0, 0, 1))], radius: 0.3, \
+                material: \"m\")";
+    let light = "materials: { \"m\": emissive(radiance: 1) }";
+    let lit = format!("({camera}, environment: constant(1), {light}, objects: [{grid}])");
+    std::fs::write(folder.path().join("lights.ron"), lit).unwrap();
     for (scene, code, expected) in [
+        ("lights.ron", 1, "1000000 emissive triangles and spheres take about 667 MiB to render"),
         ("sky.ron", 0, "`sky.png`: not enough memory; an environment of one colour is shown"),
-        ("spheres.ron", 1, "its 100000 objects, 1 materials and 0 textures take about 429 MiB to render, more than"),
-        ("materials.ron", 1, "its 50000 objects, 50000 materials and 0 textures take about 500 MiB to render, more"),
+        ("spheres.ron", 1, "its 100000 objects, 1 materials, 0 textures and 0 emissive"),
+        (
+            "materials.ron",
+            1,
+            "50000 materials, 0 textures and 0 emissive triangles and spheres take about 500 MiB to render, more",
+        ),
     ] {
         let line =
             format!("ulimit -v 700000; exec {PROGRAM} render {scene} -o {scene}.png --spp 1 --size 8x6 --threads 2");

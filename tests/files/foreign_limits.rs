@@ -117,6 +117,55 @@ fn what_takes_the_square_of_its_length_is_refused() {
 }
 
 #[test]
+fn surfaces_are_subdivided_as_far_as_there_is_room() {
+    let surface = |levels: u32, indices: &str, points: &str| {
+        let sphere = "Shape \"sphere\"\n";
+        let surface = format!("Shape \"loopsubdiv\" \"integer levels\" {levels} \"integer indices\" [{indices}]");
+        told(&pbrt(&format!("{sphere}{surface} \"point3 P\" [{points}]\n")).unwrap())
+    };
+    // Nothing would ever be so fine that it ends.
+    assert!(surface(u32::MAX, "0 0 0", "0 0 0").contains("one vertex twice"));
+    assert_eq!(surface(u32::MAX, "0 1 2", "0 0 0 1 0 0 0 1 0"), "");
+    let side = 160;
+    let corner = |x: u32, y: u32| x + y * (side + 1);
+    let cells = (0..side * side).map(|i| (i % side, i / side));
+    let indices = cells.map(|(x, y)| {
+        let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
+        format!("{a} {b} {c} {a} {c} {d} ")
+    });
+    let points = (0..(side + 1) * (side + 1)).map(|i| format!("{} {} 0 ", i % (side + 1), i / (side + 1)));
+    let told = surface(3, &indices.collect::<String>(), &points.collect::<String>());
+    assert!(told.contains("too many triangles when subdivided"), "{told}");
+}
+
+#[test]
+fn the_light_of_many_shapes_is_read_once() {
+    // Half a minute if each shape evaluated the spectrum.
+    let spectrum: String = (0..20_000).map(|i| format!("{} 1 ", 360.0 + 0.02 * f64::from(i))).collect();
+    let shapes = "Shape \"sphere\"\n".repeat(20_000);
+    let scene = pbrt(&format!("AreaLightSource \"diffuse\" \"spectrum L\" [{spectrum}]\n{shapes}")).unwrap();
+    assert_eq!(scene.file.objects.len(), 20_000);
+}
+
+#[test]
+fn a_scene_is_read_for_few_sets_of_parameters() {
+    let scene = "<scene version=\"3.0.0\"><shape type=\"cube\"/></scene>".to_owned();
+    let camera = "camera: (eye: (0, 0, 5), look_at: (0, 0, 0))";
+    let opened = |n: usize| {
+        let part = |i| {
+            format!("mesh(source: part(file: \"a.xml\", shape: 0, defines: [(\"a\", \"{i}\")]), material: \"m\"), ")
+        };
+        let parts: String = (0..n).map(part).collect();
+        let text = format!("({camera}, materials: {{ \"m\": mirror() }}, objects: [{parts}])");
+        let (_folder, path) = folder(&[("s.ron", text), ("a.xml", scene.clone())]);
+        load(&SceneSource::Scene(path), &LoadOptions::default()).map_err(|error| error.to_string())
+    };
+    assert_eq!(opened(16).unwrap().warnings.iter().count(), 0);
+    let said = opened(40).map_or_else(|error| error, |scene| told(&scene));
+    assert!(said.contains("more than 16 sets of parameters"), "{said}");
+}
+
+#[test]
 fn parameters_of_any_number_are_found_at_once() {
     // Minutes if each were compared with all others.
     let many: String = (0..200_000).map(|i| format!("<default name=\"a{i:06}\" value=\"\"/>\n")).collect();

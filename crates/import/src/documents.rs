@@ -26,13 +26,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// An image with an optional warning, or why it could not be read.
 type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
 
+type ReadScene = Result<Arc<ForeignScene>, SceneError>;
+
+/// Sets of parameters that a scene is read with: it takes its memory for each.
+const MAX_VARIANTS: usize = 16;
+
 /// Open files, by path.
 #[derive(Debug, Default)]
 pub struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
     /// Scenes of other renderers, with the names and values of their parameters.
-    scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), Arc<ForeignScene>>>,
+    scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), ReadScene>>,
     /// Of all images that are decoded.
     pixels: ImageBudget,
     /// Images that were decoded and not yet taken, by path.
@@ -97,18 +102,22 @@ impl Documents {
     /// The scene of another renderer at `path`, read on first use.
     ///
     /// - `defines`: names and values of parameters that it leaves open.
-    pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> Result<Arc<ForeignScene>, SceneError> {
+    pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> ReadScene {
         let key = (path.to_owned(), defines.to_vec());
         if let Some(scene) = lock(&self.scenes).get(&key) {
-            return Ok(scene.clone());
+            return scene.clone();
+        }
+        if lock(&self.scenes).keys().filter(|(known, _)| known == path).count() >= MAX_VARIANTS {
+            let message = format!("is read with more than {MAX_VARIANTS} sets of parameters");
+            return Err(SceneError::in_file(path, message));
         }
         let budget = ImageBudget::default();
         let light_images =
             LightImages::new(move |path| read_picture_of_scene(path, &budget).ok().map(|(image, _)| image));
         let options =
             ForeignOptions { allow_outside: self.options.allow_outside, defines: key.1.clone(), light_images };
-        let scene = Arc::new(read_scene(path, &options)?);
-        Ok(lock(&self.scenes).entry(key).or_insert(scene).clone())
+        let scene = read_scene(path, &options).map(Arc::new);
+        lock(&self.scenes).entry(key).or_insert(scene).clone()
     }
 
     /// A mesh with the normals of its file.

@@ -8,7 +8,7 @@ use crate::pbrt::curves::Strands;
 use crate::pbrt::lights::{Light, color, light};
 use crate::pbrt::params::{Param, Params};
 use crate::pbrt::shapes::{is_whole_sphere, mesh_of, oriented};
-use crate::pbrt::state::{Described, State};
+use crate::pbrt::state::{AreaLight, Described, State};
 use crate::pbrt::textures::{Texture, Textures};
 use crate::ply::{has_normals, load_ply_with};
 use firstlight_files::limits::Limits;
@@ -32,6 +32,8 @@ use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
 const MAX_OBJECTS: usize = 1 << 20;
+/// Shapes, with the pieces of hair, and those that are left out.
+const MAX_SHAPES: u32 = 1 << 23;
 /// Meshes that formulas make may have this fraction of the bytes of a scene: reading them and building their trees takes
 /// as long as for a text of such a size.
 const SCENE_BYTES_PER_BYTE_MADE: u64 = 4;
@@ -202,9 +204,12 @@ impl<'a> Builder<'a> {
         if !is_written && self.bytes_left == 0 {
             return Err(format!("there are too many shapes like it: {}", Limits::advice()));
         }
-        let mesh = mesh_of(kind, params, is_reversed, self.path, &mut self.warnings)?;
+        let bytes_of = |n_vertices, n_triangles| size_of::<Vec3>() * (3 * n_vertices + n_triangles);
+        // A subdivided surface has two triangles per vertex.
+        let most_triangles = usize::try_from(self.bytes_left).unwrap_or(usize::MAX) / bytes_of(1, 2) * 2;
+        let mesh = mesh_of(kind, params, is_reversed, most_triangles, self.path, &mut self.warnings)?;
         if !is_written {
-            let bytes = size_of::<Vec3>() * (3 * mesh.positions.len() + mesh.triangles.len());
+            let bytes = bytes_of(mesh.positions.len(), mesh.triangles.len());
             self.bytes_left = self.bytes_left.saturating_sub(bytes as u64);
         }
         Ok(Arc::new(mesh))
@@ -244,7 +249,10 @@ impl<'a> Builder<'a> {
     /// A shape.
     pub(crate) fn shape(&mut self, kind: &str, params: &Params, state: &State) -> Result<(), TooMany> {
         let number = self.n_shapes;
-        self.n_shapes = self.n_shapes.saturating_add(1);
+        if number == MAX_SHAPES {
+            return Err(TooMany);
+        }
+        self.n_shapes += 1;
         if kind == "curve" {
             return self.curve(params, state, number);
         }
@@ -377,16 +385,18 @@ impl<'a> Builder<'a> {
     /// What a shape emits, and whether both of its sides do.
     fn radiance(
         &mut self,
-        light: &Params,
+        light: &AreaLight,
         geometry: &Geometry,
         state: &State,
         shape: &Params,
         kind: &str,
         name: &str,
     ) -> (ColorValue, bool) {
+        let AreaLight { params: light, radiance } = light;
         let is_two_sided = light.flag("twosided").unwrap_or(false);
         let mut told = Vec::new();
-        let mut radiance = color(light, "L", &mut |what| told.push(what)) * light.number("scale").unwrap_or(1.0);
+        let of_light = || color(light, "L", &mut |what| told.push(what)) * light.number("scale").unwrap_or(1.0);
+        let mut radiance = *radiance.get_or_init(of_light);
         if let Some(power) = light.number("power").filter(|power| *power > 0.0) {
             let world = state.ctm;
             let (area, n_shapes) = match geometry {
@@ -559,4 +569,20 @@ fn even_scale(matrix: &DMat3) -> Option<f64> {
     let unit = *matrix * scale.recip();
     let deviation = unit.transpose() * unit - DMat3::IDENTITY;
     deviation.to_cols_array().iter().all(|entry| entry.abs() < 1e-5).then_some(scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::projection::LightImages;
+
+    #[test]
+    fn shapes_that_are_left_out_are_counted() {
+        let light_images = LightImages::new(|_| None);
+        let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+        let mut builder = Builder::new(Path::new("a.pbrt"), &options);
+        builder.n_shapes = MAX_SHAPES - 1;
+        let mut shape = || builder.shape("x", &Params::default(), &State::default()).is_ok();
+        assert_eq!([shape(), shape()], [true, false]);
+    }
 }

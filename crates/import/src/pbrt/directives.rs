@@ -3,8 +3,7 @@
 use crate::model::foreign::{ForeignOptions, cut};
 use crate::pbrt::build::{Builder, TooMany};
 use crate::pbrt::cursor::{Cursor, SourceText};
-use crate::pbrt::params::Param;
-use crate::pbrt::state::{MaterialRef, State};
+use crate::pbrt::state::{AreaLight, MaterialRef, State};
 use crate::pbrt::transforms::{look_at, rotation};
 use crate::pbrt::view::{ViewOptions, ViewParts};
 use firstlight_files::gzip::decompressed;
@@ -14,6 +13,7 @@ use firstlight_files::printable;
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_format::error::{SceneError, suggestion};
 use glam::DAffine3;
+use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -22,7 +22,7 @@ use std::rc::Rc;
 const MAX_INCLUDES_DEEP: usize = 32;
 /// Files that are included, all together.
 const MAX_INCLUDES: usize = 10_000;
-/// Parameters of the `Attribute`s that count at a time, and their bytes: each shape gets a copy of all of them.
+/// Parameters of the `Attribute`s that count at a time, and their bytes: each shape looks for its own in all of them.
 const MAX_ATTRIBUTES: usize = 256;
 const MAX_ATTRIBUTE_BYTES: usize = 1 << 14;
 /// States that are saved at a time.
@@ -267,14 +267,12 @@ impl<'a> Reader<'a> {
             "Attribute" => {
                 let of = cursor.string()?;
                 let params = cursor.params()?;
-                let list = params.into_list();
-                let lists = || self.state.defaults.iter().map(|(_, list)| list).chain([&list]).flatten();
-                if lists().count() > MAX_ATTRIBUTES || lists().map(Param::n_bytes).sum::<usize>() > MAX_ATTRIBUTE_BYTES
-                {
+                let attributes = self.state.attributes.and(cut(&of), params.into_list());
+                if attributes.n_params() > MAX_ATTRIBUTES || attributes.n_bytes() > MAX_ATTRIBUTE_BYTES {
                     let most = format!("{MAX_ATTRIBUTES} parameters, or than {MAX_ATTRIBUTE_BYTES} bytes of them");
                     return Err(cursor.wrong(at, format!("the `Attribute`s that count here have more than {most}")));
                 }
-                Rc::make_mut(&mut self.state.defaults).push((cut(&of).to_owned(), list));
+                self.state.attributes = attributes;
             }
             "Include" | "Import" => {
                 let file = cursor.string()?;
@@ -318,23 +316,23 @@ impl<'a> Reader<'a> {
             }
             "Texture" => {
                 let (texture, of, class) = (cursor.string()?, cursor.string()?, cursor.string()?);
-                let params = self.state.with_defaults("texture", cursor.params()?);
+                let params = cursor.params()?.with_attributes("texture", &self.state.attributes);
                 self.builder.define_texture(&texture, of == "float", &class, &params);
             }
             "Material" => {
                 let kind = cursor.string()?;
-                let params = self.state.with_defaults("material", cursor.params()?);
+                let params = cursor.params()?.with_attributes("material", &self.state.attributes);
                 self.state.material = MaterialRef::Own(self.builder.described("", kind, params));
             }
             "MakeNamedMaterial" => {
                 let material = cursor.string()?;
-                let params = self.state.with_defaults("material", cursor.params()?);
+                let params = cursor.params()?.with_attributes("material", &self.state.attributes);
                 self.builder.describe_material(&material, params);
             }
             "NamedMaterial" => self.state.material = MaterialRef::Named(cut(&cursor.string()?).to_owned()),
             "MakeNamedMedium" => {
                 let medium = cursor.string()?;
-                let params = self.state.with_defaults("medium", cursor.params()?);
+                let params = cursor.params()?.with_attributes("medium", &self.state.attributes);
                 self.builder.describe_medium(&medium, &params);
             }
             "MediumInterface" => {
@@ -347,22 +345,22 @@ impl<'a> Reader<'a> {
             }
             "AreaLightSource" => {
                 let kind = cursor.string()?;
-                let params = self.state.with_defaults("light", cursor.params()?);
+                let params = cursor.params()?.with_attributes("light", &self.state.attributes);
                 if kind != "diffuse" {
                     let kind = printable::name(&kind).into_owned();
                     self.builder.tell(format!("area lights of the kind `{kind}` are taken for diffuse ones"));
                 }
-                self.state.area_light = Some(Rc::new(params));
+                self.state.area_light = Some(Rc::new(AreaLight { params, radiance: OnceCell::new() }));
             }
             "LightSource" => {
                 let kind = cursor.string()?;
-                let params = self.state.with_defaults("light", cursor.params()?);
+                let params = cursor.params()?.with_attributes("light", &self.state.attributes);
                 let ctm = self.state.ctm;
                 self.builder.light(&kind, &params, &ctm);
             }
             "Shape" => {
                 let kind = cursor.string()?;
-                let params = self.state.with_defaults("shape", cursor.params()?);
+                let params = cursor.params()?.with_attributes("shape", &self.state.attributes);
                 let made = self.builder.shape(&kind, &params, &self.state);
                 made.map_err(|error| too_many(cursor, at, error))?;
                 let place = cursor.place(at);
@@ -443,5 +441,5 @@ impl<'a> Reader<'a> {
 }
 
 fn too_many(cursor: &Cursor, at: usize, TooMany: TooMany) -> SceneError {
-    cursor.wrong(at, "the scene has more objects than can be shown: use fewer instances")
+    cursor.wrong(at, "the scene has more objects than can be shown: use fewer shapes or instances")
 }

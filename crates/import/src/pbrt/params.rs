@@ -7,6 +7,7 @@ use crate::pbrt::spectrum::Spectrum;
 use firstlight_files::printable;
 use glam::{DVec2, DVec3};
 use std::cell::RefCell;
+use std::rc::Rc;
 
 /// Values of one parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,23 +42,70 @@ impl Param {
     }
 }
 
+/// Parameters that an `Attribute` gave for all later things of a kind, and those of the `Attribute`s before it.
+#[derive(Debug)]
+struct Attribute {
+    /// `shape`, `light`, `material`, `medium` or `texture`.
+    of: String,
+    list: Vec<Param>,
+    n_params: usize,
+    n_bytes: usize,
+    earlier: Attributes,
+}
+
+/// All `Attribute`s that count at a place: shared, since each shape has them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Attributes(Option<Rc<Attribute>>);
+
+impl Attributes {
+    /// With one more.
+    pub(crate) fn and(&self, of: &str, list: Vec<Param>) -> Self {
+        if list.is_empty() {
+            return self.clone();
+        }
+        Self(Some(Rc::new(Attribute {
+            n_params: self.n_params() + list.len(),
+            n_bytes: self.n_bytes() + list.iter().map(Param::n_bytes).sum::<usize>(),
+            of: of.to_owned(),
+            list,
+            earlier: self.clone(),
+        })))
+    }
+
+    /// Number of all parameters.
+    pub(crate) fn n_params(&self) -> usize {
+        self.0.as_ref().map_or(0, |last| last.n_params)
+    }
+
+    /// Bytes of all parameters.
+    pub(crate) fn n_bytes(&self) -> usize {
+        self.0.as_ref().map_or(0, |last| last.n_bytes)
+    }
+
+    /// The parameter of this name for things of a kind; the latest counts.
+    fn find(&self, of: &str, name: &str) -> Option<&Param> {
+        let all = std::iter::successors(self.0.as_deref(), |attribute| attribute.earlier.0.as_deref());
+        all.filter(|attribute| attribute.of == of).flat_map(|it| &it.list).find(|param| param.name == name)
+    }
+}
+
 /// All parameters of a directive, and complaints about them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Params {
     list: Vec<Param>,
+    /// What counts where `list` has nothing, and the kind of thing that this is.
+    attributes: (&'static str, Attributes),
     complaints: RefCell<Vec<String>>,
 }
 
 impl Params {
     pub(crate) fn new(list: Vec<Param>) -> Self {
-        Self { list, complaints: RefCell::default() }
+        Self { list, ..Self::default() }
     }
 
-    /// Adds those of another list that this one does not have.
-    pub(crate) fn add_missing(&mut self, others: &[Param]) {
-        let missing = others.iter().filter(|other| self.list.iter().all(|own| own.name != other.name));
-        let missing: Vec<Param> = missing.cloned().collect();
-        self.list.extend(missing);
+    /// With what `Attribute`s gave for things of this kind.
+    pub(crate) fn with_attributes(self, of: &'static str, attributes: &Attributes) -> Self {
+        Self { attributes: (of, attributes.clone()), ..self }
     }
 
     pub(crate) fn into_list(self) -> Vec<Param> {
@@ -70,7 +118,8 @@ impl Params {
     }
 
     pub(crate) fn find(&self, name: &str) -> Option<&Param> {
-        self.list.iter().find(|param| param.name == name)
+        let (of, attributes) = &self.attributes;
+        self.list.iter().find(|param| param.name == name).or_else(|| attributes.find(of, name))
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {
@@ -207,5 +256,26 @@ impl Params {
                 _ => self.complain(param, "a colour of three numbers"),
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_parameters_count_before_those_of_the_latest_attribute_of_their_kind() {
+        let first = Attributes::default().and("shape", vec![Param::number("a", 1.0), Param::number("b", 1.0)]);
+        let second = first.and("light", vec![Param::number("b", 2.0)]).and("shape", vec![Param::number("b", 3.0)]);
+        let numbers = |attributes: &Attributes, kind| {
+            let params = Params::new(vec![Param::number("own", 0.0)]).with_attributes(kind, attributes);
+            ["own", "a", "b", "c"].map(|name| params.number(name))
+        };
+        assert_eq!(numbers(&first, "shape"), [Some(0.0), Some(1.0), Some(1.0), None]);
+        assert_eq!(numbers(&second, "shape"), [Some(0.0), Some(1.0), Some(3.0), None]);
+        assert_eq!(numbers(&second, "light"), [Some(0.0), None, Some(2.0), None]);
+        let own = Params::new(vec![Param::number("b", 4.0)]).with_attributes("shape", &second);
+        assert_eq!(own.number("b"), Some(4.0));
+        assert_eq!((second.n_params(), second.and("shape", Vec::new()).n_params()), (4, 4));
     }
 }

@@ -34,13 +34,14 @@ pub(crate) fn mesh_of(
     kind: &str,
     params: &Params,
     is_reversed: bool,
+    most_triangles: usize,
     path: &Path,
     warnings: &mut Warnings,
 ) -> Result<Mesh, String> {
     let indexed = match kind {
         "trianglemesh" => triangles(params)?,
         "bilinearmesh" => patches(params)?,
-        "loopsubdiv" => crate::pbrt::subdivision::subdivided(params)?,
+        "loopsubdiv" => crate::pbrt::subdivision::subdivided(params, most_triangles)?,
         "sphere" => sphere(params)?,
         "disk" => disk(params)?,
         "cylinder" => cylinder(params)?,
@@ -300,7 +301,7 @@ mod tests {
     }
 
     fn mesh(kind: &str, list: &[(&str, &[f64])], is_reversed: bool) -> Result<Mesh, String> {
-        mesh_of(kind, &params(list), is_reversed, Path::new("a.pbrt"), &mut Warnings::default())
+        mesh_of(kind, &params(list), is_reversed, usize::MAX, Path::new("a.pbrt"), &mut Warnings::default())
     }
 
     /// Area, and the flux of the position through the front.

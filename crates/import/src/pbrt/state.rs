@@ -1,7 +1,8 @@
 //! The graphics state: what directives set for the shapes and lights that follow.
 
-use crate::pbrt::params::{Param, Params};
-use glam::DAffine3;
+use crate::pbrt::params::{Attributes, Params};
+use glam::{DAffine3, DVec3};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// A material as it was described.
@@ -24,6 +25,14 @@ pub(crate) enum MaterialRef {
     Named(String),
 }
 
+/// The light that shapes emit.
+#[derive(Debug)]
+pub(crate) struct AreaLight {
+    pub params: Params,
+    /// Its radiance, once it is known: shapes share it.
+    pub radiance: OnceCell<DVec3>,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     /// From object space to the world.
@@ -32,12 +41,12 @@ pub(crate) struct State {
     pub sets_start: bool,
     pub is_reversed: bool,
     pub material: MaterialRef,
-    /// Parameters of the light that the shapes emit.
-    pub area_light: Option<Rc<Params>>,
+    /// The light that the shapes emit.
+    pub area_light: Option<Rc<AreaLight>>,
     /// Name of the medium inside of the shapes; empty for none.
     pub inside: String,
-    /// Parameters for what is described from here on, by `shape`, `light`, `material`, `medium` or `texture`.
-    pub defaults: Rc<Vec<(String, Vec<Param>)>>,
+    /// Parameters for what is described from here on.
+    pub attributes: Attributes,
 }
 
 impl Default for State {
@@ -50,7 +59,7 @@ impl Default for State {
             material: MaterialRef::Own(Rc::new(plain)),
             area_light: None,
             inside: String::new(),
-            defaults: Rc::default(),
+            attributes: Attributes::default(),
         }
     }
 }
@@ -61,14 +70,5 @@ impl State {
         if self.sets_start {
             self.ctm *= transform;
         }
-    }
-
-    /// Adds the parameters that `Attribute` gave for things of this kind.
-    pub(crate) fn with_defaults(&self, kind: &str, mut params: Params) -> Params {
-        // The latest counts.
-        for (_, list) in self.defaults.iter().rev().filter(|(of, _)| of == kind) {
-            params.add_missing(list);
-        }
-        params
     }
 }

@@ -5,6 +5,7 @@
 
 use crate::model::assemble::Indexed;
 use crate::pbrt::params::Params;
+use firstlight_files::limits::Limits;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -27,7 +28,9 @@ struct Ring {
 }
 
 /// The subdivided surface of `loopsubdiv`.
-pub(crate) fn subdivided(params: &Params) -> Result<Indexed, String> {
+///
+/// - `most_triangles`: that there is room for.
+pub(crate) fn subdivided(params: &Params, most_triangles: usize) -> Result<Indexed, String> {
     let positions = params.points("P");
     let indices = params.indices("indices");
     let (triangles, rest) = indices.as_chunks::<3>();
@@ -39,11 +42,17 @@ pub(crate) fn subdivided(params: &Params) -> Result<Indexed, String> {
     }
     let is_triangle = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
     let mut surface = Surface { positions, triangles: triangles.iter().copied().filter(is_triangle).collect() };
+    if surface.triangles.is_empty() {
+        return Err("each of its triangles has one vertex twice".to_owned());
+    }
     let most = MAX_TRIANGLES.max(surface.triangles.len().saturating_mul(MAX_FACTOR));
     for _ in 0..params.count("levels").unwrap_or(3) {
         // What is finer than this looks the same.
         if surface.triangles.len() > most / 4 {
             break;
+        }
+        if surface.triangles.len() > most_triangles / 4 {
+            return Err(format!("it has too many triangles when subdivided: {}", Limits::advice()));
         }
         surface = surface.refined()?;
     }
@@ -192,7 +201,7 @@ mod tests {
             param("integer", "indices", indices),
             param("integer", "levels", vec![levels]),
         ];
-        subdivided(&Params::new(list)).unwrap()
+        subdivided(&Params::new(list), usize::MAX).unwrap()
     }
 
     #[test]
@@ -219,7 +228,7 @@ mod tests {
             param("P", &[0.0, 0.0, 2.0, 2.0, 0.0, 2.0, 2.0, 2.0, 2.0, 0.0, 2.0, 2.0, 1.0, 1.0, 2.0]),
             param("indices", &[0.0, 1.0, 4.0, 1.0, 2.0, 4.0, 2.0, 3.0, 4.0, 3.0, 0.0, 4.0]),
         ];
-        let sheet = subdivided(&Params::new(list)).unwrap();
+        let sheet = subdivided(&Params::new(list), usize::MAX).unwrap();
         assert!(sheet.positions.iter().all(|at| (at.z - 2.0).abs() < 1e-12 && at.min_element() >= -1e-12));
         assert!((sheet.positions[4] - DVec3::new(1.0, 1.0, 2.0)).length() < 1e-12);
     }
