@@ -101,7 +101,7 @@ fn the_options_that_most_people_need_come_first() {
     let [brief, help] =
         ["-h", "--help"].map(|option| does(folder.path(), &format!("render {option}")).out().to_owned());
     let at = |word: &str| help.find(word).unwrap_or_else(|| panic!("{word}: {help}"));
-    let common = ["\nOptions:", "--output", "--size", "--spp", "--time", "--error ", "--denoise "].map(at);
+    let common = ["\nOptions:", "--output <", "--size <", "--spp <", "--time <", "--error <", "    --denoise"].map(at);
     let others = ["\nScene:", "\nOutput:", "\nRendering:", "\nAnimation:", "\nFilms and parts:"].map(at);
     assert!(common.is_sorted() && others.is_sorted() && common[common.len() - 1] < others[0], "{help}");
     assert!(brief.lines().count() < 62 && brief.contains("more with '--help'"), "{brief}");
