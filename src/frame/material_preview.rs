@@ -3,8 +3,10 @@
 
 use crate::frame::core::offline::{Target, render_offline_until};
 use crate::render::{Display, Film, RenderSettings, develop};
-use crate::scene::{Extraction, LoadOptions, Material, MaterialSlots, SceneInputs, SurfaceMaterial, Trees, load_text};
-use bevy_ecs::name::Name;
+use crate::scene::{
+    Extraction, LoadOptions, Material, MaterialSlots, SceneInputs, Shape, SurfaceMaterial, Trees, library_stage,
+    load_text,
+};
 use bevy_ecs::prelude::{Entity, World};
 use std::path::Path;
 
@@ -12,17 +14,6 @@ use std::path::Path;
 const SPP: u32 = 32;
 /// Blends nested deeper than this are not followed.
 const MAX_NESTING: usize = 8;
-/// The sphere without its material, in the light and before the backdrop of `assets/materials/library.ron`.
-const STAGE: &str = "(
-    camera: (eye: (0, 0, 20), look_at: (0, 0, 0), orthographic_height: 2.4),
-    environment: gradient(zenith: (0.85, 0.88, 0.92), horizon: (0.6, 0.6, 0.6), ground: (0.16, 0.15, 0.13)),
-    textures: { \"squares\": checker(a: 0.75, b: 0.12, squares: (1.6, 1.6)) },
-    materials: { \"backdrop\": diffuse(albedo: \"squares\"), \"glow\": emissive(radiance: (3, 2.7, 2.2)) },
-    objects: [
-        sphere(name: \"sphere\", center: (0, 0, 0), radius: 1.05, material: \"backdrop\"),
-        plane(point: (0, 0, -1.6), normal: (0, 0, 1), material: \"backdrop\"),
-        quad(corner: (-10, 6, 9), edge_u: (20, 0, 0), edge_v: (0, 3, 3), material: \"glow\"),
-    ])";
 
 /// A material with those that it is a blend of, itself first. Equal if its image is.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +41,8 @@ impl MaterialPreview {
     /// Renders the sphere: `side` × `side` pixels of sRGB, three bytes each, row by row from the top. `None` if `stop`,
     /// which is called often, returned true.
     pub fn render(&self, side: u32, stop: &(dyn Fn() -> bool + Sync)) -> Option<Vec<u8>> {
-        let stage = load_text(STAGE, Path::new("preview"), &LoadOptions::default()).expect("a test renders it");
+        let stage = library_stage().to_ron();
+        let stage = load_text(&stage, Path::new("preview"), &LoadOptions::default()).expect("a test renders it");
         let mut world = World::new();
         stage.spawn(&mut world);
         let copies: Vec<(Entity, Entity)> = self.0.iter().map(|(of, _)| (*of, world.spawn_empty().id())).collect();
@@ -62,8 +54,8 @@ impl MaterialPreview {
             }
             world.entity_mut(copy_of(*of)).insert(SurfaceMaterial(material));
         }
-        for (name, mut slots) in world.query::<(&Name, &mut MaterialSlots)>().iter_mut(&mut world) {
-            if name.as_str() == "sphere" {
+        for (shape, mut slots) in world.query::<(&Shape, &mut MaterialSlots)>().iter_mut(&mut world) {
+            if matches!(shape, Shape::Sphere { .. }) {
                 slots.0 = vec![copies[0].1];
             }
         }
@@ -84,6 +76,7 @@ impl MaterialPreview {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy_ecs::name::Name;
 
     /// Mean colour of the middle of the sphere.
     fn middle(world: &World, entity: Entity) -> [u32; 3] {

@@ -79,7 +79,7 @@ pub fn save(world: &mut World) {
                 let mut status = world.resource_mut::<Status>();
                 status.scene = path.display().to_string();
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
-                status.say(now, MessageKind::Note, format!("saved {}{notes}", whole.display()));
+                status.say(now, MessageKind::Saved, format!("saved {}{notes}", whole.display()));
                 world.insert_resource(SavedAs { path: Some(path), content: Some(content) });
                 world.resource_mut::<History>().mark_clean(clean);
             }

@@ -1,5 +1,6 @@
 //! Materials to choose from: `assets/materials/library.ron`, a scene with a sphere of each.
 
+use crate::format::parts::ObjectPart;
 use crate::format::scene_file::SceneFile;
 use crate::scene::spawn::material;
 use crate::scene::world::components::SurfaceMaterial;
@@ -13,14 +14,31 @@ const N_BEHIND: usize = 1;
 pub fn library() -> &'static [(String, SurfaceMaterial)] {
     static LIBRARY: OnceLock<Vec<(String, SurfaceMaterial)>> = OnceLock::new();
     LIBRARY.get_or_init(|| {
-        let text = include_str!("../../assets/materials/library.ron");
-        let file = SceneFile::parse(text, "library.ron").expect("a test reads it");
+        let file = whole();
         let (textures, materials) = (HashMap::new(), HashMap::new());
         let n = file.materials.iter().count() - N_BEHIND;
         let read =
             file.materials.iter().take(n).map(|(name, part)| (name.to_owned(), material(part, &textures, &materials)));
         read.collect()
     })
+}
+
+/// The scene of the ready materials with the first of its spheres alone, and a camera before it.
+pub(crate) fn library_stage() -> SceneFile {
+    let mut file = whole();
+    let is_sphere = |object: &ObjectPart| matches!(object, ObjectPart::Sphere { .. });
+    let first = file.objects.iter().position(is_sphere).expect("there is a sphere");
+    let sphere = file.objects.remove(first);
+    if let ObjectPart::Sphere { center, .. } = &sphere {
+        (file.camera.eye.x, file.camera.look_at) = (center.x, Some(*center));
+    }
+    file.objects.retain(|object| !is_sphere(object));
+    file.objects.push(sphere);
+    file
+}
+
+fn whole() -> SceneFile {
+    SceneFile::parse(include_str!("../../assets/materials/library.ron"), "library.ron").expect("a test reads it")
 }
 
 /// An image (PNG) of a sphere of each ready material, from left to right; each is as wide as the image is high.

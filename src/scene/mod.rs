@@ -86,6 +86,7 @@ pub(crate) use extract::origin_of;
 pub use extract::{Extraction, SnapshotPart, origin_for};
 pub use fingerprint::SceneContent;
 pub use image_metadata::{ImageMetadata, ImageSamples, ImageScene, MetadataError};
+pub(crate) use library::library_stage;
 pub use library::{LIBRARY_IMAGE, library};
 pub use load::{LoadOptions, load, load_text};
 pub use load_stage::LoadStage;

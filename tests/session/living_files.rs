@@ -157,7 +157,7 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
     assert_eq!(driver.session.scene_file(), Some(path.join("room.ron")));
     let restarts = driver.session.status().restarts;
     driver.session.send(Command::SaveScene { path: path.join("room.ron") });
-    driver.run_until_said(MessageKind::Note, "comments of the previous file were removed");
+    driver.run_until_said(MessageKind::Saved, "comments of the previous file were removed");
     let text = std::fs::read_to_string(path.join("room.ron")).unwrap();
     assert!(text.contains("0.25") && text.contains("\"tent.obj\"") && !text.contains("zenith: 2"), "{text}");
     // Saving is no change: the samples stay, whatever the watch sees.

@@ -125,6 +125,8 @@ pub struct Message {
 pub enum MessageKind {
     /// Information; nothing is wrong.
     Note,
+    /// The scene is in its file.
+    Saved,
     /// Something differs from the request, and the session continues.
     Warning,
     /// A request has failed.

@@ -4,7 +4,7 @@ use crate::frame::{MessageKind, Selection};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::toasts::{Toasts, Tone};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -49,22 +49,18 @@ impl App {
         if is_flood {
             self.toasts.add(Tone::Problem, format!("{n_warnings} warnings: see Messages in the panel (N)"), now);
         }
-        let mut saved = None;
         for message in new.filter(|message| !is_flood || message.kind != MessageKind::Warning) {
-            let is_saved = |path: &PathBuf| message.text.starts_with(&format!("saved {}", path.display()));
-            if let Some(path) =
-                self.session.scene_file().and_then(|path| std::path::absolute(path).ok()).filter(is_saved)
-            {
-                saved = Some((path, message.text.clone()));
-                continue;
+            match message.kind {
+                MessageKind::Note => self.toasts.add(Tone::News, message.text.clone(), now),
+                MessageKind::Warning | MessageKind::Error => {
+                    self.toasts.add(Tone::Problem, message.text.clone(), now);
+                }
+                MessageKind::Saved => {
+                    self.toasts.add_saved(message.text.clone(), now);
+                    self.last_saved = self.session.scene_file().and_then(|path| std::path::absolute(path).ok());
+                }
             }
-            let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
-            self.toasts.add(tone, message.text.clone(), now);
         }
-        if let Some((path, news)) = saved {
-            self.tell_saved(path, news, now);
-        }
-        let status = self.session.status();
         // Without a first scene there is no reason to stay open, and the terminal is where the name was typed.
         if status.scene.is_empty()
             && status.loading.is_none()

@@ -157,13 +157,13 @@ pub const LENS: KeyGroup = KeyGroup {
             send_item("Focus farther", &[Menu::Lens], FARTHER)
         ),
         row!(
-            "narrow, widen the aperture",
+            "make the aperture smaller, larger",
             send("{", NARROWER),
             send("}", WIDER),
             send(",", NARROWER),
             send(".", WIDER),
-            send_item("Widen the aperture", &[Menu::Lens], WIDER),
-            send_item("Narrow the aperture", &[Menu::Lens], NARROWER)
+            send_item("Larger aperture", &[Menu::Lens], WIDER),
+            send_item("Smaller aperture", &[Menu::Lens], NARROWER)
         ),
         row!(
             "switch depth of field on, off",

@@ -116,7 +116,7 @@ mod tests {
     fn ordinary_words_find_what_they_mean() {
         for (search, wanted) in [
             ("blur", "switch depth of field on, off"),
-            ("bokeh", "narrow, widen the aperture"),
+            ("bokeh", "make the aperture smaller, larger"),
             ("brightness", "increase, decrease the exposure by a third of a stop"),
             ("video", "--turntable"),
             ("frames", "--frames"),

@@ -13,7 +13,7 @@ pub fn messages(ui: &mut Ui, session: &Session) {
     }
     for message in messages.iter().rev().take(SHOWN) {
         let color = match message.kind {
-            MessageKind::Note => Color32::from_gray(180),
+            MessageKind::Note | MessageKind::Saved => Color32::from_gray(180),
             MessageKind::Warning => Color32::from_rgb(240, 200, 120),
             MessageKind::Error => Color32::from_rgb(250, 140, 120),
         };

@@ -301,7 +301,7 @@ impl Converter<'_> {
         let wanted = within_share(self.scalar(node, "opacity", 0.5)?);
         let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
         let mut part = self.whole(node, surface.part);
-        if let Material::Principled { opacity, .. } | Material::Blend { opacity, .. } = &mut part {
+        if let Material::Blend { opacity, .. } = &mut part {
             *opacity = self.coverage(node, opacity.clone(), wanted);
         }
         Ok(Some(Surface { part, ..surface }))
@@ -350,7 +350,7 @@ impl Converter<'_> {
     /// A surface that can have holes and normals of its own.
     fn whole(&mut self, node: Node, part: MaterialPart) -> MaterialPart {
         match part {
-            Material::Principled { .. } | Material::Blend { .. } => part,
+            Material::Blend { .. } => part,
             part => {
                 let name = self.add_material(node, part);
                 Material::blend(ScalarValue::Number(0.0), name.clone(), name)
@@ -392,20 +392,9 @@ impl Converter<'_> {
         if own(&part).1 != own(&grey()).1 {
             self.tell(node, "a map of normals in another one is not modelled: only the outer one is");
         }
-        let mut part = match part {
-            // It has no shadowing of its own.
-            Material::Principled { .. } if !has_own(&part) => {
-                let name = self.add_material(node, part);
-                Material::blend(ScalarValue::Number(0.0), name.clone(), name)
-            }
-            part => self.whole(node, part),
-        };
-        match &mut part {
-            Material::Blend { normal_map, normal_shadowing, .. } => {
-                (*normal_map, *normal_shadowing) = (map, has_shadowing && turns_over);
-            }
-            Material::Principled { normal_map, .. } => *normal_map = map,
-            _ => {}
+        let mut part = self.whole(node, part);
+        if let Material::Blend { normal_map, normal_shadowing, .. } = &mut part {
+            (*normal_map, *normal_shadowing) = (map, has_shadowing && turns_over);
         }
         Ok(part)
     }
@@ -474,17 +463,11 @@ fn within_share(value: ScalarValue) -> ScalarValue {
 /// shadowing.
 fn own(part: &MaterialPart) -> (ScalarValue, ColorValue, bool) {
     match part {
-        Material::Principled { opacity, normal_map, .. } => (opacity.clone(), normal_map.clone(), false),
         Material::Blend { opacity, normal_map, normal_shadowing, .. } => {
             (opacity.clone(), normal_map.clone(), *normal_shadowing)
         }
-        _ => own(&Material::principled(ColorValue::grey(0.0))),
+        _ => own(&Material::blend(ScalarValue::Number(0.0), String::new(), String::new())),
     }
-}
-
-/// Whether a surface has holes or normals of its own.
-fn has_own(part: &MaterialPart) -> bool {
-    own(part) != own(&grey())
 }
 
 /// The same surface without holes and normals of its own.
@@ -503,19 +486,16 @@ pub(crate) fn with_parts(mut blend: MaterialPart, parts: [String; 2]) -> Materia
 
 /// Exchanges holes and normals of two surfaces, if both can have them.
 pub(crate) fn exchange_own(one: &mut MaterialPart, other: &mut MaterialPart) {
-    use Material::{Blend, Principled};
-    if let (Blend { normal_shadowing: a, .. }, Blend { normal_shadowing: b, .. }) = (&mut *one, &mut *other) {
-        std::mem::swap(a, b);
-    }
     let (
-        Blend { opacity: a, normal_map: b, .. } | Principled { opacity: a, normal_map: b, .. },
-        Blend { opacity: c, normal_map: d, .. } | Principled { opacity: c, normal_map: d, .. },
+        Material::Blend { opacity: a, normal_map: b, normal_shadowing: c, .. },
+        Material::Blend { opacity: d, normal_map: e, normal_shadowing: f, .. },
     ) = (one, other)
     else {
         return;
     };
-    std::mem::swap(a, c);
-    std::mem::swap(b, d);
+    std::mem::swap(a, d);
+    std::mem::swap(b, e);
+    std::mem::swap(c, f);
 }
 
 /// A material of its own for each side.

@@ -355,12 +355,6 @@ impl Converter<'_> {
                 }
                 part
             }
-            mut part @ Material::Principled { .. } => {
-                if let Material::Principled { emission, .. } = &mut part {
-                    *emission = radiance;
-                }
-                part
-            }
             part => {
                 let part = self.share_of_light(emitter, part, &radiance).unwrap_or_else(|| {
                     self.tell(emitter, "what a light of this kind reflects is not modelled: it only emits");
@@ -424,8 +418,7 @@ fn black() -> Surface {
 }
 
 fn has_holes(part: &MaterialPart) -> bool {
-    matches!(part, Material::Principled { opacity, .. } | Material::Blend { opacity, .. }
-        if *opacity != ScalarValue::Number(1.0))
+    matches!(part, Material::Blend { opacity, .. } if *opacity != ScalarValue::Number(1.0))
 }
 
 /// Whether an OBJ file has normals; also if it cannot be read, which is told when it is loaded.
@@ -435,12 +428,7 @@ fn has_obj_normals(path: &Path) -> bool {
 }
 
 fn needs_tangents(part: &MaterialPart) -> bool {
-    match part {
-        Material::Principled { normal_map, .. } | Material::Blend { normal_map, .. } => {
-            matches!(normal_map, ColorValue::Texture(_))
-        }
-        _ => false,
-    }
+    matches!(part, Material::Blend { normal_map: ColorValue::Texture(_), .. })
 }
 
 /// From the cylinder of radius 1 between 0 and +Z to the one between two points.

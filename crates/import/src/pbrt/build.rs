@@ -370,7 +370,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Coverage of a shape; `None` if it is opaque.
-    fn opacity(&mut self, params: &Params, name: &str) -> Option<ScalarValue> {
+    pub(super) fn opacity(&mut self, params: &Params, name: &str) -> Option<ScalarValue> {
         let alpha = self.textures.parameter(true, params, "alpha");
         if alpha.is_none() && params.has("alpha") {
             self.tell(format!("`{}` is opaque: its `alpha` is not known", printable::name(name)));

@@ -5,12 +5,10 @@ use crate::pbrt::curves::tube;
 use crate::pbrt::params::Params;
 use crate::pbrt::shapes::meshed;
 use crate::pbrt::state::State;
-use crate::pbrt::textures::Texture;
 use firstlight_files::limits::Limits;
 use firstlight_files::printable;
 use firstlight_format::parts::ObjectPart;
 use firstlight_format::sources::{MeshShading, MeshSource};
-use firstlight_format::value::ScalarValue;
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -35,12 +33,7 @@ impl Builder<'_> {
         if state.area_light.is_some() {
             self.tell(format!("`{name}` does not emit light: curves do not here"));
         }
-        let opacity = match self.textures.parameter(true, params, "alpha") {
-            None => None,
-            Some(Texture::Constant(alpha)) if alpha.x >= 1.0 => None,
-            Some(Texture::Constant(alpha)) => Some(ScalarValue::Number(alpha.x.max(0.0))),
-            Some(Texture::Varying(source)) => Some(ScalarValue::Texture(self.texture_name("alpha", source))),
-        };
+        let opacity = self.opacity(params, &name);
         let Some(material) = self.surface(state, opacity, None, &name) else { return Ok(()) };
         if self.strands.add(number, tube, &material, &state.ctm) {
             return Ok(());

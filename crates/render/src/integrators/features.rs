@@ -61,6 +61,13 @@ pub(crate) enum FeatureUse {
     Relighting,
 }
 
+impl FeatureUse {
+    /// Whether features are not saved, but make an image.
+    fn makes_image(self) -> bool {
+        self != Self::Saved
+    }
+}
+
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct FeatureWave {
@@ -83,11 +90,6 @@ impl FeatureWave {
     pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32], purpose: FeatureUse) {
         self.camera = self.sets.start(scene, camera_media);
         self.purpose = purpose;
-    }
-
-    /// Whether they are not saved, but make an image.
-    fn for_denoiser(&self) -> bool {
-        self.purpose != FeatureUse::Saved
     }
 
     /// Traces the paths that `start` pushes, one per slot, with throughput 1, and returns the features of each slot.
@@ -120,7 +122,8 @@ impl FeatureWave {
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
-            let most_next = if depth == 1 && self.for_denoiser() { 2 * self.paths.len() } else { self.paths.len() };
+            let most_next =
+                if depth == 1 && self.purpose.makes_image() { 2 * self.paths.len() } else { self.paths.len() };
             self.next.start(most_next, glass, false);
             self.see(scene, settings, depth, depth == most);
             std::mem::swap(&mut self.paths, &mut self.next);
@@ -153,7 +156,7 @@ impl FeatureWave {
                     let slot = self.paths.slot[i] as usize;
                     let seen = &mut self.seen[slot];
                     seen.albedo = self.paths.throughput_of(i);
-                    if self.purpose != FeatureUse::Saved {
+                    if self.purpose.makes_image() {
                         let dir = self.paths.rays.get(i).dir;
                         seen.emitted = seen.albedo * scene.shading.environment.radiance(dir);
                     }
@@ -204,11 +207,10 @@ impl FeatureWave {
             FeatureUse::Relighting if emission.is_some() => Vec3::ZERO,
             _ => path.throughput * visible_albedo(scene, vertex, material),
         };
-        let for_denoiser = self.for_denoiser();
         let seen = &mut self.seen[slot];
         (seen.albedo, seen.normal, seen.position) = (albedo, vertex.normal, vertex.position);
         seen.depth = along;
-        if for_denoiser {
+        if self.purpose.makes_image() {
             seen.material = material;
             seen.emitted = emission.map_or(Vec3::ZERO, |emission| path.throughput * vertex.emitted(scene, &emission));
         }
@@ -243,7 +245,7 @@ impl FeatureWave {
         {
             return None;
         }
-        let lobes = match (self.for_denoiser(), depth) {
+        let lobes = match (self.purpose.makes_image(), depth) {
             (false, _) => Lobes::AsInImage,
             (true, 1) => Lobes::Both,
             (true, _) => Lobes::MoreProbable,

@@ -211,9 +211,7 @@ impl MovingFilter {
             }
         });
     }
-}
 
-impl MovingFilter {
     /// Whether images keep light that is smoothed by narrow taps alone, too.
     pub fn keep_narrow(&mut self, keeps: bool) {
         self.keeps_narrow = keeps;

@@ -4,7 +4,8 @@
 //! they lie in the plane of the pixel and face its way. It is multiplied by the albedo of the pixel itself, so edges and
 //! textures are as sharp as the fine image. Sixteen pixels of a row at a time.
 //!
-//! The light is mixed with that of the images before ([`past`](crate::driver::relight::past)), so that it has less and less noise while it moves.
+//! The light is mixed with that of the images before ([`past`](crate::driver::relight::past)), so that it has less and
+//! less noise while it moves.
 //!
 //! What is out of focus is not sharp: as far as circles of confusion reach the size of some coarse pixels, the coarse
 //! image itself is taken.
@@ -12,26 +13,9 @@
 use crate::core::camera::Camera;
 use crate::denoise::{APART, MARGIN, SmoothRow, divided_by};
 use crate::driver::relight::past::{SeenPast, store};
+use crate::integrators::common::seen::Seen;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Truth, Vector, dispatch, select};
 use glam::{UVec2, Vec3};
-
-/// What a pixel of the fine image shows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FineSurface {
-    /// Share of light that is reflected, times the colours of mirrors and glass on the way, 0..1 a channel; black where
-    /// nothing scatters light.
-    pub albedo: Vec3,
-    /// Radiance that arrives without scattering, W·m⁻²·sr⁻¹.
-    pub emitted: Vec3,
-    /// Shading normal.
-    pub normal: Vec3,
-    /// Relative to the camera, metres.
-    pub position: Vec3,
-    /// Metres along the view axis over the whole path; infinite where nothing is hit.
-    pub depth: f32,
-    /// The object that the camera ray hits; `u32::MAX` if it is not known.
-    pub object: u32,
-}
 
 /// Planes of [`FineRow`]: albedo, emitted radiance, normal, position, depth and object.
 const N_PLANES: usize = 14;
@@ -47,12 +31,15 @@ pub struct FineRow {
 }
 
 impl FineRow {
-    /// Takes the surfaces of so many pixels.
-    pub fn fill(&mut self, surfaces: impl ExactSizeIterator<Item = FineSurface>) {
-        self.length = surfaces.len().next_multiple_of(LANES);
+    /// Takes what so many pixels show; the albedo is black where nothing scatters light.
+    ///
+    /// - `eye`: position of the camera, which positions are kept relative to.
+    pub fn fill(&mut self, seen: &[Seen], eye: Vec3) {
+        self.length = seen.len().next_multiple_of(LANES);
         self.numbers.resize(N_PLANES * self.length, 0.0);
-        for (i, surface) in surfaces.enumerate() {
-            let FineSurface { albedo, emitted, normal, position, depth, object } = surface;
+        for (i, seen) in seen.iter().enumerate() {
+            let Seen { albedo, emitted, normal, position, depth, object, .. } = *seen;
+            let position = position - eye;
             let divisor = if albedo == Vec3::ZERO { albedo } else { divided_by(albedo) };
             for (k, vector) in [divisor, emitted, normal, position].into_iter().enumerate() {
                 for c in 0..3 {
@@ -268,7 +255,7 @@ mod tests {
     }
 
     /// A checkered floor a metre below the eye before a wall, through the middle of a pixel.
-    fn surface(camera: &Camera, wall: f32, size: UVec2, x: u32, y: u32) -> FineSurface {
+    fn surface(camera: &Camera, wall: f32, size: UVec2, x: u32, y: u32) -> Seen {
         let ray = camera.middle_ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size.as_vec2());
         let to_floor = if ray.dir.y < 0.0 { -1.0 / ray.dir.y } else { f32::INFINITY };
         let to_wall = wall / -ray.dir.z;
@@ -278,10 +265,11 @@ mod tests {
         let field = ((position + camera.eye) * 3.0).floor();
         let is_dark = (field.x + field.y + field.z).rem_euclid(2.0) > 0.5;
         let albedo = Vec3::splat(if is_dark { 0.1 } else { 0.9 });
-        FineSurface { albedo, emitted: Vec3::ZERO, normal, position, depth: -position.z, object }
+        let depth = -position.z;
+        Seen { albedo, normal, position: position + camera.eye, depth, object, ..Seen::NOTHING }
     }
 
-    fn surfaces(camera: &Camera, wall: f32, size: UVec2) -> Vec<FineSurface> {
+    fn surfaces(camera: &Camera, wall: f32, size: UVec2) -> Vec<Seen> {
         let row = |y| (0..size.x).map(move |x| surface(camera, wall, size, x, y));
         (0..size.y).flat_map(row).collect()
     }
@@ -290,7 +278,7 @@ mod tests {
         if object == WALL { 4.0 } else { 1.0 }
     }
 
-    fn images(surfaces: &[FineSurface]) -> Vec<Vec3> {
+    fn images(surfaces: &[Seen]) -> Vec<Vec3> {
         surfaces.iter().map(|surface| surface.albedo * light(surface.object)).collect()
     }
 
@@ -307,9 +295,9 @@ mod tests {
         let read = |y: usize, to: &mut [Vec3], seen: &mut [PixelSurface]| {
             for x in 0..width {
                 let i = y * width + x;
-                let FineSurface { albedo, normal, position, .. } = coarse[i];
+                let Seen { albedo, normal, position, .. } = coarse[i];
                 to[x] = colors[i] * noise(i);
-                seen[x] = PixelSurface { albedo, normal, position: position + camera.eye, is_bright: false };
+                seen[x] = PixelSurface { albedo, normal, position, is_bright: false };
             }
         };
         let input = MovingInput { width, height: COARSE.y as usize, read: &read, eye: camera.eye };
@@ -320,7 +308,7 @@ mod tests {
         let width = FINE.x as usize;
         let rows = colors.chunks_mut(width).zip(present.rows_mut().chunks_mut(length)).zip(fine.chunks(width));
         for (y, ((to, to_past), fine)) in rows.enumerate() {
-            row.fill(fine.iter().copied());
+            row.fill(fine, camera.eye);
             let place = FinePlace { camera, first: UVec2::new(0, y as u32), size: FINE, weight: 1.0 };
             filter.relight_row(set, place, &row, to, to_past);
         }

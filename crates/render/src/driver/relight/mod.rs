@@ -10,7 +10,7 @@ use crate::core::filter::{FilterSampler, PixelFilter};
 use crate::core::settings::RenderSettings;
 use crate::denoise::MovingFilter;
 use crate::driver::features::{BAND, Look, Part, PartTracer};
-use crate::driver::relight::finer::{Coarse, FinePlace, FineRow, FineSurface, relight_row};
+use crate::driver::relight::finer::{Coarse, FinePlace, FineRow, relight_row};
 use crate::driver::relight::past::Past;
 use crate::driver::smooth::set_of;
 use crate::film::tiles::Film;
@@ -166,14 +166,7 @@ impl Bands<'_> {
                 tracer.trace(&look, &part.pixels(), 0..1, stop, |seen| {
                     let rows = part.rows_in_band(size.x).zip(seen.chunks_exact(part.n_columns()));
                     for (((row, seen), y), past) in rows.zip(first_row..).zip(past.chunks_exact_mut(row_length)) {
-                        fine.fill(seen.iter().map(|seen| FineSurface {
-                            albedo: seen.albedo,
-                            emitted: seen.emitted,
-                            normal: seen.normal,
-                            position: seen.position - eye,
-                            depth: seen.depth,
-                            object: seen.object,
-                        }));
+                        fine.fill(seen, eye);
                         let first = UVec2::new(row.start as u32 % size.x, y);
                         self.relight(first, fine, &mut colors[row], past);
                     }
@@ -185,33 +178,25 @@ impl Bands<'_> {
 
     fn of_film(&self, film: &Film, colors: &mut [Vec3], past: &mut [f32], stop: &(dyn Fn() -> bool + Sync)) -> bool {
         let (width, camera) = (self.size.x as usize, &self.snapshot.camera);
-        let nothing = FineSurface {
-            albedo: Vec3::ZERO,
-            emitted: Vec3::ZERO,
-            normal: Vec3::ZERO,
-            position: Vec3::ZERO,
-            depth: f32::INFINITY,
-            object: Seen::NONE,
-        };
+        let nothing = Seen { albedo: Vec3::ZERO, ..Seen::NOTHING };
         let start = || (vec![nothing; width], FineRow::default());
         let rows = colors.par_chunks_exact_mut(width).zip(past.par_chunks_exact_mut(self.row_length)).enumerate();
         let done = rows.map_init(start, |(surfaces, fine), (y, (colors, past))| {
             film.for_each_in_row(y as u32, |x, radiance| surfaces[x].emitted = radiance);
             film.for_each_surface_in_row(y as u32, |x, seen| {
-                let position = seen.position - camera.eye;
+                let emitted = surfaces[x].emitted;
                 surfaces[x] = match self.light.filter.takes_part(x, y) {
-                    true => FineSurface {
+                    true => Seen {
                         albedo: seen.albedo.max(Vec3::splat(f32::MIN_POSITIVE)),
-                        emitted: Vec3::ZERO,
                         normal: seen.normal,
-                        position,
-                        depth: position.dot(camera.forward),
-                        object: Seen::NONE,
+                        position: seen.position,
+                        depth: (seen.position - camera.eye).dot(camera.forward),
+                        ..nothing
                     },
-                    false => FineSurface { emitted: surfaces[x].emitted, ..nothing },
+                    false => Seen { emitted, ..nothing },
                 };
             });
-            fine.fill(surfaces.iter().copied());
+            fine.fill(surfaces, camera.eye);
             self.relight(UVec2::new(0, y as u32), fine, colors, past);
             !stop()
         });
