@@ -85,3 +85,22 @@ fn sample_at(tile: &FilmTile, local: u32, sample: u32) -> BadSample {
     let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
     BadSample { x: pixel.x, y: pixel.y, sample }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_above_the_bound_are_counted_with_their_places_and_kept() {
+        let origin = UVec2::new(32, 0);
+        let mut tile = FilmTile::try_new(origin, UVec2::new(8, 4)).expect("memory for a few pixels");
+        let mut report = PassReport::nothing();
+        let seen: Vec<Vec3> = (0..8 * 4).map(|pixel| Vec3::splat(if pixel == 9 { 0.5 } else { 0.25 })).collect();
+        for (sample, bound) in [(0, None), (1, Some(0.5)), (2, Some(0.499))] {
+            report.add_sample(&mut tile, 0, sample, &seen, bound);
+        }
+        assert_eq!((report.n_above, report.n_bad), (1, 0));
+        assert_eq!(report.above, [BadSample { x: 33, y: 1, sample: 2 }]);
+        assert_eq!(tile.sums[9].sum, Vec3::splat(1.5).as_dvec3());
+    }
+}

@@ -71,37 +71,14 @@ fn is_even(input: &ColorInput) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::settings::RenderSettings;
     use crate::core::snapshot::Object;
-    use crate::driver::renderer::advance;
-    use crate::driver::report::BadSample;
-    use crate::film::tiles::Film;
     use crate::prepare::prepared::Prepared;
     use crate::test_scene::prepared;
     use firstlight_kdtree::Shape;
-    use std::sync::Arc;
 
     fn scene(material: Material) -> Prepared {
         let shape = Shape::Sphere { center: Vec3::NEG_Z * 3.0, radius: 1.0 };
         prepared(vec![shape], vec![Object::plain(0)], vec![material], Environment::Constant(Vec3::splat(0.5)))
-    }
-
-    #[test]
-    fn samples_above_the_bound_are_counted_with_their_places() {
-        let mut scene = scene(Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 });
-        let run = |scene: &Prepared| {
-            let mut film = Film::new(8, 4);
-            (advance(scene, &RenderSettings::default(), &mut film, 2, &|| false), film)
-        };
-        assert_eq!(scene.tables.radiance_bound, Some(0.5));
-        let (report, film) = run(&scene);
-        assert_eq!((report.n_above, report.above), (0, vec![]));
-        // With an environment bound that is too small, every sample is reported and none is discarded.
-        Arc::get_mut(&mut scene.tables).unwrap().radiance_bound = Some(0.499);
-        let (report, same) = run(&scene);
-        assert_eq!(report.n_above, 8 * 4 * 2);
-        assert_eq!(report.above[0], BadSample { x: 0, y: 0, sample: 0 });
-        assert_eq!(film.means(), same.means());
     }
 
     #[test]
