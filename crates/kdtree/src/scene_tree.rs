@@ -113,12 +113,17 @@ impl SceneTree {
 
     /// Finds the closest hit of a single ray, for picking.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.trace(ray, false)
+        self.trace(ray, 0.0, false)
+    }
+
+    /// Like [`Self::closest_hit`], for a ray that is known to hit nothing before `t_min`: cells before it are left out.
+    pub fn closest_hit_from(&self, ray: &Ray, t_min: f32) -> Option<Hit> {
+        self.trace(ray, t_min, false)
     }
 
     /// Whether a single ray has any hit.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.trace(ray, true).is_some()
+        self.trace(ray, 0.0, true).is_some()
     }
 
     /// Like [`Self::closest_hit`], by brute force over every primitive of every object: the reference for all
@@ -144,7 +149,7 @@ impl SceneTree {
         self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, Effort::Closest);
         self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, Effort::Closest);
         self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, Effort::Closest);
-        let mut visits = self.walk_statics(&scene_ray, &mut best, Effort::Closest);
+        let mut visits = self.walk_statics(&scene_ray, 0.0, &mut best, Effort::Closest);
         let mut offer = |object: u32, best: &mut Option<Hit>| {
             if let Shape::Mesh { tree, .. } = &self.objects.shapes[object as usize] {
                 let t_max = best.map_or(ray.t_max, |hit| hit.t);
@@ -177,7 +182,7 @@ impl SceneTree {
         Visits { inner: visits.inner + above.inner, leaves: visits.leaves + above.leaves, ..visits }
     }
 
-    fn trace(&self, ray: &Ray, any: bool) -> Option<Hit> {
+    fn trace(&self, ray: &Ray, t_min: f32, any: bool) -> Option<Hit> {
         let scene_ray = SceneRay::new(ray);
         let effort = if any { Effort::Any } else { Effort::Closest };
         let mut best = None;
@@ -188,7 +193,7 @@ impl SceneTree {
         self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, effort);
         self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, effort);
         self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, effort);
-        self.walk_statics(&scene_ray, &mut best, effort);
+        self.walk_statics(&scene_ray, t_min, &mut best, effort);
         match &self.top.instances {
             Instances::Few(instances) => {
                 instances.iter().for_each(|&object| self.offer_object(object, &scene_ray, &mut best, effort));
@@ -224,13 +229,14 @@ impl SceneTree {
         });
     }
 
-    fn walk_statics(&self, ray: &SceneRay, best: &mut Option<Hit>, effort: Effort) -> Visits {
+    fn walk_statics(&self, ray: &SceneRay, t_min: f32, best: &mut Option<Hit>, effort: Effort) -> Visits {
         let mut visits = Visits::default();
         for placed in &self.top.statics {
             let blocks = &placed.tree.blocks;
             let tree_ray = TreeRay::new(ray.ray.origin, ray.ray.dir, &ray.shear, blocks.extent);
             let (mut leaves, mut n_blocks, mut inner) = (0, 0, 0);
-            let t_max = best.map_or(ray.ray.t_max, |hit| hit.t);
+            // The tree may be mostly of shapes that are not here.
+            let (t_in, t_max) = tree_ray.clip(&self.bounds, best.map_or(ray.ray.t_max, |hit| hit.t));
             let visit = |first, count, _| {
                 (leaves, n_blocks) = (leaves + 1, n_blocks + count as usize);
                 for prim in blocks.leaf(first, count).prims() {
@@ -239,9 +245,9 @@ impl SceneTree {
                         offer_triangle(&placed.vertices(prim), ray, best, object, own);
                     }
                 }
-                limit(best, &ray.ray, effort)
+                limit(best, &ray.ray, effort).min(t_max)
             };
-            blocks.nodes.walk_cells(&tree_ray, 0.0, t_max, visit, || inner += 1);
+            blocks.nodes.walk_cells(&tree_ray, t_min.max(t_in), t_max, visit, || inner += 1);
             visits.inner += inner;
             visits.leaves += leaves;
             visits.blocks += n_blocks;

@@ -166,9 +166,13 @@ impl Contacts {
             if own.geometric_normal.dot(ray.dir) < 0.0 { -own.geometric_normal } else { own.geometric_normal };
         let [near, far] =
             [-onwards, onwards].map(|to| offset_ray_origin(own.position, own.error, own.geometric_normal, to));
+        // What coincides is hit no earlier, and behind the slab only by rounding: by a few of its thicknesses.
+        let cosine = onwards.dot(ray.dir);
+        let behind = hit.t + 64.0 * (far - near).dot(onwards) / cosine;
+        let (ray, before) = (Ray { t_max: behind.max(hit.t.next_up()).min(ray.t_max), ..*ray }, 0.999 * hit.t);
         for Other { object, alone } in &self.of_object[hit.object as usize] {
-            let Some(found) = alone.closest_hit(ray) else { continue };
-            let at = alone.surface_point(ray, &found);
+            let Some(found) = alone.closest_hit_from(&ray, before) else { continue };
+            let at = alone.surface_point(&ray, &found);
             if (at.position - near).dot(onwards) >= 0.0 && (far - at.position).dot(onwards) >= 0.0 {
                 f(Hit { object: *object, ..found }, &at);
             }
