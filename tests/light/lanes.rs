@@ -150,7 +150,8 @@ fn room_with(
         texture(smooth(&normals), 2.0),
         Texture { channel: Some(Channel::R), ..colors.clone() },
         Texture { channel: Some(Channel::B), invert: true, ..colors.clone() },
-        Texture { uv_set: 1, vertex_colors: true, ..colors },
+        Texture { uv_set: 1, vertex_colors: true, ..colors.clone() },
+        Texture { channel: Some(Channel::R), relief: Some(0.3), ..colors },
     ];
     let shading = Shading { air, ..Shading::new(materials, textures, environment) };
     let mut camera = camera(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 0.6, 0.0), 42.0);
@@ -186,8 +187,9 @@ fn layered() -> [Material; 4] {
     [plastic, mapped, rich, colored]
 }
 
-/// Plastics, conductors, a leaf, surfaces of Disney, and a plastic with holes; they use textures 1 and 3 to 5 of the room.
-fn shiny() -> [Material; 13] {
+/// Plastics, with normals by a map and with holes, a relief, conductors, a leaf, and surfaces of Disney; they use textures 1
+/// to 6 of the room.
+fn shiny() -> [Material; 15] {
     let plastic = |diffuse, alpha, beckmann, nonlinear| Material::Plastic {
         diffuse,
         alpha,
@@ -227,9 +229,18 @@ fn shiny() -> [Material; 13] {
     if let Material::Blend { opacity, .. } = &mut with_holes {
         *opacity = ScalarInput::Texture(4);
     }
+    let turned = |part, map| {
+        let mut blend = Material::blend(ScalarInput::Constant(0.0), part, part);
+        if let Material::Blend { normal_map, normal_scale, .. } = &mut blend {
+            (*normal_map, *normal_scale) = (ColorInput::Texture(map), 0.7);
+        }
+        blend
+    };
     [
         plastic(ColorInput::Texture(1), none, false, true),
         plastic(ColorInput::Texture(5), ScalarInput::Texture(3), false, false),
+        turned(18, 2),
+        turned(6, 6),
         plastic(ColorInput::Constant(Vec3::new(0.7, 0.3, 0.1)), wide, true, true),
         plastic(ColorInput::Constant(Vec3::new(0.1, 0.3, 0.7)), narrow, false, true),
         gold([wide, none], false, white, false),

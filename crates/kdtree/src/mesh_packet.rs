@@ -302,7 +302,8 @@ impl<S: KernelSimd> MeshPacket<'_, S> {
             sz,
             footprint,
         };
-        let bounds = [tree.nodes.bounds.min, tree.nodes.bounds.max];
+        let bounds = self.present.map_or(&tree.nodes.bounds, |present| &present.bounds);
+        let bounds = [bounds.min, bounds.max];
         let (mut t0, mut t1) = (s.splat(0.0), s.load(&self.nearest.t));
         for axis in 0..3 {
             let down = octant >> axis & 1;

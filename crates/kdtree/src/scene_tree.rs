@@ -235,8 +235,7 @@ impl SceneTree {
             let blocks = &placed.tree.blocks;
             let tree_ray = TreeRay::new(ray.ray.origin, ray.ray.dir, &ray.shear, blocks.extent);
             let (mut leaves, mut n_blocks, mut inner) = (0, 0, 0);
-            // The tree may be mostly of shapes that are not here.
-            let (t_in, t_max) = tree_ray.clip(&self.bounds, best.map_or(ray.ray.t_max, |hit| hit.t));
+            let (t_in, t_max) = tree_ray.clip(placed.bounds(), best.map_or(ray.ray.t_max, |hit| hit.t));
             let visit = |first, count, _| {
                 (leaves, n_blocks) = (leaves + 1, n_blocks + count as usize);
                 for prim in blocks.leaf(first, count).prims() {

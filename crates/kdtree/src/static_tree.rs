@@ -24,17 +24,18 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct StaticTree {
     members: Vec<Member>,
+    /// The first primitive of each member, close together: it is searched at every hit.
+    firsts: Vec<u32>,
     /// The members by the address of their meshes.
     by_mesh: HashMap<usize, Vec<usize>>,
     pub(super) blocks: BlockTree<TriangleBlock>,
 }
 
-/// A mesh of a static tree. Its triangles are primitives of the tree from `first` on.
+/// A mesh of a static tree.
 #[derive(Clone, Debug)]
 struct Member {
     mesh: Arc<Triangles>,
     world_from_object: Affine3A,
-    first: u32,
 }
 
 /// Transforms vertices to the space of the snapshot, in an order of roundings that is the same everywhere.
@@ -55,22 +56,21 @@ impl StaticTree {
         groups(members).into_iter().map(|members| Self::build_group(members, preset)).collect()
     }
 
-    fn build_group(mut members: Vec<Member>, preset: BuildPreset) -> Self {
-        let mut n_triangles = 0;
-        for member in &mut members {
-            member.first = n_triangles as u32;
+    fn build_group(members: Vec<Member>, preset: BuildPreset) -> Self {
+        let (mut firsts, mut n_triangles) = (Vec::with_capacity(members.len()), 0);
+        for member in &members {
+            firsts.push(n_triangles as u32);
             n_triangles += member.mesh.triangles.len();
             assert!(n_triangles < MAX_PRIMS, "more than 2^31 triangles");
         }
         let (positions, triangles) = all_triangles(&members);
-        let firsts: Vec<u32> = members.iter().map(|member| member.first).collect();
         let view = LeafTriangles { positions: &positions, triangles: &triangles, firsts: &firsts };
         let blocks = view.tree(&preset.config(BLOCK));
         let mut by_mesh: HashMap<usize, Vec<usize>> = HashMap::new();
         for (i, member) in members.iter().enumerate() {
             by_mesh.entry(address(&member.mesh)).or_default().push(i);
         }
-        Self { members, by_mesh, blocks }
+        Self { members, firsts, by_mesh, blocks }
     }
 
     /// Number of meshes.
@@ -107,8 +107,8 @@ impl StaticTree {
     /// Returns the member that a primitive belongs to, and its index there.
     #[inline]
     fn member_of(&self, prim: u32) -> (usize, u32) {
-        let member = self.members.partition_point(|member| member.first <= prim) - 1;
-        (member, prim - self.members[member].first)
+        let member = self.firsts.partition_point(|&first| first <= prim) - 1;
+        (member, prim - self.firsts[member])
     }
 }
 
@@ -121,7 +121,7 @@ impl Member {
     fn of(shape: &Shape) -> Option<Self> {
         match shape {
             Shape::Mesh { tree, world_from_object, space: HitSpace::World } => {
-                Some(Self { mesh: tree.mesh.clone(), world_from_object: *world_from_object, first: 0 })
+                Some(Self { mesh: tree.mesh.clone(), world_from_object: *world_from_object })
             }
             _ => None,
         }
@@ -207,25 +207,31 @@ impl PlacedStatic {
                 objects[member] = object as u32;
             }
         }
-        let members = objects.iter().zip(&tree.members);
-        let order: Vec<(u32, u32)> = members
-            .filter(|(object, _)| **object != Self::GONE)
-            .map(|(object, member)| (*object, member.first))
-            .collect();
+        let members = objects.iter().copied().zip(tree.firsts.iter().copied());
+        let order: Vec<(u32, u32)> = members.filter(|(object, _)| *object != Self::GONE).collect();
         if order.is_empty() || !order.is_sorted_by(|a, b| a.0 < b.0) {
             return None;
         }
         order.iter().for_each(|(object, _)| placed[*object as usize] = true);
-        let here = objects.iter().zip(&tree.members).filter(|(object, _)| **object != Self::GONE);
-        let ranges = here.map(|(_, member)| (member.first as usize, member.mesh.triangles.len()));
+        let here = (0..objects.len()).filter(|&member| objects[member] != Self::GONE);
         let is_whole = order.len() == objects.len();
-        let present = (!is_whole).then(|| PresentPrimitives::new(tree.n_triangles(), ranges));
+        let present = (!is_whole).then(|| {
+            let bounds = here.clone().map(|member| tree.members[member].bounds()).fold(Aabb::EMPTY, Aabb::union);
+            let n_triangles = |member: usize| tree.members[member].mesh.triangles.len();
+            let ranges = here.map(|member| (tree.firsts[member] as usize, n_triangles(member)));
+            PresentPrimitives::new(tree.n_triangles(), bounds.intersection(tree.blocks.nodes.bounds), ranges)
+        });
         Some(Self { tree: tree.clone(), present, objects, order })
     }
 
     /// The primitives that take part; `None` for all.
     pub fn present(&self) -> Option<&PresentPrimitives> {
         self.present.as_ref()
+    }
+
+    /// Bounds of the primitives that take part.
+    pub fn bounds(&self) -> &Aabb {
+        self.present.as_ref().map_or(&self.tree.blocks.nodes.bounds, |present| &present.bounds)
     }
 
     /// Returns the object of a primitive that takes part, and its index there.

@@ -14,6 +14,7 @@ use super::present::PresentPrimitives;
 use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
+use crate::geometry::Aabb;
 
 /// Rays in state. Half as many are 6 % slower on bounces, twice as many 3 %.
 pub(super) const SLOTS: usize = 64;
@@ -131,6 +132,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     if nodes8.is_empty() {
         return;
     }
+    let bounds = present.map_or(&tree.nodes.bounds, |present| &present.bounds);
     let prefetch = tree.is_large();
     let stacks: &mut [Stack; SLOTS] = (&mut *state.stacks).try_into().expect("one for each slot");
     let slots = B::Ray::slots(&mut state.sheared, &mut state.precise);
@@ -150,7 +152,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
             if slot.is_busy {
                 source.finish(slot.id, &slot.nearest);
             }
-            slot.is_busy = refill::<S, B, ANY>(s, tree, slot, &mut setup, source);
+            slot.is_busy = refill::<S, B, ANY>(s, (tree, bounds), slot, &mut setup, source);
             inner.push_if(slot.is_busy, i);
         }
         if inner.len + leaf.len == 0 {
@@ -212,7 +214,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
 #[inline(always)]
 fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
-    tree: &BlockTree<B>,
+    (tree, bounds): (&BlockTree<B>, &Aabb),
     slot: &mut Slot<B::Ray>,
     setup: &mut RaySetup,
     source: &mut impl Source,
@@ -220,7 +222,7 @@ fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
 where
     B::Ray: StreamRay,
 {
-    let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
+    let Some(lane) = setup.next(s, bounds, tree.extent, source) else { return false };
     let (t0, t1) = setup.within(lane);
     let descent = if ANY { setup.descent(lane).far_first() } else { setup.descent(lane) };
     *slot = Slot {

@@ -81,17 +81,18 @@ impl Material {
         }
     }
 
-    /// The material that scatters: of a blend that adds nothing but holes to one opaque part, that part.
+    /// The material that scatters: of a blend that adds nothing but holes and a normal map to one opaque part, that part.
     pub(crate) fn scattering<'a>(&'a self, materials: &'a [Self]) -> &'a Self {
         match self {
             Self::Blend { weight: ScalarInput::Constant(weight), a, b, by_side: false, .. }
-                if !(0.0 < *weight && *weight < 1.0) && self.normal_map().is_none() =>
+                if !(self.turns_normals_over() || 0.0 < *weight && *weight < 1.0) =>
             {
                 let part = &materials[if *weight < 1.0 { *a } else { *b } as usize];
                 let is_plain = match part {
                     Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => true,
-                    Self::Conductor { .. } | Self::Translucent { .. } | Self::Disney { .. } => {
-                        !part.asks_for_tangents()
+                    Self::Conductor { .. } => !part.asks_for_tangents(),
+                    Self::Translucent { .. } | Self::Disney { .. } => {
+                        !part.asks_for_tangents() && self.normal_map().is_none()
                     }
                     _ => false,
                 };

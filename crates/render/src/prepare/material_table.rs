@@ -33,6 +33,8 @@ pub(crate) const RICH: u32 = 128;
 pub(crate) const BECKMANN: u32 = 256;
 /// The base of a plastic colours light at every bounce.
 pub(crate) const NONLINEAR: u32 = 512;
+/// The normal map is that of a blend around it: the scalar code turns its normals.
+pub(crate) const TURNED: u32 = 1024;
 
 /// The parameters of all materials of one lobe, and of the parts of those of two.
 #[derive(Debug, Default)]
@@ -50,6 +52,8 @@ pub(crate) struct MaterialTable {
     pub weights: [Vec<f32>; 2],
     /// Inputs of layered materials.
     pub layers: LayerTable,
+    /// Whether some material is [`TURNED`].
+    pub has_turned: bool,
     /// Whether some emission is textured.
     pub textured_emission: bool,
     /// Whether some surface scatters light through itself, so that light is sampled on both sides.
@@ -71,6 +75,10 @@ impl MaterialTable {
         let mut parts_of_classics = Vec::new();
         for (id, material) in (0..).zip(materials.iter().map(|material| material.scattering(materials))) {
             table.add(material, materials);
+            if material.normal_map().is_none() && materials[id as usize].normal_map().is_some() {
+                *table.flags.last_mut().expect("it has been added") |= TURNED;
+                table.has_turned = true;
+            }
             let mut parts = [(0, 0.0); 2];
             match material {
                 Material::Blend { weight: ScalarInput::Constant(weight), a, b, by_side: false, .. }
@@ -135,6 +143,7 @@ impl MaterialTable {
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
             layers: LayerTable::build(materials, textures),
+            has_turned: table.has_turned,
             textured_emission: materials.iter().any(is_textured_emitter),
             two_sided: materials.iter().any(Material::scatters_through),
             of_object: padded(of_object),

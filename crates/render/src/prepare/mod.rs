@@ -19,6 +19,7 @@ pub(crate) mod large_textures;
 pub(crate) mod layer_table;
 pub(crate) mod light;
 pub(crate) mod material_table;
+pub(crate) mod occluders;
 pub(crate) mod plan_cache;
 pub(crate) mod prepared;
 mod radiance_unit;

@@ -15,6 +15,7 @@ use crate::prepare::contacts::{ContactScene, Contacts, ContactsBefore};
 use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
+use crate::prepare::occluders::Occluders;
 use crate::prepare::radiance_unit::radiance_unit;
 use crate::prepare::surface_table::SurfaceTable;
 use firstlight_kdtree::geometry::Ray;
@@ -32,6 +33,8 @@ pub struct Prepared {
     snapshot: Snapshot,
     pub(crate) surfaces: Arc<SurfaceTable>,
     pub(crate) tables: Arc<Tables>,
+    /// `None` for a scene without cutouts, or without other objects.
+    pub(crate) occluders: Option<Arc<Occluders>>,
     /// `None` if nothing moves while the shutter is open.
     moments: Option<SharedMoments>,
 }
@@ -129,28 +132,33 @@ impl Prepared {
     pub fn new(snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, None));
-        Self { snapshot, surfaces, tables, moments: None }
+        let occluders = occluders(&snapshot.geometry, &tables);
+        Self { snapshot, surfaces, tables, occluders, moments: None }
     }
 
     /// Returns the same objects with other materials and lights.
     pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
         let tables = Arc::new(Tables::build(&self.geometry, &shading, Some(self)));
+        let is_same = self.tables.cutouts.iter().map(Option::is_some).eq(tables.cutouts.iter().map(Option::is_some));
+        let occluders = if is_same { self.occluders.clone() } else { occluders(&self.geometry, &tables) };
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
-        Self { snapshot, tables, surfaces: self.surfaces.clone(), moments: None }
+        Self { snapshot, tables, surfaces: self.surfaces.clone(), occluders, moments: None }
     }
 
     /// Returns the tables for another snapshot; what is the same in both, and takes long, is not computed again.
     pub fn with_snapshot(&self, snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, Some(self)));
-        Self { snapshot, surfaces, tables, moments: None }
+        let occluders = occluders(&snapshot.geometry, &tables);
+        Self { snapshot, surfaces, tables, occluders, moments: None }
     }
 
     /// Returns the same scene with other trees of the same meshes: all hits are the same, and so are the tables.
     pub fn with_trees(&self, geometry: Arc<Geometry>) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&geometry.tree));
+        let occluders = occluders(&geometry, &self.tables);
         let snapshot = Snapshot { geometry, ..self.snapshot.clone() };
-        Self { snapshot, surfaces, tables: self.tables.clone(), moments: None }
+        Self { snapshot, surfaces, tables: self.tables.clone(), occluders, moments: None }
     }
 
     /// Whether both are the same scene but for the camera.
@@ -279,6 +287,10 @@ impl Tables {
             features,
         }
     }
+}
+
+fn occluders(geometry: &Geometry, tables: &Tables) -> Option<Arc<Occluders>> {
+    tables.features.cutouts.then(|| Occluders::build(geometry, &tables.cutouts))?.map(Arc::new)
 }
 
 /// Whether two environments are equal; images only if they are shared.

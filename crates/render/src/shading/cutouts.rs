@@ -7,6 +7,7 @@
 use crate::core::material::{MaterialId, ScalarInput};
 use crate::core::material_queries::Cutout;
 use crate::core::texture::TexturePoint;
+use crate::prepare::occluders::Occluders;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{hash_combine, hash_u32};
 use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
@@ -23,22 +24,38 @@ impl Prepared {
     pub(crate) fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         self.geometry.tree.closest_hits(rays, class, hits);
         if self.tables.features.cutouts {
-            self.pass_cutouts(rays, hits);
+            self.pass_cutouts(rays, hits, |rays, hits| {
+                self.geometry.tree.closest_hits(rays, RayClass::Incoherent, hits);
+            });
         }
     }
 
     /// Whether rays are occluded; see [`firstlight_kdtree::SceneTree::any_hits`].
     ///
-    /// Among cutouts the closest hit tells where a ray continues, so that each ray is traced once and not a second time
-    /// if it hits something; a ray without a hit costs the same either way.
+    /// Among cutouts the closest hit tells where a ray continues.
     pub(crate) fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         if !self.tables.features.cutouts {
             return self.geometry.tree.any_hits(rays, class, occluded);
         }
         let mut hits = HitBatch::default();
-        self.closest_hits(rays, class, &mut hits);
-        occluded.clear();
-        occluded.extend((0..rays.len()).map(|i| hits.get(i).is_some()));
+        let Some(occluders) = &self.occluders else {
+            self.closest_hits(rays, class, &mut hits);
+            occluded.clear();
+            occluded.extend((0..rays.len()).map(|i| hits.get(i).is_some()));
+            return;
+        };
+        occluders.opaque.any_hits(rays, class, occluded);
+        let mut passed = RayBatch::default();
+        (0..rays.len()).filter(|&i| !occluded[i]).for_each(|i| passed.push(&rays.get(i)));
+        occluders.cut.closest_hits(&passed, RayClass::Incoherent, &mut hits);
+        in_scene(&mut hits, occluders);
+        self.pass_cutouts(&passed, &mut hits, |rays, hits| {
+            occluders.cut.closest_hits(rays, RayClass::Incoherent, hits);
+            in_scene(hits, occluders);
+        });
+        occluded.iter_mut().filter(|occluded| !**occluded).enumerate().for_each(|(i, occluded)| {
+            *occluded = hits.get(i).is_some();
+        });
     }
 
     /// Like [`Self::closest_hits`], for one ray.
@@ -53,8 +70,8 @@ impl Prepared {
         hits.get(0)
     }
 
-    #[cold]
-    fn pass_cutouts(&self, rays: &RayBatch, hits: &mut HitBatch) {
+    /// Replaces hits of cutouts by the next ones behind them, which `closest_hits` finds.
+    fn pass_cutouts(&self, rays: &RayBatch, hits: &mut HitBatch, closest_hits: impl Fn(&RayBatch, &mut HitBatch)) {
         let mut open: Vec<(usize, Ray)> = Vec::new();
         for i in 0..rays.len() {
             let ray = rays.get(i);
@@ -69,7 +86,7 @@ impl Prepared {
             }
             batch.clear();
             open.iter().for_each(|(_, ray)| batch.push(ray));
-            self.geometry.tree.closest_hits(&batch, RayClass::Incoherent, &mut found);
+            closest_hits(&batch, &mut found);
             let mut k = 0;
             open.retain_mut(|(i, ray)| {
                 let hit = found.get(k);
@@ -130,6 +147,13 @@ impl Prepared {
     }
 }
 
+/// Replaces the objects of hits among objects with cutouts by those of the scene.
+fn in_scene(hits: &mut HitBatch, occluders: &Occluders) {
+    for object in hits.object.iter_mut().filter(|object| **object != HitBatch::MISS) {
+        *object = occluders.cut_objects[*object as usize];
+    }
+}
+
 /// Returns the parameter of a point along a ray, in lengths of its direction.
 fn along(ray: &Ray, point: glam::Vec3) -> f32 {
     (point - ray.origin).dot(ray.dir) / ray.dir.length_squared()
@@ -140,4 +164,64 @@ fn probability(ray: &Ray, hit: &Hit) -> f32 {
     let of_ray = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).map(f32::to_bits);
     let bits = of_ray.chain([hit.object, hit.prim]).fold(0x51ed_270b, hash_combine);
     (hash_u32(bits) >> 8) as f32 * (1.0 / (1 << 24) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::environment::Environment;
+    use crate::core::material::{Material, MaterialKind};
+    use crate::core::snapshot::Object;
+    use crate::sampling::Sampler;
+    use crate::test_scene::prepared;
+    use firstlight_kdtree::Shape;
+    use glam::Vec3;
+
+    /// A scene of small quads and spheres, of materials by turns, and rays of any length through it.
+    fn crowd(materials: Vec<Material>, used: &[u32]) -> (Prepared, RayBatch) {
+        let point = |i: u32, k: u32| {
+            let [x, y] = Sampler::new(7, i, k, 0).pair(0).to_array();
+            Vec3::new(x, y, Sampler::new(7, i, k, 0).single(2))
+        };
+        let shapes = (0..300).map(|i| match i % 3 {
+            0 => Shape::Sphere { center: point(i, 0), radius: 0.02 },
+            _ => Shape::Quad { corner: point(i, 0), edge_u: 0.2 * point(i, 1), edge_v: 0.2 * (point(i, 2) - 0.5) },
+        });
+        let objects = (0..300).map(|i| Object::plain(used[i % used.len()])).collect();
+        let scene = prepared(shapes.collect(), objects, materials, Environment::Constant(Vec3::ONE));
+        let mut rays = RayBatch::default();
+        for i in 0..4000 {
+            let (origin, end) = (point(i, 3), point(i, 4));
+            let t_max = if i % 2 == 0 { 1.0 } else { f32::INFINITY };
+            rays.push(&Ray { origin, dir: end - origin, t_max });
+        }
+        (scene, rays)
+    }
+
+    #[test]
+    fn rays_among_cutouts_are_occluded_where_their_closest_hit_is_no_hole() {
+        let material = |kind| Material::of_kind(kind, Vec3::ONE.into()).expect("no blend");
+        let holes = |share: f32| {
+            let mut blend = Material::blend(ScalarInput::Constant(1.0), 0, 0);
+            if let Material::Blend { opacity, .. } = &mut blend {
+                *opacity = ScalarInput::Constant(share);
+            }
+            blend
+        };
+        let materials =
+            vec![material(MaterialKind::Diffuse), holes(0.5), holes(0.0), material(MaterialKind::Principled)];
+        for (used, apart) in [(&[0, 1, 2, 3][..], true), (&[1, 2], false), (&[0], false)] {
+            let (scene, rays) = crowd(materials.clone(), used);
+            assert_eq!(scene.occluders.is_some(), apart);
+            let (mut hits, mut occluded) = (HitBatch::default(), Vec::new());
+            for class in [RayClass::Coherent, RayClass::Incoherent] {
+                scene.closest_hits(&rays, class, &mut hits);
+                scene.any_hits(&rays, class, &mut occluded);
+                let expected: Vec<bool> = (0..rays.len()).map(|i| hits.get(i).is_some()).collect();
+                assert_eq!(occluded, expected);
+                let n = occluded.iter().filter(|occluded| **occluded).count();
+                assert!((400..3600).contains(&n), "{n} rays of 4,000 are occluded");
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@ use crate::core::material::Material;
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::caustics_weight::etendue_gain;
 use crate::prepare::casters::NO_CASTER;
-use crate::prepare::material_table::{COATED, MORE_THAN_UV, TANGENTS};
+use crate::prepare::material_table::{COATED, MORE_THAN_UV, TANGENTS, TURNED};
 use crate::sampling::cosine_hemisphere_pdf;
 use crate::shading::interface::MediumId;
 use crate::shading::mis_state::MisState;
@@ -101,7 +101,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
                 let material = at.materials[i];
                 let flags = at.scene.tables.materials.flags[material as usize];
                 // Layers may need normals that are not mapped.
-                let needs_more = KIND > COATED || flags & (TANGENTS | MORE_THAN_UV) != 0;
+                let needs_more = KIND > COATED || flags & (TANGENTS | MORE_THAN_UV | TURNED) != 0;
                 let vertex = if needs_more { at.vertex(i) } else { vertices.vertex(lane) };
                 pdfs[lane] = match at.scene.shading.materials[material as usize] {
                     Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } => {

@@ -1,7 +1,7 @@
 //! From sixteen hits to surface interactions; see [`crate::shading::vertex::Vertex`].
 
 use crate::core::texture::TexturePoint;
-use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED};
+use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED, TURNED};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
@@ -131,6 +131,10 @@ impl<S: Simd> SurfaceLanes<S> {
             let material = Bits::gather(at.materials, at.index);
             with_tangents = at.mask & Bits::gather(&at.scene.tables.materials.flags, material).has(TANGENTS);
             other |= with_tangents & !mesh;
+        }
+        if at.scene.tables.materials.has_turned {
+            let material = Bits::gather(at.materials, at.index);
+            other |= at.mask & Bits::gather(&at.scene.tables.materials.flags, material).has(TURNED);
         }
         let zero = Float::splat(s, 0.0);
         let nowhere = Vector { x: zero, y: zero, z: zero };
