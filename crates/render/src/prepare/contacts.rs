@@ -166,7 +166,8 @@ impl Contacts {
             if own.geometric_normal.dot(ray.dir) < 0.0 { -own.geometric_normal } else { own.geometric_normal };
         let [near, far] =
             [-onwards, onwards].map(|to| offset_ray_origin(own.position, own.error, own.geometric_normal, to));
-        // What coincides is hit no earlier, and behind the slab only by rounding: by a few of its thicknesses.
+        // What coincides is hit no earlier, cells being bounded far better than to a thousandth. A ray leaves the slab by
+        // no more than the error of a position, even if that of the other surface is sixteen times that of this one.
         let cosine = onwards.dot(ray.dir);
         let behind = hit.t + 64.0 * (far - near).dot(onwards) / cosine;
         let (ray, before) = (Ray { t_max: behind.max(hit.t.next_up()).min(ray.t_max), ..*ray }, 0.999 * hit.t);

@@ -6,7 +6,8 @@ use firstlight_kdtree::geometry::quad_corners;
 use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use std::hash::BuildHasher;
 
 /// A face in world space.
 struct Face {
@@ -105,7 +106,11 @@ fn compared(shapes: &[Shape], boxes: &[[Vec3; 2]], pairs: Vec<(u32, u32)>) -> Ve
     }
     let faces: FxHashMap<u32, Vec<Face>> =
         parts.into_par_iter().map(|(i, parts)| (i, faces_in(&shapes[i as usize], &parts))).collect();
+    let filter = PlaneFilter::build(boxes, &faces, &pairs);
     let touches = |&pair: &(u32, u32)| {
+        if !is_plane(pair.0) && !is_plane(pair.1) && !filter.may_touch(&faces, pair) {
+            return false;
+        }
         let [a, b] = [pair.0, pair.1].map(|i| &shapes[i as usize]);
         match (a, b) {
             // A plane has no faces: everything that lies in it touches it.
@@ -121,6 +126,99 @@ fn compared(shapes: &[Shape], boxes: &[[Vec3; 2]], pairs: Vec<(u32, u32)>) -> Ve
         }
     };
     pairs.into_par_iter().filter(touches).collect()
+}
+
+/// Tells of most pairs of objects that no two of their faces lie in one plane, in a step per face: comparing the faces of
+/// many nested bodies takes most of a minute without it.
+struct PlaneFilter {
+    /// Per object: the exponent of two that is above all of its coordinates.
+    exponents: Vec<i32>,
+    /// By object and exponent of the pair.
+    cells: FxHashMap<(u32, i32), PlaneCells>,
+}
+
+impl PlaneFilter {
+    /// Steps of its grid in those of [`STEPS`]: what is found in neighbouring cells there is found here.
+    const COARSER: f64 = 4.0;
+
+    fn build(boxes: &[[Vec3; 2]], faces: &FxHashMap<u32, Vec<Face>>, pairs: &[(u32, u32)]) -> Self {
+        let exponent = |[low, high]: &[Vec3; 2]| {
+            let most = f64::from(low.abs().max(high.abs()).max_element()).clamp(f64::MIN_POSITIVE, f64::MAX);
+            most.log2().floor() as i32 + 1
+        };
+        let mut filter = Self { exponents: boxes.iter().map(exponent).collect(), cells: FxHashMap::default() };
+        let wanted: FxHashSet<(u32, i32)> = pairs
+            .iter()
+            .filter(|(a, b)| faces.contains_key(a) && faces.contains_key(b))
+            .map(|&pair| (by_number_of_faces(faces, pair).0, filter.exponent_of(pair)))
+            .collect();
+        let cells = wanted.into_par_iter().map(|key| (key, PlaneCells::of(&faces[&key.0], key.1)));
+        filter.cells = cells.collect();
+        filter
+    }
+
+    fn exponent_of(&self, (a, b): (u32, u32)) -> i32 {
+        self.exponents[a as usize].max(self.exponents[b as usize])
+    }
+
+    fn may_touch(&self, faces: &FxHashMap<u32, Vec<Face>>, pair: (u32, u32)) -> bool {
+        let (fewer, more) = by_number_of_faces(faces, pair);
+        let exponent = self.exponent_of(pair);
+        let cells = &self.cells[&(fewer, exponent)];
+        faces[&more].iter().any(|face| cells.have(face, exponent))
+    }
+}
+
+/// The object of a pair with fewer faces, and the other.
+fn by_number_of_faces(faces: &FxHashMap<u32, Vec<Face>>, (a, b): (u32, u32)) -> (u32, u32) {
+    if faces[&a].len() <= faces[&b].len() { (a, b) } else { (b, a) }
+}
+
+/// Cells of the planes of an object's faces, of both orientations.
+struct PlaneCells {
+    /// A bit per remainder of the hash of a cell near a plane: most questions end here.
+    near: Vec<u64>,
+    hashes: FxHashSet<u64>,
+}
+
+impl PlaneCells {
+    fn of(faces: &[Face], exponent: i32) -> Self {
+        let mut cells = Self { near: vec![0; (4 * faces.len()).next_power_of_two()], hashes: FxHashSet::default() };
+        for (face, sign) in faces.iter().flat_map(|face| [(face, 1.0), (face, -1.0)]) {
+            let at = Self::place(sign * face.normal, sign * face.offset, exponent);
+            cells.hashes.insert(hash_of(at.map(|x| x.floor() as i64)));
+            for corner in 0..16 {
+                let (word, bit) = Self::bit(&cells.near, hash_of(nearest_cell(&at, corner)));
+                cells.near[word] |= bit;
+            }
+        }
+        cells
+    }
+
+    fn have(&self, face: &Face, exponent: i32) -> bool {
+        let at = Self::place(face.normal, face.offset, exponent);
+        let (word, bit) = Self::bit(&self.near, hash_of(at.map(|x| x.floor() as i64)));
+        self.near[word] & bit != 0 && (0..16).any(|corner| self.hashes.contains(&hash_of(nearest_cell(&at, corner))))
+    }
+
+    fn bit(bits: &[u64], hash: u64) -> (usize, u64) {
+        ((hash >> 38) as usize & (bits.len() - 1), 1 << (hash >> 32 & 63))
+    }
+
+    fn place(normal: DVec3, offset: f64, exponent: i32) -> [f64; 4] {
+        let [of_normal, of_offset] = STEPS.map(|step| PlaneFilter::COARSER * step);
+        let n = normal / of_normal;
+        [n.x, n.y, n.z, offset / (of_offset * f64::from(exponent).exp2())]
+    }
+}
+
+fn hash_of(cell: Cell) -> u64 {
+    FxBuildHasher.hash_one(cell)
+}
+
+/// One of the two nearest cells per axis.
+fn nearest_cell(at: &[f64; 4], corner: u32) -> Cell {
+    std::array::from_fn(|k| (at[k] - 0.5).floor() as i64 + i64::from(corner >> k & 1))
 }
 
 /// Whether two boxes overlap.
@@ -146,10 +244,8 @@ fn faces_touch(a: &[&Face], b: &[&Face]) -> bool {
     }
     many.iter().any(|face| {
         let at = place(face.normal, face.offset);
-        // The two nearest cells per axis.
         (0..16u32).any(|corner| {
-            let cell: Cell = std::array::from_fn(|k| (at[k] - 0.5).floor() as i64 + i64::from(corner >> k & 1));
-            let others = cells.get(&cell).map_or(&[][..], |list| list);
+            let others = cells.get(&nearest_cell(&at, corner)).map_or(&[][..], |list| list);
             others.len() > MOST_COMPARED || others.iter().any(|other| face.touches(other) || other.touches(face))
         })
     })
