@@ -8,6 +8,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Height of images beyond which the result is no larger.
 const MAX_HEIGHT: u32 = 4096;
+/// Height beyond which texels have fewer samples.
+const FINE_HEIGHT: u32 = 1024;
 /// Height to which images with interpolated colours are enlarged at most.
 const MAX_INTERPOLATED: u32 = 2048;
 
@@ -17,8 +19,6 @@ const MAX_INTERPOLATED: u32 = 2048;
 /// - `axes`: rows of the matrix from directions of the world to those of the image. The pole of an image is +Y of its
 ///   directions in the equirectangular layout, and +Z in the one of equal areas.
 pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Option<[[f64; 3]; 3]>) -> ImageTexture {
-    // Samples of a texel along each side, so that no light between two of them is lost.
-    let samples = if layout == EnvironmentLayout::Interpolated { 1 } else { 4 };
     let height = match layout {
         EnvironmentLayout::Equirectangular => image.height,
         EnvironmentLayout::EqualArea => image.height.max(image.width),
@@ -30,6 +30,13 @@ pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Op
     let most = if layout == EnvironmentLayout::Interpolated { height } else { (4 * texels).isqrt() as u32 };
     let height = height.min(most).clamp(1, MAX_HEIGHT);
     let width = 2 * height;
+    // Samples of a texel along each side, so that no light between two of them is lost. Light that matters has many texels
+    // of a large image.
+    let samples = match layout {
+        EnvironmentLayout::Interpolated => 1,
+        _ if height > FINE_HEIGHT => 2,
+        _ => 4,
+    };
     let image_from_world = axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
     let texel = |x: i64, y: i64| {
         let (x, y) = (x.clamp(0, i64::from(image.width) - 1), y.clamp(0, i64::from(image.height) - 1));
@@ -55,18 +62,20 @@ pub fn equirectangular(image: &ImageTexture, layout: EnvironmentLayout, axes: Op
         } * size;
         texel(point.x.floor() as i64, point.y.floor() as i64)
     };
+    // Sine and cosine at the samples of all texels along one side.
+    let angles = |n: u32, of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+        (0..n * samples).map(|k| of((f64::from(k) + 0.5) / f64::from(n * samples)).sin_cos()).collect()
+    };
+    let (azimuths, polars) = (angles(width, &|u| (u - 0.5) * TAU), angles(height, &|v| v * PI));
     let row = |y: u32| -> Vec<Vec3> {
+        let own = |cell: u32| (cell * samples) as usize..((cell + 1) * samples) as usize;
         let at = |x: u32| {
-            let cells = (0..samples).flat_map(|j| (0..samples).map(move |i| (i, j)));
-            let sum: Vec3 = cells
-                .map(|(i, j)| {
-                    let sub = |cell: u32, k: u32, n: u32| {
-                        (f64::from(cell) + (f64::from(k) + 0.5) / f64::from(samples)) / f64::from(n)
-                    };
-                    let (azimuth, polar) = ((sub(x, i, width) - 0.5) * TAU, sub(y, j, height) * PI);
-                    radiance(DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()))
-                })
-                .sum();
+            let mut sum = Vec3::ZERO;
+            for (sin_polar, cos_polar) in &polars[own(y)] {
+                for (sin, cos) in &azimuths[own(x)] {
+                    sum += radiance(DVec3::new(sin_polar * sin, *cos_polar, -sin_polar * cos));
+                }
+            }
             sum / (samples * samples) as f32
         };
         (0..width).map(at).collect()
