@@ -166,6 +166,28 @@ fn a_scene_is_read_for_few_sets_of_parameters() {
 }
 
 #[test]
+fn a_scene_is_read_once_whatever_its_names_and_few_scenes_are_read() {
+    let opened = |files: &[String]| {
+        let part = |file: &String| format!("mesh(source: part(file: \"{file}\", shape: 0), material: \"m\"), ");
+        let parts: String = files.iter().map(part).collect();
+        let camera = "camera: (eye: (0, 0, 5), look_at: (0, 0, 0))";
+        let text = format!("({camera}, materials: {{ \"m\": mirror() }}, objects: [{parts}])");
+        let mut all = vec![("s.ron".to_owned(), text)];
+        let square = "WorldBegin\nShape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]\n";
+        all.extend((0..40).map(|i| (format!("{i}.pbrt"), square.to_owned())));
+        let all: Vec<(&str, String)> = all.iter().map(|(name, text)| (&**name, text.clone())).collect();
+        let (_folder, path) = folder(&all);
+        std::fs::create_dir(path.with_file_name("x")).unwrap();
+        load(&SceneSource::Scene(path), &LoadOptions::default()).map_err(|error| error.to_string())
+    };
+    let names: Vec<String> = (0..40).map(|i| "x/../".repeat(i) + "0.pbrt").collect();
+    assert_eq!(told(&opened(&names).unwrap()), "");
+    let files: Vec<String> = (0..40).map(|i| format!("{i}.pbrt")).collect();
+    let said = opened(&files).map_or_else(|error| error, |scene| told(&scene));
+    assert!(said.contains("more than 32 scenes of other renderers"), "{said}");
+}
+
+#[test]
 fn parameters_of_any_number_are_found_at_once() {
     // Minutes if each were compared with all others.
     let many: String = (0..200_000).map(|i| format!("<default name=\"a{i:06}\" value=\"\"/>\n")).collect();

@@ -31,6 +31,9 @@ type ReadScene = Result<Arc<ForeignScene>, SceneError>;
 /// Sets of parameters that a scene is read with: it takes its memory for each.
 const MAX_VARIANTS: usize = 16;
 
+/// Scenes of other renderers that a scene reads parts of, each with all of its meshes.
+const MAX_SCENES: usize = 32;
+
 /// Open files, by path.
 #[derive(Debug, Default)]
 pub struct Documents {
@@ -103,12 +106,18 @@ impl Documents {
     ///
     /// - `defines`: names and values of parameters that it leaves open.
     pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> ReadScene {
-        let key = (path.to_owned(), defines.to_vec());
+        // One file may have many names.
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let key = (real, defines.to_vec());
         if let Some(scene) = lock(&self.scenes).get(&key) {
             return scene.clone();
         }
-        if lock(&self.scenes).keys().filter(|(known, _)| known == path).count() >= MAX_VARIANTS {
+        if lock(&self.scenes).keys().filter(|(known, _)| *known == key.0).count() >= MAX_VARIANTS {
             let message = format!("is read with more than {MAX_VARIANTS} sets of parameters");
+            return Err(SceneError::in_file(path, message));
+        }
+        if lock(&self.scenes).len() >= MAX_SCENES {
+            let message = format!("is one of more than {MAX_SCENES} scenes of other renderers in one scene");
             return Err(SceneError::in_file(path, message));
         }
         let budget = ImageBudget::default();
