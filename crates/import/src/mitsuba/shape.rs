@@ -8,7 +8,7 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
-use crate::model::foreign::LIGHT_SHARE;
+use crate::model::foreign::{LIGHT_SHARE, is_anisotropic};
 use crate::model::placing;
 use crate::ply::has_normals;
 use firstlight_files::input_file::{FileKind, InputFile};
@@ -223,7 +223,7 @@ impl Converter<'_> {
         material: PlacedMaterial,
     ) -> Result<(), SceneError> {
         let (center, radius) = (node.vector("center")?.unwrap_or(DVec3::ZERO), node.float_or("radius", 1.0)?);
-        if is_flipped {
+        if is_flipped != (own.determinant() < 0.0) {
             self.tell(node, "a sphere whose normals point inwards is not modelled: they point outwards");
         }
         let placed = own * DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
@@ -408,7 +408,7 @@ impl Converter<'_> {
                 let mut parts = [a, b].into_iter().filter_map(|name| self.file.materials.get(name));
                 matches!(weight, ScalarValue::Texture(_)) || parts.any(|part| self.is_textured(part))
             }
-            _ => !texture_names(part).is_empty(),
+            _ => is_anisotropic(part) || !texture_names(part).is_empty(),
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::mitsuba::read_scene;
 use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
 use crate::model::projection::LightImages;
 use firstlight_files::input_file::{FileKind, InputFile};
-use firstlight_format::parts::MaterialPart;
+use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{EnvironmentSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
@@ -251,4 +251,27 @@ fn old_black_bodies_open_and_environments_and_turbidities_are_told() {
     tells_only(&twice, &["`b`", "second environment"]);
     let hazy = "<emitter type=\"sunsky\"><float name=\"turbidity\" value=\"20\"/></emitter><shape type=\"sphere\"/>";
     tells_only(&read("3.0.0", hazy), &["`sunsky`", "turbidity"]);
+}
+
+#[test]
+fn a_sphere_with_highlights_of_a_direction_has_the_poles_of_mitsuba() {
+    let turned = |widths: &str| {
+        let bsdf = format!("<bsdf type=\"twosided\"><bsdf type=\"roughconductor\">{widths}</bsdf></bsdf>");
+        let scene = read("3.0.0", &format!("<shape type=\"sphere\">{bsdf}</shape>"));
+        let ObjectPart::Sphere { transform, .. } = &scene.file.objects[0] else { panic!() };
+        *transform != TransformPart::default()
+    };
+    let float = |name: &str, value: f32| format!("<float name=\"{name}\" value=\"{value}\"/>");
+    assert!(turned(&(float("alpha_u", 0.05) + &float("alpha_v", 0.4))));
+    assert!(!turned(&float("alpha", 0.2)));
+}
+
+#[test]
+fn a_mirrored_sphere_is_told() {
+    let sphere = |inside: &str| {
+        let to_world = "<transform name=\"to_world\"><scale x=\"-1\" y=\"1\" z=\"1\"/></transform>";
+        read("3.0.0", &format!("<shape type=\"sphere\">{to_world}{inside}</shape>"))
+    };
+    tells_only(&sphere(""), &["normals point inwards"]);
+    assert_eq!(told(&sphere("<boolean name=\"flip_normals\" value=\"true\"/>")), Vec::<String>::new());
 }

@@ -76,7 +76,6 @@ const DIRECTIVES: &[&str] = &[
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Saved {
     Attributes,
-    Transform,
     Object,
 }
 
@@ -241,15 +240,9 @@ impl<'a> Reader<'a> {
                 cursor.pair()?;
             }
             "ReverseOrientation" => self.state.is_reversed = !self.state.is_reversed,
-            "AttributeBegin" => self.save(cursor, at, Saved::Attributes)?,
-            "AttributeEnd" => self.restore(cursor, at, Saved::Attributes)?,
-            "TransformBegin" => self.save(cursor, at, Saved::Transform)?,
-            "TransformEnd" => {
-                let state = self.state.clone();
-                self.restore(cursor, at, Saved::Transform)?;
-                let (ctm, sets_start) = (self.state.ctm, self.state.sets_start);
-                self.state = State { ctm, sets_start, ..state };
-            }
+            // The latter names are those of version 3, and mean the same in version 4.
+            "AttributeBegin" | "TransformBegin" => self.save(cursor, at, Saved::Attributes)?,
+            "AttributeEnd" | "TransformEnd" => self.restore(cursor, at, Saved::Attributes)?,
             "ObjectBegin" => {
                 let object = cursor.string()?;
                 self.save(cursor, at, Saved::Object)?;
@@ -387,7 +380,6 @@ impl<'a> Reader<'a> {
     fn restore(&mut self, cursor: &Cursor, at: usize, what: Saved) -> Result<(), SceneError> {
         let name = match what {
             Saved::Attributes => "AttributeBegin",
-            Saved::Transform => "TransformBegin",
             Saved::Object => "ObjectBegin",
         };
         match self.stack.pop() {

@@ -15,7 +15,7 @@
 
 use crate::pbrt::params::Params;
 use crate::pbrt::spectrum::{Spectrum, UnknownSpectrum, conductor_index, normal_reflectance};
-use crate::pbrt::textures::Texture;
+use crate::pbrt::textures::{Texture, product};
 use firstlight_files::printable;
 use firstlight_format::parts::{InFile, MaterialPart};
 use firstlight_format::sources::TextureSource;
@@ -246,10 +246,21 @@ pub(crate) fn material(
             let (ior, _) = ior(scope, params, "eta");
             MaterialPart::ThinGlass { ior, reflectance: ColorValue::grey(1.0), transmittance: ColorValue::grey(1.0) }
         }
-        "diffusetransmission" => MaterialPart::Translucent {
-            reflectance: color(scope, params, "reflectance", 0.25),
-            transmittance: color(scope, params, "transmittance", 0.25),
-        },
+        "diffusetransmission" => {
+            let scale = scope.number(params, "scale").unwrap_or(Texture::Constant(Vec3::ONE));
+            let mut scaled = |name: &str| {
+                let color = scope.color(params, name).unwrap_or(Texture::Constant(Vec3::splat(0.25)));
+                let color = product(&color, &scale).unwrap_or_else(|| {
+                    scope.tell("a texture as its `scale` is not modelled beside another: it is left out");
+                    color
+                });
+                scope.color_value(match color {
+                    Texture::Constant(color) => Texture::Constant(color.clamp(Vec3::ZERO, Vec3::ONE)),
+                    texture => texture,
+                })
+            };
+            MaterialPart::Translucent { reflectance: scaled("reflectance"), transmittance: scaled("transmittance") }
+        }
         "subsurface" => {
             scope.tell("subsurface scattering is not modelled: a diffuse surface is shown");
             MaterialPart::Diffuse { albedo: color(scope, params, "reflectance", 0.5) }

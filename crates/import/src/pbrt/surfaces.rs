@@ -1,6 +1,6 @@
 //! Materials and textures of a scene: described under their names, and converted when a shape has them.
 
-use crate::model::foreign::{LIGHT_SHARE, cut, tinted, told_of_long};
+use crate::model::foreign::{LIGHT_SHARE, cut, is_anisotropic, tinted, told_of_long};
 use crate::pbrt::build::Builder;
 use crate::pbrt::materials::{MaterialScope, material, principled, with_layers, with_normals};
 use crate::pbrt::params::Params;
@@ -99,6 +99,14 @@ impl Builder<'_> {
             },
         };
         let absorption = self.media.get(&state.inside).copied().flatten().unwrap_or(Vec3::ZERO);
+        let has_medium = !state.inside.is_empty() && !matches!(self.media.get(&state.inside), Some(Some(Vec3::ZERO)));
+        if has_medium && (described.kind != "dielectric" || !self.media.contains_key(&state.inside)) {
+            let (medium, shape) = (printable::name(&state.inside).into_owned(), printable::name(shape));
+            self.tell(match self.media.contains_key(&state.inside) {
+                true => format!("`{shape}`: a medium is shown inside of `dielectric` only: `{medium}` is left out"),
+                false => format!("there is no medium `{medium}`, which is inside of `{shape}`"),
+            });
+        }
         let base = self.converted(&described, absorption);
         if opacity.is_none() && light.is_none() {
             return base;
@@ -233,7 +241,7 @@ impl Builder<'_> {
         self.lobes.insert(name.clone(), lobes);
         let is_textured = match &part {
             MaterialPart::Blend { a, b, .. } => [a, b].iter().any(|name| self.with_textures.contains(*name)),
-            _ => false,
+            _ => is_anisotropic(&part),
         };
         if is_textured || !texture_names(&part).is_empty() {
             self.with_textures.insert(name.clone());

@@ -2,12 +2,12 @@
 
 use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
 use crate::model::projection::LightImages;
-use firstlight_format::parts::MaterialPart;
+use firstlight_format::parts::{MaterialPart, ObjectPart};
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Encoding;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use std::fmt::Write;
 
 const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
@@ -200,4 +200,61 @@ fn a_mixture_of_five_has_holes() {
     let MaterialPart::Blend { opacity, a, b, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
     assert_eq!((opacity, told(&scene)), (&ScalarValue::Number(0.5), Vec::new()));
     assert_ne!(a, b);
+}
+
+#[test]
+fn a_texture_is_scaled_by_a_number_and_unknown_textures_are_told() {
+    let scaled = |scale: &str| {
+        read(&format!(
+            "Texture \"f\" \"float\" \"constant\" \"float value\" 0.1\n\
+             Texture \"t\" \"spectrum\" \"scale\" \"rgb tex\" [0.8 0.8 0.8] {scale}\n\
+             Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}"
+        ))
+    };
+    for (scale, expected) in [("\"texture scale\" \"f\"", 0.8 * 0.1), ("\"float scale\" 0.5", 0.4), ("", 0.8)] {
+        let scene = scaled(scale);
+        let albedo = ColorValue::Rgb(Vec3::splat(expected));
+        assert_eq!((part(&scene), told(&scene)), (&MaterialPart::Diffuse { albedo }, Vec::new()), "{scale}");
+    }
+    tells_only(&scaled("\"texture scale\" \"gone\""), &["texture `t`", "no texture `gone` for `scale`"]);
+}
+
+#[test]
+fn the_old_names_of_attributes_save_materials_too() {
+    let red = "Material \"diffuse\" \"rgb reflectance\" [1 0 0]\n";
+    let scene = read(&format!("{red}TransformBegin\nMaterial \"conductor\"\nTransformEnd\n{SQUARE}"));
+    let MaterialPart::Diffuse { .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+}
+
+#[test]
+fn diffuse_transmission_has_a_scale() {
+    let scene = read(&format!(
+        "Material \"diffusetransmission\" \"rgb reflectance\" [0.5 0.5 0.5] \"float scale\" 0.5\n{SQUARE}"
+    ));
+    let MaterialPart::Translucent { reflectance, transmittance } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!((reflectance, transmittance), (&ColorValue::grey(0.25), &ColorValue::grey(0.125)));
+}
+
+#[test]
+fn media_that_are_not_shown_are_told() {
+    let medium =
+        "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [1 2 3] \"rgb sigma_s\" [0 0 0]\n";
+    let inside = |material: &str, name: &str| {
+        read(&format!("{SQUARE}{medium}MediumInterface \"{name}\" \"\"\nMaterial \"{material}\"\n{SQUARE}"))
+    };
+    for material in ["interface", "thindielectric", "diffusetransmission"] {
+        tells_only(&inside(material, "m"), &["inside of `dielectric` only", "`m` is left out"]);
+    }
+    tells_only(&inside("dielectric", "gone"), &["no medium `gone`"]);
+    assert_eq!(told(&inside("dielectric", "m")), Vec::<String>::new());
+}
+
+#[test]
+fn a_sphere_with_highlights_of_a_direction_has_the_poles_of_pbrt() {
+    let sphere = |widths: &str| {
+        let scene = read(&format!("Rotate 90 1 0 0\nMaterial \"conductor\" {widths}\nShape \"sphere\"\n"));
+        matches!(scene.file.objects[0], ObjectPart::Mesh { .. })
+    };
+    assert!(sphere("\"float uroughness\" 0.05 \"float vroughness\" 0.4"));
+    assert!(!sphere("\"float roughness\" 0.2"));
 }

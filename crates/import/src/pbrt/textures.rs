@@ -64,13 +64,22 @@ impl Textures {
         let part = |name: &str, default: f32| {
             self.parameter(is_number, params, name).unwrap_or(Texture::Constant(Vec3::splat(default)))
         };
-        for name in ["value", "tex", "scale", "tex1", "tex2"] {
-            unknown_spectrum(params, name).filter(|_| !is_number).into_iter().for_each(&mut tell);
+        // The factor of a texture is a number, whatever its kind.
+        let is_number_of = |name: &str| is_number || ["scale", "amount"].contains(&name);
+        for name in ["value", "tex", "scale", "tex1", "tex2", "amount"] {
+            unknown_spectrum(params, name).filter(|_| !is_number_of(name)).into_iter().for_each(&mut tell);
+            if let Some(texture) =
+                params.texture(name).filter(|texture| self.get(is_number_of(name), texture).is_none())
+            {
+                let (texture, name) = (printable::name(texture), printable::name(name));
+                tell(format!("there is no texture `{texture}` for `{name}`: the default is used"));
+            }
         }
         match class {
             "constant" => part("value", 1.0),
             "scale" => {
-                let (tex, scale) = (part("tex", 1.0), part("scale", 1.0));
+                let scale = self.parameter(true, params, "scale").unwrap_or(Texture::Constant(Vec3::ONE));
+                let tex = part("tex", 1.0);
                 product(&tex, &scale).unwrap_or_else(|| {
                     tell("the product of these two textures is not modelled: the first is used".to_owned());
                     tex
@@ -184,7 +193,7 @@ fn mapping(params: &Params) -> Option<(DVec2, DVec2)> {
 }
 
 /// The product of two textures, if it is one.
-fn product(a: &Texture, b: &Texture) -> Option<Texture> {
+pub(crate) fn product(a: &Texture, b: &Texture) -> Option<Texture> {
     match (a, b) {
         (Texture::Constant(a), Texture::Constant(b)) => Some(Texture::Constant(*a * *b)),
         (Texture::Constant(factor), Texture::Varying(source))
