@@ -118,7 +118,13 @@ impl<'a> Reader<'a> {
     /// Reads the whole scene.
     pub(crate) fn read(&mut self) -> Result<(), SceneError> {
         let source = self.text(self.path)?;
-        self.run(&source, 0)
+        self.run(&source, 0)?;
+        if self.stack.iter().any(|(saved, _)| *saved == Saved::Object) {
+            self.builder.tell("`ObjectBegin` is not ended: what follows it is not shown; is the file cut off?");
+        } else if !self.stack.is_empty() {
+            self.builder.tell("`AttributeBegin` is not ended: is the file cut off?");
+        }
+        Ok(())
     }
 
     /// What was read: camera and film, everything else, and the files.

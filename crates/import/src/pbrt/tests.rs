@@ -258,3 +258,11 @@ fn a_sphere_with_highlights_of_a_direction_has_the_poles_of_pbrt() {
     assert!(sphere("\"float uroughness\" 0.05 \"float vroughness\" 0.4"));
     assert!(!sphere("\"float roughness\" 0.2"));
 }
+
+#[test]
+fn a_file_that_is_cut_off_is_told() {
+    tells_only(&read(&format!("{SQUARE}AttributeBegin\n{SQUARE}")), &["`AttributeBegin` is not ended", "cut off"]);
+    let scene = read(&format!("{SQUARE}ObjectBegin \"o\"\n{SQUARE}AttributeBegin\n"));
+    tells_only(&scene, &["`ObjectBegin` is not ended", "not shown"]);
+    assert_eq!(scene.file.objects.len(), 1);
+}
