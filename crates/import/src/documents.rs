@@ -39,7 +39,9 @@ const MAX_SCENES: usize = 32;
 pub struct Documents {
     options: ReadOptions,
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
-    /// Scenes of other renderers, with the names and values of their parameters.
+    /// The canonical path of a scene of another renderer, by each of its names.
+    real_paths: Mutex<HashMap<PathBuf, PathBuf>>,
+    /// Scenes of other renderers by that path, with the names and values of their parameters.
     scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), ReadScene>>,
     /// Of all images that are decoded.
     pixels: ImageBudget,
@@ -106,8 +108,9 @@ impl Documents {
     ///
     /// - `defines`: names and values of parameters that it leaves open.
     pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> ReadScene {
-        // One file may have many names.
-        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        // One file may have many names, and each may be asked for by many objects.
+        let resolved = || path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let real = lock(&self.real_paths).entry(path.to_owned()).or_insert_with(resolved).clone();
         let key = (real, defines.to_vec());
         if let Some(scene) = lock(&self.scenes).get(&key) {
             return scene.clone();

@@ -202,13 +202,7 @@ impl Bsdf {
     /// Whether it has textures, or highlights with a direction.
     fn is_textured(&self) -> bool {
         let of_material = |material: &Material<Written>| {
-            let is_anisotropic = match material {
-                Material::Conductor { alpha_v: share, .. } | Material::Disney { anisotropic: share, .. } => {
-                    *share != Scalar::Number(0.0)
-                }
-                _ => false,
-            };
-            is_anisotropic
+            material.is_anisotropic()
                 || material.params().into_iter().any(|(_, param)| {
                     matches!(param, Param::Color(Color::Texture(_)) | Param::Scalar(Scalar::Texture(_)))
                 })

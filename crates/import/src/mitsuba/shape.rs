@@ -8,7 +8,7 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
-use crate::model::foreign::{LIGHT_SHARE, is_anisotropic};
+use crate::model::foreign::LIGHT_SHARE;
 use crate::model::placing;
 use crate::ply::has_normals;
 use firstlight_files::input_file::{FileKind, InputFile};
@@ -408,7 +408,7 @@ impl Converter<'_> {
                 let mut parts = [a, b].into_iter().filter_map(|name| self.file.materials.get(name));
                 matches!(weight, ScalarValue::Texture(_)) || parts.any(|part| self.is_textured(part))
             }
-            _ => is_anisotropic(part) || !texture_names(part).is_empty(),
+            _ => part.is_anisotropic() || !texture_names(part).is_empty(),
         }
     }
 }

@@ -4,12 +4,9 @@ use crate::model::projection::LightImages;
 use firstlight_files::printable;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
-use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::TextureSource;
-use firstlight_format::value::ScalarValue;
 use firstlight_mesh::Mesh;
-use firstlight_render::Material;
 use glam::Vec3;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -71,14 +68,4 @@ pub struct ForeignScene {
     pub warnings: Warnings,
     /// The scene, then the files that it includes, each with its stamp from before it was read.
     pub files: Arc<[(PathBuf, Stamp)]>,
-}
-
-/// Whether highlights of a material have a direction, which the texture coordinates of its surface tell.
-pub(crate) fn is_anisotropic(part: &MaterialPart) -> bool {
-    match part {
-        Material::Conductor { alpha_v: share, .. }
-        | Material::Disney { anisotropic: share, .. }
-        | Material::Principled { anisotropy: share, .. } => *share != ScalarValue::Number(0.0),
-        _ => false,
-    }
 }

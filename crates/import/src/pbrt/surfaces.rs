@@ -1,6 +1,6 @@
 //! Materials and textures of a scene: described under their names, and converted when a shape has them.
 
-use crate::model::foreign::{LIGHT_SHARE, cut, is_anisotropic, tinted, told_of_long};
+use crate::model::foreign::{LIGHT_SHARE, cut, tinted, told_of_long};
 use crate::pbrt::build::Builder;
 use crate::pbrt::materials::{MaterialScope, material, principled, with_layers, with_normals};
 use crate::pbrt::params::Params;
@@ -241,7 +241,7 @@ impl Builder<'_> {
         self.lobes.insert(name.clone(), lobes);
         let is_textured = match &part {
             MaterialPart::Blend { a, b, .. } => [a, b].iter().any(|name| self.with_textures.contains(*name)),
-            _ => is_anisotropic(&part),
+            _ => part.is_anisotropic(),
         };
         if is_textured || !texture_names(&part).is_empty() {
             self.with_textures.insert(name.clone());

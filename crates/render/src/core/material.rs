@@ -317,6 +317,16 @@ impl<P: Params> Material<P> {
         Some(material)
     }
 
+    /// Whether its highlights have a direction, which the texture coordinates of its surface tell.
+    pub fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Conductor { alpha_v: share, .. }
+            | Self::Disney { anisotropic: share, .. }
+            | Self::Principled { anisotropy: share, .. } => *share != 0.0.into(),
+            _ => false,
+        }
+    }
+
     /// The parameters that do not have their default, as in [`Self::params`].
     pub fn given(&self) -> Vec<(&'static Property, ParamRef<'_, P>)> {
         let mut params = self.params();

@@ -232,8 +232,58 @@ mod tests {
         contacts.of_object.iter().map(|list| list.iter().map(|other| other.object).collect()).collect()
     }
 
+    /// What [`Contacts::in_place_of`] finds, and what lies in the slab among the first hits of the others on the whole ray.
+    fn found_by_both(contacts: &Contacts, touched: &ContactScene, ray: &Ray, hit: &Hit) -> [Vec<Hit>; 2] {
+        let mut found = Vec::new();
+        contacts.in_place_of(touched, ray, hit, |other, _| found.push(other));
+        let own = touched.geometry.tree.surface_point(ray, hit);
+        let reach = own.geometric_normal.abs().dot(own.error);
+        let others = contacts.of_object[hit.object as usize].iter();
+        let expected = others.filter_map(|Other { object, alone }| {
+            let first = alone.closest_hit(ray)?;
+            let away = (alone.surface_point(ray, &first).position - own.position).dot(own.geometric_normal).abs();
+            // The offset of a ray is rounded up by a unit in the last place.
+            (away <= reach + 1e-6).then_some(Hit { object: *object, ..first })
+        });
+        [found, expected.collect()]
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn what_coincides_is_found_as_on_the_whole_ray(
+            places in proptest::collection::vec((0u8..4, 0u8..4), 12),
+            stands in any::<bool>(),
+            rays in proptest::collection::vec(
+                ([-3.0f32..7.0, -3.0f32..7.0, -4.0f32..4.0], [0.0f32..4.0, 0.0f32..4.0, -0.5f32..0.5]), 200),
+        ) {
+            let mesh = procedural::cuboid(DVec3::ONE).flat();
+            let geometry = {
+                // Meshes that stand still need trees of their own to be in one.
+                let tree = || Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
+                let shapes = places.iter().map(|&(x, y)| Shape::Mesh {
+                    tree: tree(),
+                    world_from_object: Affine3A::from_translation(Vec3::new(f32::from(x), f32::from(y), 0.0)),
+                    space: if stands { HitSpace::World } else { HitSpace::Object },
+                });
+                Geometry::build(shapes.collect(), (0..12).map(|i| Object::plain(i % 2)).collect())
+            };
+            let materials = [MaterialKind::Glass, MaterialKind::Diffuse]
+                .map(|kind| Material::of_kind(kind, Vec3::ONE.into()).expect("no blend"));
+            let contacts = Contacts::build(&geometry, &materials, None);
+            prop_assume!(!contacts.of_object.is_empty());
+            let bodies = Bodies::build(&geometry, &materials);
+            let touched = ContactScene { geometry: &geometry, materials: &materials, bodies: &bodies };
+            for (from, to) in rays {
+                let (from, to) = (Vec3::from(from), Vec3::from(to));
+                let ray = Ray::new(from, (to - from).normalize_or(Vec3::X));
+                if let Some(hit) = geometry.tree.closest_hit(&ray) {
+                    let [found, expected] = found_by_both(&contacts, &touched, &ray, &hit);
+                    prop_assert_eq!(found, expected);
+                }
+            }
+        }
+
         #[test]
         fn contacts_after_changes_are_those_of_a_new_scene(
             before in proptest::collection::vec((0u8..5, 0u8..5), 12),
