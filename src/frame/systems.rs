@@ -362,15 +362,17 @@ pub fn accumulate(
         shown.region = brush.0;
         found.0.add(Level::Reschedule, "region");
     }
-    // An empty scene has nothing to show, and the one that opens needs the processor.
-    let opens_first = shown.inputs.objects.is_empty() && beside.progress().0.is_some();
-    let paused = paused.0 || hidden.0 || size.is_empty() || opens_first;
+    let paused = paused.0 || hidden.0 || size.is_empty();
     if shown.paused != paused {
         orders.paused = Some(paused);
         shown.paused = paused;
         found.0.add(Level::Reschedule, "pause");
     }
-    if found.0.restarts()
+    // An empty scene has nothing to show, and the one that opens needs the processor.
+    let opens_first = shown.inputs.objects.is_empty() && beside.progress().0.is_some();
+    shown.is_unordered |= found.0.restarts();
+    if shown.is_unordered
+        && !opens_first
         && let (Some(extraction), Some(PictureSize { width, height })) = (&shown.extraction, shown.size)
     {
         orders.job = Some(Job {
@@ -380,6 +382,7 @@ pub fn accumulate(
             width,
             height,
         });
+        shown.is_unordered = false;
     }
     renderer.0.order(orders);
 }

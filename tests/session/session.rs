@@ -91,6 +91,23 @@ fn levelling_a_level_view_is_no_change() {
     assert!((driver.session.status().rig.view.up - view.up).length() < 1e-12);
 }
 
+/// What opens needs the processor: until there is something to see, nothing is rendered or denoised.
+#[test]
+fn an_empty_session_renders_only_if_nothing_opens() {
+    let mut driver = Driver::new(64, 48, spp(2));
+    driver.open("models");
+    driver.run_until(|session| {
+        let is_empty = session.inputs().objects.is_empty();
+        assert!(!is_empty || session.status().film_width == 0, "{:?}", session.status());
+        !is_empty
+    });
+    driver.run_until(|session| session.is_idle() && session.status().spp == 2);
+    let mut driver = Driver::new(64, 48, spp(2));
+    driver.session.open(SceneSource::Scene("missing.ron".into()));
+    driver.run_until(|session| session.is_idle() && session.status().spp == 2);
+    assert_eq!(driver.say(MessageKind::Error).len(), 1);
+}
+
 #[test]
 fn it_is_known_whether_edits_are_saved() {
     let folder = tempfile::tempdir().unwrap();

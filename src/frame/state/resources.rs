@@ -100,6 +100,8 @@ pub struct RenderState {
     pub(crate) target: Option<Target>,
     pub(crate) threads: Option<usize>,
     pub(crate) paused: bool,
+    /// Whether the workers have not got the job of what is to be rendered.
+    pub(crate) is_unordered: bool,
     pub(crate) region: Option<[f64; 4]>,
     /// Whether the world has changes that wait for a tree.
     pub(crate) waiting: bool,
