@@ -281,11 +281,16 @@ impl Reader<'_> {
             return Ok(Some(Value::Vector(vector)));
         }
         if tag == "transform" {
-            let mut matrix = DMat4::IDENTITY;
-            for step in element.children().filter(Element::is_element) {
-                matrix = self.transform_step(step, place.file)? * matrix;
-            }
-            return Ok(Some(Value::Transform(matrix)));
+            return Ok(Some(Value::Transform(self.transform(element, place.file)?)));
+        }
+        // Of version 0.x.
+        if tag == "animation" {
+            let mut steps = element.children().filter(|step| step.has_tag_name("transform"));
+            let Some(first) = steps.next() else {
+                return Err(self.graph.error(place, "an `<animation>` consists of `<transform>`s"));
+            };
+            self.graph.tell(place, "an `<animation>` stands still where it begins", self.warnings);
+            return Ok(Some(Value::Transform(self.transform(first, place.file)?)));
         }
         if tag == "spectrum" && !element.has_attribute("value") {
             let name = self.required(element, place, "filename")?;
@@ -328,6 +333,10 @@ impl Reader<'_> {
             "boolean" if text.eq_ignore_ascii_case("false") => Value::Boolean(false),
             "boolean" => return Err(expected("`true` or `false`")),
             "string" => Value::Text(text),
+            // Of version 0.x, whose spectra are linear RGB unless it is compiled otherwise.
+            "spectrum" if self.old && numbers(&text).is_some_and(|all| all.len() == 3) => {
+                Value::Rgb(numbers(&text).map_or(DVec3::ZERO, |all| DVec3::from_slice(&all)))
+            }
             "spectrum" => Value::Spectrum(spectrum::parse(&text).map_err(|why| expected(&why))?),
             _ => match hex(&text) {
                 Some(rgb) => Value::Rgb(rgb),
@@ -345,6 +354,13 @@ impl Reader<'_> {
                 },
             },
         }))
+    }
+
+    fn transform(&mut self, element: Element, file: u32) -> Result<DMat4, SceneError> {
+        element
+            .children()
+            .filter(Element::is_element)
+            .try_fold(DMat4::IDENTITY, |matrix, step| Ok(self.transform_step(step, file)? * matrix))
     }
 
     fn transform_step(&mut self, element: Element, file: u32) -> Result<DMat4, SceneError> {

@@ -5,11 +5,12 @@ use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
 use crate::model::projection::LightImages;
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
+use firstlight_format::placement::Placement;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{EnvironmentSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
 use firstlight_render::{Channel, Encoding, ImageTexture, Material};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::fmt::Write;
 
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
@@ -274,4 +275,26 @@ fn a_mirrored_sphere_is_told() {
     };
     tells_only(&sphere(""), &["normals point inwards"]);
     assert_eq!(told(&sphere("<boolean name=\"flip_normals\" value=\"true\"/>")), Vec::<String>::new());
+}
+
+#[test]
+fn old_colours_and_animations_open() {
+    let spectrum = |value: &str| format!("<spectrum name=\"reflectance\" value=\"{value}\"/>");
+    let body = |value: &str| {
+        format!(
+            "<shape type=\"sphere\"><animation name=\"toWorld\"><transform time=\"0\"><translate x=\"2\"/></transform>\
+             <transform time=\"1\"><translate x=\"5\"/></transform></animation>\
+             <bsdf type=\"diffuse\">{}</bsdf></shape>",
+            spectrum(value)
+        )
+    };
+    for value in ["0.25 0.5 0.75", "0.25, 0.5, 0.75"] {
+        let scene = read("0.6.0", &body(value));
+        tells_only(&scene, &["`<animation>`", "where it begins"]);
+        let ObjectPart::Sphere { center, transform, .. } = &scene.file.objects[0] else { panic!() };
+        let at = Placement::from_part(transform).affine().transform_point3(*center);
+        assert_eq!(at, DVec3::new(2.0, 0.0, 0.0));
+        let Material::Diffuse { albedo } = part(&scene, 0) else { panic!() };
+        assert_eq!(*albedo, ColorValue::Rgb(Vec3::new(0.25, 0.5, 0.75)));
+    }
 }
