@@ -368,6 +368,21 @@ fn a_scene_that_cannot_be_written_leaves_no_folder() {
     }
 }
 
+/// Files of meshes without triangles stop other renderers.
+#[test]
+fn a_mesh_that_was_left_out_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.pbrt");
+    let text = "Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\n\
+                Shape \"plymesh\" \"string filename\" \"missing.ply\"\n\
+                Shape \"trianglemesh\" \"point3 P\" [0 0 3 1 0 3 0 1 3] \"integer indices\" [0 1 2]\n";
+    std::fs::write(&path, text).unwrap();
+    for format in SceneFormat::ALL {
+        let (_, after, _) = there_and_back(SceneSource::Foreign(path.clone()), format, folder.path());
+        assert_eq!(after.file.objects.len(), 1, "{format:?}");
+    }
+}
+
 /// Names that one of the grammars writes alike, has no letter for, or that our reader cuts.
 #[test]
 fn materials_and_textures_keep_apart_whose_names_are_written_alike() {

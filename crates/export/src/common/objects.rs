@@ -129,7 +129,8 @@ pub(crate) fn placed(scene: &WholeScene, emits: impl Fn(&str) -> bool, warnings:
                 }
             }
             ObjectPart::Mesh { material, materials, .. } => {
-                let Some(mesh) = &scene.meshes[i] else { continue };
+                // A mesh that was left out on reading has no triangles, which renderers refuse or stumble over.
+                let Some(mesh) = scene.meshes[i].as_ref().filter(|mesh| !mesh.triangles.is_empty()) else { continue };
                 let of_slot = |slot: u16| -> &str {
                     let list = materials.as_deref().unwrap_or_default();
                     list.get(usize::from(slot)).or(list.last()).or(material.as_ref()).map_or("", String::as_str)
