@@ -12,6 +12,7 @@ mod converter;
 pub(crate) mod emitter;
 pub(crate) mod graph;
 pub(crate) mod ior;
+mod lenient;
 pub(crate) mod meshes;
 mod parameters;
 pub(crate) mod read;

@@ -6,6 +6,7 @@
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/key_topics/scene_format.html>
 
 use crate::mitsuba::graph::{Child, Graph, Object, Parameter, Place, SourceFile, Spectrum, Target, Value};
+use crate::mitsuba::lenient::{tags_of, text_of};
 use crate::mitsuba::parameters::{Defines, Parameters};
 use crate::mitsuba::spectrum;
 use crate::mitsuba::transform;
@@ -84,9 +85,10 @@ impl Reader<'_> {
     /// - `parent`: the object that includes it, and the name that it gives.
     fn file(&mut self, path: &Path, parent: Option<(usize, Option<String>)>) -> Result<(), SceneError> {
         let stamp = stamp(path);
-        let read = InputFile::open_within(path, FileKind::Scene, self.bytes_left).and_then(InputFile::text);
-        let text = read.map_err(|error| SceneError::in_file(path, error.to_string()))?;
-        self.bytes_left = self.bytes_left.saturating_sub(text.len() as u64);
+        let read = InputFile::open_within(path, FileKind::Scene, self.bytes_left).and_then(InputFile::bytes);
+        let bytes = read.map_err(|error| SceneError::in_file(path, error.to_string()))?;
+        self.bytes_left = self.bytes_left.saturating_sub(bytes.len() as u64);
+        let text = tags_of(&text_of(&bytes));
         let number = self.graph.files.len() as u32;
         self.graph.files.push(SourceFile { path: path.to_owned(), text: text.clone(), stamp });
         if number == 0 {
@@ -95,9 +97,8 @@ impl Reader<'_> {
         check_tags(&text).map_err(|why| SceneError::in_file(path, why))?;
         let document = roxmltree::Document::parse(&text).map_err(|error| {
             let at = error.pos();
-            let message = error.to_string();
             // The position stands in front of the message.
-            let message = message.rsplit_once(" at ").map_or(&*message, |(start, _)| start);
+            let message = error.to_string().replacen(&format!(" at {at}"), "", 1);
             SceneError::at(path, (at.row as usize, at.col as usize), format!("not valid XML: {message}"))
         })?;
         let root = document.root_element();

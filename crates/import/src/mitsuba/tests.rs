@@ -31,6 +31,9 @@ fn read(version: &str, body: &str) -> ForeignScene {
     let normals = "property float nx\nproperty float ny\nproperty float nz\nelement face";
     write("full.ply", &PLY.replace("element face", normals).replace(" 0\n", " 0 0 0 1\n"));
     write("cut.ply", &PLY.replace("face 1", "face 2"));
+    let backwards = PLY.replace("element face", normals).replace(" 0\n", " 0 0 0 -1\n");
+    write("turned.ply", &backwards);
+    write("turned.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 -1\nf 1//1 2//1 3//1\n");
     write("bare.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("nan.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 nan 0\nf 1 2 3\nf 1 2 4\n");
     let path = folder.path().join("a.xml");
@@ -297,4 +300,27 @@ fn old_colours_and_animations_open() {
         let Material::Diffuse { albedo } = part(&scene, 0) else { panic!() };
         assert_eq!(*albedo, ColorValue::Rgb(Vec3::new(0.25, 0.5, 0.75)));
     }
+}
+
+#[test]
+fn what_the_parser_of_mitsuba_passes_over_is_no_error() {
+    let body = "<!-- a -- b --->\n<shape type=\"sphere\" id=\"a & <b>\"/>\n<?foo?> text & more <![CDATA[<]]>";
+    let scene = read("3.0.0", body);
+    assert_eq!((scene.file.objects.len(), told(&scene)), (1, Vec::new()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.xml");
+    let options =
+        || ForeignOptions { allow_outside: false, defines: Vec::new(), light_images: LightImages::new(|_| None) };
+    let text = "\n<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><!DOCTYPE scene>\n<scene version=\"3.0.0\">\n\
+                <!-- ä --> <shape type=\"cone\"/>\n</scene> end\0";
+    let utf16 = std::iter::once(0xfeff).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    for bytes in [text.as_bytes().to_vec(), text.chars().map(|c| c as u8).collect(), utf16] {
+        std::fs::write(&path, bytes).unwrap();
+        tells_only(&read_scene(&path, &options()).unwrap(), &["a.xml:4:12: ", "cone"]);
+    }
+    std::fs::write(&path, "<!DOCTYPE scene [<!ENTITY a \"b\">]>\n<scene version=\"3.0.0\"/>").unwrap();
+    assert!(read_scene(&path, &options()).unwrap_err().to_string().contains("DTD"));
+    std::fs::write(&path, "<scene version=\"3.0.0\" version=\"3\"/>").unwrap();
+    let error = read_scene(&path, &options()).unwrap_err().to_string();
+    assert!(error.contains("a.xml:1:24: not valid XML: attribute 'version' is already defined"), "{error}");
 }
