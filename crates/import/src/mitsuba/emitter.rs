@@ -151,8 +151,12 @@ impl Converter<'_> {
             Ok(path) => {
                 // Its centre is at +Z; ours at −Z.
                 let mut image = EnvironmentSource::image(self.file_path(&path));
-                if let EnvironmentSource::Image { scale: factor, rotate, layout, .. } = &mut image {
+                if let EnvironmentSource::Image { scale: factor, rotate, layout, axes, .. } = &mut image {
                     (*factor, *rotate, *layout) = (Rgb(Vec3::splat(scale)), 180.0, EnvironmentLayout::Interpolated);
+                    // Our world has its axes, up to a reflection.
+                    if is_mirrored(&node.transform("to_world")?) != is_mirrored(&self.world) {
+                        *axes = Some([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+                    }
                 }
                 self.file.environment = image;
             }

@@ -3,6 +3,7 @@
 
 use crate::mitsuba::serialized::{UnpackedBytes, read_serialized};
 use crate::model::imported::{ModelNormals, ModelOptions};
+use crate::model::placing::oriented;
 use crate::obj::load_obj_with;
 use crate::ply::load_ply_colored;
 use crate::ply::vertices::ColourSource;
@@ -23,6 +24,7 @@ pub(crate) enum Geometry {
     Serialized(PathBuf, u32),
     Cube,
     Disk,
+    Rectangle,
     /// About +Z, from 0 to 1, radius 1, open.
     Cylinder,
 }
@@ -32,7 +34,7 @@ impl Geometry {
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Model(_, path) | Self::Serialized(path, _) => Some(path),
-            Self::Cube | Self::Disk | Self::Cylinder => None,
+            Self::Cube | Self::Disk | Self::Rectangle | Self::Cylinder => None,
         }
     }
 }
@@ -68,6 +70,7 @@ impl MeshRequest {
     /// A sentence about the file.
     pub(crate) fn make(&self, room: &UnpackedBytes) -> Result<(Mesh, Warnings), String> {
         let mut warnings = Warnings::default();
+        // In Mitsuba, the side of a surface is that of its shading normal.
         let mut mesh = match &self.geometry {
             Geometry::Model(format, path) => {
                 // Mitsuba smooths every edge of a file without normals.
@@ -81,18 +84,20 @@ impl MeshRequest {
                     _ => load_ply_colored(path, &options, self.colors()).map_err(|error| error.to_string())?,
                 };
                 warnings = model.warnings;
-                Mesh { slots: Vec::new(), ..model.mesh }
+                let mesh = Mesh { slots: Vec::new(), ..model.mesh };
+                if model.normals_from_file { oriented(mesh, false) } else { mesh }
             }
             Geometry::Serialized(path, index) => {
                 let read = read_serialized(path, *index, room).map_err(|why| format!("{}: {why}", path.display()))?;
                 match read.mesh.normals.is_empty() && !read.face_normals && !self.face_normals {
                     true => read.mesh.with_smooth_normals(NormalWeight::Angle, None),
                     false if read.face_normals || self.face_normals => read.mesh.flat(),
-                    false => read.mesh,
+                    false => oriented(read.mesh, false),
                 }
             }
             Geometry::Cube => cube(),
             Geometry::Disk => disk(),
+            Geometry::Rectangle => rectangle(),
             Geometry::Cylinder => cylinder(),
         };
         if self.flip_v {
@@ -153,6 +158,13 @@ fn cube() -> Mesh {
     built(vertices, triangles)
 }
 
+/// From −1 to 1 in the plane z = 0, facing +Z.
+fn rectangle() -> Mesh {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let vertex = |[u, v]: [f64; 2]| (DVec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 0.0), DVec3::Z, [u, v]);
+    built(corners.map(vertex).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+}
+
 /// Radius 1 in the plane z = 0, facing +Z; u is the radius and v the angle.
 fn disk() -> Mesh {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
@@ -195,7 +207,8 @@ mod tests {
         let cube = cube();
         assert!(Topology::of(&cube).is_closed());
         assert!((cube.signed_volume() - 8.0).abs() < 1e-6);
-        for (name, mesh, area) in [("disk", disk(), PI), ("cylinder", cylinder(), TAU)] {
+        for (name, mesh, area) in [("disk", disk(), PI), ("cylinder", cylinder(), TAU), ("rectangle", rectangle(), 4.0)]
+        {
             assert!((mesh.area() / area - 1.0).abs() < 3e-5, "{name}: {}", mesh.area());
             for (t, triangle) in mesh.triangles.iter().enumerate() {
                 let normal = mesh.doubled_area_normal(t);

@@ -143,20 +143,22 @@ impl<'a> Converter<'a> {
 
     /// Chooses our world so that environment and camera are ones that we have.
     fn turn_world(&mut self, emitters: &[Node], sensor: Option<Node>) -> Result<(), SceneError> {
-        if let Some(envmap) = emitters.iter().find(|emitter| emitter.plugin() == "envmap") {
-            if let Some(turned) = orthonormal(DMat3::from_mat4(envmap.transform("to_world")?)) {
+        let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+        let is_sky = |emitter: &&Node| SKIES.iter().any(|(plugin, _)| *plugin == emitter.plugin());
+        // The last environment is the one that is shown.
+        if let Some(envmap) = emitters.iter().rfind(|emitter| emitter.plugin() == "envmap") {
+            if let Some(axes) = orthonormal(DMat3::from_mat4(envmap.transform("to_world")?)) {
+                // That it mirrors is left to the image.
+                let turned = if axes.determinant() < 0.0 { axes * mirror } else { axes };
                 self.world = DMat4::from_mat3(turned.transpose());
             }
-            return Ok(());
-        }
-        let is_sky = |emitter: &&Node| SKIES.iter().any(|(plugin, _)| *plugin == emitter.plugin());
-        if let Some(sky) = emitters.iter().find(is_sky) {
+        } else if let Some(sky) = emitters.iter().rfind(is_sky) {
             self.world = upright(*sky)?;
         }
-        let Some(sensor) = sensor else { return Ok(()) };
-        let m = Self::sensor_to_world(sensor)?;
-        if m.determinant() < 0.0 {
-            self.world = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * self.world;
+        if let Some(sensor) = sensor
+            && Self::sensor_to_world(sensor)?.determinant() < 0.0
+        {
+            self.world = DMat4::from_mat3(mirror) * self.world;
         }
         Ok(())
     }

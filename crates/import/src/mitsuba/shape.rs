@@ -223,7 +223,7 @@ impl Converter<'_> {
         material: PlacedMaterial,
     ) -> Result<(), SceneError> {
         let (center, radius) = (node.vector("center")?.unwrap_or(DVec3::ZERO), node.float_or("radius", 1.0)?);
-        if is_flipped != (own.determinant() < 0.0) {
+        if is_flipped != (own.determinant() * self.world.determinant() < 0.0) {
             self.tell(node, "a sphere whose normals point inwards is not modelled: they point outwards");
         }
         let placed = own * DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
@@ -267,16 +267,14 @@ impl Converter<'_> {
         // The normal is that of the plane, also where the transform mirrors.
         let normal = DMat3::from_mat4(own).inverse().transpose() * DVec3::Z;
         let is_turned = (edge_u.cross(edge_v).dot(normal) < 0.0) != is_flipped;
+        // From the other side, the texture of a quad runs backwards.
+        if is_turned && material.is_textured {
+            return self.mesh(node, Geometry::Rectangle, own, is_flipped, name, material);
+        }
         let transform = TransformPart::default();
         let (corner, edge_u, edge_v) = match is_turned {
             false => (at(-1.0, -1.0), edge_u, edge_v),
-            // The same surface from the other side; its texture runs along u backwards.
-            true => {
-                if material.is_textured {
-                    self.tell(node, "a texture on a rectangle that faces backwards is not modelled: it is mirrored");
-                }
-                (at(1.0, -1.0), -edge_u, edge_v)
-            }
+            true => (at(1.0, -1.0), -edge_u, edge_v),
         };
         self.file.objects.push(ObjectPart::Quad { name, corner, edge_u, edge_v, material: material.name, transform });
         Ok(())

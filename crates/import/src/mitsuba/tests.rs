@@ -324,3 +324,60 @@ fn what_the_parser_of_mitsuba_passes_over_is_no_error() {
     let error = read_scene(&path, &options()).unwrap_err().to_string();
     assert!(error.contains("a.xml:1:24: not valid XML: attribute 'version' is already defined"), "{error}");
 }
+
+#[test]
+fn the_front_of_a_mesh_is_where_the_normals_of_its_file_point() {
+    let front = |file: &str, more: &str| {
+        let scene = read(
+            "3.0.0",
+            &format!(
+                "<shape type=\"{}\"><string name=\"filename\" value=\"{file}\"/>{more}</shape>",
+                file.split_once('.').unwrap().1
+            ),
+        );
+        let mesh = &scene.parts[&0];
+        (mesh.doubled_area_normal(0).z.signum(), mesh.normals.first().map(|normal| normal.z))
+    };
+    let flat = "<boolean name=\"face_normals\" value=\"true\"/>";
+    let flipped = "<boolean name=\"flip_normals\" value=\"true\"/>";
+    for file in ["turned.obj", "turned.ply"] {
+        assert_eq!(front(file, ""), (-1.0, Some(-1.0)), "{file}");
+        assert_eq!(front(file, flipped), (1.0, Some(1.0)), "{file}");
+        assert_eq!(front(file, flat), (1.0, None), "{file}");
+    }
+}
+
+#[test]
+fn a_scene_that_is_mirrored_as_a_whole_has_its_own_sides() {
+    let scene = |sensor: &str, envmap: &str, more: &str| {
+        let mirrored = |by: &str| format!("<transform name=\"to_world\"><scale x=\"{by}\"/></transform>");
+        let emitter = format!("<string name=\"filename\" value=\"red.png\"/>{}", mirrored(envmap));
+        read(
+            "3.0.0",
+            &format!(
+                "<sensor type=\"perspective\">{}</sensor><emitter type=\"envmap\">{emitter}</emitter>\
+                 <shape type=\"sphere\"><point name=\"center\" x=\"2\" y=\"0\" z=\"0\"/></shape>{more}",
+                mirrored(sensor)
+            ),
+        )
+    };
+    for (sensor, envmap, x, is_mirrored) in
+        [("1", "1", 2.0, false), ("1", "-1", 2.0, true), ("-1", "1", -2.0, true), ("-1", "-1", -2.0, false)]
+    {
+        let scene = scene(sensor, envmap, "");
+        assert_eq!(told(&scene), Vec::<String>::new());
+        let ObjectPart::Sphere { center, transform, .. } = &scene.file.objects[0] else { panic!() };
+        assert_eq!(Placement::from_part(transform).affine().transform_point3(*center).x, x, "{sensor} {envmap}");
+        let EnvironmentSource::Image { axes, .. } = &scene.file.environment else { panic!() };
+        assert_eq!(axes.is_some(), is_mirrored, "{sensor} {envmap}");
+        assert!(axes.is_none_or(|rows| rows == [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]));
+    }
+    // A textured rectangle keeps its texture: a mesh, where a quad from its other side would have it mirrored.
+    let bsdf =
+        format!("<bsdf type=\"twosided\"><bsdf type=\"diffuse\">{}</bsdf></bsdf>", image("reflectance", "n.png", ""));
+    for (sensor, is_mesh) in [("1", false), ("-1", true)] {
+        let scene = scene(sensor, "1", &format!("<shape type=\"rectangle\">{bsdf}</shape>"));
+        assert_eq!(told(&scene), Vec::<String>::new());
+        assert_eq!(matches!(scene.file.objects[1], ObjectPart::Mesh { .. }), is_mesh);
+    }
+}

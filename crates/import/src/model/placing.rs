@@ -1,9 +1,9 @@
-//! Matrices as placements of a scene file.
+//! Placements of a scene file, and the fronts of meshes in it.
 
 use firstlight_format::bounds;
 use firstlight_format::parts::TransformPart;
 use firstlight_mesh::Mesh;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// Whether an object may have this transform.
 pub(crate) fn is_placement(world: &DAffine3) -> bool {
@@ -22,6 +22,23 @@ pub(crate) fn transform(world: &DAffine3) -> TransformPart {
     let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
     let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
     TransformPart { matrix, ..TransformPart::default() }
+}
+
+/// The same mesh with its front where its normals point, also that of triangles whose order says otherwise; or turned
+/// round.
+pub(crate) fn oriented(mut mesh: Mesh, is_reversed: bool) -> Mesh {
+    if is_reversed {
+        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    }
+    for triangle in &mut mesh.triangles {
+        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let along = triangle.iter().filter_map(|&vertex| mesh.normals.get(vertex as usize)).sum::<Vec3>();
+        let agreement = (b - a).cross(c - a).dot(along);
+        if agreement < 0.0 || agreement == 0.0 && is_reversed {
+            triangle.swap(1, 2);
+        }
+    }
+    mesh
 }
 
 /// Corners of the box of a mesh, in its own coordinates, metres.

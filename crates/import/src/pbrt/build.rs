@@ -2,12 +2,12 @@
 
 use crate::model::foreign::{ForeignOptions, cut};
 use crate::model::imported::{ModelNormals, ModelOptions};
-use crate::model::placing::{is_placement, transform};
+use crate::model::placing::{is_placement, oriented, transform};
 use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
 use crate::pbrt::lights::{Light, color, light};
 use crate::pbrt::params::{Param, Params};
-use crate::pbrt::shapes::{is_whole_sphere, mesh_of, oriented};
+use crate::pbrt::shapes::{is_whole_sphere, mesh_of};
 use crate::pbrt::state::{AreaLight, Described, State};
 use crate::pbrt::textures::{Texture, Textures};
 use crate::ply::{has_normals, load_ply_with};

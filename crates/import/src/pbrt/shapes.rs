@@ -83,22 +83,6 @@ pub(crate) fn meshed(
     assemble(path, indexed, &options, warnings).map(|(mesh, _)| mesh).map_err(|error| error.to_string())
 }
 
-/// The same mesh with pbrt's front: along its normals, or turned round.
-pub(crate) fn oriented(mut mesh: Mesh, is_reversed: bool) -> Mesh {
-    if is_reversed {
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    }
-    for triangle in &mut mesh.triangles {
-        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
-        let along = triangle.iter().filter_map(|&vertex| mesh.normals.get(vertex as usize)).sum::<glam::Vec3>();
-        let agreement = (b - a).cross(c - a).dot(along);
-        if agreement < 0.0 || agreement == 0.0 && is_reversed {
-            triangle.swap(1, 2);
-        }
-    }
-    mesh
-}
-
 /// Whether a PLY file has texture coordinates, by its header; also if it has no good one.
 pub(crate) fn has_uvs(path: &Path) -> bool {
     /// Longer headers are rare, and not read for this.
