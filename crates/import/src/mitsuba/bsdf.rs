@@ -7,6 +7,7 @@ use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::ior;
 use crate::mitsuba::spectrum::Use;
+use crate::mitsuba::words::numbers;
 use crate::model::foreign::tinted;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
@@ -55,6 +56,29 @@ impl Converter<'_> {
                 self.plastic(node)?
             }
             "principled" | "principledthin" => self.principled(node)?,
+            // From here to `mixturebsdf`, of version 0.x.
+            "roughdiffuse" => {
+                self.tell(node, "the roughness of a diffuse surface is not modelled: it is smooth");
+                node.ignore(&["alpha", "use_fast_approx"]);
+                let albedo = self.color(node, "reflectance", 0.5, Use::Reflectance)?;
+                Surface::one_sided(Material::Diffuse { albedo })
+            }
+            "phong" | "ward" => {
+                self.tell(node, &format!("highlights of a {} are not modelled: it is diffuse", node.plugin()));
+                node.skip();
+                let albedo = self.color(node, "diffuse_reflectance", 0.5, Use::Reflectance)?;
+                Surface::one_sided(Material::Diffuse { albedo })
+            }
+            "difftrans" => {
+                let transmittance = self.color(node, "transmittance", 0.5, Use::Reflectance)?;
+                Surface::two_sided(Material::Translucent { reflectance: ColorValue::grey(0.0), transmittance })
+            }
+            "coating" | "roughcoating" => {
+                self.tell(node, "coatings are not modelled: the surface is the one below");
+                node.skip();
+                return self.only_nested(node, depth);
+            }
+            "mixturebsdf" => return self.mixture(node, depth),
             "polarizer" | "circular" | "retarder" => self.polarizing_filter(node)?,
             "twosided" => return self.both_sides(node, depth),
             "mask" => return self.mask(node, depth),
@@ -111,9 +135,15 @@ impl Converter<'_> {
     /// Microfacets of a rough surface.
     fn microfacets(&mut self, node: Node) -> Result<Microfacets, SceneError> {
         // Beckmann's distribution is the default of Mitsuba.
-        let beckmann = match node.text("distribution")? {
+        let distribution = node.text("distribution")?.map(str::to_ascii_lowercase);
+        let beckmann = match distribution.as_deref() {
             None | Some("beckmann") => true,
             Some("ggx") => false,
+            // Of version 0.x.
+            Some("phong" | "as") => {
+                self.tell(node, "Phong's distribution of microfacets is not modelled: it is Beckmann's");
+                true
+            }
             Some(_) => return Err(node.error("`distribution` must be beckmann or ggx")),
         };
         node.ignore(&["sample_visible"]);
@@ -321,12 +351,12 @@ impl Converter<'_> {
         if factor == 1.0 {
             return ScalarValue::Texture(name);
         }
-        ScalarValue::Texture(self.tinted(&name, factor).unwrap_or(name))
+        ScalarValue::Texture(self.tinted(&name, Vec3::splat(factor)).unwrap_or(name))
     }
 
     /// The texture of this name with a factor; `None` if there is none.
-    pub(crate) fn tinted(&mut self, name: &str, factor: f32) -> Option<String> {
-        let source = self.file.textures.get(name).and_then(|source| tinted(source, Vec3::splat(factor)))?;
+    pub(crate) fn tinted(&mut self, name: &str, factor: Vec3) -> Option<String> {
+        let source = self.file.textures.get(name).and_then(|source| tinted(source, factor))?;
         let new = self.names.free(&format!("{name}, tinted"));
         if let Some(attribute) = self.attributes.get(name).cloned() {
             self.attributes.insert(new.clone(), attribute);
@@ -362,16 +392,47 @@ impl Converter<'_> {
         let weight = within_share(self.scalar(node, "weight", 0.5)?);
         let nested = self.nested(node, 2)?;
         let [first, second] = nested[..] else { return Err(node.error("a blendbsdf contains two BSDFs")) };
-        let [a, b] = match (self.surface(first, depth + 1)?, self.surface(second, depth + 1)?) {
-            (Some(a), Some(b)) => [a, b],
-            (a, b) => {
+        let parts = [self.surface(first, depth + 1)?, self.surface(second, depth + 1)?];
+        Ok(self.blended(node, weight, [first, second], parts))
+    }
+
+    /// BSDFs with a weight each.
+    fn mixture(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+        let (nested, weights) = (node.children("bsdf")?, node.text("weights")?.and_then(numbers).unwrap_or_default());
+        if nested.is_empty() || nested.len() != weights.len() || weights.iter().any(|weight| *weight < 0.0) {
+            return Err(node.error("`weights` of a mixturebsdf are one number of at least 0 for each of its BSDFs"));
+        }
+        let (mut whole, mut sum) = (self.surface(nested[0], depth + 1)?, weights[0]);
+        for (&part, weight) in nested.iter().zip(weights).skip(1) {
+            let other = self.surface(part, depth + 1)?;
+            sum += weight;
+            let share = if sum > 0.0 { (weight / sum) as f32 } else { 0.0 };
+            whole = self.blended(node, share.into(), [node, part], [whole, other]);
+        }
+        if sum < 0.999 {
+            self.tell(node, "weights whose sum is below 1 are not modelled: they are shares");
+        }
+        Ok(whole)
+    }
+
+    /// The blend of the surfaces of two BSDFs.
+    fn blended(
+        &mut self,
+        node: Node,
+        weight: ScalarValue,
+        [first, second]: [Node; 2],
+        parts: [Option<Surface>; 2],
+    ) -> Option<Surface> {
+        let [a, b] = match parts {
+            [Some(a), Some(b)] => [a, b],
+            [a, b] => {
                 self.tell(node, "a blend with a null BSDF is not modelled: it is the other part");
-                return Ok(a.or(b));
+                return a.or(b);
             }
         };
         if self.n_lobes(&a.part) + self.n_lobes(&b.part) > MAX_LOBES {
             self.tell(node, &format!("a blend of more than {MAX_LOBES} lobes is not modelled: it is the first part"));
-            return Ok(Some(a));
+            return Some(a);
         }
         let mut whole = Material::blend(weight, String::new(), String::new());
         if !self.share_own(&mut whole, [&a.part, &b.part]) {
@@ -379,7 +440,7 @@ impl Converter<'_> {
         }
         let two_sided = a.two_sided && b.two_sided;
         let parts = [(first, a), (second, b)].map(|(node, side)| self.add_material(node, without_own(side.part)));
-        Ok(Some(Surface { part: with_parts(whole, parts), two_sided }))
+        Some(Surface { part: with_parts(whole, parts), two_sided })
     }
 
     /// Gives a surface a map of its normals.
@@ -400,9 +461,16 @@ impl Converter<'_> {
     }
 
     fn bump_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        let scale = node.float_or("scale", 1.0)? as f32;
-        let heights = node.children("texture")?.first().copied();
-        let heights = heights.ok_or_else(|| node.error("a bumpmap contains a texture of heights"))?;
+        let mut scale = node.float_or("scale", 1.0)? as f32;
+        let Some(mut heights) = node.children("texture")?.first().copied() else {
+            self.tell(node, "a bumpmap has no effect without a nested texture of heights");
+            return self.only_nested(node, depth);
+        };
+        // Of version 0.x; depths have negative factors.
+        for _ in 0..MAX_DEPTH {
+            let Some((inner, factor)) = self.scaled(heights)? else { break };
+            (heights, scale) = (inner, scale * factor.x as f32);
+        }
         let heights = self.texture(heights, Use::Factor, Reads::Number)?;
         let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
         // A constant is of one height everywhere.
@@ -434,8 +502,11 @@ impl Converter<'_> {
     }
 
     fn normal_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
-        let map = node.child("normalmap")?;
-        let map = map.ok_or_else(|| node.error("a normalmap contains a texture called `normalmap`"))?;
+        // Of version 0.x, it has any name.
+        let Some(map) = node.child("normalmap")?.or(node.children("texture")?.first().copied()) else {
+            self.tell(node, "a normalmap has no effect without a nested texture called `normalmap`");
+            return self.only_nested(node, depth);
+        };
         let map = self.texture(map, Use::Factor, Reads::Color)?;
         let Some(surface) = self.only_nested(node, depth)? else { return Ok(None) };
         if map == ColorValue::Rgb(Vec3::new(0.5, 0.5, 1.0)) {

@@ -11,6 +11,9 @@ use glam::{DMat4, DVec3};
 /// Degrees; a camera has a field of view between these.
 const FIELDS: std::ops::RangeInclusive<f64> = 0.01..=179.0;
 
+/// Degrees, of cameras that say theirs otherwise: about that of a lens of 50 mm.
+const UNKNOWN_FIELD: f64 = 40.0;
+
 impl Converter<'_> {
     /// The transform of the sensor, before any of the scene.
     pub(crate) fn sensor_to_world(node: Node) -> Result<DMat4, SceneError> {
@@ -23,12 +26,21 @@ impl Converter<'_> {
         node.children("sampler")?.into_iter().for_each(Node::skip);
         let (film, size) = self.film(node)?;
         let aspect = size.0 / size.1;
-        let is_perspective = matches!(node.plugin(), "perspective" | "thinlens");
-        if !is_perspective && node.plugin() != "orthographic" {
+        // The last is of version 0.x.
+        let is_orthographic = matches!(node.plugin(), "orthographic" | "telecentric");
+        let is_known = is_orthographic || matches!(node.plugin(), "perspective" | "thinlens");
+        let is_perspective = !is_orthographic;
+        if !is_known {
+            // Others may be lenses, where these are no cameras.
+            let is_meter = node.plugin().ends_with("meter") || node.plugin().ends_with("distant");
+            let is_camera = node.has("to_world") && !is_meter;
+            let other = if is_camera { "a perspective one" } else { "another one" };
             let plugin = printable::name(node.plugin()).into_owned();
-            self.tell(node, &format!("sensors of type {plugin} are not modelled: the camera is another one"));
+            self.tell(node, &format!("sensors of type {plugin} are not modelled: the camera is {other}"));
             node.skip();
-            return Ok(None);
+            if !is_camera {
+                return Ok(None);
+            }
         }
         let matrix = self.world * Self::sensor_to_world(node)?;
         let eye = matrix.w_axis.truncate();
@@ -56,7 +68,9 @@ impl Converter<'_> {
             }
         }
         if is_perspective {
-            let half = (0.5 * self.horizontal_field(node, aspect)?.to_radians()).tan();
+            let field = self.horizontal_field(node, aspect);
+            let field = if is_known { field? } else { field.unwrap_or(UNKNOWN_FIELD) };
+            let half = (0.5 * field.to_radians()).tan();
             // The part of the film that is shown.
             let share = film.1 / size.1;
             let vfov = 2.0 * (half / aspect * share).atan().to_degrees();

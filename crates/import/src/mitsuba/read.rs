@@ -155,7 +155,7 @@ impl Reader<'_> {
         }
         match tag {
             "scene" | "integrator" | "sensor" | "film" | "rfilter" | "sampler" | "bsdf" | "texture" | "shape"
-            | "emitter" | "medium" | "phase" | "volume" => {
+            | "emitter" | "medium" | "phase" | "volume" | "subsurface" => {
                 self.object(element, place, parent, depth, given)?;
             }
             "spectrum" if element.has_attribute("type") => self.object(element, place, parent, depth, given)?,

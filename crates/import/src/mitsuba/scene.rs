@@ -100,7 +100,7 @@ impl<'a> Converter<'a> {
         self.settle_numbers();
         let has_camera = self.sensors(&sensors)?;
         // Definitions that nothing uses are no loss.
-        for tag in ["bsdf", "texture", "medium", "volume", "sampler", "phase", "film"] {
+        for tag in ["bsdf", "texture", "medium", "volume", "sampler", "phase", "film", "subsurface"] {
             root.children(tag)?;
         }
         root.ignore(&["embree_use_robust_intersections", "bvh_max_depth"]);

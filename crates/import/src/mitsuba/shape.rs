@@ -20,7 +20,7 @@ use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{MeshShading, MeshSource};
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::{MAX_LOBES, Material};
-use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -298,6 +298,10 @@ impl Converter<'_> {
             self.tell(node, "media are not modelled: the inside of the shape is empty");
             medium.skip();
         }
+        for scattering in node.children("subsurface")? {
+            self.tell(node, "subsurface scattering is not modelled: the surface is its BSDF alone");
+            scattering.skip();
+        }
         let bsdf = node.children("bsdf")?.first().copied();
         let emitter = node.children("emitter")?.first().copied();
         let key = (bsdf.map(|node| node.index), emitter.map(|node| node.index));
@@ -378,7 +382,7 @@ impl Converter<'_> {
         }
         let radiance = match radiance {
             ColorValue::Rgb(rgb) => ColorValue::Rgb(*rgb / LIGHT_SHARE),
-            ColorValue::Texture(name) => ColorValue::Texture(self.tinted(name, LIGHT_SHARE.recip())?),
+            ColorValue::Texture(name) => ColorValue::Texture(self.tinted(name, Vec3::splat(LIGHT_SHARE.recip()))?),
         };
         let mut whole = Material::blend(LIGHT_SHARE.into(), String::new(), String::new());
         exchange_own(&mut part, &mut whole);

@@ -381,3 +381,94 @@ fn a_scene_that_is_mirrored_as_a_whole_has_its_own_sides() {
         assert_eq!(matches!(scene.file.objects[1], ObjectPart::Mesh { .. }), is_mesh);
     }
 }
+
+#[test]
+fn a_map_of_normals_without_its_texture_has_no_effect_and_is_told() {
+    for plugin in ["bumpmap", "normalmap"] {
+        let scene = surface(&format!("<bsdf type=\"twosided\"><bsdf type=\"{plugin}\">{DIFFUSE}</bsdf></bsdf>"));
+        tells_only(&scene, &[plugin, "without a nested texture"]);
+        assert_eq!(part(&scene, 0), &Material::Diffuse { albedo: ColorValue::grey(0.5) });
+    }
+    let any = image("other", "n.png", "");
+    let scene =
+        read("0.6.0", &format!("<shape type=\"sphere\"><bsdf type=\"normalmap\">{any}{DIFFUSE}</bsdf></shape>"));
+    assert!(told(&scene).is_empty() && !scene.file.textures.0.is_empty());
+}
+
+#[test]
+fn distributions_of_any_case_and_of_old_versions_open() {
+    let of = |name: &str| {
+        let bsdf = format!("<bsdf type=\"roughconductor\"><string name=\"distribution\" value=\"{name}\"/></bsdf>");
+        let scene = read("0.6.0", &format!("<shape type=\"sphere\">{bsdf}</shape>"));
+        let Material::Conductor { beckmann, .. } = part(&scene, 0) else { panic!("{:?}", part(&scene, 0)) };
+        (*beckmann, told(&scene).len())
+    };
+    assert_eq!([of("GGX"), of("Beckmann"), of("phong"), of("as")], [(false, 0), (true, 0), (true, 1), (true, 1)]);
+}
+
+#[test]
+fn bsdfs_and_textures_of_old_versions_keep_their_colours() {
+    let read_as = |bsdf: &str| read("0.6.0", &format!("<shape type=\"sphere\">{bsdf}</shape>"));
+    let colour = |name: &str| format!("<rgb name=\"{name}\" value=\"0.75 0.5 0.25\"/>");
+    let expected = ColorValue::Rgb(Vec3::new(0.75, 0.5, 0.25));
+    let diffuse = Material::Diffuse { albedo: expected.clone() };
+    for (plugin, name) in
+        [("roughdiffuse", "reflectance"), ("phong", "diffuseReflectance"), ("ward", "diffuseReflectance")]
+    {
+        let scene =
+            read_as(&format!("<bsdf type=\"{plugin}\">{}<float name=\"alpha\" value=\"0.3\"/></bsdf>", colour(name)));
+        assert_eq!(part(&scene, 0), &diffuse);
+        tells_only(&scene, &[plugin, "not modelled"]);
+    }
+    let inner = format!("<bsdf type=\"diffuse\">{}</bsdf>", colour("reflectance"));
+    for plugin in ["coating", "roughcoating"] {
+        let scene = read_as(&format!("<bsdf type=\"{plugin}\"><float name=\"thickness\" value=\"1\"/>{inner}</bsdf>"));
+        assert_eq!(part(&scene, 0), &diffuse);
+        tells_only(&scene, &[plugin, "coatings"]);
+    }
+    let scene = read_as(&format!("<bsdf type=\"difftrans\">{}</bsdf>", colour("transmittance")));
+    assert_eq!(part(&scene, 0), &Material::Translucent { reflectance: ColorValue::grey(0.0), transmittance: expected });
+    let weights = "<string name=\"weights\" value=\"0.25, 0.25, 0.5\"/>";
+    let scene = read_as(&format!("<bsdf type=\"mixturebsdf\">{weights}{inner}{inner}{inner}</bsdf>"));
+    let Material::Blend { weight, a, .. } = part(&scene, 0) else { panic!("{:?}", part(&scene, 0)) };
+    let Material::Blend { weight: inside, .. } = named(&scene, a) else { panic!("{:?}", named(&scene, a)) };
+    let half = ScalarValue::Number(0.5);
+    assert_eq!((weight, inside, told(&scene)), (&half, &half, Vec::new()));
+    // A factor of a texture, which may be negative for heights.
+    let scaled = |name: &str, factor: f32| {
+        let image = image("inner", "grey.png", "");
+        format!("<texture type=\"scale\" name=\"{name}\">{image}<float name=\"scale\" value=\"{factor}\"/></texture>")
+    };
+    let tints = |bsdf: String, wanted: Option<f32>| -> Vec<f32> {
+        let scene = read_as(&bsdf);
+        assert_eq!(told(&scene), Vec::<String>::new());
+        let tint = |source: &TextureSource| match source {
+            TextureSource::Image { relief, tint, .. } if *relief == wanted => Some(tint.0.x),
+            _ => None,
+        };
+        scene.file.textures.0.values().filter_map(tint).collect()
+    };
+    assert!(tints(format!("<bsdf type=\"diffuse\">{}</bsdf>", scaled("reflectance", 0.25)), None).contains(&0.25));
+    let bumpy = format!("<bsdf type=\"bumpmap\">{}{DIFFUSE}</bsdf>", scaled("heights", -2.0));
+    assert_eq!(tints(bumpy, Some(-2.0)), [1.0]);
+    let scene = read_as(&format!("{inner}</shape><shape type=\"sphere\"><subsurface type=\"dipole\"/>"));
+    tells_only(&scene, &["subsurface scattering"]);
+}
+
+#[test]
+fn a_camera_of_another_kind_is_a_perspective_one_in_its_place() {
+    let looks = |plugin: &str, more: &str| {
+        let body = format!("<sensor type=\"{plugin}\">{more}</sensor><shape type=\"sphere\"/>");
+        let scene = read("3.0.0", &body);
+        tells_only(&scene, &[plugin]);
+        (scene.file.camera.eye, scene.file.camera.vfov)
+    };
+    let placed = "<transform name=\"to_world\"><lookat origin=\"1, 2, 9\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>\
+                  <string name=\"focal_length\" value=\"long\"/>";
+    let (eye, vfov) = looks("realisticlens", placed);
+    assert_eq!(eye, DVec3::new(1.0, 2.0, 9.0));
+    assert!((30.0..31.0).contains(&vfov), "{vfov}");
+    let with_fov = format!("{placed}<float name=\"fov\" value=\"90\"/><string name=\"fov_axis\" value=\"y\"/>");
+    assert_eq!(looks("codedperspective", &with_fov).1.round(), 90.0);
+    assert_ne!(looks("irradiancemeter", placed).0, DVec3::new(1.0, 2.0, 9.0));
+}

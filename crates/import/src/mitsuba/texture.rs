@@ -91,6 +91,20 @@ impl Converter<'_> {
         if self.texture_depth > MAX_DEPTH {
             return Err(node.error("textures are nested too deep, or contain themselves"));
         }
+        if let Some((inner, factor)) = self.scaled(node)? {
+            let factor = limited(factor, Use::Factor);
+            self.texture_depth += 1;
+            let inner = self.texture(inner, of, reads)?;
+            self.texture_depth -= 1;
+            return Ok(match inner {
+                ColorValue::Rgb(rgb) => ColorValue::Rgb(limited((rgb * factor).as_dvec3(), of)),
+                ColorValue::Texture(name) => {
+                    let name = self.tinted(&name, factor).unwrap_or(name);
+                    self.textures.insert((node.index, reads), name.clone());
+                    ColorValue::Texture(name)
+                }
+            });
+        }
         let mut read_attribute = None;
         let source = match node.plugin() {
             "bitmap" => match self.bitmap(node, reads)? {
@@ -129,6 +143,17 @@ impl Converter<'_> {
         self.attributes.extend(read_attribute.map(|attribute| (name.clone(), attribute)));
         self.textures.insert((node.index, reads), name.clone());
         Ok(ColorValue::Texture(name))
+    }
+
+    /// The texture inside of a `scale` of version 0.x, and its factor; `None` for other plugins.
+    pub(crate) fn scaled<'b>(&self, node: Node<'b>) -> Result<Option<(Node<'b>, DVec3)>, SceneError> {
+        if node.plugin() != "scale" {
+            return Ok(None);
+        }
+        let inner = node.children("texture")?.first().copied();
+        let inner = inner.ok_or_else(|| node.error("a scale contains a texture"))?;
+        let factor = node.value("scale").map_or(Some(DVec3::ONE), |value| constant(value, Use::Factor));
+        Ok(Some((inner, factor.ok_or_else(|| node.error("`scale` must be a number or a colour"))?)))
     }
 
     /// A plugin that is a constant colour; `None` if it is another one.
