@@ -8,7 +8,7 @@ use crate::pbrt::curves::Strands;
 use crate::pbrt::lights::{Light, color, light};
 use crate::pbrt::params::{Param, Params};
 use crate::pbrt::shapes::{is_whole_sphere, mesh_of};
-use crate::pbrt::state::{AreaLight, Described, State};
+use crate::pbrt::state::{AreaLight, Described, MaterialRef, State};
 use crate::pbrt::textures::{Texture, Textures};
 use crate::ply::{has_normals, load_ply_with};
 use firstlight_files::limits::Limits;
@@ -64,6 +64,14 @@ pub(super) struct Item {
 /// Why a scene cannot be read on.
 pub(crate) struct TooMany;
 
+/// Everything with a name that a scene describes.
+pub(crate) struct Known {
+    named: HashMap<String, Rc<Described>>,
+    media: HashMap<String, Option<Vec3>>,
+    textures: Textures,
+    n_described: u64,
+}
+
 pub(crate) struct Builder<'a> {
     pub(super) path: &'a Path,
     pub(super) folder: &'a Path,
@@ -83,6 +91,10 @@ pub(crate) struct Builder<'a> {
     /// Meshes in files of their own that became parts.
     pub files: Vec<(PathBuf, Stamp)>,
     pub(super) named: HashMap<String, Rc<Described>>,
+    /// Whether `named` is from an earlier reading: then it stays.
+    pub(super) is_known: bool,
+    /// Names of materials, textures and media that were used and not there.
+    pub(super) missing: HashSet<String>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
     definitions: HashMap<String, Vec<Item>>,
@@ -135,6 +147,8 @@ impl<'a> Builder<'a> {
             parts: HashMap::new(),
             files: Vec::new(),
             named: HashMap::new(),
+            is_known: false,
+            missing: HashSet::new(),
             media: HashMap::new(),
             definitions: HashMap::new(),
             open: None,
@@ -155,6 +169,24 @@ impl<'a> Builder<'a> {
             n_described: 0,
             depth: 0,
         }
+    }
+
+    /// What the scene describes, if it has used some of it before.
+    pub(crate) fn described_later(&mut self) -> Option<Known> {
+        let Self { named, media, textures, .. } = self;
+        let is_texture = |name: &str| [true, false].iter().any(|&is_number| textures.get(is_number, name).is_some());
+        let is_there = |name: &String| named.contains_key(name) || media.contains_key(name) || is_texture(name);
+        if !self.missing.iter().any(is_there) {
+            return None;
+        }
+        let (named, media, textures) = (std::mem::take(named), std::mem::take(media), std::mem::take(textures));
+        Some(Known { named, media, textures, n_described: self.n_described })
+    }
+
+    /// Takes what an earlier reading has found.
+    pub(crate) fn know(&mut self, known: Known) {
+        (self.named, self.media, self.textures) = (known.named, known.media, known.textures);
+        (self.n_described, self.is_known) = (known.n_described, true);
     }
 
     /// Remarks that something is not shown.
@@ -281,13 +313,24 @@ impl<'a> Builder<'a> {
         if params.has("displacement") || params.has("displacement.edgelength") {
             self.tell(format!("`{}` is shown without its displacement", printable::name(&name)));
         }
-        let opacity = self.opacity(params, &name);
-        if opacity == Some(ScalarValue::Number(0.0)) {
-            self.tell(format!("`{}` is left out: it is transparent everywhere", printable::name(&name)));
-            return Ok(());
-        }
+        let mut opacity = self.opacity(params, &name);
         let light = area_light.map(|light| self.radiance(&light, &geometry, state, params, kind, &name));
-        let Some(material) = self.surface(state, opacity, light, &name) else { return Ok(()) };
+        let mut bare = None;
+        if opacity == Some(ScalarValue::Number(0.0)) {
+            let shown = printable::name(&name);
+            if light.is_none() {
+                self.tell(format!("`{shown}` is left out: it is transparent everywhere"));
+                return Ok(());
+            }
+            // In pbrt no ray hits it, and still it lights.
+            self.tell(format!("`{shown}` is an invisible light, which is not modelled: it is seen"));
+            opacity = None;
+            let material = MaterialRef::Own(self.described("", "interface".to_owned(), Params::default()));
+            bare = Some(State { material, inside: String::new(), ..state.clone() });
+        }
+        let Some(material) = self.surface(bare.as_ref().unwrap_or(state), opacity, light, &name) else {
+            return Ok(());
+        };
         self.add_item(Item { name, geometry, material, local: state.ctm })
     }
 
@@ -373,6 +416,7 @@ impl<'a> Builder<'a> {
     pub(super) fn opacity(&mut self, params: &Params, name: &str) -> Option<ScalarValue> {
         let alpha = self.textures.parameter(true, params, "alpha");
         if alpha.is_none() && params.has("alpha") {
+            self.missing.extend(params.texture("alpha").map(str::to_owned));
             self.tell(format!("`{}` is opaque: its `alpha` is not known", printable::name(name)));
         }
         match alpha? {
@@ -545,10 +589,11 @@ impl<'a> Builder<'a> {
 
     /// An error if nothing was described that can be seen.
     pub(crate) fn check_any(&self) -> Result<(), SceneError> {
-        if !self.objects.is_empty() {
+        if !self.objects.is_empty() || self.environment != EnvironmentSource::Black {
             return Ok(());
         }
-        let first = self.warnings.iter().next().map_or_else(String::new, |first| format!(": {}", &**first));
+        let mut left_out = self.warnings.iter().filter(|warning| warning.contains("left out"));
+        let first = left_out.next().map_or_else(String::new, |first| format!(": {}", &**first));
         Err(SceneError::in_file(self.path, format!("has no shape that can be shown{first}")))
     }
 }

@@ -164,6 +164,12 @@ impl<'a> Cursor<'a> {
         Ok((affine, matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0]))
     }
 
+    /// A name and its value, without a type.
+    pub(crate) fn option(&mut self) -> Result<(), SceneError> {
+        self.string()?;
+        self.values().map(drop)
+    }
+
     /// The parameters of a directive.
     pub(crate) fn params(&mut self) -> Result<Params, SceneError> {
         let mut list = Vec::new();

@@ -72,6 +72,10 @@ const DIRECTIVES: &[&str] = &[
     "WorldBegin",
 ];
 
+/// Directives that version 4 has no more.
+const OF_VERSION_3: [&str; 7] =
+    ["AreaLight", "PixelSampler", "Renderer", "SurfaceIntegrator", "Volume", "VolumeIntegrator", "WorldEnd"];
+
 /// What ends a saved state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Saved {
@@ -98,7 +102,7 @@ pub(crate) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    pub(crate) fn new(path: &'a Path, options: &'a ForeignOptions) -> Self {
+    fn new(path: &'a Path, options: &'a ForeignOptions) -> Self {
         Self {
             path,
             folder: path.parent().unwrap_or(Path::new("")),
@@ -115,8 +119,19 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the whole scene.
-    pub(crate) fn read(&mut self) -> Result<(), SceneError> {
+    /// Reads a scene; once more if it uses names before it describes them, which pbrt allows.
+    pub(crate) fn read(path: &'a Path, options: &'a ForeignOptions) -> Result<Self, SceneError> {
+        let mut reader = Self::new(path, options);
+        reader.read_all()?;
+        if let Some(known) = reader.builder.described_later() {
+            reader = Self::new(path, options);
+            reader.builder.know(known);
+            reader.read_all()?;
+        }
+        Ok(reader)
+    }
+
+    fn read_all(&mut self) -> Result<(), SceneError> {
         let source = self.text(self.path)?;
         self.run(&source, 0)?;
         if self.stack.iter().any(|(saved, _)| *saved == Saved::Object) {
@@ -285,9 +300,7 @@ impl<'a> Reader<'a> {
                         .tell(format!("the colour space `{space}` is not modelled: colours are taken for sRGB"));
                 }
             }
-            "Option" => {
-                cursor.params()?;
-            }
+            "Option" => cursor.option()?,
             "Sampler" | "Accelerator" => {
                 cursor.string()?;
                 cursor.params()?;
@@ -367,6 +380,10 @@ impl<'a> Reader<'a> {
                     self.builder.warnings.push(format!("{place}: {complaint}"));
                 }
             }
+            other if OF_VERSION_3.contains(&other) => {
+                let message = format!("`{other}` is of pbrt 3 or older: convert the scene with `pbrt --upgrade`");
+                return Err(cursor.wrong(at, message));
+            }
             other => {
                 let hint = suggestion(other, DIRECTIVES.iter().copied());
                 return Err(cursor.wrong(at, format!("there is no directive `{}`{hint}", printable::name(other))));
@@ -391,6 +408,11 @@ impl<'a> Reader<'a> {
         match self.stack.pop() {
             Some((saved, state)) if saved == what => {
                 self.state = state;
+                Ok(())
+            }
+            None if what == Saved::Attributes => {
+                let place = cursor.place(at);
+                self.builder.warnings.push(format!("{place}: there is no `{name}` that this could end: it is ignored"));
                 Ok(())
             }
             _ => Err(cursor.wrong(at, format!("there is no `{name}` that this could end"))),

@@ -115,7 +115,8 @@ fn color(scope: &mut impl MaterialScope, params: &Params, name: &str, default: f
 
 /// Index of refraction and dispersion.
 fn ior(scope: &mut impl MaterialScope, params: &Params, name: &str) -> (f32, f32) {
-    let spectrum = params.find(name).filter(|param| param.kind == "spectrum").and_then(|_| params.spectrum(name));
+    let is_spectrum = params.find(name).is_some_and(|param| matches!(&*param.kind, "spectrum" | "rgb"));
+    let spectrum = if is_spectrum { params.spectrum(name) } else { None };
     let found = match spectrum {
         Some(spectrum) => spectrum.ior(),
         None => Ok((params.number(name).unwrap_or(1.5), 0.0)),
@@ -195,6 +196,9 @@ pub(crate) fn material(
             let diffuse = color(scope, params, "reflectance", 0.5);
             let width = alpha(scope, params, "");
             let (ior, _) = ior(scope, params, "eta");
+            if params.has("albedo") {
+                scope.tell("a medium in its coat is not modelled: the coat is clear");
+            }
             MaterialPart::Plastic {
                 diffuse,
                 alpha: scope.scalar_value(width),
@@ -310,8 +314,11 @@ fn normals(scope: &mut impl MaterialScope, params: &Params) -> Option<ColorValue
     }
     match scope.number(params, "displacement")? {
         Texture::Varying(mut source @ TextureSource::Image { .. }) => {
-            if let TextureSource::Image { relief, .. } = &mut source {
-                *relief = Some(1.0);
+            if let TextureSource::Image { relief, tint, invert, .. } = &mut source {
+                // Negative factors are depths, and an inverted image with one rises with its values.
+                let is_negative = tint.0.x < 0.0;
+                *relief = Some(if is_negative && !*invert { -1.0 } else { 1.0 });
+                (tint.0, *invert) = (tint.0.abs(), *invert && !is_negative);
             }
             Some(scope.color_value(Texture::Varying(source)))
         }

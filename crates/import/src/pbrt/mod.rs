@@ -40,9 +40,7 @@ use std::path::Path;
 /// # Errors
 /// If the text is not of the format, or includes what it must not; with file, line and column.
 pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene, SceneError> {
-    let mut reader = Reader::new(path, options);
-    reader.read()?;
-    let (view, mut builder, mut files) = reader.finish()?;
+    let (view, mut builder, mut files) = Reader::read(path, options)?.finish()?;
     builder.finish_strands();
     builder.add_missing_uvs();
     builder.check_any()?;

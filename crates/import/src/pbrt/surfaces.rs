@@ -7,7 +7,7 @@ use crate::pbrt::params::Params;
 use crate::pbrt::shapes::{has_uvs, with_own_uvs};
 use crate::pbrt::spectrum::UnknownSpectrum;
 use crate::pbrt::state::{Described, MaterialRef, State};
-use crate::pbrt::textures::{Texture, unknown_spectrum};
+use crate::pbrt::textures::{Texture, unknown_spectrum, without_negative};
 use firstlight_files::printable;
 use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_format::material_textures::texture_names;
@@ -42,6 +42,9 @@ impl Builder<'_> {
     /// Describes a material with a name.
     pub(crate) fn describe_material(&mut self, name: &str, params: Params) {
         told_of_long(name).into_iter().for_each(|what| self.tell(what));
+        if self.is_known && self.named.contains_key(cut(name)) {
+            return;
+        }
         let kind = params.string("type").unwrap_or("diffuse").to_owned();
         let described = self.described(cut(name), kind, params);
         self.named.insert(cut(name).to_owned(), described);
@@ -89,6 +92,7 @@ impl Builder<'_> {
             MaterialRef::Named(name) => match self.named.get(name) {
                 Some(described) => described.clone(),
                 None => {
+                    self.missing.insert(name.clone());
                     let (name, shape) = (printable::name(name).into_owned(), printable::name(shape));
                     self.tell(format!("there is no material `{name}`, which `{shape}` has: grey is shown"));
                     match State::default().material {
@@ -100,6 +104,9 @@ impl Builder<'_> {
         };
         let absorption = self.media.get(&state.inside).copied().flatten().unwrap_or(Vec3::ZERO);
         let has_medium = !state.inside.is_empty() && !matches!(self.media.get(&state.inside), Some(Some(Vec3::ZERO)));
+        if has_medium && !self.media.contains_key(&state.inside) {
+            self.missing.insert(state.inside.clone());
+        }
         if has_medium && (described.kind != "dielectric" || !self.media.contains_key(&state.inside)) {
             let (medium, shape) = (printable::name(&state.inside).into_owned(), printable::name(shape));
             self.tell(match self.media.contains_key(&state.inside) {
@@ -318,6 +325,7 @@ impl Builder<'_> {
 
     /// The name of a texture, which is added on its first use.
     pub(super) fn texture_name(&mut self, wanted: &str, source: TextureSource) -> String {
+        let source = without_negative(source);
         let key = format!("{source:?}");
         if let Some(name) = self.texture_of.get(&key) {
             return name.clone();
@@ -347,6 +355,7 @@ impl Scope<'_, '_> {
         if found.is_none()
             && let Some(texture) = params.texture(name)
         {
+            self.builder.missing.insert(texture.to_owned());
             self.tell(&format!("there is no texture `{}`", printable::name(texture)));
         }
         if !is_number && let Some(spectrum) = unknown_spectrum(params, name) {
@@ -388,7 +397,10 @@ impl MaterialScope for Scope<'_, '_> {
     }
 
     fn material(&mut self, name: &str) -> Option<String> {
-        let described = self.builder.named.get(cut(name)).cloned()?;
+        let Some(described) = self.builder.named.get(cut(name)).cloned() else {
+            self.builder.missing.insert(cut(name).to_owned());
+            return None;
+        };
         self.builder.converted(&described, Vec3::ZERO)
     }
 

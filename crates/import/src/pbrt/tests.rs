@@ -117,6 +117,43 @@ fn heights_have_the_encoding_of_their_image() {
 }
 
 #[test]
+fn negative_factors_are_depths_of_a_relief_and_black_as_colours() {
+    let image = |kind: &str, scale: f32, invert: bool| {
+        format!(
+            "Texture \"t\" \"{kind}\" \"imagemap\" \"string filename\" \"n.png\" \"float scale\" {scale} \
+             \"bool invert\" {invert}\n"
+        )
+    };
+    let scaled = |kind: &str, by: f32| {
+        format!("Texture \"t\" \"{kind}\" \"scale\" \"texture tex\" \"t\" \"float scale\" {by}\n")
+    };
+    let shown = |world: String, parameter: &str| {
+        let scene = read(&format!("{world}Material \"diffuse\" \"texture {parameter}\" \"t\"\n{SQUARE}"));
+        assert_eq!(told(&scene), Vec::<String>::new());
+        match scene.file.textures.0.values().next() {
+            Some(TextureSource::Image { relief, tint, invert, .. }) => (*relief, tint.0.x, *invert),
+            other => panic!("{other:?}"),
+        }
+    };
+    for (world, expected) in [
+        (image("float", -0.5, false), (Some(-1.0), 0.5, false)),
+        (image("float", 0.5, false) + &scaled("float", -0.5), (Some(-1.0), 0.25, false)),
+        (image("float", -0.5, false) + &scaled("float", -0.5), (Some(1.0), 0.25, false)),
+        // 1 + 0.5 x, and 1 − 0.5 x.
+        (image("float", -0.5, true), (Some(1.0), 0.5, false)),
+        (image("float", 0.5, true), (Some(1.0), 0.5, true)),
+    ] {
+        assert_eq!(shown(world.clone(), "displacement"), expected, "{world}");
+    }
+    let black = image("spectrum", 1.0, false) + &scaled("spectrum", -0.5);
+    assert_eq!(shown(black, "reflectance"), (None, 0.0, false));
+    let checkers = "Texture \"t\" \"spectrum\" \"checkerboard\"\n".to_owned() + &scaled("spectrum", -2.0);
+    let scene = read(&format!("{checkers}Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}"));
+    let Some(TextureSource::Checker { a, b, .. }) = scene.file.textures.0.values().next() else { panic!() };
+    assert_eq!((a.0, b.0), (Vec3::ZERO, Vec3::ZERO));
+}
+
+#[test]
 fn a_light_reflects_like_its_material() {
     let light = |sides: &str, rest: &str| {
         read(&format!("AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] \"bool twosided\" {sides}\n{rest}{SQUARE}"))
@@ -265,4 +302,54 @@ fn a_file_that_is_cut_off_is_told() {
     let scene = read(&format!("{SQUARE}ObjectBegin \"o\"\n{SQUARE}AttributeBegin\n"));
     tells_only(&scene, &["`ObjectBegin` is not ended", "not shown"]);
     assert_eq!(scene.file.objects.len(), 1);
+}
+
+#[test]
+fn options_have_no_type_and_an_end_too_many_is_told() {
+    let options = "Option \"seed\" 42 Option \"disablepixeljitter\" true Option \"msereferenceout\" \"x\"\n";
+    assert_eq!(told(&read(&format!("{options}{SQUARE}"))), Vec::<String>::new());
+    let scene = read(&format!("AttributeEnd\n{SQUARE}"));
+    tells_only(&scene, &["a.pbrt:2: ", "no `AttributeBegin`"]);
+    assert_eq!(scene.file.objects.len(), 1);
+}
+
+#[test]
+fn invisible_lights_light() {
+    let lit = |emits: &str| {
+        let shape = "Shape \"sphere\" \"float alpha\" 0\n";
+        read(&format!("AttributeBegin\n{emits}{shape}AttributeEnd\n{SQUARE}"))
+    };
+    let scene = lit("AreaLightSource \"diffuse\" \"rgb L\" [1 1 1] \"float scale\" 10\n");
+    tells_only(&scene, &["`sphere 1`", "invisible light"]);
+    let MaterialPart::Emissive { radiance: ColorValue::Rgb(radiance) } = part(&scene) else { panic!() };
+    assert!((*radiance - Vec3::splat(10.0)).abs().max_element() < 1e-3, "{radiance}");
+    let scene = lit("");
+    tells_only(&scene, &["`sphere 1`", "left out"]);
+    assert_eq!(scene.file.objects.len(), 1);
+}
+
+#[test]
+fn names_may_stand_before_what_they_name() {
+    let scene = read(&format!(
+        "NamedMaterial \"later\"\n{SQUARE}\
+         MakeNamedMaterial \"later\" \"string type\" \"diffuse\" \"texture reflectance\" \"t\"\n\
+         Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"n.png\"\n{SQUARE}"
+    ));
+    assert_eq!(told(&scene), Vec::<String>::new());
+    assert!(matches!(part(&scene), MaterialPart::Diffuse { albedo: ColorValue::Texture(_) }), "{:?}", part(&scene));
+    let materials: Vec<_> = scene.file.objects.iter().map(|object| object.material()).collect();
+    assert_eq!(materials, [Some("later"); 2]);
+    // Names that are nowhere are told once.
+    tells_only(&read(&format!("NamedMaterial \"never\"\n{SQUARE}")), &["there is no material `never`"]);
+}
+
+#[test]
+fn an_environment_alone_is_a_scene_and_an_index_may_be_a_colour() {
+    let scene = read("LightSource \"infinite\" \"rgb L\" [1 2 3]\n");
+    assert_eq!((scene.file.objects.len(), told(&scene)), (0, Vec::new()));
+    let scene = read(&format!("Material \"dielectric\" \"rgb eta\" [1.25 1.25 1.25]\n{SQUARE}"));
+    let MaterialPart::Glass { ior, .. } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!((*ior, told(&scene)), (1.25, Vec::new()));
+    let coated = format!("Material \"coateddiffuse\" \"rgb albedo\" [0.5 0.5 0.5]\n{SQUARE}");
+    tells_only(&read(&coated), &["medium in its coat"]);
 }

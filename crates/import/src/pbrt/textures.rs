@@ -15,6 +15,7 @@ use std::collections::HashMap;
 pub(crate) enum Texture {
     /// The same everywhere.
     Constant(Vec3),
+    /// Factors may be negative, which only heights show.
     Varying(TextureSource),
 }
 
@@ -150,7 +151,7 @@ impl Textures {
                 } = &mut source
                 {
                     (*r, *o, *w, *e) = (repeat, offset, wrap, encoding);
-                    (*tint, *invert) = (Rgb(Vec3::splat(scale.max(0.0))), params.flag("invert").unwrap_or(false));
+                    (*tint, *invert) = (Rgb(Vec3::splat(scale)), params.flag("invert").unwrap_or(false));
                     *smooth = params.string("filter") != Some("point");
                 }
                 Texture::Varying(source)
@@ -190,6 +191,15 @@ fn mapping(params: &Params) -> Option<(DVec2, DVec2)> {
     let scale = DVec2::new(number("uscale", 1.0), number("vscale", 1.0));
     let offset = DVec2::new(number("udelta", 0.0), number("vdelta", 0.0));
     (scale.x != 0.0 && scale.y != 0.0).then_some((scale, offset))
+}
+
+/// A texture as a surface shows it: pbrt takes negative values for 0 there.
+pub(crate) fn without_negative(mut source: TextureSource) -> TextureSource {
+    match &mut source {
+        TextureSource::Checker { a, b, .. } => (a.0, b.0) = (a.0.max(Vec3::ZERO), b.0.max(Vec3::ZERO)),
+        TextureSource::Image { tint, .. } | TextureSource::VertexColors { tint, .. } => tint.0 = tint.0.max(Vec3::ZERO),
+    }
+    source
 }
 
 /// The product of two textures, if it is one.
