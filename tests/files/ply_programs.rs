@@ -60,6 +60,11 @@ fn a_texture_that_a_comment_names_is_the_material() {
         let scene = load(&SceneSource::Model(folder.path().join("model.ply")), &LoadOptions::default());
         assert!(scene.is_ok(), "{:?}", scene.err());
     }
+    // The name of the file itself, as MeshLab writes it.
+    std::fs::copy(folder.path().join("b.png"), folder.path().join("model_A.png")).unwrap();
+    let text = square("comment TextureFile <this>_A.png\n", [ST, ""], &["0 0", "1 0", "1 1", "0 1", "", ""]);
+    let model = read(folder.path(), &text);
+    assert_eq!(model.materials[0].diffuse_texture.as_ref().unwrap().path, folder.path().join("model_A.png"));
     // Not what lies outside of the folder of the model.
     let inner = folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();

@@ -26,6 +26,7 @@ use firstlight_files::gzip::{decompressed, start_of_decompressed};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::printable;
 use firstlight_files::reference::References;
+use firstlight_files::relative::path_to_text;
 use firstlight_files::warnings::Warnings;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -143,7 +144,10 @@ fn images(
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut missing = Vec::new();
+    // As MeshLab writes a name that begins like that of the file.
+    let own = path.file_stem().map(|stem| path_to_text(stem.as_ref())).unwrap_or_default();
     let found = names.iter().map(|name| {
+        let name = &name.replace("<this>", &own);
         let resolve = |name: &str| files.resolve(folder, name);
         // A path of another computer.
         let beside = name.rsplit(['/', '\\']).next().and_then(|last| resolve(last).ok());
