@@ -10,7 +10,7 @@ use firstlight_format::error::SceneError;
 use firstlight_format::locate::line_and_column;
 use glam::{DMat4, DVec3};
 use std::cell::Cell;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -114,7 +114,8 @@ pub(crate) struct Graph {
     /// Files of spectra, each with its stamp from before it was read.
     pub other_files: Vec<(PathBuf, Stamp)>,
     pub objects: Vec<Object>,
-    pub ids: HashMap<String, usize>,
+    /// In the order in which messages list them.
+    pub ids: BTreeMap<String, usize>,
     /// Folders in which files are looked for, in order.
     pub folders: Vec<PathBuf>,
 }

@@ -127,6 +127,7 @@ fn gamma_and_channel_of_old_images_count() {
     assert_eq!(read_as(&gamma("-1")), (Some(Channel::A), Encoding::Auto, 0));
     assert_eq!(read_as(&gamma("2.2")), (Some(Channel::A), Encoding::Auto, 1));
     assert_eq!(read_as("<string name=\"channel\" value=\"x\"/>").2, 2);
+    assert_eq!(read_as("<string name=\"channel\" value=\"a\"/><string name=\"wrapMode\" value=\"zero\"/>").2, 1);
 }
 
 #[test]

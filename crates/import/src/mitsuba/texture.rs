@@ -222,6 +222,11 @@ impl Converter<'_> {
             None | Some("repeat") => Wrap::Repeat,
             Some("mirror") => Wrap::Mirror,
             Some("clamp") => Wrap::Clamp,
+            // Of version 0.x.
+            Some("zero" | "one") => {
+                self.tell(node, "black and white around an image are not modelled: its edge continues");
+                Wrap::Clamp
+            }
             Some(other) => {
                 let other = printable::name(other);
                 return Err(node.error(format!("`wrap_mode` must be repeat, mirror or clamp, not {other}")));
