@@ -1,31 +1,27 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
 use crate::model::foreign::{ForeignOptions, cut};
-use crate::model::imported::{ModelNormals, ModelOptions};
-use crate::model::placing::{is_placement, oriented, transform};
+use crate::model::placing::{is_placement, transform};
 use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
-use crate::pbrt::lights::{Light, color, light};
+use crate::pbrt::lights::{Light, light};
 use crate::pbrt::params::{Param, Params};
-use crate::pbrt::shapes::{is_whole_sphere, mesh_of};
-use crate::pbrt::state::{AreaLight, Described, MaterialRef, State};
+use crate::pbrt::state::{Described, MaterialRef, State};
 use crate::pbrt::textures::{Texture, Textures};
-use crate::ply::{has_normals, load_ply_with};
 use firstlight_files::limits::Limits;
 use firstlight_files::printable;
 use firstlight_files::reference::References;
-use firstlight_files::relative::{path_to_text, text_to_path};
-use firstlight_files::stamp::{Stamp, stamp};
+use firstlight_files::relative::path_to_text;
+use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
 use firstlight_format::names::Names;
 use firstlight_format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
-use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
+use firstlight_format::value::{Rgb, ScalarValue};
 use firstlight_mesh::Mesh;
 use glam::{DAffine3, DMat3, Vec3};
 use std::collections::{HashMap, HashSet};
-use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -219,34 +215,6 @@ impl<'a> Builder<'a> {
         self.resolved.get(name).cloned().flatten()
     }
 
-    /// See [`has_normals`].
-    fn has_normals(&mut self, path: &Path) -> Option<bool> {
-        *self.with_normals.entry(path.to_owned()).or_insert_with(|| has_normals(path))
-    }
-
-    /// The mesh of a shape of the scene, by its number.
-    pub(super) fn shape_source(&self, shape: u32) -> MeshSource {
-        let file = self.path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-        MeshSource::Part { file, shape, defines: Vec::new() }
-    }
-
-    /// The mesh of a shape that is no file; see [`mesh_of`].
-    fn made(&mut self, kind: &str, params: &Params, is_reversed: bool) -> Result<Arc<Mesh>, String> {
-        let is_written = kind == "trianglemesh";
-        if !is_written && self.bytes_left == 0 {
-            return Err(format!("there are too many shapes like it: {}", Limits::advice()));
-        }
-        let bytes_of = |n_vertices, n_triangles| size_of::<Vec3>() * (3 * n_vertices + n_triangles);
-        // A subdivided surface has two triangles per vertex.
-        let most_triangles = usize::try_from(self.bytes_left).unwrap_or(usize::MAX) / bytes_of(1, 2) * 2;
-        let mesh = mesh_of(kind, params, is_reversed, most_triangles, self.path, &mut self.warnings)?;
-        if !is_written {
-            let bytes = bytes_of(mesh.positions.len(), mesh.triangles.len());
-            self.bytes_left = self.bytes_left.saturating_sub(bytes as u64);
-        }
-        Ok(Arc::new(mesh))
-    }
-
     pub(crate) fn begin_object(&mut self, name: &str) -> Result<(), &'static str> {
         if self.open.is_some() {
             return Err("an object definition inside of another one");
@@ -348,70 +316,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// What a shape is made of, or why it cannot be shown.
-    fn geometry(
-        &mut self,
-        kind: &str,
-        params: &Params,
-        state: &State,
-        emits: bool,
-        number: u32,
-        file_name: Option<&str>,
-    ) -> Result<Geometry, String> {
-        if kind == "sphere" && is_whole_sphere(params) {
-            let source = self.shape_source(number);
-            let radius = params.number("radius").unwrap_or(1.0);
-            // The front of our spheres is outside.
-            if !state.is_reversed {
-                return Ok(Geometry::Sphere { radius, shape: number });
-            }
-            let mesh = self.made(kind, params, true)?;
-            self.parts.insert(number, mesh);
-            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
-        }
-        if kind != "plymesh" {
-            let source = self.shape_source(number);
-            let mesh = self.made(kind, params, state.is_reversed)?;
-            self.parts.insert(number, mesh);
-            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
-        }
-        let source = self.shape_source(number);
-        let name = file_name.ok_or("it has no `filename`")?;
-        let file = self.file(name).ok_or_else(|| "its file must not be read".to_owned())?;
-        let path = self.folder.join(text_to_path(&file));
-        // Only the front of an emitter, and what is turned round, are not as in the file.
-        if emits || state.is_reversed {
-            let mesh = self.ply_mesh(&path, state.is_reversed)?;
-            self.parts.insert(number, mesh);
-            return Ok(Geometry::Mesh { source, shading: MeshShading::Auto });
-        }
-        // pbrt smooths nothing by itself.
-        let shading = if self.has_normals(&path) == Some(false) { MeshShading::Flat } else { MeshShading::Auto };
-        Ok(Geometry::Mesh { source: MeshSource::Ply(file), shading })
-    }
-
-    fn ply_mesh(&mut self, path: &Path, is_reversed: bool) -> Result<Arc<Mesh>, String> {
-        let key = (path.to_owned(), is_reversed);
-        if let Some(known) = self.ply.get(&key) {
-            return known.clone();
-        }
-        let normals = match self.has_normals(path) {
-            Some(false) => ModelNormals::Ignore,
-            _ => ModelOptions::default().normals,
-        };
-        let options = ModelOptions { normals, allow_outside: self.allow_outside, ..ModelOptions::default() };
-        let before = stamp(path);
-        let read = load_ply_with(path, &options).map(|model| {
-            self.warnings.append(&model.warnings);
-            Arc::new(oriented(model.mesh, is_reversed))
-        });
-        // Also if it cannot be read, since it may appear later.
-        self.files.push((path.to_owned(), before));
-        let read = read.map_err(|error| error.to_string());
-        self.ply.insert(key, read.clone());
-        read
-    }
-
     /// Coverage of a shape; `None` if it is opaque.
     pub(super) fn opacity(&mut self, params: &Params, name: &str) -> Option<ScalarValue> {
         let alpha = self.textures.parameter(true, params, "alpha");
@@ -424,60 +328,6 @@ impl<'a> Builder<'a> {
             Texture::Constant(alpha) => Some(ScalarValue::Number(alpha.x.max(0.0))),
             Texture::Varying(source) => Some(ScalarValue::Texture(self.texture_name("alpha", source))),
         }
-    }
-
-    /// What a shape emits, and whether both of its sides do.
-    fn radiance(
-        &mut self,
-        light: &AreaLight,
-        geometry: &Geometry,
-        state: &State,
-        shape: &Params,
-        kind: &str,
-        name: &str,
-    ) -> (ColorValue, bool) {
-        let AreaLight { params: light, radiance } = light;
-        let is_two_sided = light.flag("twosided").unwrap_or(false);
-        let mut told = Vec::new();
-        let of_light = || color(light, "L", &mut |what| told.push(what)) * light.number("scale").unwrap_or(1.0);
-        let mut radiance = *radiance.get_or_init(of_light);
-        if let Some(power) = light.number("power").filter(|power| *power > 0.0) {
-            let world = state.ctm;
-            let (area, n_shapes) = match geometry {
-                Geometry::Sphere { radius, .. } => {
-                    let scale = world.matrix3.determinant().abs().cbrt();
-                    (4.0 * PI * (radius * scale).powi(2), 1)
-                }
-                Geometry::Mesh { source: MeshSource::Part { shape, .. }, .. } => match self.parts.get(shape) {
-                    Some(mesh) => (area_of(mesh, &world), mesh.triangles.len()),
-                    None => (1.0, 1),
-                },
-                Geometry::Mesh { .. } => (1.0, 1),
-            };
-            // In pbrt, each triangle and each patch of a mesh is a light of this power.
-            let n_lights = match kind {
-                "trianglemesh" | "plymesh" | "loopsubdiv" => n_shapes,
-                "bilinearmesh" => (shape.numbers("indices").len() / 4).max(1),
-                _ => 1,
-            };
-            let sides = if is_two_sided { 2.0 } else { 1.0 };
-            radiance *= power * n_lights as f64 / (PI * area * sides);
-        }
-        told.extend(light.complaints());
-        told.into_iter().for_each(|what| self.tell(format!("`{}`: {what}", printable::name(name))));
-        let radiance = radiance.as_vec3();
-        let radiance = if radiance.is_finite() { radiance.max(Vec3::ZERO) } else { Vec3::ZERO };
-        let value = match light.string("filename").and_then(|image| self.file(image)) {
-            Some(file) => {
-                let mut source = TextureSource::image(file);
-                if let TextureSource::Image { tint, .. } = &mut source {
-                    *tint = Rgb(radiance);
-                }
-                ColorValue::Texture(self.texture_name("light", source))
-            }
-            None => ColorValue::Rgb(radiance),
-        };
-        (value, is_two_sided)
     }
 
     /// Adds an item to the scene.
@@ -596,16 +446,6 @@ impl<'a> Builder<'a> {
         let first = left_out.next().map_or_else(String::new, |first| format!(": {}", &**first));
         Err(SceneError::in_file(self.path, format!("has no shape that can be shown{first}")))
     }
-}
-
-/// Area of a mesh in the world, square metres.
-fn area_of(mesh: &Mesh, world: &DAffine3) -> f64 {
-    let corner = |vertex: u32| world.transform_vector3(mesh.positions[vertex as usize].as_dvec3());
-    let area = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(corner);
-        0.5 * (b - a).cross(c - a).length()
-    };
-    mesh.triangles.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// The scale of a matrix, if it is the same in all directions as far as seven digits in a file can say.

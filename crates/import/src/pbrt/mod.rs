@@ -1,16 +1,19 @@
 //! pbrt, version 4: a scene in text, with PLY files beside it.
 //!
 //! Words (`tokens`), arguments (`cursor`, `params`) and directives (`directives`) with the graphics state (`state`); what
-//! they describe is collected (`build`, `surfaces`) from `shapes`, `materials`, `textures`, `lights` and `spectrum`, and the camera
-//! and film before the world are in `view`. Lengths are metres. Start reading at [`read`].
+//! they describe is collected (`build`, `geometry`, `area_lights`, `surfaces`) from `shapes`, `materials`, `textures`,
+//! `lights` and `spectrum`, and the camera and film before the world are in `view`. Lengths are metres. Start reading at
+//! [`read`].
 //!
 //! Source of what a directive means: the description of the format, "pbrt-v4 Input File Format", and Pharr, Jakob and
 //! Humphreys 2023, "Physically Based Rendering", fourth edition.
 
+mod area_lights;
 mod build;
 mod cursor;
 mod curves;
 mod directives;
+mod geometry;
 mod lights;
 mod materials;
 mod named_spectra;
