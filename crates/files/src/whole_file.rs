@@ -422,7 +422,7 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
 fn remove_left_over(target: &Path, from: u32, to: u32) {
     for number in from..to {
         let name = part_name(target, Some(number));
-        let Ok(file) = OpenOptions::new().read(true).open(&name) else { return };
+        let Ok(file) = without_waiting(OpenOptions::new().read(true)).open(&name) else { return };
         if file.try_lock().is_ok() && is_at(&file, &name) {
             // Without permission to remove it, it stays.
             let _ = std::fs::remove_file(&name);
@@ -600,12 +600,13 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_pipe_in_place_of_a_lock_is_not_waited_for() {
+    fn a_pipe_in_place_of_a_lock_or_a_left_over_file_is_not_waited_for() {
         use rustix::fs::{CWD, Mode, mkfifoat};
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         let claimed = part_name(&path, None);
-        for pipe in [&folder.path().join("lock"), &claimed] {
+        let left_over = part_name(&path, Some(1));
+        for pipe in [&folder.path().join("lock"), &claimed, &left_over] {
             mkfifoat(CWD, pipe, Mode::RUSR | Mode::WUSR).unwrap();
         }
         assert!(lock_file(&folder.path().join("lock")).is_err());
