@@ -4,7 +4,7 @@ use bevy_ecs::prelude::World;
 use firstlight::export::export;
 use firstlight::format::property::SkyProperty;
 use firstlight::format::scene_format::SceneFormat;
-use firstlight::format::value::{ColorValue, ScalarValue};
+use firstlight::format::value::ColorValue;
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::{Film, Material};
 use firstlight::scene::file::{MaterialPart, SceneFile};
@@ -118,28 +118,41 @@ fn surfaces_come_back_with_all_their_numbers() {
     }
 }
 
-/// Mitsuba has no surface that scatters diffusely to both sides: half of a leaf is diffuse, the other only transmits.
+/// Mitsuba has no surface that scatters diffusely to both sides: a share of a leaf is diffuse, the other only transmits,
+/// each with a colour that is above 1 in the channels in which it returns more than its share.
 #[test]
-fn a_translucent_surface_is_a_blend_in_mitsuba() {
-    let text = "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), materials: {\"leaf\": \
-                translucent(reflectance: (0.25, 0.125, 0.5), transmittance: 0.5)}, objects: [sphere(center: (0, 1, 0), \
-                radius: 0.25, material: \"leaf\")])";
-    let folder = tempfile::tempdir().unwrap();
-    let from = written(folder.path(), text);
-    let (_, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
-    assert!(told.is_empty(), "{told:?}");
-    let part = |name: &str| after.file.materials.get(name).unwrap();
-    let Material::Blend { weight: ScalarValue::Number(0.5), a, b, .. } =
-        part(after.file.objects[0].material().unwrap())
-    else {
-        panic!("{:?}", after.file.materials)
-    };
-    assert_eq!(*part(a), Material::Diffuse { albedo: ColorValue::Rgb(Vec3::new(0.5, 0.25, 1.0)) });
-    let Material::Disney { base_color, thin_walled: true, diffuse_transmission, transmission, .. } = part(b) else {
-        panic!("{:?}", part(b))
-    };
-    assert_eq!(*base_color, ColorValue::grey(1.0));
-    assert_eq!([diffuse_transmission, transmission], [&ScalarValue::Number(2.0), &ScalarValue::Number(0.0)]);
+fn a_translucent_surface_comes_back_from_a_blend_of_mitsuba() {
+    let image = image::Rgb32FImage::from_fn(2, 1, |x, _| image::Rgb([0.9, 0.5 * x as f32, 0.0]));
+    for (given, wanted) in [
+        ("reflectance: (0.25, 0.125, 0.5), transmittance: 0.5", [[0.25, 0.125, 0.5], [0.5; 3]]),
+        ("reflectance: (0.9, 0.05, 0.05), transmittance: (0.05, 0.9, 0.9)", [[0.9, 0.05, 0.05], [0.05, 0.9, 0.9]]),
+        ("reflectance: 0, transmittance: (0.5, 0, 0)", [[0.0; 3], [0.5, 0.0, 0.0]]),
+        // Scaled, as it is shown.
+        ("reflectance: (1, 0.5, 0), transmittance: (1, 0, 0.5)", [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]]),
+        ("reflectance: \"image\", transmittance: (0.1, 0.25, 1)", [[0.9, 0.25, 0.0], [0.1, 0.25, 1.0]]),
+        ("reflectance: \"squares\", transmittance: (0.1, 0.2, 0.9)", [[0.9, 0.4, 0.05], [0.1, 0.2, 0.9]]),
+    ] {
+        let text = format!(
+            "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), textures: {{\"image\": \
+             image(file: \"image.exr\"), \"squares\": checker(a: (0.9, 0.8, 0), b: (0.9, 0, 0.1))}}, materials: \
+             {{\"leaf\": translucent({given})}}, objects: [sphere(center: (0, 1, 0), radius: 0.25, material: \"leaf\")])"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        image.save(folder.path().join("image.exr")).unwrap();
+        let from = written(folder.path(), &text);
+        let (mut world, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        assert!(told.is_empty() && after.warnings.is_empty(), "{given}: {told:?} {:?}", after.warnings);
+        let whole = whole_scene(&mut world, &after);
+        let part = whole.file.materials.get(whole.file.objects[0].material().unwrap()).unwrap();
+        let Material::Translucent { reflectance, transmittance } = part else { panic!("{given}: {part:?}") };
+        let mean = |color: &ColorValue| match color {
+            ColorValue::Rgb(rgb) => *rgb,
+            ColorValue::Texture(name) => whole.textures[name].texture.mean(),
+        };
+        for (found, wanted) in [reflectance, transmittance].map(mean).into_iter().zip(wanted) {
+            assert!(found.abs_diff_eq(Vec3::from(wanted), 2e-3), "{given}: {part:?}, {found}");
+        }
+    }
 }
 
 /// Mean radiance of the four quarters of an image of 64 × 48 pixels.
