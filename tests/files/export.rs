@@ -234,6 +234,63 @@ fn the_light_of_every_quarter_of_the_image_stays() {
     }
 }
 
+/// Meshes without texture coordinates show a texture in each triangle; checkers are turned, with unequal squares.
+#[test]
+fn patterns_stay_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = "textures: {\"c\": checker(a: (0.9, 0.1, 0), b: (0, 0.2, 0.8), squares: (3, 4))}, objects: [ \
+                mesh(source: builtin(\"cube\"), material: \"m\", transform: (rotate: (30, 40, 0))), \
+                mesh(source: builtin(\"bored-block\"), material: \"m\", \
+                     transform: (translate: (2.2, 0, 0), scale: (-0.8, 0.9, 0.7)))";
+    let turned = |degrees: i32| {
+        format!(
+            "textures: {{\"c\": checker(a: (0.9, 0.1, 0), b: (0, 0.2, 0.8), squares: (1.5, 4), rotate: {degrees}, \
+             offset: (0.2, 0.1))}}, objects: [quad(corner: (-1, -1, 0), edge_u: (3, 0, 0), edge_v: (0, 2, 0), \
+             material: \"m\")"
+        )
+    };
+    let all = SceneFormat::ALL.map(|format| (format, bare.to_owned()));
+    let of_mitsuba = [30, 90, 130, -50].map(|degrees| (SceneFormat::Mitsuba, turned(degrees)));
+    for (format, what) in all.into_iter().chain(of_mitsuba) {
+        let text = format!(
+            "(camera: (eye: (1, 0.5, 6), look_at: (0.8, 0, 0), vfov: 40), film: (width: 64, height: 48), max_depth: 2,
+              environment: constant(1), materials: {{\"m\": diffuse(albedo: \"c\")}}, {what}])"
+        );
+        let from = written(folder.path(), &text);
+        let (mut world, scene) = open(from.clone());
+        let wanted = quarters(&mut world, &scene);
+        let (mut world, scene, told) = there_and_back(from, format, folder.path());
+        assert!(told.is_empty() && scene.warnings.is_empty(), "{what}: {told:?} {:?}", scene.warnings);
+        let found = quarters(&mut world, &scene);
+        for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
+            let ratio = *found / *wanted;
+            assert!((ratio - 1.0).abs().max_element() < 0.02, "{format:?} {what}, quarter {k}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn what_firstlight_leaves_out_of_its_own_files_is_told() {
+    for (material, expected) in [
+        ("glass(absorption: (1, 0, 2))", "`m`: its absorption is a medium, which firstlight leaves out"),
+        (
+            "rough_glass(alpha: 0.2, absorption: (1, 0, 2))",
+            "`m`: its absorption is a medium, which firstlight leaves out",
+        ),
+        ("translucent(reflectance: \"c\", transmittance: 0.2)", "exceed 1 together, it is brighter"),
+    ] {
+        let text = format!(
+            "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), textures: {{\"c\": \
+             checker(a: 0.9, b: 0)}}, materials: {{\"m\": {material}}}, objects: [sphere(center: (0, 1, 0), \
+             radius: 0.25, material: \"m\")])"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let from = written(folder.path(), &text);
+        let (_, _, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        assert!(told.len() == 1 && told[0].contains(expected), "{material}: {told:?}");
+    }
+}
+
 /// Images of lights that the formats have: a projector and a spot of Mitsuba, a projector of pbrt.
 #[test]
 fn projected_images_stay_where_they_are() {
