@@ -54,7 +54,7 @@ fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     let n = sequence.len() as u32;
     let frames = part.frames(n).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
     let sequence = sequence.part(frames);
-    let args = &sequence.opened(args)?;
+    let args = &sequence.opened(&args.of_image()?)?;
     let mut files = args.overwrite.files();
     let progress = RenderProgress::new();
     let job = load(args, &mut files, &progress)?;

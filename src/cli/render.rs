@@ -60,6 +60,7 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     let jobs = command.jobs()?;
     // An error in the last argument should be reported before the others are rendered.
     crate::cli::args::check_scenes(jobs.iter().map(|job| &job.scene))?;
+    let jobs = jobs.iter().map(RenderArgs::of_image).collect::<Result<Vec<_>, _>>()?;
     for job in &jobs {
         job.picture_format()?;
     }
