@@ -168,7 +168,7 @@ fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
 }
 
 /// The message for a failure to write.
-fn reason(error: &(dyn Error + 'static)) -> String {
+pub fn reason(error: &(dyn Error + 'static)) -> String {
     match io_kind(error) {
         Some(ErrorKind::StorageFull) => "the disk is full".to_owned(),
         Some(ErrorKind::QuotaExceeded) => "the disk quota is exceeded".to_owned(),
