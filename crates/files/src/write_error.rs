@@ -44,6 +44,9 @@ pub enum WriteError {
     /// The file exists and is not a recording.
     #[error("{}: exists and is not a recording: choose another name", .0.display())]
     NotRecording(PathBuf),
+    /// The file exists, and firstlight has not written it.
+    #[error("{}: exists and was not written by firstlight: choose another folder", .0.display())]
+    NotOwn(PathBuf),
     /// The extension is not that of a supported format.
     #[error("{}: unsupported output format .{extension}: use .png, .jpg or .exr", path.display())]
     Format {
