@@ -4,6 +4,7 @@ use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
 use crate::cli::frames::FramesArg;
 use crate::cli::job::RenderJob;
+use crate::cli::number::counted;
 use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::RenderArgs;
 use crate::cli::sequence::{Sequence, SequenceMotion};
@@ -74,11 +75,12 @@ pub(super) fn animate(
         n => format!(", replacing {n} existing files"),
     };
     let kept = if n_kept > 0 { format!(", {n_kept} complete already") } else { String::new() };
-    inform(format_args!("{} to {}: {n} frames{kept}{replaced}", first.display(), last.display()));
+    let frames = counted(n, "frame");
+    inform(format_args!("{} to {}: {frames}{kept}{replaced}", first.display(), last.display()));
     if let Some(path) = &args.video {
         let images = sequence.numbers.clone().map(|number| sequence.path(&args.output, number));
         video::write(path, images, job.fps(args), replace, stop)?;
-        inform(format_args!("{}: {n} frames at {} per second", path.display(), job.fps(args)));
+        inform(format_args!("{}: {frames} at {} per second", path.display(), job.fps(args)));
     }
     Ok(())
 }

@@ -186,6 +186,10 @@ impl SceneArgs {
         progress: &(dyn Fn(&str) + Sync),
     ) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
+        let given = Path::new(&self.scene);
+        if is_archive(given) && given.is_file() {
+            files.read(given)?;
+        }
         if let Some(path) = source.path() {
             files.read(path)?;
             check_film_source(&source)?;

@@ -4,6 +4,7 @@
 use crate::cli::failure::Failure;
 use firstlight::console::is_verbose;
 pub use firstlight::console::{Bar, Message, inform, lines, prints_to_terminal, remark};
+use firstlight::files::write_error::reason;
 use firstlight::scene::{Severity, Warning, Warnings};
 
 /// Prints what there is to say about a scene: a line per kind, or all with `--verbose`.
@@ -29,11 +30,11 @@ pub fn tell(warnings: &Warnings) {
 /// Writes a binary result to standard output.
 pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     firstlight::console::print_bytes(bytes)
-        .map_err(|error| Failure::Failed(format!("cannot write to standard output: {error}")))
+        .map_err(|error| Failure::Failed(format!("cannot write to standard output: {}", reason(&error))))
 }
 
 /// Prints part of a command's result.
 pub fn print(message: impl Message) -> Result<(), Failure> {
     firstlight::console::print(message)
-        .map_err(|error| Failure::Failed(format!("cannot write to standard output: {error}")))
+        .map_err(|error| Failure::Failed(format!("cannot write to standard output: {}", reason(&error))))
 }

@@ -10,11 +10,15 @@ use firstlight::render::{DenoiseSource, Denoised, Film, SurfaceGuides, denoise_s
 pub struct DenoiseArgs {
     /// Save the image denoised: raw and filtered combined, so that it converges to the raw image
     ///
-    /// With --layers, the denoised image is the layer `denoised`, and the others stay raw. The film stays raw, and --error
+    /// Also without this option where the scene is a denoised image, unless --no-denoise or --region is given. With
+    /// --layers, the denoised image is the layer `denoised`, and the others stay raw. The film stays raw, and --error
     /// counts for the raw image unless --error-of denoised is given.
     #[arg(long, conflicts_with = "region")]
     pub denoise: bool,
-    /// The filter of --denoise and --layers denoised [default: own].
+    /// Save the image raw, also for a scene that is a denoised image.
+    #[arg(help_heading = "Output", long, conflicts_with = "denoise")]
+    pub no_denoise: bool,
+    /// The filter of --denoise and --layers denoised [default: own, or that of the image that is opened].
     #[arg(help_heading = "Output", long, value_enum, value_name = "FILTER")]
     pub denoiser: Option<DenoiserArg>,
     /// The image whose error --error counts [default: raw].
@@ -50,6 +54,15 @@ impl DenoiseArgs {
             _ => return Ok(()),
         };
         Err(Failure::Usage(format!("{option} needs an image that is denoised: add --denoise or --layers denoised")))
+    }
+
+    /// Denoises like an image that is opened, unless it is told otherwise.
+    ///
+    /// - `filter`: the name in its metadata.
+    pub fn like(&mut self, filter: &str) {
+        self.denoise = true;
+        let of_image = if filter == DenoiseFilter::Oidn.name() { DenoiserArg::Oidn } else { DenoiserArg::Own };
+        self.denoiser.get_or_insert(of_image);
     }
 
     /// Name of the denoiser in image metadata.

@@ -4,7 +4,7 @@ use crate::cli::console::{inform, print_bytes};
 use crate::cli::failure::Failure;
 use clap::{Args, Command};
 use clap_mangen::Man;
-use firstlight::scene::whole_file::write_whole;
+use firstlight::scene::whole_file::{check_own, write_whole};
 use std::path::PathBuf;
 
 #[derive(Args, Clone, Debug)]
@@ -24,9 +24,12 @@ pub fn run(args: &ManArgs, program: Command) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::Failed(format!("{}: cannot create the folder: {error}", folder.display())))?;
     let pages: Vec<&Command> = std::iter::once(&main).chain(main.get_subcommands()).collect();
+    let path = |command: &Command| folder.join(format!("{}.1", name(command)));
     for command in &pages {
-        let path = folder.join(format!("{}.1", name(command)));
-        write_whole(&path, &page(command)?)?;
+        check_own(&path(command), |text| text.lines().any(|line| line.starts_with(".TH firstlight")))?;
+    }
+    for command in &pages {
+        write_whole(&path(command), &page(command)?)?;
     }
     inform(format_args!("{}: {} manual pages saved", folder.display(), pages.len()));
     Ok(())

@@ -9,13 +9,13 @@ use crate::cli::denoising::DenoiserArg;
 use crate::cli::failure::Failure;
 use crate::cli::film_denoiser::FilmDenoiser;
 use crate::cli::layers::LayerArgs;
-use crate::cli::number::percent;
+use crate::cli::number::{percent, samples_per_pixel};
 use crate::cli::part::numbered;
 use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::parse_range;
 use crate::cli::stop::Stop;
 use clap::Args;
-use firstlight::cluster::coverage::{Coverage, Duplicate, groups, in_words};
+use firstlight::cluster::coverage::{Coverage, Duplicate, groups, missing_in_words};
 use firstlight::cluster::part::Part;
 use firstlight::frame::{
     FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, check_replaced_film, read_film_file,
@@ -109,7 +109,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let mut set = FilmSet::read(args.films.clone())?;
     let missing = set.missing(args.samples.clone());
     if !missing.is_empty() {
-        let message = format!("samples {} are missing", in_words(&missing));
+        let message = missing_in_words(&missing);
         if !args.allow_missing {
             let advice = "render them, or merge without them with --allow-missing";
             return Err(Failure::Failed(format!("{message}: {advice}")));
@@ -179,7 +179,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
     let error = error.map_or_else(String::new, |error| format!(", estimated error {}{of_denoised}", percent(error)));
     let image = args.image.as_ref().map_or_else(String::new, |path| format!(", image saved to {}", path.display()));
     let replaced = replaced(files.replaced());
-    inform(format_args!("{}: {} samples per pixel{error}{image}{replaced}", output.display(), film.spp()));
+    inform(format_args!("{}: {}{error}{image}{replaced}", output.display(), samples_per_pixel(film.spp())));
     Ok(())
 }
 

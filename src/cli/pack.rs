@@ -3,6 +3,7 @@
 use crate::cli::args::{OverwriteArgs, SceneArgs, open_options, replaced};
 use crate::cli::console::{inform, remark};
 use crate::cli::failure::Failure;
+use crate::cli::number::counted;
 use clap::Args;
 use firstlight::cluster::engine::shell_word;
 use firstlight::cluster::pack::{PackError, Package};
@@ -51,12 +52,13 @@ pub fn run(args: &PackArgs) -> Result<(), Failure> {
     package.opening = args.scene.opening()?;
     tell_outside(&package);
     package.write_zip(out)?;
-    let (output, n) = (args.output.display(), package.names().count());
+    let (output, files_in_it) = (args.output.display(), counted(package.names().count(), "file"));
     let replaced = replaced(files.replaced());
     let environment = package.environment.as_ref().map(|name| format!(" --env {}", shell_word(name)));
     let options = open_options(&package.opening).map(|option| format!(" {}", shell_word(&String::from(option))));
     let options = options.chain(environment);
     let options = options.collect::<String>();
-    inform(format_args!("{output}: {n} files{replaced}; open it, or unpack it and open {}{options}", package.scene));
+    let scene = &package.scene;
+    inform(format_args!("{output}: {files_in_it}{replaced}; open it, or unpack it and open {scene}{options}"));
     Ok(())
 }

@@ -54,7 +54,7 @@ fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     let n = sequence.len() as u32;
     let frames = part.frames(n).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
     let sequence = sequence.part(frames);
-    let args = &sequence.opened(args)?;
+    let args = &sequence.opened(&args.of_image()?)?;
     let mut files = args.overwrite.files();
     let progress = RenderProgress::new();
     let job = load(args, &mut files, &progress)?;
@@ -208,11 +208,9 @@ impl PartWork<'_> {
     /// Such as `part 3/64, samples 128 to 191`.
     fn name(&self) -> String {
         let Part { count, .. } = self.part;
-        let samples = in_words(std::slice::from_ref(&self.samples));
         let what = match self.region {
             Some(Region { start, end }) => format!("pixels {},{} to {},{}", start.x, start.y, end.x - 1, end.y - 1),
-            None if self.samples.len() == 1 => format!("sample {samples}"),
-            None => format!("samples {samples}"),
+            None => in_words(std::slice::from_ref(&self.samples)),
         };
         format!("part {}/{count}, {what}", self.part.number())
     }
@@ -302,7 +300,7 @@ fn check_samples(film: &Film, samples: &Range<u32>, region: Option<&Region>, pat
             .find(|(start, end)| start < end && !(is_ours && samples.start <= *start && *end <= samples.end));
         if let Some(&(start, end)) = others {
             let message = format!(
-                "{}: has samples {} of other parts: choose another --film for each part, such as part-{NUMBER}.exr",
+                "{}: has {} of other parts: choose another --film for each part, such as part-{NUMBER}.exr",
                 path.display(),
                 in_words(&[start..end])
             );

@@ -6,7 +6,7 @@ use crate::cli::console::{inform, print, prints_to_terminal, remark};
 use crate::cli::denoising::ErrorOf;
 use crate::cli::failure::Failure;
 use crate::cli::job::{RenderJob, room_to_write};
-use crate::cli::number::{percent, samples_per_pixel};
+use crate::cli::number::{counted, percent, samples_per_pixel};
 use crate::cli::part;
 use crate::cli::progress::RenderProgress;
 use crate::cli::render_args::{RenderArgs, RenderCommand};
@@ -60,6 +60,7 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     let jobs = command.jobs()?;
     // An error in the last argument should be reported before the others are rendered.
     crate::cli::args::check_scenes(jobs.iter().map(|job| &job.scene))?;
+    let jobs = jobs.iter().map(RenderArgs::of_image).collect::<Result<Vec<_>, _>>()?;
     for job in &jobs {
         job.picture_format()?;
     }
@@ -188,8 +189,9 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
-        let message = format!("the image was saved in the middle of a pass; the new one has {} samples", shot.spp);
-        progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
+        let samples = counted(shot.spp as usize, "sample");
+        let message = format!("the image was saved in the middle of a pass; the new one has {samples} in every pixel");
+        progress.suspend(|| remark(format_args!("warning: {message}")));
     }
     let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());
     let mut film = job.film(args, kept)?;

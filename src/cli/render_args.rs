@@ -1,6 +1,7 @@
 //! Arguments of `firstlight render`.
 
 use crate::cli::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
+use crate::cli::console::remark;
 use crate::cli::denoising::DenoiseArgs;
 use crate::cli::failure::Failure;
 use crate::cli::frames::{FramesArg, parse_frames};
@@ -11,6 +12,7 @@ use crate::cli::number::{
 use clap::{Arg, Args, ValueEnum};
 use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
+use firstlight::scene::{ImageMetadata, SceneSource};
 use std::ffi::{OsStr, OsString};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -292,6 +294,25 @@ impl RenderArgs {
         let mut args = self.clone();
         args.layers.denoise(&mut args.denoise.denoise);
         args
+    }
+
+    /// These, where a scene that is a denoised image makes another one.
+    pub fn of_image(&self) -> Result<Self, Failure> {
+        if self.wants_denoised() || self.denoise.no_denoise {
+            return Ok(self.clone());
+        }
+        let SceneSource::Picture(path) = self.scene.source()? else { return Ok(self.clone()) };
+        // What is wrong with it is told when it is opened.
+        let Some(filter) = ImageMetadata::read(&path).ok().and_then(|image| image.denoised) else {
+            return Ok(self.clone());
+        };
+        if self.region.is_some() {
+            remark(format_args!("warning: {} is denoised: with --region, the new image is raw", path.display()));
+            return Ok(self.clone());
+        }
+        let mut args = self.clone();
+        args.denoise.like(&filter);
+        Ok(args.with_denoised_layer())
     }
 
     /// Whether the image, or a layer of it, is denoised.

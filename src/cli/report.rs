@@ -15,10 +15,10 @@ use firstlight::render::{
 };
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, LinearPicture, ReferenceImage, ReferenceKey, ReferenceStore,
-    SceneOutcome, ZTest, against_text, csv, denoised_curves, denoised_text, foreign_share, measure_curve, page,
-    summary_text, timed, write_difference,
+    SceneOutcome, ZTest, against_text, csv, denoised_curves, denoised_text, foreign_share, is_csv, is_page,
+    measure_curve, page, summary_text, timed, write_difference,
 };
-use firstlight::scene::whole_file::write_whole;
+use firstlight::scene::whole_file::{check_own, write_whole};
 use firstlight::scene::{
     Animation, BUILTIN_SCENES, DisplaySettings, Extraction, Files, FilmSize, LoadedScene, Moment, Rendering,
     SceneInputs, Trees,
@@ -114,6 +114,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     let (html, table) = (args.output.join("index.html"), args.output.join("steps.csv"));
     let mut files = OverwriteArgs::default().files();
     files.read_all(args.reference.iter().chain(&args.reference_variance).cloned())?;
+    check_own(&html, is_page).and_then(|()| check_own(&table, is_csv))?;
     files.write_all([html.clone(), table.clone()].into_iter().chain(args.difference.clone()), files.replace())?;
     let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))

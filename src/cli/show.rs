@@ -189,5 +189,5 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         part_by: None,
         save_every: 60.0,
     };
-    render::run_one(&args, stop)
+    render::run_one(&args.of_image()?, stop)
 }

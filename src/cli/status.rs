@@ -3,7 +3,7 @@
 use crate::cli::console::{inform, print, remark};
 use crate::cli::failure::Failure;
 use crate::cli::merge::{FilmSet, note_of};
-use crate::cli::number::percent;
+use crate::cli::number::{counted, percent, samples_per_pixel};
 use crate::cli::work::ALL;
 use clap::Args;
 use firstlight::cluster::coverage::in_words;
@@ -88,10 +88,11 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
         }));
     }
     let target = job.error.map_or_else(String::new, |error| format!(", to an error of {}", percent(error)));
-    print(format!("{}: {} in {} parts{target}", folder.display(), job.scene, job.parts))?;
+    let parts_of_job = counted(job.parts as usize, "part");
+    print(format!("{}: {} in {parts_of_job}{target}", folder.display(), job.scene))?;
     for (number, round) in (1..).zip(rounds.0.iter().filter(|round| round.merged)) {
         let error = round.error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
-        print(format!("round {number}: {} samples per pixel{error}", round.samples.1))?;
+        print(format!("round {number}: {}{error}", samples_per_pixel(round.samples.1)))?;
     }
     if is_done {
         return print(format!("done: {}", folder.join(ALL[1]).display()));
@@ -100,7 +101,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     let left = left.map_or_else(String::new, |seconds| format!(", about {} left in this round", duration(seconds)));
     let samples = in_words(&[round.range()]);
     print(format!(
-        "round {number}, samples {samples}: {done} of {count} parts done, {begun} begun, {:.0} %{left}",
+        "round {number}, {samples}: {done} of {count} parts done, {begun} begun, {:.0} %{left}",
         100.0 * share
     ))
 }
@@ -126,7 +127,8 @@ fn frames(args: &StatusArgs, job: &Job, rounds: &Rounds, n: u32) -> Result<(), F
             "seconds_left_in_round": left.filter(|_| !missing.is_empty()),
         }));
     }
-    print(format!("{}: {}, {n} frames in {} parts", folder.display(), job.scene, job.parts))?;
+    let (frames, parts) = (counted(n as usize, "frame"), counted(job.parts as usize, "part"));
+    print(format!("{}: {}, {frames} in {parts}", folder.display(), job.scene))?;
     let Some(next) = missing.first() else {
         return print(format!("done: {}", folder.join("frames").display()));
     };
@@ -159,6 +161,6 @@ fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> R
     Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
         .write(path, Replace::AllButFilms)?;
     let error = film.error_estimate().map(|error| format!(", estimated error {}", percent(error.relative)));
-    inform(format_args!("{}: {} samples per pixel{}", path.display(), film.spp(), error.unwrap_or_default()));
+    inform(format_args!("{}: {}{}", path.display(), samples_per_pixel(film.spp()), error.unwrap_or_default()));
     Ok(())
 }

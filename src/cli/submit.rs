@@ -5,7 +5,9 @@ use crate::cli::args::{FilterArg, IntegratorArg, SceneArgs, open_options};
 use crate::cli::console::inform;
 use crate::cli::failure::Failure;
 use crate::cli::frames::{FramesArg, parse_frames};
-use crate::cli::number::{at_least_one, between, parse_fps, parse_positive, parse_share, parse_size, parse_stops};
+use crate::cli::number::{
+    at_least_one, between, counted, parse_fps, parse_positive, parse_share, parse_size, parse_stops, samples_per_pixel,
+};
 use crate::cli::render::Command;
 use crate::cli::render_args::file_stem;
 use crate::cli::work::render_words;
@@ -201,11 +203,12 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         claim: args.claim.clone(),
     };
     write_job(&folder, &job, &options, package.ok())?;
-    let (name, parts) = (folder.display(), job.parts);
-    let frames = job.frames.map_or_else(String::new, |(start, end)| format!("{} frames, ", end - start));
+    let (name, parts) = (folder.display(), counted(job.parts as usize, "part"));
+    let frames = |(start, end): (u32, u32)| counted((end - start) as usize, "frame") + ", ";
+    let frames = job.frames.map_or_else(String::new, frames);
     inform(format_args!(
-        "{name}: {frames}{parts} parts, {} samples per pixel{}",
-        job.spp,
+        "{name}: {frames}{parts}, {}{}",
+        samples_per_pixel(job.spp),
         if job.error.is_some() { " in the first round" } else { "" }
     ));
     hand_over(engine, &options.folder, args.dry_run)

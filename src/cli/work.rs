@@ -4,12 +4,12 @@
 use crate::cli::console::{inform, print};
 use crate::cli::failure::Failure;
 use crate::cli::merge::{FilmSet, note_of};
-use crate::cli::number::{at_least_one, between, percent};
+use crate::cli::number::{at_least_one, between, percent, samples_per_pixel};
 use crate::cli::part;
 use crate::cli::render::Command;
 use crate::cli::stop::Stop;
 use clap::Args;
-use firstlight::cluster::coverage::in_words;
+use firstlight::cluster::coverage::{in_words, missing_in_words};
 use firstlight::cluster::job::{Job, JobError, JobRound, ROUNDS, Rounds};
 use firstlight::cluster::part::Part;
 use firstlight::frame::{FilmFile, Print, read_film_summary, write_film_with_features};
@@ -108,7 +108,7 @@ impl WorkOrder {
         if part.index >= count || round.merged {
             let what = match self.job.frames {
                 Some(_) => "frames".to_owned(),
-                None => format!("samples {}", in_words(&[round.range()])),
+                None => in_words(&[round.range()]),
             };
             let part = part.number();
             inform(format_args!("part {part}/{parts} of round {number}, {what}: there is nothing to do"));
@@ -188,8 +188,8 @@ impl WorkOrder {
         let set = FilmSet::read(before.into_iter().chain(films).collect())?;
         let missing = set.missing(Some(0..round.samples.1));
         if !missing.is_empty() && !allow_missing {
-            let missing = in_words(&missing);
-            let message = format!("error: round {number}: samples {missing} are missing: their parts are not done yet");
+            let missing = missing_in_words(&missing);
+            let message = format!("error: round {number}: {missing}: their parts are not done yet");
             return Err(Failure::Retry(message));
         }
         let FilmFile { film, shot, features, .. } = set.add_up(&|done, n| inform_of(done, n))?;
@@ -210,7 +210,7 @@ impl WorkOrder {
         let error = estimate.map(|estimate| estimate.relative);
         rounds.0[number - 1] = JobRound { merged: true, error, ..round.clone() };
         let told = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
-        inform(format_args!("round {number}: {} samples per pixel{told}: {}", film.spp(), all.display()));
+        inform(format_args!("round {number}: {}{told}: {}", samples_per_pixel(film.spp()), all.display()));
         let is_good = self.job.error.zip(error).is_some_and(|(target, error)| error <= target);
         let wanted = self.job.error.zip(estimate).map(|(target, estimate)| estimate.spp_for(target));
         let end = self.job.next_end(round.samples.1, Some(wanted.unwrap_or(u32::MAX))).filter(|_| !is_good);
@@ -241,7 +241,7 @@ impl WorkOrder {
     fn tell_next(&self, rounds: &Rounds) {
         match rounds.open().and_then(|number| Some((number, rounds.get(number)?))) {
             Some((number, round)) => {
-                inform(format_args!("next: round {number}, samples {}", in_words(&[round.range()])));
+                inform(format_args!("next: round {number}, {}", in_words(&[round.range()])));
             }
             None => inform("done"),
         }

@@ -155,8 +155,22 @@ pub fn joined(mut ranges: Vec<Range<u32>>) -> Vec<Range<u32>> {
     joined
 }
 
-/// Sample numbers in words: `0 to 63, 128 and 130 to 191`.
+/// Samples in words: `sample 3`, `samples 0 to 63, 128 and 130 to 191`.
 pub fn in_words(ranges: &[Range<u32>]) -> String {
+    let noun = if is_one(ranges) { "sample" } else { "samples" };
+    format!("{noun} {}", numbers_in_words(ranges))
+}
+
+/// The same as missing: `sample 3 is missing`.
+pub fn missing_in_words(ranges: &[Range<u32>]) -> String {
+    format!("{} {} missing", in_words(ranges), if is_one(ranges) { "is" } else { "are" })
+}
+
+fn is_one(ranges: &[Range<u32>]) -> bool {
+    ranges.iter().map(|range| range.len() as u64).sum::<u64>() == 1
+}
+
+fn numbers_in_words(ranges: &[Range<u32>]) -> String {
     /// Nobody reads more.
     const MOST: usize = 6;
     let one = |range: &Range<u32>| match range.len() {
@@ -249,7 +263,9 @@ mod tests {
         let mut twice = parts.clone();
         twice.add(&film(&[&[(10, 14)], &[(10, 14)]]));
         assert_eq!(twice.duplicate(), Some(Duplicate { films: [1, 3], samples: 10..12 }));
-        assert_eq!(in_words(&parts.missing(0..21)), "4 to 7, 12 to 15 and 20");
+        assert_eq!(in_words(&parts.missing(0..21)), "samples 4 to 7, 12 to 15 and 20");
+        assert_eq!(missing_in_words(&[3..4]), "sample 3 is missing");
+        assert_eq!(missing_in_words(&[3..5]), "samples 3 to 4 are missing");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! and sums on no order, so a replay gives the same image, bit for bit, with any number of threads; times are stored
 //! for information only.
 
+use crate::files::whole_file::is_foreign;
 use crate::frame::command::Command;
 use crate::frame::core::status::MessageKind;
 use crate::frame::input::CommandQueue;
@@ -13,14 +14,11 @@ use crate::scene::{FileKind, InputFile, ReadError, WriteError, check_film_size};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Format version; increased by incompatible changes.
 pub(super) const FORMAT: u32 = 1;
-
-/// Maximum size of the first line in bytes.
-const HEADER_BYTES: u64 = 1 << 16;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,20 +111,10 @@ pub fn record(
 /// # Errors
 /// If there is another file.
 pub fn check_recordable(path: &Path) -> Result<(), WriteError> {
-    let Ok(info) = std::fs::metadata(path) else { return Ok(()) };
-    // Paths that are not files are rejected by the writer.
-    if !info.is_file() || info.len() == 0 {
-        return Ok(());
-    }
-    let mut start = Vec::new();
-    let read = InputFile::open_within(path, FileKind::Recording, u64::MAX)
-        .map_err(std::io::Error::other)
-        .and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
-    let text = String::from_utf8_lossy(&start);
-    let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<RecordingHeader>(line).is_ok());
-    match read {
-        Ok(_) if is_recording => Ok(()),
-        _ => Err(WriteError::NotRecording(path.to_path_buf())),
+    let is_header = |line: &str| ron::from_str::<RecordingHeader>(line).is_ok();
+    match is_foreign(path, |text| text.lines().next().is_some_and(is_header)) {
+        true => Err(WriteError::NotRecording(path.to_path_buf())),
+        false => Ok(()),
     }
 }
 

@@ -16,13 +16,20 @@ const TARGETS: [f64; 3] = [0.10, 0.03, 0.01];
 /// Factor by which an estimate may be off before the page highlights it.
 const CALIBRATION: f64 = 1.25;
 
+const TITLE: &str = "<title>Speed against error</title>";
+
+/// Whether a text begins as a page does.
+pub fn is_page(text: &str) -> bool {
+    text.lines().take(8).any(|line| line == TITLE)
+}
+
 /// Builds the page. `command` is the command line, so that the report can be repeated. `interrupted` describes what is
 /// missing if the report was stopped early.
 pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>) -> String {
     let threads = outcomes.first().map_or(0, |outcome| outcome.curve.last().spent.threads);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>Speed against error</title>\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n{TITLE}\n\
          <style>\n{}</style>\n<h1>Speed against error</h1>\n\
          <p class=\"soft\">firstlight {} · {threads} threads · <code>{}</code></p>\n\
          <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \

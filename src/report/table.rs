@@ -6,6 +6,11 @@ use std::fmt::Write;
 const HEADER: &str = "scene,width,height,without,denoiser,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\
     estimated_error,estimated_low,estimated_high,reference_differs\n";
 
+/// Whether a text is a table, also one of other columns.
+pub fn is_csv(text: &str) -> bool {
+    text.starts_with("scene,width,height,")
+}
+
 /// One row per step; `without` is the technique that is switched off, `denoiser` the one whose result is compared, with
 /// the cost of the samples alone, `reference_differs` the share of the image that
 /// differs from a given reference by more than noise can. Fields are empty if unknown.

@@ -1,6 +1,6 @@
 //! The meshes of the objects of a scene. One that is missing or broken costs only itself.
 
-use crate::files::relative::text_to_path;
+use crate::files::relative::{place, text_to_path};
 use crate::files::stamp::stamp;
 use crate::format::error::SceneError;
 use crate::format::parts::ObjectPart;
@@ -10,7 +10,7 @@ use crate::import::documents::Documents;
 use crate::import::meshes::{LoadedMesh, load_mesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Identity of a mesh: source, shading and bits of the simplification ratio.
 pub(super) type LoadedMeshKey = (MeshSource, MeshShading, Option<u64>);
@@ -39,7 +39,7 @@ pub(super) struct ObjectMeshes {
     pub lost: Vec<LostMesh>,
 }
 
-/// Reads each mesh once, those in files of their own in parallel.
+/// Reads each mesh once, whatever the names of its file, those in files of their own in parallel.
 ///
 /// - `known`: the mesh of an object that is read already; `say`: called before a mesh is read.
 pub(super) fn load_meshes(
@@ -49,11 +49,17 @@ pub(super) fn load_meshes(
     known: impl Fn(&ObjectPart) -> Option<LoadedMesh> + Sync,
     say: impl Fn(&MeshSource) + Sync,
 ) -> ObjectMeshes {
-    let mut numbers: HashMap<LoadedMeshKey, usize> = HashMap::new();
+    let mut places: HashMap<String, [PathBuf; 2]> = HashMap::new();
+    let mut numbers: HashMap<(LoadedMeshKey, Option<[PathBuf; 2]>), usize> = HashMap::new();
     let mut firsts: Vec<(usize, LoadedMeshKey)> = Vec::new();
     let number_of = |(i, object)| {
         let key = mesh_key(object)?;
-        Some(*numbers.entry(key.clone()).or_insert_with(|| {
+        let mut nameless = key.clone();
+        let place = nameless.0.file_mut().map(|file| {
+            let name = std::mem::take(file);
+            places.entry(name).or_insert_with_key(|name| place(&folder.join(text_to_path(name)))).clone()
+        });
+        Some(*numbers.entry((nameless, place)).or_insert_with(|| {
             firsts.push((i, key));
             firsts.len() - 1
         }))

@@ -249,6 +249,7 @@ impl Work {
         }
         let folder = order.path.display();
         Ok(Some(match saved {
+            1 if n == 1 => format!("saved 1 frame in {folder}"),
             saved if saved == n => format!("saved {n} frames in {folder}"),
             saved => format!("saved {saved} of {n} frames in {folder}"),
         }))

@@ -32,6 +32,28 @@ fn a_render_stops_at_the_error_of_the_denoised_image() {
 }
 
 #[test]
+fn a_denoised_image_opens_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    let size = "--size 48x48 --spp 4";
+    does(path, &format!("render cornell -o a.png {size} --denoise"));
+    does(path, &format!("render cornell -o raw.png {size}"));
+    does(path, &format!("render a.png -o b.png {size}"));
+    assert!(bytes("a.png") == bytes("b.png") && bytes("a.png") != bytes("raw.png"));
+    does(path, &format!("render a.png -o c.png {size} --no-denoise"));
+    let image = |name: &str| image::open(path.join(name)).unwrap().to_rgb8();
+    assert_eq!(image("c.png"), image("raw.png"));
+    assert_eq!(firstlight::scene::ImageMetadata::read(&path.join("c.png")).unwrap().denoised, None);
+    // A layer of an image with layers, where it would be one if it were asked for.
+    does(path, &format!("render a.png -o d.exr {size} --layers albedo"));
+    let layered = firstlight::scene::ImageMetadata::read(&path.join("d.exr")).unwrap();
+    assert_eq!((layered.denoised, layered.denoised_layer), (None, Some("own".to_owned())));
+    let said = does(path, "render a.png -o e.png --size 48x48 --spp 4 --region 0,0,9,9").err;
+    assert!(said.contains("a.png is denoised: with --region, the new image is raw"), "{said}");
+}
+
+#[test]
 fn merged_films_denoise_to_the_bytes_of_the_one_that_was_rendered_in_one_go() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

@@ -93,6 +93,22 @@ fn help_that_cannot_be_written_is_a_failure() {
     assert!(said.contains("cannot write the help text"), "{said}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_finds_a_full_disk_says_so() {
+    for line in [
+        "info cornell",
+        "render cornell -o - --spp 1 --size 8x8",
+        "render cornell -o - --format jpg --spp 1 --size 8x8",
+    ] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = Command::new(PROGRAM).args(line.split(' ')).stdout(full).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains("cannot write to standard output: the disk is full"), "{line}: {said}");
+    }
+}
+
 #[test]
 fn limits_that_are_no_number_are_told() {
     for (text, is_wrong) in [("2", false), (" 0.5 ", false), ("0", true), ("-1", true), ("two", true), ("NaN", true)] {

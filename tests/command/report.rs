@@ -2,7 +2,7 @@
 //! error that the renderer tells is the error that it has.
 
 use crate::common::*;
-use crate::program::{does, run};
+use crate::program::{does, fails, run};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
@@ -147,6 +147,18 @@ fn the_command_writes_a_page_and_a_table() {
     assert_eq!(rows.iter().filter(|row| row[4].is_empty()).count(), 10 * 3, "{table}");
     assert_eq!(rows.iter().filter(|row| row[4] == "denoised").count(), 3, "{table}");
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
+
+    // Its own files are replaced, others are not.
+    let again = "report cornell --size 20x20 --spp 4 --no-ablation --output";
+    does(folder.path(), &format!("{again} deep/page"));
+    for name in ["index.html", "steps.csv"] {
+        let other = folder.path().join(name);
+        std::fs::write(&other, "mine").unwrap();
+        let said = fails(folder.path(), &format!("{again} ."), 1);
+        assert!(said.contains(&format!("{name}: exists and was not written by firstlight")), "{said}");
+        assert_eq!(std::fs::read(&other).unwrap(), b"mine");
+        std::fs::remove_file(other).unwrap();
+    }
 
     for (line, expected) in [
         ("report cornell --reference none.exr", "none.exr"),

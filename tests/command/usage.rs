@@ -13,6 +13,13 @@ fn every_shell_gets_completions_and_every_command_a_manual_page() {
     }
     assert!(does(path, "man").out().contains(".TH firstlight 1"));
     does(path, "man pages");
+    does(path, "man pages");
+    std::fs::create_dir(path.join("other")).unwrap();
+    std::fs::write(path.join("other/firstlight-save.1"), "mine").unwrap();
+    let said = fails(path, "man other", 1);
+    assert!(said.contains("firstlight-save.1: exists and was not written by firstlight"), "{said}");
+    assert_eq!(std::fs::read(path.join("other/firstlight-save.1")).unwrap(), b"mine");
+    assert_eq!(std::fs::read_dir(path.join("other")).unwrap().count(), 1);
     let help = does(path, "help");
     let commands =
         help.out().lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());

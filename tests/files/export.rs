@@ -4,7 +4,7 @@ use bevy_ecs::prelude::World;
 use firstlight::export::export;
 use firstlight::format::property::SkyProperty;
 use firstlight::format::scene_format::SceneFormat;
-use firstlight::format::value::{ColorValue, ScalarValue};
+use firstlight::format::value::ColorValue;
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::{Film, Material};
 use firstlight::scene::file::{MaterialPart, SceneFile};
@@ -118,28 +118,41 @@ fn surfaces_come_back_with_all_their_numbers() {
     }
 }
 
-/// Mitsuba has no surface that scatters diffusely to both sides: half of a leaf is diffuse, the other only transmits.
+/// Mitsuba has no surface that scatters diffusely to both sides: a share of a leaf is diffuse, the other only transmits,
+/// each with a colour that is above 1 in the channels in which it returns more than its share.
 #[test]
-fn a_translucent_surface_is_a_blend_in_mitsuba() {
-    let text = "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), materials: {\"leaf\": \
-                translucent(reflectance: (0.25, 0.125, 0.5), transmittance: 0.5)}, objects: [sphere(center: (0, 1, 0), \
-                radius: 0.25, material: \"leaf\")])";
-    let folder = tempfile::tempdir().unwrap();
-    let from = written(folder.path(), text);
-    let (_, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
-    assert!(told.is_empty(), "{told:?}");
-    let part = |name: &str| after.file.materials.get(name).unwrap();
-    let Material::Blend { weight: ScalarValue::Number(0.5), a, b, .. } =
-        part(after.file.objects[0].material().unwrap())
-    else {
-        panic!("{:?}", after.file.materials)
-    };
-    assert_eq!(*part(a), Material::Diffuse { albedo: ColorValue::Rgb(Vec3::new(0.5, 0.25, 1.0)) });
-    let Material::Disney { base_color, thin_walled: true, diffuse_transmission, transmission, .. } = part(b) else {
-        panic!("{:?}", part(b))
-    };
-    assert_eq!(*base_color, ColorValue::grey(1.0));
-    assert_eq!([diffuse_transmission, transmission], [&ScalarValue::Number(2.0), &ScalarValue::Number(0.0)]);
+fn a_translucent_surface_comes_back_from_a_blend_of_mitsuba() {
+    let image = image::Rgb32FImage::from_fn(2, 1, |x, _| image::Rgb([0.9, 0.5 * x as f32, 0.0]));
+    for (given, wanted) in [
+        ("reflectance: (0.25, 0.125, 0.5), transmittance: 0.5", [[0.25, 0.125, 0.5], [0.5; 3]]),
+        ("reflectance: (0.9, 0.05, 0.05), transmittance: (0.05, 0.9, 0.9)", [[0.9, 0.05, 0.05], [0.05, 0.9, 0.9]]),
+        ("reflectance: 0, transmittance: (0.5, 0, 0)", [[0.0; 3], [0.5, 0.0, 0.0]]),
+        // Scaled, as it is shown.
+        ("reflectance: (1, 0.5, 0), transmittance: (1, 0, 0.5)", [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]]),
+        ("reflectance: \"image\", transmittance: (0.1, 0.25, 1)", [[0.9, 0.25, 0.0], [0.1, 0.25, 1.0]]),
+        ("reflectance: \"squares\", transmittance: (0.1, 0.2, 0.9)", [[0.9, 0.4, 0.05], [0.1, 0.2, 0.9]]),
+    ] {
+        let text = format!(
+            "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), textures: {{\"image\": \
+             image(file: \"image.exr\"), \"squares\": checker(a: (0.9, 0.8, 0), b: (0.9, 0, 0.1))}}, materials: \
+             {{\"leaf\": translucent({given})}}, objects: [sphere(center: (0, 1, 0), radius: 0.25, material: \"leaf\")])"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        image.save(folder.path().join("image.exr")).unwrap();
+        let from = written(folder.path(), &text);
+        let (mut world, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        assert!(told.is_empty() && after.warnings.is_empty(), "{given}: {told:?} {:?}", after.warnings);
+        let whole = whole_scene(&mut world, &after);
+        let part = whole.file.materials.get(whole.file.objects[0].material().unwrap()).unwrap();
+        let Material::Translucent { reflectance, transmittance } = part else { panic!("{given}: {part:?}") };
+        let mean = |color: &ColorValue| match color {
+            ColorValue::Rgb(rgb) => *rgb,
+            ColorValue::Texture(name) => whole.textures[name].texture.mean(),
+        };
+        for (found, wanted) in [reflectance, transmittance].map(mean).into_iter().zip(wanted) {
+            assert!(found.abs_diff_eq(Vec3::from(wanted), 2e-3), "{given}: {part:?}, {found}");
+        }
+    }
 }
 
 /// Mean radiance of the four quarters of an image of 64 × 48 pixels.
@@ -218,6 +231,63 @@ fn the_light_of_every_quarter_of_the_image_stays() {
             let ratio = *found / *wanted;
             assert!((ratio - 1.0).abs().max_element() < 0.03, "{format:?}, quarter {k}: {ratio}, told {told:?}");
         }
+    }
+}
+
+/// Meshes without texture coordinates show a texture in each triangle; checkers are turned, with unequal squares.
+#[test]
+fn patterns_stay_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = "textures: {\"c\": checker(a: (0.9, 0.1, 0), b: (0, 0.2, 0.8), squares: (3, 4))}, objects: [ \
+                mesh(source: builtin(\"cube\"), material: \"m\", transform: (rotate: (30, 40, 0))), \
+                mesh(source: builtin(\"bored-block\"), material: \"m\", \
+                     transform: (translate: (2.2, 0, 0), scale: (-0.8, 0.9, 0.7)))";
+    let turned = |degrees: i32| {
+        format!(
+            "textures: {{\"c\": checker(a: (0.9, 0.1, 0), b: (0, 0.2, 0.8), squares: (1.5, 4), rotate: {degrees}, \
+             offset: (0.2, 0.1))}}, objects: [quad(corner: (-1, -1, 0), edge_u: (3, 0, 0), edge_v: (0, 2, 0), \
+             material: \"m\")"
+        )
+    };
+    let all = SceneFormat::ALL.map(|format| (format, bare.to_owned()));
+    let of_mitsuba = [30, 90, 130, -50].map(|degrees| (SceneFormat::Mitsuba, turned(degrees)));
+    for (format, what) in all.into_iter().chain(of_mitsuba) {
+        let text = format!(
+            "(camera: (eye: (1, 0.5, 6), look_at: (0.8, 0, 0), vfov: 40), film: (width: 64, height: 48), max_depth: 2,
+              environment: constant(1), materials: {{\"m\": diffuse(albedo: \"c\")}}, {what}])"
+        );
+        let from = written(folder.path(), &text);
+        let (mut world, scene) = open(from.clone());
+        let wanted = quarters(&mut world, &scene);
+        let (mut world, scene, told) = there_and_back(from, format, folder.path());
+        assert!(told.is_empty() && scene.warnings.is_empty(), "{what}: {told:?} {:?}", scene.warnings);
+        let found = quarters(&mut world, &scene);
+        for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
+            let ratio = *found / *wanted;
+            assert!((ratio - 1.0).abs().max_element() < 0.02, "{format:?} {what}, quarter {k}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn what_firstlight_leaves_out_of_its_own_files_is_told() {
+    for (material, expected) in [
+        ("glass(absorption: (1, 0, 2))", "`m`: its absorption is a medium, which firstlight leaves out"),
+        (
+            "rough_glass(alpha: 0.2, absorption: (1, 0, 2))",
+            "`m`: its absorption is a medium, which firstlight leaves out",
+        ),
+        ("translucent(reflectance: \"c\", transmittance: 0.2)", "exceed 1 together, it is brighter"),
+    ] {
+        let text = format!(
+            "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), textures: {{\"c\": \
+             checker(a: 0.9, b: 0)}}, materials: {{\"m\": {material}}}, objects: [sphere(center: (0, 1, 0), \
+             radius: 0.25, material: \"m\")])"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let from = written(folder.path(), &text);
+        let (_, _, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        assert!(told.len() == 1 && told[0].contains(expected), "{material}: {told:?}");
     }
 }
 

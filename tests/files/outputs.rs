@@ -52,6 +52,7 @@ fn nothing_that_a_command_reads_is_written_over() {
     std::fs::write(path.join("frames.ron"), ROOM.replace("wall.png", "wall-0002.png")).unwrap();
     does(&path, "render room.ron -o a.png --film a.exr --spp 2");
     does(&path, "render room.ron -o b.png --film b.exr --samples 2..3");
+    does(&path, "pack room.ron -o room.zip");
     std::fs::create_dir(path.join("sub")).unwrap();
     #[cfg(unix)]
     {
@@ -79,6 +80,7 @@ fn nothing_that_a_command_reads_is_written_over() {
         "merge a.exr b.exr -o c.exr --overwrite --image a.exr",
         "save room.ron -o ./room.ron",
         "simplify tent.obj -o sub/../tent.obj --ratio 0.5",
+        "pack room.zip -o sub/../room.zip",
     ];
     if cfg!(unix) {
         lines.extend([

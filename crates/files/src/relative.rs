@@ -103,6 +103,12 @@ pub fn absolute(path: &Path) -> PathBuf {
     absolute.ancestors().find_map(written).unwrap_or(absolute)
 }
 
+/// The folder in which a file is found, from which other files are found that it names, and the file itself: the same
+/// for all names of a file in one folder.
+pub fn place(path: &Path) -> [PathBuf; 2] {
+    [absolute(path.parent().unwrap_or(path)), absolute(path)]
+}
+
 /// `path` relative to `folder`, with `/` as separator; the absolute path if they have only the root in common.
 pub fn relative_path(folder: &Path, path: &Path) -> String {
     let (folder, path) = (absolute(folder), absolute(path));

@@ -166,6 +166,32 @@ pub fn is_film(path: &Path) -> bool {
     read.is_ok() && start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) && start.windows(name.len()).any(|part| part == name)
 }
 
+/// Whether there is a file with other contents than those that are about to be replaced. An empty one has none.
+///
+/// - `is_own`: whether a text that begins like this may be replaced.
+pub fn is_foreign(path: &Path, is_own: impl Fn(&str) -> bool) -> bool {
+    /// What the program writes says so soon.
+    const LOOKED_AT: u64 = 1 << 16;
+    let Ok(info) = std::fs::metadata(path) else { return false };
+    // Paths that are not files are rejected by the writer.
+    if !info.is_file() || info.len() == 0 {
+        return false;
+    }
+    let mut start = Vec::new();
+    let read = InputFile::open_within(path, FileKind::Settings, u64::MAX)
+        .map_err(io::Error::other)
+        .and_then(|file| file.take(LOOKED_AT).read_to_end(&mut start));
+    read.is_err() || !is_own(&String::from_utf8_lossy(&start))
+}
+
+/// Checks that a file of a fixed name is missing, or one that the program wrote; see [`is_foreign`].
+///
+/// # Errors
+/// If it is another file.
+pub fn check_own(path: &Path, is_own: impl Fn(&str) -> bool) -> Result<(), WriteError> {
+    if is_foreign(path, is_own) { Err(WriteError::NotOwn(path.to_path_buf())) } else { Ok(()) }
+}
+
 /// Whether a path ends in `/` or `/.`: comparisons of paths ignore that, the operating system does not.
 fn is_named_as_folder(path: &Path) -> bool {
     let name = path.as_os_str().as_encoded_bytes();
@@ -422,7 +448,7 @@ fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempF
 fn remove_left_over(target: &Path, from: u32, to: u32) {
     for number in from..to {
         let name = part_name(target, Some(number));
-        let Ok(file) = OpenOptions::new().read(true).open(&name) else { return };
+        let Ok(file) = without_waiting(OpenOptions::new().read(true)).open(&name) else { return };
         if file.try_lock().is_ok() && is_at(&file, &name) {
             // Without permission to remove it, it stays.
             let _ = std::fs::remove_file(&name);
@@ -600,12 +626,13 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_pipe_in_place_of_a_lock_is_not_waited_for() {
+    fn a_pipe_in_place_of_a_lock_or_a_left_over_file_is_not_waited_for() {
         use rustix::fs::{CWD, Mode, mkfifoat};
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         let claimed = part_name(&path, None);
-        for pipe in [&folder.path().join("lock"), &claimed] {
+        let left_over = part_name(&path, Some(1));
+        for pipe in [&folder.path().join("lock"), &claimed, &left_over] {
             mkfifoat(CWD, pipe, Mode::RUSR | Mode::WUSR).unwrap();
         }
         assert!(lock_file(&folder.path().join("lock")).is_err());

@@ -44,6 +44,9 @@ pub enum WriteError {
     /// The file exists and is not a recording.
     #[error("{}: exists and is not a recording: choose another name", .0.display())]
     NotRecording(PathBuf),
+    /// The file exists, and firstlight has not written it.
+    #[error("{}: exists and was not written by firstlight: choose another folder", .0.display())]
+    NotOwn(PathBuf),
     /// The extension is not that of a supported format.
     #[error("{}: unsupported output format .{extension}: use .png, .jpg or .exr", path.display())]
     Format {
@@ -168,7 +171,7 @@ fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
 }
 
 /// The message for a failure to write.
-fn reason(error: &(dyn Error + 'static)) -> String {
+pub fn reason(error: &(dyn Error + 'static)) -> String {
     match io_kind(error) {
         Some(ErrorKind::StorageFull) => "the disk is full".to_owned(),
         Some(ErrorKind::QuotaExceeded) => "the disk quota is exceeded".to_owned(),

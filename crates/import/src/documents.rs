@@ -13,6 +13,7 @@ use crate::model::projection::LightImages;
 use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
 use crate::read_scene::read_scene;
 use firstlight_files::limits::Limits;
+use firstlight_files::relative::place;
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_format::choice::ModelChoice;
 use firstlight_format::error::SceneError;
@@ -34,13 +35,13 @@ const MAX_VARIANTS: usize = 16;
 /// Scenes of other renderers that a scene reads parts of, each with all of its meshes.
 const MAX_SCENES: usize = 32;
 
-/// Open files, by path.
+/// Open files, by place.
 #[derive(Debug, Default)]
 pub struct Documents {
     options: ReadOptions,
-    open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
-    /// The canonical path of a scene of another renderer, by each of its names.
-    real_paths: Mutex<HashMap<PathBuf, PathBuf>>,
+    open: Mutex<HashMap<[PathBuf; 2], Arc<Opened>>>,
+    /// The folder and the canonical path of a file, by each of its names.
+    places: Mutex<HashMap<PathBuf, [PathBuf; 2]>>,
     /// Scenes of other renderers by that path, with the names and values of their parameters.
     scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), ReadScene>>,
     /// Of all images that are decoded.
@@ -81,10 +82,16 @@ impl Documents {
         self.options.allow_outside
     }
 
+    /// One file may have many names, and each may be asked for by many objects.
+    fn place(&self, path: &Path) -> [PathBuf; 2] {
+        lock(&self.places).entry(path.to_owned()).or_insert_with(|| place(path)).clone()
+    }
+
     /// The file at `path`, read on first use.
     pub(crate) fn open(&self, path: &Path) -> Result<Arc<Opened>, GltfError> {
+        let place = self.place(path);
         let mut open = lock(&self.open);
-        if let Some(opened) = open.get(path) {
+        if let Some(opened) = open.get(&place) {
             return Ok(opened.clone());
         }
         // Taken before reading, so that a change in the meantime is noticed.
@@ -100,7 +107,7 @@ impl Documents {
             meshes: Mutex::default(),
             made: AtomicU64::default(),
         });
-        open.insert(path.to_owned(), opened.clone());
+        open.insert(place, opened.clone());
         Ok(opened)
     }
 
@@ -108,9 +115,7 @@ impl Documents {
     ///
     /// - `defines`: names and values of parameters that it leaves open.
     pub fn scene(&self, path: &Path, defines: &[(String, String)]) -> ReadScene {
-        // One file may have many names, and each may be asked for by many objects.
-        let resolved = || path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let real = lock(&self.real_paths).entry(path.to_owned()).or_insert_with(resolved).clone();
+        let [_, real] = self.place(path);
         let key = (real, defines.to_vec());
         if let Some(scene) = lock(&self.scenes).get(&key) {
             return scene.clone();

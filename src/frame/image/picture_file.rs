@@ -188,10 +188,15 @@ impl Print<'_> {
         rgb
     }
 
-    fn jpeg(&self, out: &mut impl Write) -> image::ImageResult<()> {
+    fn jpeg(&self, out: &mut impl Write) -> io::Result<()> {
         let (width, height) = self.size;
         let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(out, JPEG_QUALITY);
-        encoder.encode(&self.rgb(), width, height, image::ExtendedColorType::Rgb8)
+        let encoded = encoder.encode(&self.rgb(), width, height, image::ExtendedColorType::Rgb8);
+        encoded.map_err(|error| match error {
+            // As a cause it would be hidden.
+            image::ImageError::IoError(error) => error,
+            error => io::Error::other(error),
+        })
     }
 
     fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
@@ -267,6 +272,28 @@ mod tests {
         let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
         assert_eq!(linear, (5, 3));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
+    }
+
+    #[test]
+    fn a_full_disk_is_told_in_the_same_words_for_all_formats() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let (film, display) = (Film::new(5, 3), Display::default());
+        let print = Print { film: &film, display: &display, size: (10, 6), note: None, denoised: None };
+        let path = Path::new("a");
+        for error in
+            [unwritable(path, print.jpeg(&mut Full).unwrap_err()), unwritable(path, print.png(&mut Full).unwrap_err())]
+        {
+            assert_eq!(error.to_string(), "a: cannot be written: the disk is full");
+        }
     }
 
     #[test]

@@ -28,8 +28,8 @@ pub(crate) struct Folder {
     pictures: HashMap<String, Picture>,
 }
 
-/// Which triangles of a mesh, by its address; whether mirrored along x; whether with second texture coordinates.
-pub(crate) type MeshKey = (usize, Option<u16>, bool);
+/// Which triangles of a mesh, by its address; whether mirrored along x; whether with texture coordinates that it lacks.
+pub(crate) type MeshKey = (usize, Option<u16>, bool, bool);
 
 impl Folder {
     /// The folder of a scene, named after it: `kitchen-xml` of `kitchen.xml`, or `kitchen-xml-2` if there is one.
@@ -82,18 +82,19 @@ impl Folder {
     /// A mesh as a PLY file, relative to its centre. Equal ones are written once.
     ///
     /// - `slot`: only triangles of this material slot; `is_mirrored`: mirrored along x, with the same front.
+    /// - `is_textured`: whether texture coordinates matter.
     pub(crate) fn mesh(
         &mut self,
         mesh: &Arc<Mesh>,
         slot: Option<u16>,
-        is_mirrored: bool,
+        [is_mirrored, is_textured]: [bool; 2],
         name: &str,
     ) -> Result<String, WriteError> {
-        let key = (Arc::as_ptr(mesh) as usize, slot, is_mirrored);
+        let key = (Arc::as_ptr(mesh) as usize, slot, is_mirrored, is_textured && mesh.uvs.is_empty());
         if let Some(known) = self.meshes.get(&key) {
             return Ok(known.clone());
         }
-        let file = self.add(name, "ply", &ply::bytes(mesh, slot, is_mirrored))?;
+        let file = self.add(name, "ply", &ply::bytes(mesh, slot, is_mirrored, is_textured))?;
         self.meshes.insert(key, file.clone());
         Ok(file)
     }

@@ -1,5 +1,6 @@
 //! Objects as spheres, squares and meshes with a transform, and which of them share a mesh.
 
+use crate::common::ply::OWN_UVS;
 use crate::common::scene::WholeScene;
 use firstlight_files::printable;
 use firstlight_files::warnings::Warnings;
@@ -52,7 +53,8 @@ impl Placed {
         let mut areas = (0.0, 0.0);
         for (i, triangle) in mesh.triangles.iter().enumerate() {
             let is_of_slot = slot.is_none_or(|slot| mesh.slots.get(i).copied().unwrap_or(0) == slot);
-            let corners = triangle.map(|vertex| mesh.uvs.get(vertex as usize).copied().unwrap_or_default());
+            let corner = |k: usize| mesh.uvs.get(triangle[k] as usize).copied().unwrap_or(OWN_UVS[k]);
+            let corners: [Vec2; 3] = std::array::from_fn(corner);
             let area = side * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
             if is_of_slot {
                 areas = (areas.0 + area.max(0.0), areas.1 + (-area).max(0.0));

@@ -238,17 +238,17 @@ impl Bsdf {
     }
 }
 
-/// The largest value of any channel that a texture shows; vertex colours count as white.
-fn largest(texture: &Texture) -> f32 {
+/// The largest value of each channel that a texture shows; vertex colours count as white.
+fn largest(texture: &Texture) -> Vec3 {
     match &texture.pattern {
-        TexturePattern::White => texture.tint.max_element(),
-        TexturePattern::Checker { a, b } => a.max(*b).max_element(),
+        TexturePattern::White => texture.tint,
+        TexturePattern::Checker { a, b } => a.max(*b),
         TexturePattern::Image { image, .. } => {
             let (width, height) = (image.width, image.height);
             let straight = Texture { uv_matrix: Mat2::IDENTITY, uv_offset: Vec2::ZERO, ..texture.clone() };
             let center = |i: u32| Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-            let at = |i| straight.eval(center(i) / Vec2::new(width as f32, height as f32)).max_element();
-            (0..width * height).map(at).fold(0.0, f32::max)
+            let at = |i| straight.eval(center(i) / Vec2::new(width as f32, height as f32));
+            (0..width * height).map(at).fold(Vec3::ZERO, Vec3::max)
         }
     }
 }
@@ -370,6 +370,7 @@ impl Taking<'_> {
             Material::Metal { alpha, reflectance, fresnel, compensate: true } => {
                 plain(self.compensated(alpha, reflectance, fresnel))
             }
+            Material::Translucent { reflectance, transmittance } => plain(self.translucent(reflectance, transmittance)),
             Material::Disney { .. } if self.renderer != Renderer::Mitsuba => self.disney(written),
             Material::Glass { absorption, dispersion, .. } | Material::RoughGlass { absorption, dispersion, .. } => {
                 self.absorb(absorption, dispersion);
@@ -385,6 +386,31 @@ impl Taking<'_> {
             Scalar::Number(alpha) => *alpha,
             Scalar::Texture(Use { name, change }) => change.of(self.scene.textures[name].texture.mean()).x,
         }
+    }
+
+    fn largest(&self, color: &Color) -> Vec3 {
+        match color {
+            Color::Rgb(rgb) => *rgb,
+            Color::Texture(Use { name, .. }) => largest(&self.scene.textures[name].texture),
+        }
+    }
+
+    /// Here, both are scaled where their sum is above 1; elsewhere they are not.
+    fn translucent(&mut self, reflectance: Color, transmittance: Color) -> Bsdf {
+        let sum = self.largest(&reflectance) + self.largest(&transmittance);
+        let (reflectance, transmittance) = match (reflectance, transmittance) {
+            (Color::Rgb(back), Color::Rgb(through)) => {
+                let most = sum.max(Vec3::ONE);
+                (Color::Rgb(back / most), Color::Rgb(through / most))
+            }
+            textured => {
+                if sum.max_element() > 1.0 {
+                    self.tell("where its reflectance and transmittance exceed 1 together, it is brighter");
+                }
+                textured
+            }
+        };
+        Bsdf::Plain(Material::Translucent { reflectance, transmittance })
     }
 
     /// A metal without compensation that returns as much light as one with it.
@@ -446,10 +472,7 @@ impl Taking<'_> {
         if width <= LOSSLESS {
             return coated(albedo, alpha);
         }
-        let most = match &albedo {
-            Color::Rgb(rgb) => rgb.max_element(),
-            Color::Texture(Use { name, .. }) => largest(&self.scene.textures[name].texture),
-        };
+        let most = self.largest(&albedo).max_element();
         let Metallic { share, metal, diffuse } = base.metallic(most.clamp(0.0, 1.0));
         let (reflectance, compensate) = (Vec3::splat(metal).into(), false);
         let metal = Material::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, compensate };

@@ -107,11 +107,11 @@ impl Writer<'_> {
         match material {
             Material::Diffuse { albedo } => {
                 open(self, "diffuse");
-                self.color("reflectance", albedo)?;
+                self.share("reflectance", albedo)?;
             }
             Material::Plastic { diffuse, alpha, ior, specular, nonlinear, beckmann } => {
                 open(self, if smooth(alpha) { "plastic" } else { "roughplastic" });
-                self.color("diffuse_reflectance", diffuse)?;
+                self.share("diffuse_reflectance", diffuse)?;
                 self.iors(*ior);
                 if *specular != Scalar::Number(1.0) {
                     self.scalar("specular_reflectance", specular)?;
@@ -156,14 +156,14 @@ impl Writer<'_> {
             }
             Material::Metal { alpha, reflectance, fresnel: Fresnel::Schlick, .. } => {
                 open(self, "principled");
-                self.metal_color("base_color", reflectance)?;
+                self.share("base_color", reflectance)?;
                 self.xml.float("metallic", 1.0);
                 self.scalar("roughness", &alpha.root())?;
             }
             Material::Metal { alpha, reflectance, .. } => {
                 open(self, if smooth(alpha) { "conductor" } else { "roughconductor" });
                 self.xml.value("string", "material", "none");
-                self.metal_color("specular_reflectance", reflectance)?;
+                self.share("specular_reflectance", reflectance)?;
                 if !smooth(alpha) {
                     self.width(alpha, false)?;
                 }
@@ -221,6 +221,7 @@ impl Writer<'_> {
     }
 
     /// Two shares of a surface: one reflects, the other is a thin surface of Disney, whose diffuse transmission is even.
+    /// Each has its colour divided by its share, which may be above 1 in one channel and not in another.
     fn translucent(&mut self, reflectance: &Color, transmittance: &Color, attributes: &[(&str, &str)]) -> Result {
         let strength = |color: &Color| match color {
             Color::Rgb(rgb) => rgb.max_element(),
@@ -228,21 +229,25 @@ impl Writer<'_> {
         };
         let [back, through] = [reflectance, transmittance].map(strength);
         let share = if back + through > 0.0 { through / (back + through) } else { 0.5 };
-        let of_part = |color: &Color, share: f32| match color {
-            Color::Rgb(rgb) => Color::Rgb(if share > 0.0 { (*rgb / share).min(Vec3::ONE) } else { *rgb }),
-            Color::Texture(Use { name, .. }) => {
-                Color::Texture(Use { name: name.clone(), change: Change::Times(1.0 / share.max(1e-3)) })
+        let of_part = |color: &Color, share: f32| {
+            // A part without a share is black.
+            let factor = if share > 0.0 { 1.0 / share } else { 0.0 };
+            match color {
+                Color::Rgb(rgb) => Color::Rgb(factor * *rgb),
+                Color::Texture(Use { name, .. }) => {
+                    Color::Texture(Use { name: name.clone(), change: Change::Times(factor) })
+                }
             }
         };
         self.xml.open("bsdf", &[&[("type", "blendbsdf")], attributes].concat());
         self.xml.float("weight", share);
         self.xml.open("bsdf", &[("type", "twosided")]);
         self.xml.open("bsdf", &[("type", "diffuse")]);
-        self.color("reflectance", &of_part(reflectance, 1.0 - share))?;
+        self.share("reflectance", &of_part(reflectance, 1.0 - share))?;
         self.xml.close();
         self.xml.close();
         self.xml.open("bsdf", &[("type", "principledthin")]);
-        self.color("base_color", &of_part(transmittance, share))?;
+        self.share("base_color", &of_part(transmittance, share))?;
         self.xml.float("eta", 1.0);
         self.xml.float("diff_trans", 2.0);
         self.xml.close();
@@ -266,18 +271,24 @@ impl Writer<'_> {
         if *color == Color::Rgb(Vec3::ONE) { Ok(()) } else { self.color(name, color) }
     }
 
-    /// A colour that may be above 1, where it makes up for what microfacets lose.
-    fn metal_color(&mut self, name: &str, color: &Color) -> Result {
+    /// A share of light that may be above 1: of a metal, where it makes up for what microfacets lose, and of a part.
+    fn share(&mut self, name: &str, color: &Color) -> Result {
         match color {
-            Color::Rgb(rgb) if rgb.max_element() > 1.0 => {
-                self.xml.open("texture", &[("name", name), ("type", "srgb")]);
-                self.xml.rgb("color", *rgb);
-                self.xml.value("boolean", "unbounded", "true");
-                self.xml.close();
-                Ok(())
-            }
-            color => self.color(name, color),
+            Color::Rgb(rgb) => self.unbounded(name, *rgb),
+            Color::Texture(_) => self.color(name, color)?,
         }
+        Ok(())
+    }
+
+    /// A colour where Mitsuba expects a share: it refuses one above 1 that does not say so.
+    fn unbounded(&mut self, name: &str, rgb: Vec3) {
+        if rgb.max_element() <= 1.0 {
+            return self.xml.rgb(name, rgb);
+        }
+        self.xml.open("texture", &[("name", name), ("type", "srgb")]);
+        self.xml.rgb("color", rgb);
+        self.xml.value("boolean", "unbounded", "true");
+        self.xml.close();
     }
 
     pub(crate) fn color(&mut self, name: &str, color: &Color) -> Result {
@@ -308,7 +319,11 @@ impl Writer<'_> {
             TexturePattern::White => {
                 self.xml.open("texture", &[("name", name), ("type", "mesh_attribute")]);
                 self.xml.value("string", "name", "vertex_color");
-                let scale = wanted.change.of(texture.tint).x;
+                let tint = wanted.change.of(texture.tint);
+                let scale = tint.element_sum() / 3.0;
+                if tint != Vec3::splat(tint.x) {
+                    self.tell(&wanted.name, "the colour that tints the vertex colours is left out");
+                }
                 if scale != 1.0 {
                     self.xml.float("scale", scale);
                 }
@@ -318,8 +333,8 @@ impl Writer<'_> {
                 let [a, b] = [*a, *b].map(|color| wanted.change.of(color));
                 // Mitsuba exchanges them where it reads a number.
                 let (first, second) = if is_number { (b, a) } else { (a, b) };
-                self.xml.rgb("color0", first);
-                self.xml.rgb("color1", second);
+                self.unbounded("color0", first);
+                self.unbounded("color1", second);
                 // Its squares have sides of 1/2.
                 self.transform_uv(0.5 * matrix, 0.5 * offset.as_dvec2());
             }

@@ -72,6 +72,9 @@ impl Writer<'_> {
         let names = self.scene.used_materials();
         for name in &names {
             let surface = Surface::of(self.scene, name, Renderer::Mitsuba, self.warnings);
+            if surface.absorption != Vec3::ZERO {
+                self.tell(name, "its absorption is a medium, which firstlight leaves out when it opens the file");
+            }
             self.surfaces.insert(name.clone(), surface);
         }
         let emits = |name: &str| self.surfaces.get(name).is_some_and(|surface| surface.radiance.is_some());
@@ -128,12 +131,13 @@ impl Writer<'_> {
             Geometry::Square => "rectangle",
             Geometry::Mesh(..) => "ply",
         };
+        let is_textured = self.surfaces.get(&placed.material).is_some_and(Surface::is_textured);
         let is_mirrored = placed.world.matrix3.determinant() < 0.0;
         let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         self.xml.open("shape", &[("type", plugin)]);
         match &placed.geometry {
             Geometry::Sphere => {
-                if self.surfaces.get(&placed.material).is_some_and(Surface::is_textured) {
+                if is_textured {
                     // Its texture runs the other way round, so it is mirrored and would be inside out.
                     self.xml.transform("to_world", &(placed.world * DAffine3::from_mat3(SPHERE_AXES)));
                     self.xml.value("boolean", "flip_normals", if is_mirrored { "false" } else { "true" });
@@ -144,7 +148,7 @@ impl Writer<'_> {
             }
             Geometry::Square => self.xml.transform("to_world", &placed.world),
             Geometry::Mesh(mesh, slot) => {
-                let file = self.folder.mesh(mesh, *slot, is_mirrored, &placed.name)?;
+                let file = self.folder.mesh(mesh, *slot, [is_mirrored, is_textured], &placed.name)?;
                 self.xml.value("string", "filename", &file);
                 if mesh.normals.is_empty() {
                     self.xml.value("boolean", "face_normals", "true");

@@ -149,10 +149,11 @@ impl Writer<'_> {
                 }
             };
         }
+        let is_textured = surface.as_ref().is_some_and(Surface::is_textured);
         let kind = match &placed.geometry {
             Geometry::Sphere => {
                 let radius = placed.world.matrix3.determinant().abs().cbrt();
-                let linear = match surface.as_ref().is_some_and(Surface::is_textured) {
+                let linear = match is_textured {
                     true => placed.world.matrix3 * (1.0 / radius) * SPHERE_AXES,
                     false => DMat3::IDENTITY,
                 };
@@ -168,7 +169,8 @@ impl Writer<'_> {
             }
             Geometry::Mesh(mesh, slot) => {
                 self.text.transform(&placed.world);
-                list = list.string("filename", &self.folder.mesh(mesh, *slot, false, &placed.name)?);
+                let file = self.folder.mesh(mesh, *slot, [false, is_textured], &placed.name)?;
+                list = list.string("filename", &file);
                 "plymesh"
             }
         };

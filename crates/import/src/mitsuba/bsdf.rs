@@ -82,7 +82,10 @@ impl Converter<'_> {
             "polarizer" | "circular" | "retarder" => self.polarizing_filter(node)?,
             "twosided" => return self.both_sides(node, depth),
             "mask" => return self.mask(node, depth),
-            "blendbsdf" => return self.blend(node, depth),
+            "blendbsdf" => match self.sheet(node)? {
+                Some(sheet) => sheet,
+                None => return self.blend(node, depth),
+            },
             "normalmap" => return self.normal_map(node, depth),
             "bumpmap" => return self.bump_map(node, depth),
             "null" => return Ok(None),

@@ -19,6 +19,7 @@ pub(crate) mod read;
 pub(crate) mod scene;
 pub(crate) mod serialized;
 pub(crate) mod shape;
+mod sheet;
 pub(crate) mod spectrum;
 mod sunsky;
 #[cfg(test)]

@@ -163,6 +163,7 @@ impl Converter<'_> {
             "srgb" | "rgb" | "uniform" | "spectrum" | "rawconstant" | "d65" => {
                 let given = ["color", "value"].into_iter().find_map(|name| node.value(name));
                 let daylight = node.plugin() == "d65";
+                let is_unbounded = node.boolean_or("unbounded", false)?;
                 let rgb = given.map_or(Some(DVec3::ONE), |value| match value {
                     Value::Spectrum(spectrum @ Spectrum::Uniform(_)) if daylight => Some(spectrum.rgb(Use::Factor)),
                     Value::Float(number) if node.plugin() == "uniform" && of == Use::Emission => {
@@ -170,7 +171,11 @@ impl Converter<'_> {
                     }
                     value => constant(value, of),
                 });
-                Some(rgb.ok_or_else(|| node.error("its colour must be one"))? * scale)
+                let rgb = rgb.ok_or_else(|| node.error("its colour must be one"))? * scale;
+                if is_unbounded && of == Use::Reflectance && rgb.max_element() > 1.0 {
+                    self.tell(node, "a reflectance above 1 is not modelled: it is 1");
+                }
+                Some(rgb)
             }
             "blackbody" => {
                 let kelvin = node.float_or("temperature", 5000.0)?;
@@ -313,7 +318,9 @@ impl Converter<'_> {
         }
         let (matrix, offset) = self.uv_transform(node, reads)?;
         // Its squares have sides of 1/2.
-        let placed = Placed::of(2.0 * matrix, 2.0 * offset).filter(|placed| placed.stretch == DVec2::ONE);
+        let placed = Placed::of(2.0 * matrix, 2.0 * offset)
+            // Numbers of single precision are a little off.
+            .filter(|placed| placed.stretch.abs_diff_eq(DVec2::ONE, 1e-6));
         let Placed { repeat: squares, offset, rotate, .. } = placed.unwrap_or_else(|| {
             self.tell(node, "a sheared or flat texture transform is not modelled: it is left out");
             Placed::of(2.0 * DMat2::IDENTITY, DVec2::ZERO).expect("it is no shear")
@@ -350,7 +357,8 @@ impl Placed {
         if a == 0.0 && d == 0.0 && b != 0.0 && c != 0.0 {
             return Some(Self { stretch: DVec2::ONE, repeat: DVec2::new(-b, c), offset, rotate: 90.0 });
         }
-        let tangent = (-(b * c) / (a * d)).sqrt();
+        // Of both directions the one in which nothing is mirrored.
+        let tangent = (-(b * c) / (a * d)).sqrt().copysign(c * d);
         if !tangent.is_normal() {
             return None;
         }
@@ -404,6 +412,7 @@ mod tests {
             let placed = Placed::of(matrix, DVec2::ZERO);
             assert_eq!(placed.is_some(), is_placed, "{matrix}");
             let Some(Placed { stretch, repeat, rotate, .. }) = placed else { continue };
+            assert!(stretch.min_element() > 0.0, "{matrix}: {stretch}");
             let rotation = DMat2::from_angle(rotate.to_radians());
             let again = DMat2::from_diagonal(repeat) * rotation * DMat2::from_diagonal(stretch);
             assert!(again.abs_diff_eq(matrix, 1e-12), "{matrix}: {placed:?}");

@@ -315,7 +315,7 @@ impl Builder<'_> {
                     let path = self.folder.join(text_to_path(file));
                     let name = printable::name(file).into_owned();
                     if !*with_uvs.entry(file.clone()).or_insert_with(|| has_uvs(&path)) {
-                        self.tell(format!("`{name}` has no texture coordinates: its textures are of one colour"));
+                        self.tell(format!("`{name}` has no texture coordinates: in pbrt its textures lie otherwise"));
                     }
                 }
                 _ => {}
