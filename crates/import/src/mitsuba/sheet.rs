@@ -35,7 +35,9 @@ impl Converter<'_> {
         let mut part = |node: Node, name: &str, share: f64| -> Result<ColorValue, SceneError> {
             Ok(match self.color(node, name, 0.5, Use::Factor)? {
                 ColorValue::Rgb(rgb) => ColorValue::Rgb((share as f32 * rgb).min(Vec3::ONE)),
-                ColorValue::Texture(name) => ColorValue::Texture(self.tinted(&name, Vec3::splat(share as f32)).unwrap_or(name)),
+                ColorValue::Texture(name) => {
+                    ColorValue::Texture(self.tinted(&name, Vec3::splat(share as f32)).unwrap_or(name))
+                }
             })
         };
         let reflectance = part(diffuse, "reflectance", 1.0 - weight)?;
