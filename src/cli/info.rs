@@ -10,16 +10,15 @@ use crate::cli::number::{counted, two_digits};
 use clap::Args;
 use firstlight::frame::{DenoiseFilter, PictureLayer, f_number, f_stop};
 use firstlight::printable;
-use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
+use firstlight::render::{CausticChoice, Emission, Environment, Film, caustic_choice};
 use firstlight::scene::animation::Shutter;
 use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Animation, EnvironmentSource, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput,
-    Projection, Rendering, SceneEnvironment, SceneInputs, SceneSource, Severity, Shape, Warning, Warnings,
+    Animation, EnvironmentSource, Extraction, FilmSize, Lens, LightKind, LoadedScene, Projection, Rendering,
+    SceneEnvironment, SceneInputs, SceneSource, Severity, Shape, Warning, Warnings,
 };
-use glam::Vec3;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 #[derive(Args, Clone, Debug)]
@@ -241,14 +240,10 @@ impl SceneReport<'_> {
     }
 
     fn emitters(&self) -> usize {
-        let emits = |material: &&MaterialInput| match &material.material {
-            scene::Material::Emissive { .. } => true,
-            scene::Material::Principled { emission, .. } => *emission != scene::ColorParam::Rgb(Vec3::ZERO),
-            _ => false,
-        };
-        let glowing: HashSet<_> = self.inputs.materials.iter().filter(emits).map(|material| material.entity).collect();
-        let glows = |object: &&ObjectInput| object.slots.iter().any(|slot| glowing.contains(slot));
-        self.inputs.objects.iter().filter(glows).count()
+        let prepared = &self.extraction.prepared;
+        let emits = |&id: &u32| Emission::of(&prepared.shading.materials, id).is_some();
+        let objects = prepared.geometry.objects.iter().filter(|object| !object.is_point_light);
+        objects.filter(|object| object.materials.iter().any(emits)).count()
     }
 
     /// The number of lights of each kind.

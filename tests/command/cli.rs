@@ -172,6 +172,15 @@ fn info_tells_what_is_in_a_scene_and_what_it_uses() {
 }
 
 #[test]
+fn info_counts_lights_that_reflect() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "<scene version=\"3.0.0\"><shape type=\"rectangle\"><emitter type=\"area\"/></shape></scene>";
+    std::fs::write(folder.path().join("light.xml"), scene).unwrap();
+    let out = firstlight(folder.path(), &["info", "light.xml"]);
+    assert!(out.contains("1 emissive object,"), "{out}");
+}
+
+#[test]
 fn info_tells_machines_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let out = firstlight(folder.path(), &["info", "cornell-balls", "--json"]);
