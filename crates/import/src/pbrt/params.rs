@@ -6,7 +6,7 @@
 use crate::pbrt::spectrum::Spectrum;
 use firstlight_files::printable;
 use glam::{DVec2, DVec3};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 /// Values of one parameter.
@@ -96,6 +96,8 @@ pub(crate) struct Params {
     /// What counts where `list` has nothing, and the kind of thing that this is.
     attributes: (&'static str, Attributes),
     complaints: RefCell<Vec<String>>,
+    /// A bit for each of the first parameters of `list`: whether it was asked for.
+    asked: Cell<u64>,
 }
 
 impl Params {
@@ -119,7 +121,19 @@ impl Params {
 
     pub(crate) fn find(&self, name: &str) -> Option<&Param> {
         let (of, attributes) = &self.attributes;
-        self.list.iter().find(|param| param.name == name).or_else(|| attributes.find(of, name))
+        let Some(own) = self.list.iter().position(|param| param.name == name) else {
+            return attributes.find(of, name);
+        };
+        self.asked.set(self.asked.get() | 1_u64.checked_shl(own as u32).unwrap_or(0));
+        Some(&self.list[own])
+    }
+
+    /// Complaints about parameters that were not asked for.
+    pub(crate) fn unused(&self) -> impl Iterator<Item = String> {
+        let is_unused = |(i, _): &(usize, &Param)| *i < 64 && self.asked.get() >> i & 1 == 0;
+        self.list.iter().enumerate().filter(is_unused).map(|(_, param)| {
+            format!("`{} {}` has no effect", printable::name(&param.kind), printable::name(&param.name))
+        })
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {

@@ -278,7 +278,9 @@ impl Builder<'_> {
         let mut scope = Scope { builder: self, name: wanted.clone() };
         let mut part = material(&mut scope, &described.kind, &described.params, absorption);
         self.depth -= 1;
-        for complaint in described.params.complaints() {
+        // Of what is grey, nothing has an effect.
+        let unused = described.params.unused().filter(|_| !matches!(&*described.kind, "hair" | "measured"));
+        for complaint in described.params.complaints().into_iter().chain(unused) {
             self.tell(format!("material `{}`: {complaint}", printable::name(&wanted)));
         }
         if let Some(MaterialPart::Blend { a, b, .. }) = &part

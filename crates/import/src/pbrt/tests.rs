@@ -353,3 +353,11 @@ fn an_environment_alone_is_a_scene_and_an_index_may_be_a_colour() {
     let coated = format!("Material \"coateddiffuse\" \"rgb albedo\" [0.5 0.5 0.5]\n{SQUARE}");
     tells_only(&read(&coated), &["medium in its coat"]);
 }
+
+#[test]
+fn parameters_of_materials_that_nothing_uses_are_told() {
+    let scene = read(&format!("Material \"diffuse\" \"rgb Kd\" [1 0 0] \"rgb reflectance\" [0 1 0]\n{SQUARE}"));
+    tells_only(&scene, &["`rgb Kd` has no effect"]);
+    let scene = read(&format!("Material \"hair\" \"float eumelanin\" 1\n{SQUARE}"));
+    tells_only(&scene, &["not modelled"]);
+}
