@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-/// Refuses what no scene has, and what takes the parser a time that grows with its square: an element with thousands of
+/// Refuses what no scene has, and what takes the parser a time that grows with its square: an element with many
 /// attributes, and names of namespaces, of which each element knows those of all around it.
 pub(crate) fn check_tags(text: &str) -> Result<(), String> {
     const MAX_NAMESPACES: usize = 64;
-    const MAX_ATTRIBUTES: usize = 4096;
+    const MAX_ATTRIBUTES: usize = 64;
     if text.matches("xmlns").nth(MAX_NAMESPACES).is_some() {
         return Err(format!("has more than {MAX_NAMESPACES} namespaces, but Mitsuba knows none"));
     }

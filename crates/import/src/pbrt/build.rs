@@ -91,6 +91,8 @@ pub(crate) struct Builder<'a> {
     pub(super) is_known: bool,
     /// Names of materials, textures and media that were used and not there.
     pub(super) missing: HashSet<String>,
+    /// Textures that this reading has defined.
+    pub(super) fresh: HashSet<String>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
     definitions: HashMap<String, Vec<Item>>,
@@ -145,6 +147,7 @@ impl<'a> Builder<'a> {
             named: HashMap::new(),
             is_known: false,
             missing: HashSet::new(),
+            fresh: HashSet::new(),
             media: HashMap::new(),
             definitions: HashMap::new(),
             open: None,

@@ -76,6 +76,9 @@ const DIRECTIVES: &[&str] = &[
 const OF_VERSION_3: [&str; 7] =
     ["AreaLight", "PixelSampler", "Renderer", "SurfaceIntegrator", "Volume", "VolumeIntegrator", "WorldEnd"];
 
+/// Textures may consist of later ones to this depth.
+const MOST_READINGS: u32 = 4;
+
 /// What ends a saved state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Saved {
@@ -119,11 +122,13 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads a scene; once more if it uses names before it describes them, which pbrt allows.
+    /// Reads a scene; once more if it uses names before it describes them, which pbrt allows, and again while textures
+    /// consist of later ones.
     pub(crate) fn read(path: &'a Path, options: &'a ForeignOptions) -> Result<Self, SceneError> {
         let mut reader = Self::new(path, options);
         reader.read_all()?;
-        if let Some(known) = reader.builder.described_later() {
+        for _ in 1..MOST_READINGS {
+            let Some(known) = reader.builder.described_later() else { break };
             reader = Self::new(path, options);
             reader.builder.know(known);
             reader.read_all()?;

@@ -7,7 +7,7 @@ use crate::pbrt::params::Params;
 use crate::pbrt::shapes::{has_uvs, with_own_uvs};
 use crate::pbrt::spectrum::UnknownSpectrum;
 use crate::pbrt::state::{Described, MaterialRef, State};
-use crate::pbrt::textures::{Texture, unknown_spectrum, without_negative};
+use crate::pbrt::textures::{TEXTURES, Texture, unknown_spectrum, without_negative};
 use firstlight_files::printable;
 use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_format::material_textures::texture_names;
@@ -30,6 +30,12 @@ impl Builder<'_> {
             // Tells what is wrong with it.
             self.file(image);
         }
+        for part in TEXTURES.into_iter().filter_map(|part| params.texture(part)) {
+            if !self.fresh.contains(cut(part)) {
+                self.missing.insert(cut(part).to_owned());
+            }
+        }
+        self.fresh.insert(cut(name).to_owned());
         let mut told = Vec::new();
         let mut textures = std::mem::take(&mut self.textures);
         textures.define(cut(name), is_number, class, params, |name| self.named_file(name), |what| told.push(what));

@@ -361,3 +361,14 @@ fn parameters_of_materials_that_nothing_uses_are_told() {
     let scene = read(&format!("Material \"hair\" \"float eumelanin\" 1\n{SQUARE}"));
     tells_only(&scene, &["not modelled"]);
 }
+
+#[test]
+fn textures_of_later_textures_have_their_colours() {
+    let scene = read(&format!(
+        "Material \"diffuse\" \"texture reflectance\" \"A\"\n{SQUARE}\n\
+         Texture \"A\" \"spectrum\" \"scale\" \"texture tex\" \"B\"\n\
+         Texture \"B\" \"spectrum\" \"constant\" \"rgb value\" [0.5 0.25 0.125]\n"
+    ));
+    let MaterialPart::Diffuse { albedo } = part(&scene) else { panic!("{:?}", part(&scene)) };
+    assert_eq!((albedo, told(&scene)), (&ColorValue::Rgb(Vec3::new(0.5, 0.25, 0.125)), Vec::new()));
+}

@@ -26,6 +26,9 @@ pub(crate) struct Textures {
     colors: HashMap<String, Texture>,
 }
 
+/// Parameters of a texture that may be textures.
+pub(crate) const TEXTURES: [&str; 6] = ["value", "tex", "scale", "tex1", "tex2", "amount"];
+
 /// What a texture is replaced by that is not modelled.
 const GREY: Texture = Texture::Constant(Vec3::splat(0.5));
 
@@ -67,7 +70,7 @@ impl Textures {
         };
         // The factor of a texture is a number, whatever its kind.
         let is_number_of = |name: &str| is_number || ["scale", "amount"].contains(&name);
-        for name in ["value", "tex", "scale", "tex1", "tex2", "amount"] {
+        for name in TEXTURES {
             unknown_spectrum(params, name).filter(|_| !is_number_of(name)).into_iter().for_each(&mut tell);
             if let Some(texture) =
                 params.texture(name).filter(|texture| self.get(is_number_of(name), texture).is_none())
