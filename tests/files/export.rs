@@ -453,6 +453,20 @@ fn a_mesh_that_was_left_out_is_not_written() {
     }
 }
 
+#[test]
+fn pbrt_has_no_checkers_above_1_which_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for (a, n_told) in [(1.0, 0), (3.0, 1)] {
+        let text = format!(
+            "(camera: (eye: (0, 0, 9), look_at: (0, 0, 0)), textures: {{ \"c\": checker(a: ({a}, 1, 1), b: 0) }},\n\
+             materials: {{ \"m\": diffuse(albedo: \"c\") }}, environment: constant(1),\n\
+             objects: [ quad(corner: (0, 0, 0), edge_u: (1, 0, 0), edge_v: (0, 1, 0), material: \"m\") ])"
+        );
+        let told = there_and_back(written(folder.path(), &text), SceneFormat::Pbrt, folder.path()).2;
+        assert_eq!(told.iter().filter(|line| line.contains("above 1")).count(), n_told, "{told:?}");
+    }
+}
+
 /// Names that one of the grammars writes alike, has no letter for, or that our reader cuts.
 #[test]
 fn materials_and_textures_keep_apart_whose_names_are_written_alike() {

@@ -221,8 +221,11 @@ impl Writer<'_> {
                 ("constant", constant(List::default(), "value", wanted.change.of(texture.tint)))
             }
             TexturePattern::Checker { a, b } => {
-                let list = constant(List::default(), "tex1", wanted.change.of(*a));
-                ("checkerboard", place(constant(list, "tex2", wanted.change.of(*b))))
+                let [a, b] = [*a, *b].map(|color| wanted.change.of(color));
+                if !is_number && a.max(b).max_element() > 1.0 {
+                    self.tell(&wanted.name, "colours above 1 are 1 in pbrt");
+                }
+                ("checkerboard", place(constant(constant(List::default(), "tex1", a), "tex2", b)))
             }
             TexturePattern::Image { wrap, smooth, .. } => {
                 if texture.vertex_colors {
