@@ -362,14 +362,14 @@ pub fn accumulate(
         shown.region = brush.0;
         found.0.add(Level::Reschedule, "region");
     }
-    let paused = paused.0 || hidden.0 || size.is_empty();
+    // An empty scene has nothing to show, and the one that opens needs the processor.
+    let opens_first = shown.inputs.objects.is_empty() && beside.progress().0.is_some();
+    let paused = paused.0 || hidden.0 || size.is_empty() || opens_first;
     if shown.paused != paused {
         orders.paused = Some(paused);
         shown.paused = paused;
         found.0.add(Level::Reschedule, "pause");
     }
-    // An empty scene has nothing to show, and the one that opens needs the processor.
-    let opens_first = shown.inputs.objects.is_empty() && beside.progress().0.is_some();
     shown.is_unordered |= found.0.restarts();
     if shown.is_unordered
         && !opens_first

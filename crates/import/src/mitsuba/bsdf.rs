@@ -412,6 +412,7 @@ impl Converter<'_> {
             let share = if sum > 0.0 { (weight / sum) as f32 } else { 0.0 };
             whole = self.blended(node, share.into(), [node, part], [whole, other]);
         }
+        // Thirds are written as 0.333.
         if sum < 0.999 {
             self.tell(node, "weights whose sum is below 1 are not modelled: they are shares");
         }

@@ -87,16 +87,21 @@ fn escape(tag: &str, out: &mut String) {
     }
 }
 
-/// Whether the text behind an `&` is a reference to a character.
+/// Whether the text behind an `&` is a reference to a character that XML has.
 fn is_reference(text: &str) -> bool {
     /// No longer one is a character.
     const LONGEST: usize = 10;
     let Some((name, _)) = text.char_indices().nth(LONGEST).map_or(text, |(end, _)| &text[..end]).split_once(';') else {
         return false;
     };
-    let is_number = |digits: &str, radix: u32| u32::from_str_radix(digits, radix).is_ok();
+    let is_character = |digits: &str, radix: u32| {
+        let number = Some(digits).filter(|digits| !digits.starts_with('+'));
+        let code = number.and_then(|digits| u32::from_str_radix(digits, radix).ok());
+        code.and_then(char::from_u32)
+            .is_some_and(|c| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..='\u{10ffff}'))
+    };
     match name.strip_prefix('#') {
-        Some(number) => number.strip_prefix('x').map_or_else(|| is_number(number, 10), |hex| is_number(hex, 16)),
+        Some(number) => number.strip_prefix('x').map_or_else(|| is_character(number, 10), |hex| is_character(hex, 16)),
         None => matches!(name, "lt" | "gt" | "amp" | "apos" | "quot"),
     }
 }
@@ -113,6 +118,7 @@ mod tests {
                 "\n                     \n<a> \n                  \n</a>     ",
             ),
             ("<a b=\"<&&amp;&#38;&x;\" c='\">'/>", "<a b=\"&lt;&amp;&amp;&#38;&amp;x;\" c='\">'/>"),
+            ("<a b=\"&#0;&#+5;&#xD800;&#x9;\"/>", "<a b=\"&amp;#0;&amp;#+5;&amp;#xD800;&#x9;\"/>"),
             ("<!DOCTYPE scene><a/>", "                <a/>"),
             ("<!DOCTYPE scene [<!ENTITY a \"b\">]><a/>", "<!DOCTYPE scene [<!ENTITY a \"b\">  <a/>"),
             ("<a><![CDATA[<b>]]>\u{c}</a>", "<a>                </a>"),

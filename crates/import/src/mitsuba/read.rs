@@ -334,11 +334,11 @@ impl Reader<'_> {
             "boolean" if text.eq_ignore_ascii_case("false") => Value::Boolean(false),
             "boolean" => return Err(expected("`true` or `false`")),
             "string" => Value::Text(text),
-            // Of version 0.x, whose spectra are linear RGB unless it is compiled otherwise.
-            "spectrum" if self.old && numbers(&text).is_some_and(|all| all.len() == 3) => {
-                Value::Rgb(numbers(&text).map_or(DVec3::ZERO, |all| DVec3::from_slice(&all)))
-            }
-            "spectrum" => Value::Spectrum(spectrum::parse(&text).map_err(|why| expected(&why))?),
+            "spectrum" => match numbers(&text).as_deref() {
+                // Of version 0.x, whose spectra are linear RGB unless it is compiled otherwise.
+                Some(&[r, g, b]) if self.old => Value::Rgb(DVec3::new(r, g, b)),
+                _ => Value::Spectrum(spectrum::parse(&text).map_err(|why| expected(&why))?),
+            },
             _ => match hex(&text) {
                 Some(rgb) => Value::Rgb(rgb),
                 None => match numbers(&text).as_deref() {
