@@ -8,7 +8,7 @@ use crate::frame::navigation;
 use crate::frame::saving::SavedAs;
 use crate::frame::scene_bounds::SceneBounds;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{CurrentScene, RenderState, SceneGeneration};
+use crate::frame::state::resources::{CurrentScene, PlayRange, RenderState, SceneGeneration};
 use crate::frame::views::ViewTrail;
 use crate::scene::{
     Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
@@ -29,6 +29,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<History>().forget();
     world.resource_mut::<ViewTrail>().forget();
     world.insert_resource(Focus::default());
+    world.insert_resource(PlayRange::default());
     world.insert_resource(crate::frame::state::selection::Selection::default());
     world.resource_mut::<crate::frame::state::explain::Explaining>().forget();
     let mut shown = world.resource_mut::<RenderState>();
@@ -69,12 +70,14 @@ pub fn adopt_again(
     let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
         == (old.file.integrator, old.file.max_depth, old.file.film.filter);
     let rendering = same_settings.then(|| *world.resource::<Rendering>());
+    let range = *world.resource::<PlayRange>();
     scene.shot = None;
     let trees = scene.trees.clone();
     adopt(world, scene, now);
     let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(trees);
     shown.adopted = Some(cause);
+    world.insert_resource(range);
     if let Some(seconds) = moment.filter(|_| world.contains_resource::<Animation>()) {
         set_moment(world, seconds);
     }

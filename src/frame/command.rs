@@ -170,10 +170,15 @@ pub enum Command {
         /// Time in seconds; `None` for the stored pose of a glTF model.
         seconds: Option<f64>,
     },
-    /// Advance the time of the animation, from its end on at its start.
+    /// Advance the time of the animation, from the end of what plays on at its start.
     AdvanceMoment {
         /// Seconds.
         seconds: f64,
+    },
+    /// Set which part of the animation plays.
+    SetPlayRange {
+        /// From when, until when; `None` for all of it.
+        seconds: Option<[f64; 2]>,
     },
     /// Set when to stop.
     SetTarget(Target),
@@ -266,6 +271,12 @@ impl Command {
             Self::SetMoment { seconds: Some(seconds) } | Self::AdvanceMoment { seconds } if !seconds.is_finite() => {
                 let allowed = "be a finite number of seconds".to_owned();
                 Err(BadValue::OutOfRange { field: "at", value: seconds.to_string(), allowed })
+            }
+            Self::SetPlayRange { seconds: Some([from, until]) }
+                if !(0.0 <= *from && from < until && until.is_finite()) =>
+            {
+                let allowed = "begin at 0 s or later, and end after that".to_owned();
+                Err(BadValue::OutOfRange { field: "range", value: format!("{from} to {until}"), allowed })
             }
             _ => Ok(()),
         }

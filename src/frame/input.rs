@@ -13,8 +13,8 @@ use crate::frame::scene_cameras::{beside, cameras_of};
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::Explaining;
 use crate::frame::state::resources::{
-    Clock, CurrentScene, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt,
-    Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState, Renderer,
+    StopAt, Threads, ViewMode, WantedMoment,
 };
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
@@ -60,6 +60,7 @@ pub struct CommandParams<'w, 's> {
     beside: Res<'w, BackgroundTasks>,
     saving: ResMut<'w, Saving>,
     moment: ResMut<'w, WantedMoment>,
+    range: ResMut<'w, PlayRange>,
     renderer: Res<'w, Renderer>,
     scene: Option<Res<'w, CurrentScene>>,
     clock: Res<'w, Clock>,
@@ -128,6 +129,7 @@ impl CommandParams<'_, '_> {
             }
             Command::SetMoment { seconds } => *self.moment = WantedMoment { at: Some(seconds), advance: 0.0 },
             Command::AdvanceMoment { seconds } => self.moment.advance += seconds,
+            Command::SetPlayRange { seconds } => *self.range = PlayRange(seconds),
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {

@@ -11,7 +11,7 @@ use crate::frame::input::ModelUp;
 use crate::frame::saving::SavedAs;
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment};
+use crate::frame::state::resources::{Clock, CurrentScene, PictureSize, PlayRange, Renderer, WantedMoment};
 use crate::frame::watch::Watch;
 use crate::scene::{
     Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
@@ -142,12 +142,12 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
             _ => {
                 let at = at.flatten().unwrap_or(shown);
                 let wanted = at + advance;
-                // Past its end it starts over.
-                let wraps = advance != 0.0 && length > 0.0 && !(0.0..length).contains(&wanted);
-                return set_moment(
-                    world,
-                    if wraps { wanted.rem_euclid(length) } else { wanted.clamp(0.0, MOST_SECONDS) },
-                );
+                let wanted = if advance == 0.0 {
+                    wanted.clamp(0.0, MOST_SECONDS)
+                } else {
+                    world.resource::<PlayRange>().wrap(wanted, length)
+                };
+                return set_moment(world, wanted);
             }
         }
     }

@@ -19,8 +19,8 @@ use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::{Explaining, explain_pixel};
 use crate::frame::state::history::{History, notice, remember};
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer,
-    SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState,
+    Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
 use crate::frame::state::selection::{OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
@@ -152,6 +152,7 @@ impl Session {
         world.init_resource::<SceneGeneration>();
         world.init_resource::<SavedAs>();
         world.init_resource::<WantedMoment>();
+        world.init_resource::<PlayRange>();
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
         world.insert_resource(HotReload::new(waker));

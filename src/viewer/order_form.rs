@@ -5,6 +5,7 @@ use crate::scene::{Animation, FilmSize};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::order::Order;
 use crate::viewer::saver::{file_stem, new_file};
+use crate::viewer::time_line::{NOTHING_MOVES, Strip};
 use egui::{Align2, Button, ComboBox, Context, DragValue, Grid, RichText, Ui, Vec2, Window};
 use std::path::{Path, PathBuf};
 
@@ -87,7 +88,7 @@ impl OrderForm {
 
     /// Opens the form for the scene of the session.
     ///
-    /// - `frames`: of its animation rather than one image; `folder`: of files that are not chosen yet.
+    /// - `frames`: what plays of its animation rather than one image; `folder`: of files that are not chosen yet.
     ///
     /// # Errors
     /// If there are to be frames and nothing moves.
@@ -107,9 +108,9 @@ impl OrderForm {
         self.frames = match frames {
             false => None,
             true => {
-                let animation = world.get_resource::<Animation>().filter(|animation| animation.moves());
-                let animation = animation.ok_or("nothing in this scene moves: Ctrl+K sets keys")?;
-                Some((0, animation.n_frames().saturating_sub(1)))
+                let moves = world.get_resource::<Animation>().is_some_and(Animation::moves);
+                let [first, last] = Strip::of(session).filter(|_| moves).ok_or(NOTHING_MOVES)?.plays;
+                Some((first, last))
             }
         };
         // Each time another one, so that nothing is replaced by a second click.

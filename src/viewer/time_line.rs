@@ -1,15 +1,24 @@
-//! The strip of an animation above the bar: play, the frame, its keys, and a button that renders the frames.
+//! The strip of an animation above the bar: play, the frame, its keys, what part of it plays, and a button that renders
+//! the frames.
 
-use crate::frame::{Command, CurrentScene, Session};
+use crate::frame::{Command, CurrentScene, PlayRange, Session};
 use crate::scene::{Animation, Moment};
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, PlayEnd};
 use crate::viewer::overlay::{GLASS, KEY, TEXT, TEXT_SIZE};
-use egui::{Align, Align2, Color32, Context, FontId, Frame, Layout, Margin, Pos2, Rect, Sense, Stroke, TopBottomPanel};
+use egui::{
+    Align, Align2, Color32, Context, CursorIcon, FontId, Frame, Layout, Margin, Pos2, Rect, Sense, Stroke,
+    TopBottomPanel, Ui,
+};
 
 /// Points.
 const HEIGHT: f32 = 30.0;
 /// Distance of two labels of frames, points.
 const LABELS: f64 = 56.0;
+/// Why there is no strip.
+pub const NOTHING_MOVES: &str = "nothing in this scene moves: Ctrl+K sets keys";
+/// Of the line above the lower edge, and of a mark of what plays, points.
+const LINE: f32 = 11.0;
+const MARK: f32 = 9.0;
 
 /// An animation as the strip shows it.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,13 +29,14 @@ pub struct Strip {
     pub n: u32,
     /// The frame that is shown; `None` for the pose that a model is stored in.
     pub frame: Option<f64>,
+    /// First and last frame of what plays.
+    pub plays: [u32; 2],
     /// Frames with a key.
     keys: Vec<f64>,
 }
 
 /// What is asked for on the strip.
 pub enum Ask {
-    Play,
     Send(Command),
     Act(Action),
 }
@@ -36,16 +46,46 @@ impl Strip {
     pub fn of(session: &Session) -> Option<Self> {
         let world = session.world();
         let shown = world.get_resource::<Moment>().map_or(0.0, |moment| moment.0);
+        let range = world.resource::<PlayRange>().0;
+        let plays = |fps: f64, n: u32| {
+            let last = n.saturating_sub(1);
+            let frame = |seconds: f64| (seconds * fps).round().clamp(0.0, f64::from(last)) as u32;
+            // The last frame is shown until its end.
+            range.map_or([0, last], |[from, until]| [frame(from), frame(until - 1.0 / fps)])
+        };
         if let Some(animation) = world.get_resource::<Animation>().filter(|animation| animation.moves()) {
             let fps = animation.fps;
             let keys = animation.key_times().iter().map(|time| time * fps).collect();
-            return Some(Self { fps, n: animation.n_frames(), frame: Some(shown * fps), keys });
+            let n = animation.n_frames();
+            return Some(Self { fps, n, frame: Some(shown * fps), plays: plays(fps, n), keys });
         }
         // A glTF model in its stored pose.
         let length = world.get_resource::<CurrentScene>()?.0.facts.as_ref()?.animation_length?;
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
         let n = (length * fps - 1e-6).ceil().max(1.0) as u32;
-        Some(Self { fps, n, frame: None, keys: Vec::new() })
+        Some(Self { fps, n, frame: None, plays: plays(fps, n), keys: Vec::new() })
+    }
+
+    /// Begins or ends what plays at a frame; the other end gives way.
+    pub fn with_end(&self, end: PlayEnd, frame: f64) -> Command {
+        let frame = frame.clamp(0.0, f64::from(self.n.saturating_sub(1))) as u32;
+        let [first, last] = match end {
+            PlayEnd::First => [frame, self.plays[1].max(frame)],
+            PlayEnd::Last => [self.plays[0].min(frame), frame],
+        };
+        let is_all = first == 0 && last + 1 >= self.n;
+        let seconds = [f64::from(first) / self.fps, f64::from(last + 1) / self.fps];
+        Command::SetPlayRange { seconds: (!is_all).then_some(seconds) }
+    }
+
+    /// Where playing begins, stops or goes on: commands before it.
+    pub fn before_play(&self, is_playing: bool) -> Option<Command> {
+        match self.frame {
+            // It stops at a whole frame.
+            Some(frame) if is_playing => Some(self.moment(frame.round())),
+            None if !is_playing => Some(self.moment(f64::from(self.plays[0]))),
+            _ => None,
+        }
     }
 
     /// Seconds of a frame.
@@ -84,12 +124,7 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
         ui.horizontal_centered(|ui| {
             let (sign, hint) = if is_playing { ("⏸", "pause the animation") } else { ("▶", "play the animation") };
             if ui.button(sign).on_hover_text(hint).clicked() {
-                if is_playing {
-                    asked.push(Ask::Send(strip.moment(strip.frame.unwrap_or(0.0).round())));
-                } else if strip.frame.is_none() {
-                    asked.push(Ask::Send(strip.moment(0.0)));
-                }
-                asked.push(Ask::Play);
+                asked.push(Ask::Act(Action::TogglePlay));
             }
             let shown = strip.frame.map_or("–".to_owned(), |frame| format!("{:.0}", frame.floor()));
             let last = strip.n.saturating_sub(1);
@@ -110,11 +145,15 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 let (rect, track) = ui.allocate_exact_size(size, Sense::click_and_drag());
                 draw_track(ui.painter(), rect, strip);
                 let about = track.on_hover_text("drag: another frame; yellow marks are keys");
+                let frame_at = |place: Pos2| strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));
                 if let Some(place) = about.interact_pointer_pos().filter(|_| about.is_pointer_button_down_on()) {
-                    let frame = strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));
+                    let frame = frame_at(place);
                     if strip.frame != Some(frame) {
                         asked.push(Ask::Send(strip.moment(frame)));
                     }
+                }
+                for end in [PlayEnd::First, PlayEnd::Last] {
+                    asked.extend(mark(ui, rect, strip, end, frame_at).map(Ask::Send));
                 }
             });
         });
@@ -122,14 +161,40 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
     asked
 }
 
+/// Draws an end of what plays below the line, and returns where it was dragged.
+fn mark(ui: &Ui, rect: Rect, strip: &Strip, end: PlayEnd, frame_at: impl Fn(Pos2) -> f64) -> Option<Command> {
+    let (frame, outward, hint) = match end {
+        PlayEnd::First => {
+            (strip.plays[0], -1.0, "drag: where playing and rendering begin; double click: at the first frame")
+        }
+        PlayEnd::Last => {
+            (strip.plays[1], 1.0, "drag: where playing and rendering end; double click: at the last frame")
+        }
+    };
+    let tip =
+        Pos2::new(rect.left() + rect.width() * strip.place_of(f64::from(frame)) as f32, rect.bottom() - LINE + 2.0);
+    let corners = [tip, tip + egui::vec2(0.0, MARK), tip + egui::vec2(outward * MARK, MARK)];
+    let target = Rect::from_points(&corners).expand2(egui::vec2(3.0, 0.0));
+    let response = ui.interact(target, ui.id().with(("end", outward > 0.0)), Sense::click_and_drag());
+    let is_meant = response.hovered() || response.dragged();
+    let color = if is_meant { Color32::WHITE } else { Color32::from_gray(170) };
+    ui.painter().add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::NONE));
+    let response = response.on_hover_text(hint).on_hover_cursor(CursorIcon::ResizeHorizontal);
+    if response.double_clicked() {
+        return Some(strip.with_end(end, if end == PlayEnd::First { 0.0 } else { f64::from(strip.n) }));
+    }
+    let dragged = response.interact_pointer_pos().filter(|_| response.dragged()).map(frame_at);
+    dragged.filter(|wanted| *wanted != f64::from(frame)).map(|wanted| strip.with_end(end, wanted))
+}
+
 fn draw_track(painter: &egui::Painter, rect: Rect, strip: &Strip) {
     let x = |frame: f64| rect.left() + rect.width() * strip.place_of(frame) as f32;
-    let line = rect.bottom() - 11.0;
-    painter.rect_filled(
-        Rect::from_min_max(Pos2::new(rect.left(), line - 1.5), Pos2::new(rect.right(), line + 1.5)),
-        1.5,
-        Color32::from_gray(70),
-    );
+    let line = rect.bottom() - LINE;
+    let [first, last] = strip.plays.map(|frame| x(f64::from(frame)));
+    for ([left, right], gray) in [([rect.left(), rect.right()], 60), ([first, last], 120)] {
+        let part = Rect::from_min_max(Pos2::new(left, line - 1.5), Pos2::new(right, line + 1.5));
+        painter.rect_filled(part, 1.5, Color32::from_gray(gray));
+    }
     let step = strip.step(rect.width());
     let weak = Color32::from_gray(150);
     for frame in (0..strip.n).step_by(step as usize) {
@@ -163,7 +228,7 @@ mod tests {
     use super::*;
 
     fn strip(n: u32) -> Strip {
-        Strip { fps: 24.0, n, frame: Some(0.0), keys: Vec::new() }
+        Strip { fps: 24.0, n, frame: Some(0.0), plays: [0, n - 1], keys: Vec::new() }
     }
 
     #[test]
@@ -175,6 +240,21 @@ mod tests {
         );
         assert_eq!(strip.place_of(30.0), 0.5);
         assert_eq!(strip.moment(12.0), Command::SetMoment { seconds: Some(0.5) });
+    }
+
+    #[test]
+    fn what_plays_has_ends_that_give_way_and_none_where_it_is_all() {
+        let mut strip = strip(48);
+        let range = |command| match command {
+            Command::SetPlayRange { seconds } => seconds,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(range(strip.with_end(PlayEnd::First, 12.0)), Some([0.5, 2.0]));
+        strip.plays = [12, 23];
+        assert_eq!(range(strip.with_end(PlayEnd::First, 36.0)), Some([1.5, 37.0 / 24.0]));
+        assert_eq!(range(strip.with_end(PlayEnd::Last, 5.0)), Some([5.0 / 24.0, 0.25]));
+        strip.plays = [0, 23];
+        assert_eq!(range(strip.with_end(PlayEnd::Last, 48.0)), None);
     }
 
     #[test]

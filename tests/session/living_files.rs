@@ -428,6 +428,17 @@ fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
     driver.frame();
     assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
     assert!(!driver.session.has_unsaved_edits());
+    // Of a part of it that plays, too, until all of it plays again.
+    driver.session.send(Command::SetPlayRange { seconds: Some([0.25, 1.0]) });
+    for (seconds, at) in [(0.25, 0.75), (0.375, 0.375), (0.75, 0.375)] {
+        driver.session.send(Command::AdvanceMoment { seconds });
+        driver.frame();
+        assert_eq!(shown(&mut driver).0, at);
+    }
+    driver.session.send(Command::SetPlayRange { seconds: None });
+    driver.session.send(Command::AdvanceMoment { seconds: 2.125 });
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
     // All of that is one step.
     driver.session.send(Command::Edit(Edit::Undo));
     driver.frame();

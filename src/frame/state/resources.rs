@@ -80,6 +80,20 @@ pub struct WantedMoment {
     pub advance: f64,
 }
 
+/// The part of the animation that plays over and over, seconds; `None` for all of it.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlayRange(pub Option<[f64; 2]>);
+
+impl PlayRange {
+    /// A time of an animation of this length, seconds, in what plays: past its end it starts over.
+    pub fn wrap(self, seconds: f64, length: f64) -> f64 {
+        let [from, until] = self.0.map(|range| range.map(|end| end.min(length))).unwrap_or([0.0, length]);
+        // An animation that became shorter may leave nothing of it.
+        let [from, until] = if from < until { [from, until] } else { [0.0, length] };
+        if (from..until).contains(&seconds) { seconds } else { from + (seconds - from).rem_euclid(until - from) }
+    }
+}
+
 /// Number of scenes that have been opened so far.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SceneGeneration(pub u64);

@@ -10,7 +10,7 @@ use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
 use crate::viewer::panel::DroppedMaterial;
 use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
-use crate::viewer::time_line::Ask;
+use crate::viewer::time_line::{Ask, NOTHING_MOVES, Strip};
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, file_manager, panel};
 use std::path::{Path, PathBuf};
@@ -31,28 +31,11 @@ impl App {
         if let Some(speed) = asked.speed {
             self.input.set_speed(speed, now);
         }
-        if asked.toggle_spin {
-            self.input.toggle_spin(now);
-            self.needs_tick = true;
-        }
-        if asked.toggle_play {
-            self.input.toggle_play(now);
-            self.needs_tick = true;
-        }
-        if asked.toggle_brush {
-            self.toggle_brush(now);
-        }
-        if asked.toggle_drag {
-            self.toggle_drag(now);
-        }
         if let Some(navigation) = asked.navigation {
             self.set_navigation(navigation, now);
         }
         if let Some(purpose) = asked.dialog {
             self.ask_for_file(purpose, now);
-        }
-        if let Some(linear) = asked.screenshot {
-            self.screenshot(linear);
         }
         if let Some(filter) = asked.filter {
             match filter.check() {
@@ -88,7 +71,6 @@ impl App {
         for ask in asked {
             self.needs_tick = true;
             match ask {
-                Ask::Play => self.input.toggle_play(now),
                 Ask::Act(action) => self.act(action),
                 Ask::Send(command) => {
                     self.reaction.asked(now);
@@ -186,6 +168,15 @@ impl App {
                 self.announce_handles(now);
             }
             Action::Grab(mode) => self.begin_grab(mode, now),
+            Action::TogglePlay => self.toggle_play(now),
+            Action::PlayRange(end) => {
+                if let Some((strip, frame)) =
+                    Strip::of(&self.session).and_then(|strip| strip.frame.map(|at| (strip, at)))
+                {
+                    self.session.send(strip.with_end(end, frame.round()));
+                }
+            }
+            Action::PlayAll => self.session.send(Command::SetPlayRange { seconds: None }),
             Action::ToggleSpin => self.input.toggle_spin(now),
             Action::ToggleDrag => self.toggle_drag(now),
             Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),
@@ -237,6 +228,16 @@ impl App {
     pub(super) fn scene_path(&self, new: bool) -> PathBuf {
         let known = self.session.scene_file().filter(|_| !new);
         known.unwrap_or_else(|| new_file(&self.options.folder, &self.session.status().scene, "ron"))
+    }
+
+    fn toggle_play(&mut self, now: Instant) {
+        let Some(strip) = Strip::of(&self.session) else {
+            return self.toasts.add(Tone::News, NOTHING_MOVES, now);
+        };
+        if let Some(command) = strip.before_play(self.input.is_playing()) {
+            self.session.send(command);
+        }
+        self.input.toggle_play(now);
     }
 
     fn announce_handles(&mut self, now: Instant) {

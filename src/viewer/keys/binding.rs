@@ -132,6 +132,11 @@ pub enum Action {
     Gizmo(Option<gizmo::Mode>),
     /// Moves, rotates or scales the selection with the mouse at once.
     Grab(gizmo::Mode),
+    /// Starts or stops the animation.
+    TogglePlay,
+    /// Begins or ends what plays at the shown frame.
+    PlayRange(PlayEnd),
+    PlayAll,
     /// Starts or stops the turntable.
     ToggleSpin,
     /// Toggles whether a drag looks around or orbits the pivot.
@@ -155,6 +160,13 @@ pub enum Action {
     /// Closes the help, or clears the selection, or closes the window.
     Leave,
     Quit,
+}
+
+/// An end of the part of an animation that plays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlayEnd {
+    First,
+    Last,
 }
 
 impl Motion {

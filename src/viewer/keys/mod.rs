@@ -15,7 +15,7 @@ mod table_view;
 mod table_window;
 mod words;
 
-pub use binding::{Action, Binding, Chord, Item, KeyGroup, Menu, Motion, Trigger, Typed};
+pub use binding::{Action, Binding, Chord, Item, KeyGroup, Menu, Motion, PlayEnd, Trigger, Typed};
 pub use build::{REDO, UNDO};
 pub use page::markdown;
 pub use presets::shown;

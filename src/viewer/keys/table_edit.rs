@@ -1,7 +1,7 @@
 //! Keys and commands of selecting and editing.
 
 use crate::frame::{Command, Edit, NewThing, gizmo};
-use crate::viewer::keys::binding::{Action, KeyGroup, Menu, Trigger};
+use crate::viewer::keys::binding::{Action, KeyGroup, Menu, PlayEnd, Trigger};
 use crate::viewer::keys::build::{REDO, UNDO, add_item, edit, edit_item, item, named, row, text};
 use winit::keyboard::NamedKey;
 
@@ -53,6 +53,13 @@ pub const EDIT: KeyGroup = KeyGroup {
             "set a key of the camera at the shown time",
             edit("k", Some(true), Edit::SetKeys { camera: true }),
             edit_item("Set a key of the camera", &[Menu::Edit], Edit::SetKeys { camera: true })
+        ),
+        row!(
+            "play the animation, pause it; what plays, and is rendered, begins and ends at the shown frame",
+            item("Play or pause the animation", &[Menu::View], Action::TogglePlay),
+            item("Play from this frame on", &[], Action::PlayRange(PlayEnd::First)),
+            item("Play up to this frame", &[], Action::PlayRange(PlayEnd::Last)),
+            item("Play all frames", &[], Action::PlayAll)
         ),
         row!("undo", edit("z", Some(false), Edit::Undo), item("Undo", &[Menu::Edit, Menu::Here], UNDO)),
         row!(

@@ -3,6 +3,7 @@
 use crate::frame::{Command, CurrentScene, Edit, Property, Selection, Session};
 use crate::scene::animation::{Interpolation, Shutter, Track};
 use crate::scene::{Animation, Moment};
+use crate::viewer::keys::Action;
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{number, row_with_hint, rows, slider};
 use egui::Ui;
@@ -38,12 +39,7 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
             let (label, hint) =
                 if around.playing { ("Pause", "stop the animation") } else { ("Play", "play the animation") };
             if ui.button(label).on_hover_text(hint).clicked() {
-                asked.toggle_play = true;
-                if around.playing {
-                    asked.send(Command::SetMoment { seconds: Some(to_frame(at)) });
-                } else if is_stored_pose {
-                    asked.send(Command::SetMoment { seconds: Some(0.0) });
-                }
+                asked.action = Some(Action::TogglePlay);
             }
             if let Some(animation) = animation.filter(|animation| animation.moves()) {
                 let frame = format!("frame {:.1} of {}", at * fps, animation.n_frames());

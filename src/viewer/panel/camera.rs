@@ -6,6 +6,7 @@ use crate::frame::{
     radius_of_f_stop, sharp_zone,
 };
 use crate::scene::{Lens, Projection, View};
+use crate::viewer::keys::Action;
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use crate::viewer::status::metres;
@@ -55,8 +56,9 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
         row_with_hint(ui, "drag", "left mouse drag (Space)", |ui| {
             ui.horizontal(|ui| {
                 for (label, orbits) in [("look around", false), ("orbit", true)] {
-                    if ui.selectable_label(around.orbits == orbits, label).clicked() {
-                        asked.toggle_drag |= around.orbits != orbits;
+                    let is_chosen = around.orbits == orbits;
+                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
+                        asked.action = Some(Action::ToggleDrag);
                     }
                 }
             })
@@ -112,7 +114,9 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
             }
         }
         let turntable = ui.selectable_label(around.spinning, "Turntable");
-        asked.toggle_spin |= turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked();
+        if turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked() {
+            asked.action = Some(Action::ToggleSpin);
+        }
     });
     cameras(ui, session, asked);
     let bookmarks = session.world().resource::<Bookmarks>();

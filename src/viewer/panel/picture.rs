@@ -88,7 +88,7 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             .on_hover_text("drag a rectangle to render only that region (B)")
             .clicked()
         {
-            asked.toggle_brush = true;
+            asked.action = Some(Action::Brush);
         }
         if status.region.is_some()
             && ui.button("Whole image").on_hover_text("render the whole image (Shift+B)").clicked()
@@ -102,10 +102,10 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             asked.action = Some(Action::RenderTo { frames: false });
         }
         if ui.button("PNG").on_hover_text("save the image as it is displayed now, in a new file (K)").clicked() {
-            asked.screenshot = Some(false);
+            asked.action = Some(Action::Screenshot { linear: false });
         }
         if ui.button("EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
-            asked.screenshot = Some(true);
+            asked.action = Some(Action::Screenshot { linear: true });
         }
         let layers =
             "save linear light with layers in a new EXR: albedo, normal, depth, position, masks, samples, error";

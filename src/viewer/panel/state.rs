@@ -89,17 +89,12 @@ pub struct Around<'a> {
 pub struct Asked {
     pub commands: Vec<Command>,
     pub speed: Option<f64>,
-    pub toggle_spin: bool,
-    pub toggle_play: bool,
-    pub toggle_drag: bool,
     pub navigation: Option<Navigation>,
-    pub screenshot: Option<bool>,
     pub save_layers: bool,
     /// A command of the table.
     pub action: Option<Action>,
     /// The filter of denoised images, which may not be installed.
     pub filter: Option<DenoiseFilter>,
-    pub toggle_brush: bool,
     /// A file dialog to show, with its purpose.
     pub dialog: Option<DialogPurpose>,
     /// A material that was dropped at this place of the window, points.
