@@ -142,7 +142,8 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 if size.x < 40.0 {
                     return;
                 }
-                let (rect, track) = ui.allocate_exact_size(size, Sense::click_and_drag());
+                let (whole, track) = ui.allocate_exact_size(size, Sense::click_and_drag());
+                let rect = whole.shrink2(egui::vec2(MARK, 0.0));
                 draw_track(ui.painter(), rect, strip);
                 let about = track.on_hover_text("drag: another frame; yellow marks are keys");
                 let frame_at = |place: Pos2| strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));

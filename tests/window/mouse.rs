@@ -176,7 +176,7 @@ fn keep_panel(desktop: &Desktop, open: &[&str]) {
 fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     let Some(desktop) = Desktop::start() else { return };
     let path = desktop.folder().join("room.ron");
-    std::fs::write(&path, ROOM.replace("environment:", "film: (width: 160, height: 120), environment:"))
+    std::fs::write(&path, ROOM.replace("environment:", "film: (width: 1920, height: 1080), environment:"))
         .expect("a file");
     keep_panel(&desktop, &["Lights", "Environment"]);
     let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
@@ -215,13 +215,13 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     program.hold("w", 300);
     let image = desktop.folder().join("room-0001.png");
     until("the image", || image.is_file().then_some(()));
-    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (800, 600));
+    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (1920, 1080));
     let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
     // The camera may still have glided a little; flying goes much farther.
     let moved = shot.camera.eye.distance(camera.eye);
     assert!(moved < 0.01 && shot.denoised.as_deref() == Some("own"), "as it was seen: {moved} m");
     until("its path", || {
-        (program.output() + &program.errors()).contains("room-0001.png (800 × 600, noise ").then_some(())
+        (program.output() + &program.errors()).contains("room-0001.png (1920 × 1080, noise ").then_some(())
     });
     program.key("ctrl+q");
     assert!(program.ended().success());
