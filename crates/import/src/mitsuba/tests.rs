@@ -473,3 +473,35 @@ fn a_camera_of_another_kind_is_a_perspective_one_in_its_place() {
     assert_eq!(looks("codedperspective", &with_fov).1.round(), 90.0);
     assert_ne!(looks("irradiancemeter", placed).0, DVec3::new(1.0, 2.0, 9.0));
 }
+
+#[test]
+fn sheets_of_two_parts_tell_colours_above_one_alone() {
+    let sheet = |reflectance: f32| {
+        surface(&format!(
+            "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/>\
+             <bsdf type=\"twosided\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"{reflectance}\"/></bsdf></bsdf>\
+             <bsdf type=\"principledthin\"><float name=\"eta\" value=\"1\"/><float name=\"diff_trans\" value=\"2\"/>\
+             <float name=\"roughness\" value=\"0.3\"/><float name=\"anisotropic\" value=\"0.5\"/>\
+             <rgb name=\"base_color\" value=\"0.5\"/></bsdf></bsdf>"
+        ))
+    };
+    for (reflectance, kept) in [(1.5, 0.75), (3.0, 1.0)] {
+        let scene = sheet(reflectance);
+        let transmittance = ColorValue::grey(0.25);
+        assert_eq!(*part(&scene, 0), Material::Translucent { reflectance: ColorValue::grey(kept), transmittance });
+        match kept < 1.0 {
+            true => assert_eq!(told(&scene), Vec::<String>::new()),
+            false => tells_only(&scene, &["`reflectance`", "above 1"]),
+        }
+    }
+}
+
+#[test]
+fn bsdfs_in_too_many_others_are_grey() {
+    let masks = |n: usize| {
+        let (begin, end) = ("<bsdf type=\"twosided\">".repeat(n), "</bsdf>".repeat(n));
+        surface(&format!("{begin}<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.25\"/></bsdf>{end}"))
+    };
+    assert_eq!(told(&masks(20)), Vec::<String>::new());
+    tells_only(&masks(60), &["BSDFs are nested more than 32 deep"]);
+}
