@@ -21,7 +21,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// Materials inside of one another.
-const MAX_DEPTH: u32 = 8;
+const MAX_DEPTH: u32 = 32;
 
 impl Builder<'_> {
     /// Defines a texture.
@@ -274,6 +274,8 @@ impl Builder<'_> {
             return known.clone();
         }
         if self.depth >= MAX_DEPTH {
+            let name = printable::name(&described.name).into_owned();
+            self.tell(format!("material `{name}` lies more than {MAX_DEPTH} mixtures deep: it is left out"));
             return None;
         }
         // A mixture that contains itself finds nothing there.
@@ -293,7 +295,7 @@ impl Builder<'_> {
             && [a, b].iter().filter_map(|name| self.lobes.get(*name)).sum::<usize>() > MAX_LOBES
         {
             let first = self.part(a);
-            let what = "is a mixture of too many materials: the first is shown";
+            let what = format!("is a mixture of more than {MAX_LOBES} materials: the first is shown");
             self.tell(format!("material `{}` {what}", printable::name(&wanted)));
             part = first;
         }
@@ -407,6 +409,7 @@ impl MaterialScope for Scope<'_, '_> {
     fn material(&mut self, name: &str) -> Option<String> {
         let Some(described) = self.builder.named.get(cut(name)).cloned() else {
             self.builder.missing.insert(cut(name).to_owned());
+            self.tell(&format!("there is no material `{}`", printable::name(name)));
             return None;
         };
         self.builder.converted(&described, Vec3::ZERO)

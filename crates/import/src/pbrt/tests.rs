@@ -372,3 +372,21 @@ fn textures_of_later_textures_have_their_colours() {
     let MaterialPart::Diffuse { albedo } = part(&scene) else { panic!("{:?}", part(&scene)) };
     assert_eq!((albedo, told(&scene)), (&ColorValue::Rgb(Vec3::new(0.5, 0.25, 0.125)), Vec::new()));
 }
+
+#[test]
+fn deep_mixtures_are_told_by_what_they_are() {
+    let mixtures = |n: u32| {
+        let mix = |i: u32| {
+            format!("MakeNamedMaterial \"m{i}\" \"string type\" \"mix\" \"string materials\" [\"m{}\" \"m0\"]\n", i - 1)
+        };
+        let all: String = (1..=n).rev().map(mix).collect();
+        read(&format!("MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"\n{all}NamedMaterial \"m{n}\"\n{SQUARE}"))
+    };
+    assert_eq!(told(&mixtures(7)), Vec::<String>::new());
+    for n in [8, 9, 30] {
+        let told = told(&mixtures(n));
+        assert!(!told.is_empty() && told.iter().all(|told| told.contains("mixture of more than 8")), "{told:#?}");
+    }
+    let told = told(&mixtures(40));
+    assert!(told.iter().any(|told| told.contains("more than 32 mixtures deep")), "{told:#?}");
+}
