@@ -27,7 +27,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
-const MAX_OBJECTS: usize = 1 << 20;
+pub(super) const MAX_OBJECTS: usize = 1 << 20;
 /// Shapes, with the pieces of hair, and those that are left out.
 const MAX_SHAPES: u32 = 1 << 23;
 /// Meshes that formulas make may have this fraction of the bytes of a scene: reading them and building their trees takes
@@ -91,13 +91,15 @@ pub(crate) struct Builder<'a> {
     pub(super) is_known: bool,
     /// Names of materials, textures and media that were used and not there.
     pub(super) missing: HashSet<String>,
-    /// Textures that this reading has defined.
-    pub(super) fresh: HashSet<String>,
+    /// What this reading has defined: its kind and its name.
+    pub(super) defined: HashSet<(&'static str, String)>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
-    definitions: HashMap<String, Vec<Item>>,
+    pub(super) definitions: HashMap<String, Vec<Item>>,
+    /// Instances before the definition of their object.
+    pub(super) early: Vec<(String, DAffine3)>,
     /// The object definition that is being read.
-    open: Option<(String, Vec<Item>)>,
+    pub(super) open: Option<(String, Vec<Item>)>,
     pub(super) material_names: Names,
     pub(super) texture_names: Names,
     /// Names of textures by what they are.
@@ -147,9 +149,10 @@ impl<'a> Builder<'a> {
             named: HashMap::new(),
             is_known: false,
             missing: HashSet::new(),
-            fresh: HashSet::new(),
+            defined: HashSet::new(),
             media: HashMap::new(),
             definitions: HashMap::new(),
+            early: Vec::new(),
             open: None,
             material_names: Names::default(),
             texture_names: Names::default(),
@@ -216,37 +219,6 @@ impl<'a> Builder<'a> {
     /// Like [`Self::file`], for a file that was named before.
     pub(super) fn named_file(&self, name: &str) -> Option<String> {
         self.resolved.get(name).cloned().flatten()
-    }
-
-    pub(crate) fn begin_object(&mut self, name: &str) -> Result<(), &'static str> {
-        if self.open.is_some() {
-            return Err("an object definition inside of another one");
-        }
-        self.open = Some((cut(name).to_owned(), Vec::new()));
-        self.strands.part();
-        Ok(())
-    }
-
-    pub(crate) fn end_object(&mut self) -> Result<(), &'static str> {
-        let (name, items) = self.open.take().ok_or("there is no object definition to end")?;
-        self.definitions.insert(name, items);
-        self.strands.part();
-        Ok(())
-    }
-
-    /// An instance of an object definition.
-    pub(crate) fn instance(&mut self, name: &str, ctm: &DAffine3) -> Result<(), TooMany> {
-        if self.open.is_some() {
-            self.tell(format!("an instance of `{}` inside of an object definition is ignored", printable::name(name)));
-            return Ok(());
-        }
-        let Some(items) = self.definitions.remove(cut(name)) else {
-            self.tell(format!("there is no object `{}` to make an instance of", printable::name(name)));
-            return Ok(());
-        };
-        let all = items.iter().try_for_each(|item| self.place(item, &(*ctm * item.local)));
-        self.definitions.insert(cut(name).to_owned(), items);
-        all
     }
 
     /// A shape.
@@ -334,7 +306,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds an item to the scene.
-    fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
+    pub(super) fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
         self.n_placed += 1;
         if self.n_placed > MAX_OBJECTS {
             return Err(TooMany);

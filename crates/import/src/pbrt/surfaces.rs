@@ -23,7 +23,19 @@ use std::sync::Arc;
 /// Materials inside of one another.
 const MAX_DEPTH: u32 = 32;
 
+/// Textures of numbers and of colours have names of their own.
+const TEXTURE_KINDS: [&str; 2] = ["texture of colours", "texture of numbers"];
+
 impl Builder<'_> {
+    /// Whether nothing of this kind has this name before; tells of the second, which pbrt refuses.
+    pub(super) fn is_first(&mut self, kind: &'static str, name: &str) -> bool {
+        let is_first = self.defined.insert((kind, cut(name).to_owned()));
+        if !is_first {
+            self.tell(format!("{kind} `{}` is defined more than once: the first counts", printable::name(name)));
+        }
+        is_first
+    }
+
     /// Defines a texture.
     pub(crate) fn define_texture(&mut self, name: &str, is_number: bool, class: &str, params: &Params) {
         if let Some(image) = params.string("filename") {
@@ -31,11 +43,14 @@ impl Builder<'_> {
             self.file(image);
         }
         for part in TEXTURES.into_iter().filter_map(|part| params.texture(part)) {
-            if !self.fresh.contains(cut(part)) {
+            let is_defined = |kind| self.defined.contains(&(kind, cut(part).to_owned()));
+            if !TEXTURE_KINDS.into_iter().any(is_defined) {
                 self.missing.insert(cut(part).to_owned());
             }
         }
-        self.fresh.insert(cut(name).to_owned());
+        if !self.is_first(TEXTURE_KINDS[usize::from(is_number)], name) {
+            return;
+        }
         let mut told = Vec::new();
         let mut textures = std::mem::take(&mut self.textures);
         textures.define(cut(name), is_number, class, params, |name| self.named_file(name), |what| told.push(what));
@@ -48,7 +63,7 @@ impl Builder<'_> {
     /// Describes a material with a name.
     pub(crate) fn describe_material(&mut self, name: &str, params: Params) {
         told_of_long(name).into_iter().for_each(|what| self.tell(what));
-        if self.is_known && self.named.contains_key(cut(name)) {
+        if !self.is_first("material", name) || self.is_known && self.named.contains_key(cut(name)) {
             return;
         }
         let kind = params.string("type").unwrap_or("diffuse").to_owned();
@@ -64,6 +79,9 @@ impl Builder<'_> {
 
     /// A medium: only one that absorbs and does not scatter is modelled, inside of glass.
     pub(crate) fn describe_medium(&mut self, name: &str, params: &Params) {
+        if !self.is_first("medium", name) {
+            return;
+        }
         let quantity = |name: &str| params.spectrum(name).and_then(|spectrum| spectrum.quantity().ok());
         for coefficient in ["sigma_a", "sigma_s"] {
             if let Some(Err(UnknownSpectrum(spectrum))) = params.spectrum(coefficient).map(|it| it.quantity()) {
