@@ -1,6 +1,7 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
 use crate::model::foreign::{ForeignOptions, cut};
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::placing::{is_placement, transform};
 use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
@@ -74,6 +75,7 @@ pub(crate) struct Builder<'a> {
     pub(super) references: References,
     pub(super) allow_outside: bool,
     light_images: &'a LightImages,
+    pub(super) meshes: &'a MeshBudget,
     /// From the world of the file to ours.
     pub world: DMat3,
     pub warnings: Warnings,
@@ -136,6 +138,7 @@ impl<'a> Builder<'a> {
             references: References::of(path, allow_outside),
             allow_outside,
             light_images: &options.light_images,
+            meshes: &options.meshes,
             world: DMat3::IDENTITY,
             warnings: Warnings::default(),
             textures: Textures::default(),
@@ -439,7 +442,8 @@ mod tests {
     #[test]
     fn shapes_that_are_left_out_are_counted() {
         let light_images = LightImages::new(|_| None);
-        let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+        let options =
+            ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
         let mut builder = Builder::new(Path::new("a.pbrt"), &options);
         builder.n_shapes = MAX_SHAPES - 1;
         let mut shape = || builder.shape("x", &Params::default(), &State::default()).is_ok();

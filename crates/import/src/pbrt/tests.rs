@@ -9,6 +9,7 @@ use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Encoding;
 use glam::{Vec2, Vec3};
 use std::fmt::Write;
+use std::sync::Arc;
 
 const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
 const TRIANGLES: &str =
@@ -26,7 +27,7 @@ fn read(world: &str) -> ForeignScene {
     let path = folder.path().join("a.pbrt");
     std::fs::write(&path, format!("WorldBegin\n{world}")).unwrap();
     let light_images = LightImages::new(|_| None);
-    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
     let scene = super::read(&path, &options).unwrap_or_else(|error| panic!("{error}"));
     SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));
     scene
