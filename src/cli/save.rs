@@ -4,6 +4,7 @@
 use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
 use crate::cli::console::{inform, tell};
 use crate::cli::failure::Failure;
+use crate::cli::waiting::Waiting;
 use clap::Args;
 use firstlight::export::export;
 use firstlight::format::scene_format::SceneFormat;
@@ -43,7 +44,9 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     if let Some(format) = format {
+        let waiting = Waiting::new(format!("writing {}", args.output.display()));
         let exported = export(&whole_scene(&mut world, &scene), format, &args.output, args.overwrite)?;
+        drop(waiting);
         tell(&exported.warnings);
         let folder = exported.folder.map(|folder| format!(", its meshes and images in {}", folder.display()));
         let folder = folder.unwrap_or_default();

@@ -285,6 +285,12 @@ fn package(scene: &SceneArgs) -> Result<Result<Package, String>, Failure> {
     let loaded = scene.load(None, &mut Files::default(), &|_| ())?;
     let package = Package::of(&loaded, &source)?;
     crate::cli::pack::tell_outside(&package);
+    if loaded.shot.as_ref().is_some_and(|image| image.denoised.is_some()) {
+        let name = scene.scene.display();
+        inform(format_args!(
+            "note: {name} is denoised, what a job renders is raw: `merge --denoise` denoises its parts"
+        ));
+    }
     Ok(Ok(package))
 }
 

@@ -472,8 +472,8 @@ impl LoadedScene {
         }
         match choice.at {
             Some(at) if self.file.animation.tracks.is_empty() => {
-                self.warnings
-                    .push(format!("{} has no animation: {at} s shows what any moment does", self.source.title()));
+                let (title, at) = (self.source.title(), bounds::number(at));
+                self.warnings.push(format!("{title} has no animation: {at} s shows what any moment does"));
             }
             Some(at) => {
                 let wrong = |bad| SceneError::in_file(self.source.title(), bad);

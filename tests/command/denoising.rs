@@ -51,6 +51,14 @@ fn a_denoised_image_opens_as_one() {
     assert_eq!((layered.denoised, layered.denoised_layer), (None, Some("own".to_owned())));
     let said = does(path, "render a.png -o e.png --size 48x48 --spp 4 --region 0,0,9,9").err;
     assert!(said.contains("a.png is denoised: with --region, the new image is raw"), "{said}");
+    let said = does(path, "submit openjd a.png --parts 2 --spp 4 --size 48x48 --dry-run").err;
+    assert!(said.contains("a.png is denoised, what a job renders is raw"), "{said}");
+    does(path, "work firstlight-job-a --part 1/2");
+    does(path, "work firstlight-job-a --part 2/2");
+    does(path, "work firstlight-job-a --merge");
+    let parts = [1, 2].map(|part| format!("firstlight-job-a/parts/round-01-part-{part:04}.exr")).join(" ");
+    does(path, &format!("merge {parts} -o all.exr --image all.png --denoise"));
+    assert!(firstlight::scene::ImageMetadata::read(&path.join("all.png")).unwrap().denoised.is_some());
 }
 
 #[test]

@@ -280,31 +280,49 @@ fn shapes_of_formulas_end_where_their_bytes_do() {
     assert!(said.contains("there are too many shapes like it") && said.contains("FIRSTLIGHT_LIMITS"), "{said}");
 }
 
-/// A file of a mesh is read again for each attribute that textures read: all but the first have a limit together.
+/// All meshes of a scene have a limit together, also one file that is read for many attributes.
 #[test]
-fn attributes_of_meshes_end_where_their_bytes_do() {
+fn meshes_of_a_scene_end_where_their_bytes_do() {
     let folder = tempfile::tempdir().unwrap();
-    let header = "ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\nproperty float z\n\
-                  element face 20000\nproperty list uchar int vertex_indices\nend_header\n";
-    let vertices = (0..40_000).map(|i| format!("{} {} 0\n", i % 200, i / 200));
-    let faces = (0..20_000).map(|i| format!("3 {} {} {}\n", i, i + 1, i + 200));
+    let path = folder.path();
+    let header = "ply\nformat ascii 1.0\nelement vertex 4000\nproperty float x\nproperty float y\nproperty float z\n\
+                  element face 3000\nproperty list uchar int vertex_indices\nend_header\n";
+    let vertices = (0..4_000).map(|i| format!("{} {} 0\n", i % 200, i / 200));
+    let faces = (0..3_000).map(|i| format!("3 {} {} {}\n", i, i + 1, i + 200));
     let mesh: String = std::iter::once(header.to_owned()).chain(vertices).chain(faces).collect();
-    std::fs::write(folder.path().join("m.ply"), mesh).unwrap();
-    let shape = |i| {
+    let all = |shape: &dyn Fn(usize) -> String| (0..12).map(shape).collect::<String>();
+    for i in 0..12 {
+        std::fs::write(path.join(format!("m{i}.ply")), &mesh).unwrap();
+    }
+    let of_ron = all(&|i| format!("mesh(source: ply(\"m{i}.ply\"), material: \"a\"),\n"));
+    let of_ron = format!(
+        "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), materials: {{\"a\": diffuse(albedo: 0.5)}}, \
+         environment: constant(1), objects: [{of_ron}])"
+    );
+    let of_xml = all(&|i| {
         format!(
-            "<shape type=\"ply\"><string name=\"filename\" value=\"m.ply\"/><bsdf type=\"diffuse\">\
+            "<shape type=\"ply\"><string name=\"filename\" value=\"m0.ply\"/><bsdf type=\"diffuse\">\
              <texture type=\"mesh_attribute\" name=\"reflectance\"><string name=\"name\" value=\"vertex_a{i}\"/>\
              </texture></bsdf></shape>\n"
         )
-    };
-    let shapes: String = (0..12).map(shape).collect();
-    let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>{shapes}</scene>");
-    std::fs::write(folder.path().join("many.xml"), scene).unwrap();
-    let mut command = program(folder.path());
-    let outcome = Outcome::of(command.args(["info", "--json", "many.xml"]).env("FIRSTLIGHT_LIMITS", "0.01"));
-    assert_eq!(outcome.status, Some(0), "{outcome:?}");
-    let said = format!("{}{}", outcome.err, outcome.out());
-    assert!(said.contains("too much is read of one file of a mesh"), "{said}");
+    });
+    let of_xml = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>{of_xml}</scene>");
+    // Meshes that emit are read with the scene, others with the files.
+    let of_pbrt = all(&|i| {
+        let light = if i % 2 == 0 { "AreaLightSource \"diffuse\"" } else { "" };
+        format!("AttributeBegin {light} Shape \"plymesh\" \"string filename\" \"m{i}.ply\" AttributeEnd\n")
+    });
+    let of_pbrt = format!("Camera \"perspective\"\nWorldBegin\n{of_pbrt}");
+    // So that a file is within the limit of one, and all of them are not within that of all.
+    let factor = 1.6 * mesh.len() as f64 / f64::from(1 << 30);
+    for (name, text) in [("many.ron", of_ron), ("many.xml", of_xml), ("many.pbrt", of_pbrt)] {
+        std::fs::write(path.join(name), text).unwrap();
+        let mut command = program(path);
+        let outcome = Outcome::of(command.args(["info", "--json", name]).env("FIRSTLIGHT_LIMITS", factor.to_string()));
+        assert_eq!(outcome.status, Some(0), "{outcome:?}");
+        let said = format!("{}{}", outcome.err, outcome.out());
+        assert!(said.contains("the meshes of the scene take more than 0 MiB together"), "{said}");
+    }
 }
 
 /// What a scene takes beyond the memory of the process is refused or left out, with its size; nothing is aborted.

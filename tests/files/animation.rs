@@ -392,5 +392,8 @@ fn a_moment_beyond_reach_is_refused_and_one_without_tracks_told() {
     let still = &MOVING[..MOVING.find("    animation:").unwrap()];
     let warnings = open(&format!("{still})"), 1.0).unwrap().warnings;
     assert!(warnings.len() == 1 && warnings[0].contains("no animation"), "{warnings:?}");
+    // As an archive may say it.
+    let warnings = open(&format!("{still})"), 1e300).unwrap().warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("no animation: 1e300 s shows"), "{warnings:?}");
     assert_eq!(Interpolation::default(), Interpolation::Linear);
 }

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::World;
 use firstlight::export::export;
 use firstlight::format::property::SkyProperty;
 use firstlight::format::scene_format::SceneFormat;
-use firstlight::format::value::ColorValue;
+use firstlight::format::value::{ColorValue, ScalarValue};
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::{Film, Material};
 use firstlight::scene::file::{MaterialPart, SceneFile};
@@ -114,6 +114,47 @@ fn surfaces_come_back_with_all_their_numbers() {
         for (i, surface) in surfaces.iter().enumerate() {
             let (wanted, found) = (part(&before, i), part(&after.file, i));
             assert!(format!("{wanted:?}") == format!("{found:?}"), "{format:?}, {surface}: {found:?}");
+        }
+    }
+}
+
+/// Other renderers have no cutoff: the image of the coverage is written as 0 and 1.
+#[test]
+fn holes_come_back_as_they_are_cut() {
+    let image = image::GrayImage::from_fn(2, 2, |x, y| image::Luma([[[100, 200], [120, 140]][y as usize][x as usize]]));
+    for format in SceneFormat::ALL {
+        for (opacity, share) in [("\"image\"", 0.5), ("\"squares\"", 0.5), ("0.4", 0.0)] {
+            let leaf = |kind: &str| format!("{kind}, opacity: {opacity}, opacity_cutoff: 0.5)");
+            let text = format!(
+                "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), environment: constant(0.5), textures: {{\"image\": \
+                 image(file: \"image.png\", encoding: linear), \"squares\": checker(a: 0.9, b: 0.3)}}, materials: \
+                 {{\"a\": diffuse(albedo: 0.5), \"layered\": {}, \"blended\": {}}}, objects: [\
+                 quad(corner: (0, 0, 0), edge_u: (1, 0, 0), edge_v: (0, 1, 0), material: \"layered\"), \
+                 quad(corner: (2, 0, 0), edge_u: (1, 0, 0), edge_v: (0, 1, 0), material: \"blended\"), \
+                 sphere(center: (0, 1, 0), radius: 0.25, material: \"a\")])",
+                leaf("principled(base_color: 0.5"),
+                leaf("blend(weight: 0, a: \"a\", b: \"a\"")
+            );
+            let folder = tempfile::tempdir().unwrap();
+            image.save(folder.path().join("image.png")).unwrap();
+            let from = written(folder.path(), &text);
+            let (mut world, after, _) = there_and_back(from, format, folder.path());
+            let whole = whole_scene(&mut world, &after);
+            let shown = whole.file.objects.iter().filter_map(|object| whole.file.materials.get(object.material()?));
+            let opacities = shown.filter_map(|part| match part {
+                Material::Principled { opacity, .. } | Material::Blend { opacity, .. } => Some(opacity),
+                _ => None,
+            });
+            let opacities: Vec<f32> = opacities
+                .map(|opacity| match opacity {
+                    ScalarValue::Number(number) => *number,
+                    ScalarValue::Texture(name) => whole.textures[name].texture.mean().x,
+                })
+                .filter(|opacity| *opacity < 1.0)
+                .collect();
+            // In pbrt, what is a hole everywhere is left out.
+            assert!(opacities.iter().all(|found| *found == share), "{format:?} {opacity}: {opacities:?}");
+            assert_eq!(opacities.len(), if share > 0.0 { 2 } else { opacities.len() }, "{format:?} {opacity}");
         }
     }
 }

@@ -73,7 +73,7 @@ fn materials_that_double_themselves_are_read_at_once() {
          NamedMaterial \"m\"\nShape \"sphere\"\n",
     );
     let scene = scene.unwrap();
-    assert!(told(&scene).contains("`m`: its two `materials` are not there"), "{}", told(&scene));
+    assert!(told(&scene).contains("`m`: it has no two `materials` that can be mixed"), "{}", told(&scene));
     assert!(!told(&scene).contains("too many"), "{}", told(&scene));
 }
 

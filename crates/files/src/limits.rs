@@ -1,6 +1,7 @@
 //! Limits for files of unknown origin, and the variable that scales all of them.
 
 use crate::printable::name;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes of an image file besides its pixels and its metadata: profiles, thumbnails, tables.
 const BESIDE: u64 = 64 << 20;
@@ -19,6 +20,8 @@ pub struct Limits {
     pub picture_pixels: u64,
     /// Bytes of all images of a scene together, as they stay in memory.
     pub scene_image_bytes: u64,
+    /// Bytes of all meshes of a scene together, and of the files that are read for them.
+    pub scene_mesh_bytes: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
     /// Bytes of the metadata in an image, with the scene that it may hold.
@@ -38,6 +41,29 @@ pub fn has_room(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| room.try_reserve_exact(bytes).is_ok())
 }
 
+/// What everything of one kind in a scene may still take, all together.
+#[derive(Debug)]
+pub struct Budget {
+    limit: u64,
+    used: AtomicU64,
+}
+
+impl Budget {
+    /// All of the limit is left.
+    pub fn new(limit: u64) -> Self {
+        Self { limit, used: AtomicU64::new(0) }
+    }
+
+    /// Takes so many bytes of what is left.
+    ///
+    /// # Errors
+    /// The limit, if there are fewer.
+    pub fn take(&self, bytes: u64) -> Result<(), u64> {
+        let used = |used: u64| used.checked_add(bytes).filter(|used| *used <= self.limit);
+        self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, used).map(drop).map_err(|_| self.limit)
+    }
+}
+
 impl Limits {
     /// The environment variable that multiplies all limits.
     pub const VARIABLE: &str = "FIRSTLIGHT_LIMITS";
@@ -49,6 +75,7 @@ impl Limits {
         scene_bytes: 256 << 20,
         picture_pixels: 1 << 27,
         scene_image_bytes: 4 << 30,
+        scene_mesh_bytes: 4 << 30,
         film_pixels: 1 << 26,
         note_bytes: 16 << 20,
         recording_bytes: 256 << 20,
@@ -83,6 +110,7 @@ impl Limits {
             scene_bytes: scaled(self.scene_bytes),
             picture_pixels: scaled(self.picture_pixels),
             scene_image_bytes: scaled(self.scene_image_bytes),
+            scene_mesh_bytes: scaled(self.scene_mesh_bytes),
             film_pixels: scaled(self.film_pixels),
             note_bytes: scaled(self.note_bytes),
             recording_bytes: scaled(self.recording_bytes),

@@ -1,6 +1,5 @@
 //! Values out of range and inconsistent values.
 
-use std::fmt;
 use thiserror::Error;
 
 /// An invalid value: which field, its value, and what is allowed.
@@ -27,8 +26,8 @@ pub enum BadValue {
 }
 
 impl BadValue {
-    pub(crate) fn out_of_range(field: &'static str, value: impl fmt::Display, allowed: impl Into<String>) -> Self {
-        Self::OutOfRange { field, value: value.to_string(), allowed: allowed.into() }
+    pub(crate) fn out_of_range(field: &'static str, value: String, allowed: impl Into<String>) -> Self {
+        Self::OutOfRange { field, value, allowed: allowed.into() }
     }
 
     pub(crate) fn unfit(field: &'static str, problem: impl Into<String>) -> Self {

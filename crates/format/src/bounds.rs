@@ -6,6 +6,7 @@
 
 use crate::bad_value::BadValue;
 use crate::film_size::FilmSize;
+use crate::numbers::{short, short_color};
 use firstlight_render::{Film, RenderSettings};
 use glam::{DVec3, Vec3};
 
@@ -39,7 +40,7 @@ pub const MOST_SECONDS: f64 = 1e6;
 pub(crate) const MOST_KEYS: usize = 1_000_000;
 
 /// A number for a message: very large and very small ones in scientific notation.
-pub(crate) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
 }
@@ -85,8 +86,7 @@ pub(crate) fn check_light(field: &'static str, light: Vec3) -> Result<(), BadVal
     if light.is_finite() && light.cmpge(Vec3::ZERO).all() {
         return Ok(());
     }
-    let Vec3 { x, y, z } = light;
-    Err(BadValue::out_of_range(field, format!("({x}, {y}, {z})"), "be finite and not negative"))
+    Err(BadValue::out_of_range(field, triple(short_color(light)), "be finite and not negative"))
 }
 
 /// Checks the radius of a point light; metres.
@@ -170,7 +170,7 @@ pub fn check_stops(stops: f32) -> Result<(), BadValue> {
         return Ok(());
     }
     let rule = format!("be a finite number of stops, from -{MOST_STOPS} to {MOST_STOPS}");
-    Err(BadValue::out_of_range("exposure", stops, rule))
+    Err(BadValue::out_of_range("exposure", number(short(stops)), rule))
 }
 
 /// Checks the maximum length of paths, in segments; `None`: unlimited.

@@ -3,6 +3,8 @@
 //! Names, limits and meanings are those of the table of materials, [`MaterialKind::properties`].
 
 use crate::bad_value::BadValue;
+use crate::bounds::number;
+use crate::numbers::short;
 use crate::quantity::Quantity;
 use firstlight_render::{Domain, Fresnel, MaterialKind, Param, Params, Property, ValueType};
 use glam::{DVec3, Vec3};
@@ -39,8 +41,10 @@ pub fn check_value(property: &Property, channels: &[f32]) -> Result<(), BadValue
         return Ok(());
     }
     let value = match channels {
-        [number] => number.to_string(),
-        channels => format!("({})", channels.iter().map(f32::to_string).collect::<Vec<_>>().join(", ")),
+        [one] => number(short(*one)),
+        channels => {
+            format!("({})", channels.iter().map(|&channel| number(short(channel))).collect::<Vec<_>>().join(", "))
+        }
     };
     Err(BadValue::out_of_range(property.name, value, property.domain.rule()))
 }

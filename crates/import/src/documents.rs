@@ -2,6 +2,7 @@
 //! each of its meshes is built once.
 
 use crate::error::gltf::{GltfError, GltfProblem, Located};
+use crate::error::together::MeshesTooLarge;
 use crate::gltf::assembly::{MeshKey, Posed};
 use crate::gltf::document::{Document, ReadOptions};
 use crate::gltf::images::part_of_model;
@@ -9,6 +10,7 @@ use crate::gltf::mesh::BuiltMesh;
 use crate::gltf::surfaces::Surfaces;
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::model::imported::ModelNormals;
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::projection::LightImages;
 use crate::picture::{ImageBudget, PictureError, picture_of_bytes, read_picture_of_scene};
 use crate::read_scene::read_scene;
@@ -46,6 +48,8 @@ pub struct Documents {
     scenes: Mutex<HashMap<(PathBuf, Vec<(String, String)>), ReadScene>>,
     /// Of all images that are decoded.
     pixels: ImageBudget,
+    /// Of all meshes.
+    meshes: Arc<MeshBudget>,
     /// Images that were decoded and not yet taken, by path.
     decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
 }
@@ -82,6 +86,11 @@ impl Documents {
         self.options.allow_outside
     }
 
+    /// What all meshes may take.
+    pub(crate) fn mesh_budget(&self) -> &MeshBudget {
+        &self.meshes
+    }
+
     /// One file may have many names, and each may be asked for by many objects.
     fn place(&self, path: &Path) -> [PathBuf; 2] {
         lock(&self.places).entry(path.to_owned()).or_insert_with(|| place(path)).clone()
@@ -96,7 +105,10 @@ impl Documents {
         }
         // Taken before reading, so that a change in the meantime is noticed.
         let before = stamp(path);
+        let whole = |error: MeshesTooLarge| GltfError::at(path, (String::new(), error.into()));
+        let length = self.meshes.before(path).map_err(whole)?;
         let document = Document::read(path, self.options)?;
+        self.meshes.take(document.n_bytes().saturating_sub(length)).map_err(whole)?;
         let others = document.files()[1..].iter().map(|file| (file.clone(), stamp(file)));
         let files = std::iter::once((path.to_owned(), before)).chain(others).collect();
         let opened = Arc::new(Opened {
@@ -131,8 +143,12 @@ impl Documents {
         let budget = ImageBudget::default();
         let light_images =
             LightImages::new(move |path| read_picture_of_scene(path, &budget).ok().map(|(image, _)| image));
-        let options =
-            ForeignOptions { allow_outside: self.options.allow_outside, defines: key.1.clone(), light_images };
+        let options = ForeignOptions {
+            allow_outside: self.options.allow_outside,
+            defines: key.1.clone(),
+            light_images,
+            meshes: self.meshes.clone(),
+        };
         let scene = read_scene(path, &options).map(Arc::new);
         lock(&self.scenes).entry(key).or_insert(scene).clone()
     }

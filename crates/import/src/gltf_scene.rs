@@ -14,6 +14,7 @@ use crate::gltf_parts::{camera_of, light_of};
 use crate::model::placing::corners_of;
 use crate::model::placing::{is_placement, transform};
 use firstlight_files::warnings::Warnings;
+use firstlight_format::bounds::number;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::choice::ModelChoice;
 use firstlight_format::error::{SceneError, suggestion};
@@ -260,10 +261,11 @@ impl Maker<'_> {
 
 /// Returns a warning for a time, in seconds, outside of the animations of a scene.
 pub fn beyond_animation(at: f64, length: Option<f64>) -> Option<String> {
+    let shown = number(at);
     match length {
-        None => Some(format!("has no animation: {at} s shows the stored pose")),
-        Some(end) if at > end => Some(format!("the animation ends at {end} s: {at} s shows its end")),
-        Some(_) if at < 0.0 => Some(format!("the animation begins at 0 s: {at} s shows its start")),
+        None => Some(format!("has no animation: {shown} s shows the stored pose")),
+        Some(end) if at > end => Some(format!("the animation ends at {} s: {shown} s shows its end", number(end))),
+        Some(_) if at < 0.0 => Some(format!("the animation begins at 0 s: {shown} s shows its start")),
         Some(_) => None,
     }
 }
@@ -275,4 +277,20 @@ fn textures_of(
 ) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
     all.iter().filter(|(name, _)| names.contains(name)).cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_told_with_few_digits() {
+        for (at, length, told) in [
+            (1e300, None, "has no animation: 1e300 s shows the stored pose"),
+            (1e300, Some(2.5), "the animation ends at 2.5 s: 1e300 s shows its end"),
+            (-1e300, Some(2.5), "the animation begins at 0 s: -1e300 s shows its start"),
+        ] {
+            assert_eq!(beyond_animation(at, length).as_deref(), Some(told));
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! The meshes of a scene: from files or built in, shaded as specified, with the materials of their files.
 
 use crate::documents::Documents;
+use crate::error::together::MeshesTooLarge;
 use crate::gltf::assembly::MeshKey;
 use crate::gltf_mesh::GltfMesh;
 use crate::load_model::load_model;
@@ -59,7 +60,40 @@ pub struct LoadedMesh {
 }
 
 /// Reads or generates a mesh, then simplifies and shades it.
+///
+/// # Errors
+/// If it cannot be read, or the meshes that `documents` counts are too large together.
 pub fn load_mesh(
+    source: &MeshSource,
+    shading: MeshShading,
+    simplify: Option<f64>,
+    folder: &Path,
+    documents: &Documents,
+) -> Result<LoadedMesh, SceneError> {
+    let budget = documents.mesh_budget();
+    let too_large =
+        |error| SceneError::in_file(folder.join(text_to_path(source.name())), MeshesTooLarge::to_string(&error));
+    // Documents count their files.
+    let length = match source {
+        MeshSource::Obj(file) | MeshSource::Ply(file) | MeshSource::Stl(file) => {
+            budget.before(&folder.join(text_to_path(file))).map_err(too_large)?
+        }
+        MeshSource::Gltf { .. } | MeshSource::Part { .. } | MeshSource::Builtin(_) => 0,
+    };
+    let loaded = load(source, shading, simplify, folder, documents)?;
+    // Meshes that a scene of another renderer has as they are were counted with it.
+    if !matches!(source, MeshSource::Part { .. }) || !is_as_in_file(shading, simplify) {
+        budget.after(length, &loaded.mesh).map_err(too_large)?;
+    }
+    Ok(loaded)
+}
+
+/// Whether the mesh of a file is neither simplified nor shaded otherwise.
+fn is_as_in_file(shading: MeshShading, simplify: Option<f64>) -> bool {
+    shading == MeshShading::Auto && simplify.is_none()
+}
+
+fn load(
     source: &MeshSource,
     shading: MeshShading,
     simplify: Option<f64>,
@@ -80,8 +114,7 @@ pub fn load_mesh(
         let path = folder.join(text_to_path(file));
         let scene = documents.scene(&path, defines)?;
         let mesh = part_of(&scene, &path, *shape)?;
-        let is_as_in_file = shading == MeshShading::Auto && simplify.is_none();
-        let mesh = if is_as_in_file {
+        let mesh = if is_as_in_file(shading, simplify) {
             mesh.clone()
         } else {
             Arc::new(finish(part_base(mesh, shading), source, shading, simplify, Some(CREASE))?)

@@ -5,14 +5,13 @@ use crate::ktx2;
 use crate::pfm;
 use bytemuck::allocation::try_cast_vec;
 use firstlight_files::input_file::{FileKind, InputFile, ReadError};
-use firstlight_files::limits::{Limits, has_room};
+use firstlight_files::limits::{Budget, Limits, has_room};
 use firstlight_render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::{BufRead, BufReader, Cursor, Seek, SeekFrom};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Maximum width and height, pixels.
@@ -73,23 +72,17 @@ pub enum PictureError {
 
 /// The memory that the images of a scene may still take, all together.
 #[derive(Debug)]
-pub(crate) struct ImageBudget {
-    limit: u64,
-    used: AtomicU64,
-}
+pub(crate) struct ImageBudget(Budget);
 
 impl Default for ImageBudget {
     fn default() -> Self {
-        Self { limit: Limits::of_this_process().scene_image_bytes, used: AtomicU64::new(0) }
+        Self(Budget::new(Limits::of_this_process().scene_image_bytes))
     }
 }
 
 impl ImageBudget {
     fn take(&self, bytes: u64) -> Result<(), PictureError> {
-        let limit = self.limit;
-        let used = |used: u64| used.checked_add(bytes).filter(|used| *used <= limit);
-        let taken = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, used);
-        taken.map(drop).map_err(|_| PictureError::TooLargeTogether { limit })
+        self.0.take(bytes).map_err(|limit| PictureError::TooLargeTogether { limit })
     }
 }
 
@@ -476,7 +469,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("small.png");
         image::GrayImage::new(10, 10).save(&path).unwrap();
-        let budget = ImageBudget { limit: 250, used: AtomicU64::new(0) };
+        let budget = ImageBudget(Budget::new(250));
         let read = || read_picture_of_scene(&path, &budget).map(drop).map_err(|error| error.to_string());
         assert_eq!((read(), read()), (Ok(()), Ok(())));
         assert!(read().unwrap_err().contains("more than 0 MiB together"));

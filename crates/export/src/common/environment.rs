@@ -2,6 +2,7 @@
 
 use firstlight_render::Environment;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Rows of an image from which on it does not matter whether colours are interpolated.
@@ -19,7 +20,8 @@ fn equal_area(u: f64, v: f64) -> DVec3 {
     let angle = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 } * FRAC_PI_4;
     let ring = radius * (2.0 - radius * radius).sqrt();
     let z = (1.0 - radius * radius).copysign(distance);
-    DVec3::new(angle.cos().copysign(u) * ring, angle.sin().copysign(v) * ring, z)
+    let (sin, cos) = angle.sin_cos();
+    DVec3::new(cos.copysign(u) * ring, sin.copysign(v) * ring, z)
 }
 
 /// The environment as a square of equal areas, row by row: its side and the radiance of each texel. The middle of the
@@ -34,12 +36,10 @@ pub(crate) fn square_image(environment: &Environment) -> (u32, Vec<Vec3>) {
     let texel = |x: u32, y: u32| {
         let cells = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));
         let place = |cell: u32, k: u32| (f64::from(cell) + (f64::from(k) + 0.5) / f64::from(SAMPLES)) / f64::from(side);
-        let sum: Vec3 =
-            cells.map(|(i, j)| environment.radiance(equal_area(place(x, i), place(y, j)).normalize().as_vec3())).sum();
+        let sum: Vec3 = cells.map(|(i, j)| environment.radiance(equal_area(place(x, i), place(y, j)).as_vec3())).sum();
         sum / (SAMPLES * SAMPLES) as f32
     };
-    let texels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| texel(x, y));
-    (side, texels.collect())
+    (side, by_rows(side, side, texel))
 }
 
 /// The environment as longitude and latitude: width, height and the radiance of each texel. The middle column is in
@@ -65,6 +65,11 @@ pub(crate) fn round_image(environment: &Environment) -> (u32, u32, Vec<Vec3>) {
         let step = 0.5 / f64::from(height - 1);
         0.5 * (radiance(u, v - 0.5 * step) + radiance(u, v + 0.5 * step))
     };
-    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y));
-    (width, height, texels.collect())
+    (width, height, by_rows(width, height, texel))
+}
+
+/// The texels of an image, row by row.
+fn by_rows(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec3 + Sync) -> Vec<Vec3> {
+    let rows = (0..height).into_par_iter();
+    rows.flat_map_iter(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect()
 }

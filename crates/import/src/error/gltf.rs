@@ -1,5 +1,6 @@
 //! Errors of glTF files: which file, which part of it, what was expected.
 
+use crate::error::together::MeshesTooLarge;
 use firstlight_files::input_file::ReadError;
 use firstlight_files::limits::Limits;
 use firstlight_files::printable::name;
@@ -40,6 +41,9 @@ pub enum GltfProblem {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// With it, the meshes of the scene are too large.
+    #[error(transparent)]
+    Together(#[from] MeshesTooLarge),
     /// The file is neither a GLB nor JSON.
     #[error("is no glTF file: expected `glTF` or a JSON text at its beginning")]
     NotGltf,

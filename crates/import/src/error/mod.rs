@@ -4,6 +4,7 @@ pub(crate) mod gltf;
 pub(crate) mod obj;
 pub(crate) mod ply;
 pub(crate) mod stl;
+pub(crate) mod together;
 
 use crate::error::gltf::GltfError;
 use crate::error::obj::ObjError;

@@ -34,7 +34,8 @@ impl Converter<'_> {
             return Ok(known.clone());
         }
         if depth > MAX_DEPTH {
-            return Err(node.error("BSDFs are nested too deep, or contain themselves"));
+            self.tell(node, &format!("BSDFs are nested more than {MAX_DEPTH} deep: the inner ones are grey"));
+            return Ok(Some(Surface::two_sided(grey())));
         }
         let surface = self.surface_of(node, depth)?;
         self.surfaces.insert(node.index, surface.clone());

@@ -2,6 +2,7 @@
 
 use crate::mitsuba::graph::Graph;
 use crate::mitsuba::meshes::MeshRequest;
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::projection::LightImages;
 use firstlight_files::reference::References;
 use firstlight_files::warnings::Warnings;
@@ -87,6 +88,7 @@ pub(crate) struct Converter<'a> {
     /// Names and values from the command line.
     pub defines: &'a [(String, String)],
     pub light_images: &'a LightImages,
+    pub meshes: &'a MeshBudget,
     /// Of the scene in its folder.
     pub file_name: String,
     pub textures: HashMap<(usize, Reads), String>,

@@ -6,13 +6,16 @@
 
 use crate::obj::lines::decoded;
 
-/// Text of a file: UTF-8, UTF-16 with a byte order mark, and Latin-1, as old programs wrote it.
+/// Text of a file: UTF-8, UTF-16 with a byte order mark, and Latin-1, as old programs wrote it; also where a text in UTF-8
+/// has some bytes of it.
 pub(crate) fn text_of(bytes: &[u8]) -> String {
     let bytes = decoded(bytes);
-    match std::str::from_utf8(&bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    let mut text = String::with_capacity(bytes.len());
+    for chunk in bytes.utf8_chunks() {
+        text.push_str(chunk.valid());
+        text.extend(chunk.invalid().iter().map(|&byte| char::from(byte)));
     }
+    text
 }
 
 /// The tags of a text; everything else is blank, since a scene says all in attributes.
@@ -31,14 +34,15 @@ pub(crate) fn tags_of(text: &str) -> String {
             Some((opening, closing)) => {
                 from[opening.len()..].find(closing).map(|at| opening.len() + at + closing.len())
             }
-            None => end_of_tag(from),
+            // Which may stand in the value of an attribute before.
+            None => unquoted(from, b'>').map(|at| at + 1),
         };
         let Some(end) = end else {
             tags.push_str(from);
             return tags;
         };
         let (tag, after) = from.split_at(end);
-        match blanked.is_some() || (tag.starts_with("<!DOCTYPE") && !tag.contains('[')) {
+        match blanked.is_some() || (tag.starts_with("<!DOCTYPE") && unquoted(tag, b'[').is_none()) {
             true => blank(tag, &mut tags),
             false => escape(tag, &mut tags),
         }
@@ -53,21 +57,19 @@ fn blank(text: &str, out: &mut String) {
     out.extend(text.chars().map(|c| if c == '\n' || c == '\r' { c } else { ' ' }));
 }
 
-/// Bytes of a tag up to its `>`, which may stand in the value of an attribute before.
-fn end_of_tag(text: &str) -> Option<usize> {
+/// The place of the first such byte outside of quotes.
+fn unquoted(text: &str, wanted: u8) -> Option<usize> {
     let mut quote = None;
-    text.bytes()
-        .position(|byte| match quote {
-            Some(open) => {
-                quote = quote.filter(|_| byte != open);
-                false
-            }
-            None => {
-                quote = Some(byte).filter(|byte| matches!(byte, b'"' | b'\''));
-                byte == b'>'
-            }
-        })
-        .map(|at| at + 1)
+    text.bytes().position(|byte| match quote {
+        Some(open) => {
+            quote = quote.filter(|_| byte != open);
+            false
+        }
+        None => {
+            quote = Some(byte).filter(|byte| matches!(byte, b'"' | b'\''));
+            byte == wanted
+        }
+    })
 }
 
 /// Adds a tag: values of attributes may have `<`, `&` and control characters.
@@ -120,6 +122,7 @@ mod tests {
             ("<a b=\"<&&amp;&#38;&x;\" c='\">'/>", "<a b=\"&lt;&amp;&amp;&#38;&amp;x;\" c='\">'/>"),
             ("<a b=\"&#0;&#+5;&#xD800;&#x9;\"/>", "<a b=\"&amp;#0;&amp;#+5;&amp;#xD800;&#x9;\"/>"),
             ("<!DOCTYPE scene><a/>", "                <a/>"),
+            ("<!DOCTYPE a PUBLIC \"-//b[1]\" 'c>'><a/>", "                                  <a/>"),
             ("<!DOCTYPE scene [<!ENTITY a \"b\">]><a/>", "<!DOCTYPE scene [<!ENTITY a \"b\">  <a/>"),
             ("<a><![CDATA[<b>]]>\u{c}</a>", "<a>                </a>"),
             ("<a><!-- b", "<a><!-- b"),
@@ -135,5 +138,7 @@ mod tests {
         for bytes in ["ä".as_bytes(), b"\xef\xbb\xbf\xc3\xa4", b"\xe4", &utf16] {
             assert_eq!(text_of(bytes), "ä");
         }
+        // A comment in Latin-1 does not change a name in UTF-8.
+        assert_eq!(text_of(b"<!-- \xfc --> \xc3\xa4 \xe4\xe4 \xe2\x82"), "<!-- ü --> ä ää â\u{82}");
     }
 }

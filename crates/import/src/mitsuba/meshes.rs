@@ -1,8 +1,10 @@
 //! Shapes as meshes: files of other programs with Mitsuba's rules for normals and texture coordinates, and the shapes
 //! that ours lack.
 
+use crate::error::together::MeshesTooLarge;
 use crate::mitsuba::serialized::{UnpackedBytes, read_serialized};
 use crate::model::imported::{ModelNormals, ModelOptions};
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::placing::oriented;
 use crate::obj::load_obj_with;
 use crate::ply::load_ply_colored;
@@ -64,12 +66,21 @@ impl MeshRequest {
 
     /// Makes the mesh.
     ///
-    /// - `room`: of all serialized meshes of the scene.
+    /// - `room`: of all serialized meshes of the scene; `budget`: of all meshes.
     ///
     /// # Errors
     /// A sentence about the file.
-    pub(crate) fn make(&self, room: &UnpackedBytes) -> Result<(Mesh, Warnings), String> {
+    pub(crate) fn make(&self, room: &UnpackedBytes, budget: &MeshBudget) -> Result<(Mesh, Warnings), String> {
         let mut warnings = Warnings::default();
+        let too_large = |error: MeshesTooLarge| match self.geometry.file() {
+            Some(path) => format!("{}: {error}", path.display()),
+            None => format!("a mesh {error}"),
+        };
+        // Of a serialized file, no more is read than the mesh.
+        let length = match &self.geometry {
+            Geometry::Model(_, path) => budget.before(path).map_err(too_large)?,
+            _ => 0,
+        };
         // In Mitsuba, the side of a surface is that of its shading normal.
         let mut mesh = match &self.geometry {
             Geometry::Model(format, path) => {
@@ -113,6 +124,7 @@ impl MeshRequest {
             // The bitangent is normal × tangent, also where the texture is mirrored.
             mesh.tangents.iter_mut().for_each(|tangent| tangent.w = 1.0);
         }
+        budget.after(length, &mesh).map_err(too_large)?;
         Ok((mesh, warnings))
     }
 }
@@ -237,7 +249,7 @@ mod tests {
                 tangents: false,
                 attribute: Some(attribute.to_owned()),
             };
-            let (mesh, _) = request.make(&UnpackedBytes::new(0)).unwrap();
+            let (mesh, _) = request.make(&UnpackedBytes::new(0), &MeshBudget::default()).unwrap();
             // Of the corners of both triangles.
             let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| color.truncate());
             mesh.triangles.iter().flatten().filter_map(|&vertex| color(vertex)).collect::<Vec<Vec3>>()

@@ -12,7 +12,6 @@ use crate::mitsuba::sunsky::{SKIES, upright};
 use crate::mitsuba::transform::orthonormal;
 use crate::model::foreign::ForeignOptions;
 use crate::model::placing::corners_of;
-use firstlight_files::limits::Limits;
 use firstlight_files::printable;
 use firstlight_files::reference::References;
 use firstlight_files::relative::{path_to_text, relative_path};
@@ -60,6 +59,7 @@ impl<'a> Converter<'a> {
             folder,
             defines: &options.defines,
             light_images: &options.light_images,
+            meshes: &options.meshes,
             file_name,
             textures: HashMap::new(),
             numbers: Vec::new(),
@@ -220,23 +220,9 @@ impl<'a> Converter<'a> {
             _ => None,
         });
         let room = UnpackedBytes::of_files(serialized.collect::<HashSet<_>>().into_iter());
-        let mut files = HashSet::new();
-        let (first, again): (Vec<_>, Vec<_>) = requests.iter().partition(|(request, _)| match &request.geometry {
-            Geometry::Model(_, path) => files.insert(path),
-            _ => true,
-        });
-        let mut made: Vec<(u32, Result<(Mesh, Warnings), String>)> =
-            first.par_iter().map(|(request, number)| (*number, request.make(&room))).collect();
-        // A file that is read for another attribute, or other normals, takes its memory again.
-        let mut left = Limits::of_this_process().scene_bytes;
-        for (request, number) in again {
-            let mesh = match left {
-                0 => Err(format!("too much is read of one file of a mesh: {}", Limits::advice())),
-                _ => request.make(&room),
-            };
-            left = left.saturating_sub(mesh.as_ref().map_or(0, |(mesh, _)| bytes_of(mesh)));
-            made.push((number, mesh));
-        }
+        let budget = self.meshes;
+        let made: Vec<(u32, Result<(Mesh, Warnings), String>)> =
+            requests.par_iter().map(|(request, number)| (*number, request.make(&room, budget))).collect();
         let (mut parts, mut lost) = (HashMap::new(), HashSet::new());
         for (number, mesh) in made {
             match mesh {
@@ -277,12 +263,6 @@ impl<'a> Converter<'a> {
         self.file.objects.retain(|object| part_of(object).is_none_or(|shape| !lost.contains(&shape)));
         parts
     }
-}
-
-/// Bytes that a mesh takes.
-fn bytes_of(mesh: &Mesh) -> u64 {
-    let of_vertices = size_of_val(&*mesh.positions) + size_of_val(&*mesh.normals) + size_of_val(&*mesh.uvs);
-    (of_vertices + size_of_val(&*mesh.colors) + size_of_val(&*mesh.triangles)) as u64
 }
 
 /// Whether a mesh is no closed body: then its vectors of area do not sum to zero.

@@ -5,12 +5,12 @@
 //!
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/generated/plugins_shapes.html#shape-serialized>
 
-use firstlight_files::input_file::{FileKind, InputFile};
+use firstlight_files::input_file::{FileKind, InputFile, ReadError};
 use firstlight_files::limits::Limits;
 use firstlight_mesh::Mesh;
 use flate2::read::ZlibDecoder;
 use glam::{DVec3, Vec2, Vec3};
-use std::io::Read;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -57,28 +57,47 @@ impl UnpackedBytes {
 /// # Errors
 /// A sentence that follows the path.
 pub(crate) fn read_serialized(path: &Path, index: u32, room: &UnpackedBytes) -> Result<Read5, String> {
-    let bytes = InputFile::open(path, FileKind::Model).and_then(InputFile::bytes).map_err(|error| error.to_string())?;
-    parse(&bytes, index, Limits::of_this_process().model_bytes, room)
+    let file = InputFile::open(path, FileKind::Model).map_err(|error| error.to_string())?;
+    parse(file, index, Limits::of_this_process().model_bytes, room)
+}
+
+/// What is wrong with a file that cannot be read on.
+fn unreadable(error: io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => "is damaged: it ends early".to_owned(),
+        _ => ReadError::from(error).to_string(),
+    }
+}
+
+fn read_array<const N: usize>(from: &mut impl Read) -> Result<[u8; N], String> {
+    let mut bytes = [0; N];
+    from.read_exact(&mut bytes).map_err(unreadable)?;
+    Ok(bytes)
 }
 
 /// - `limit`: bytes of the decompressed mesh.
 /// - `room`: of all meshes.
-pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64, room: &UnpackedBytes) -> Result<Read5, String> {
-    const DAMAGED: &str = "is damaged: it ends early";
-    let header = |at: usize| {
-        let word = |at: usize| Some(u16::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
-        Some((word(at)?, word(at.checked_add(2)?)?))
-    };
-    let (magic, version) = header(0).ok_or(DAMAGED)?;
+pub(crate) fn parse<R: Read + Seek>(
+    mut file: R,
+    index: u32,
+    limit: u64,
+    room: &UnpackedBytes,
+) -> Result<Read5, String> {
+    let [magic, version] = header(&mut file)?;
     if magic != MAGIC {
         return Err("is no serialized mesh of Mitsuba".to_owned());
     }
     if !(3..=5).contains(&version) {
         return Err(format!("has version {version}, but 3 to 5 can be read"));
     }
-    let start = if index == 0 { 0 } else { offset(bytes, index, version)? };
-    header(start).filter(|(magic, _)| *magic == MAGIC).ok_or("is damaged: its directory points elsewhere")?;
-    let mut contents = Contents { from: ZlibDecoder::new(&bytes[start + 4..]).take(limit), limit, room };
+    if index > 0 {
+        let start = offset(&mut file, index, version)?;
+        let found = file.seek(SeekFrom::Start(start)).map_err(unreadable).and_then(|_| header(&mut file));
+        if !matches!(found, Ok([MAGIC, _])) {
+            return Err("is damaged: its directory points elsewhere".to_owned());
+        }
+    }
+    let mut contents = Contents { from: ZlibDecoder::new(file).take(limit), limit, room };
     let flags = contents.u32()?;
     match version {
         5 => {
@@ -96,20 +115,27 @@ pub(crate) fn parse(bytes: &[u8], index: u32, limit: u64, room: &UnpackedBytes) 
     }
 }
 
+/// The number of the format, and the version.
+fn header(file: &mut impl Read) -> Result<[u16; 2], String> {
+    let [a, b, c, d] = read_array(file)?;
+    Ok([[a, b], [c, d]].map(u16::from_le_bytes))
+}
+
 /// Of the mesh of this index, from the directory at the end.
-fn offset(bytes: &[u8], index: u32, version: u16) -> Result<usize, String> {
-    let end = bytes.len().checked_sub(4).ok_or("is damaged: it ends early")?;
-    let count = u32::from_le_bytes(*bytes[end..].first_chunk().expect("there are four bytes"));
+fn offset(file: &mut (impl Read + Seek), index: u32, version: u16) -> Result<u64, String> {
+    // There is a header of four bytes.
+    let end = file.seek(SeekFrom::End(-4)).map_err(unreadable)?;
+    let count = u32::from_le_bytes(read_array(file)?);
     if index >= count {
         return Err(format!("has {count} meshes: there is no mesh {index}, counted from 0"));
     }
     let size = if version == 3 { 4 } else { 8 };
-    let back = (u64::from(count - index) * size) as usize;
-    let entry = end.checked_sub(back).and_then(|at| bytes.get(at..at + size as usize));
-    let entry = entry.ok_or("is damaged: its directory is too short")?;
-    let mut word = [0; 8];
-    word[..entry.len()].copy_from_slice(entry);
-    usize::try_from(u64::from_le_bytes(word)).map_err(|_| "is damaged: its directory points elsewhere".to_owned())
+    let entry = end.checked_sub(u64::from(count - index) * size).ok_or("is damaged: its directory is too short")?;
+    file.seek(SeekFrom::Start(entry)).map_err(unreadable)?;
+    Ok(match version {
+        3 => u32::from_le_bytes(read_array(file)?).into(),
+        _ => u64::from_le_bytes(read_array(file)?),
+    })
 }
 
 struct Contents<'a, R> {
@@ -135,6 +161,7 @@ impl<R: Read> Contents<'_, R> {
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| Some(left.saturating_sub(bytes.len() as u64)));
         match read {
             Ok(read) if read as u64 == count => Ok(bytes),
+            Err(error) if error.get_ref().is_some_and(|error| error.is::<ReadError>()) => Err(unreadable(error)),
             _ => Err("is damaged: it ends early".to_owned()),
         }
     }
@@ -214,7 +241,7 @@ mod tests {
     use super::*;
     use flate2::Compression;
     use flate2::write::ZlibEncoder;
-    use std::io::Write;
+    use std::io::{Cursor, Write};
 
     static ROOM: UnpackedBytes = UnpackedBytes { limit: u64::MAX, left: AtomicU64::new(u64::MAX) };
 
@@ -250,20 +277,51 @@ mod tests {
         let bytes = file(4, &[&triangle(1.0), &triangle(3.0)]);
         for (index, area) in [(0, 0.5), (1, 4.5)] {
             let Read5 { mesh, face_normals } =
-                parse(&bytes, index, 1 << 20, &ROOM).unwrap_or_else(|why| panic!("{why}"));
+                parse(Cursor::new(&bytes), index, 1 << 20, &ROOM).unwrap_or_else(|why| panic!("{why}"));
             assert_eq!((mesh.area(), face_normals), (area, false));
             assert_eq!((mesh.normals[2], mesh.uvs[1]), (Vec3::Z, Vec2::X));
         }
-        let wrong = |index, limit| parse(&bytes, index, limit, &ROOM).err().unwrap();
+        let wrong = |index, limit| parse(Cursor::new(&bytes), index, limit, &ROOM).err().unwrap();
         assert!(wrong(2, 1 << 20).contains("2 meshes"), "{}", wrong(2, 1 << 20));
         assert!(wrong(1, 100).contains("more than 100 bytes"), "{}", wrong(1, 100));
+    }
+
+    /// Counts the bytes that are read.
+    struct Counted<'a>(Cursor<&'a [u8]>, &'a AtomicU64);
+
+    impl Read for Counted<'_> {
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            let read = self.0.read(bytes)?;
+            self.1.fetch_add(read as u64, Ordering::Relaxed);
+            Ok(read)
+        }
+    }
+
+    impl Seek for Counted<'_> {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.0.seek(to)
+        }
+    }
+
+    #[test]
+    fn a_mesh_is_read_without_the_others() {
+        let unread = vec![0; 1 << 20];
+        let bytes = [file(4, &[&triangle(1.0)]), unread].concat();
+        // A directory whose second mesh begins where the first does.
+        let bytes = [bytes, [0_u64; 2].map(u64::to_le_bytes).concat(), 2_u32.to_le_bytes().to_vec()].concat();
+        for index in 0..2 {
+            let n_read = AtomicU64::new(0);
+            let read = parse(Counted(Cursor::new(&bytes), &n_read), index, 1 << 20, &ROOM);
+            assert_eq!(read.unwrap_or_else(|why| panic!("{why}")).mesh.area(), 0.5);
+            assert!(n_read.into_inner() < 1 << 17);
+        }
     }
 
     #[test]
     fn meshes_at_one_place_have_their_bytes_once() {
         let bytes = file(4, &[&triangle(1.0)]);
         let room = UnpackedBytes::new(2 * triangle(1.0).len() as u64);
-        let mut read = std::iter::repeat_with(|| parse(&bytes, 0, 1 << 20, &room));
+        let mut read = std::iter::repeat_with(|| parse(Cursor::new(&bytes), 0, 1 << 20, &room));
         assert!(read.next().unwrap().is_ok() && read.next().unwrap().is_ok());
         let why = read.next().unwrap().err().unwrap();
         assert!(why.contains("all serialized meshes"), "{why}");
@@ -272,7 +330,7 @@ mod tests {
     #[test]
     fn a_name_that_does_not_end_is_no_name() {
         let bytes = file(4, &[&vec![b'a'; 1 << 20]]);
-        let why = parse(&bytes, 0, 1 << 30, &ROOM).err().unwrap();
+        let why = parse(Cursor::new(&bytes), 0, 1 << 30, &ROOM).err().unwrap();
         assert!(why.contains("name of the mesh"), "{why}");
     }
 
@@ -281,13 +339,13 @@ mod tests {
         let bytes = file(4, &[&triangle(1.0), &triangle(3.0)]);
         for length in 0..bytes.len() {
             for index in 0..2 {
-                let _ = parse(&bytes[..length], index, 1 << 20, &ROOM);
+                let _ = parse(Cursor::new(&bytes[..length]), index, 1 << 20, &ROOM);
             }
         }
         for at in 0..bytes.len() {
             let mut changed = bytes.clone();
             changed[at] ^= 0x55;
-            let _ = parse(&changed, 1, 1 << 20, &ROOM);
+            let _ = parse(Cursor::new(&changed), 1, 1 << 20, &ROOM);
         }
     }
 }

@@ -11,6 +11,9 @@ use glam::Vec3;
 /// What gives a `principledthin` other light than that which it transmits diffusely.
 const OTHER_LIGHT: [&str; 4] = ["spec_trans", "spec_tint", "flatness", "sheen"];
 
+/// Parameters of highlights, which one of index 1 has not, and of sheen.
+const WITHOUT_EFFECT: [&str; 3] = ["roughness", "anisotropic", "sheen_tint"];
+
 impl Converter<'_> {
     /// A blend of a surface that only reflects diffusely with one that only transmits diffusely; `None` for others.
     ///
@@ -32,9 +35,17 @@ impl Converter<'_> {
         if diffuse.plugin() != "diffuse" || !only_transmits || !(0.0..=1.0).contains(&weight) {
             return Ok(None);
         }
+        thin.ignore(&WITHOUT_EFFECT);
         let mut part = |node: Node, name: &str, share: f64| -> Result<ColorValue, SceneError> {
             Ok(match self.color(node, name, 0.5, Use::Factor)? {
-                ColorValue::Rgb(rgb) => ColorValue::Rgb((share as f32 * rgb).min(Vec3::ONE)),
+                ColorValue::Rgb(rgb) => {
+                    let color = share as f32 * rgb;
+                    // `save` divides by the share: two roundings.
+                    if color.max_element() > 1.0 + 2.0 * f32::EPSILON {
+                        self.tell(node, &format!("`{name}` with its share of the blend is above 1: it is 1"));
+                    }
+                    ColorValue::Rgb(color.min(Vec3::ONE))
+                }
                 ColorValue::Texture(name) => {
                     ColorValue::Texture(self.tinted(&name, Vec3::splat(share as f32)).unwrap_or(name))
                 }

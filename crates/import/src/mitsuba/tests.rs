@@ -12,6 +12,7 @@ use firstlight_format::value::{ColorValue, Rgb, ScalarValue};
 use firstlight_render::{Channel, Encoding, ImageTexture, Material};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
+use std::sync::Arc;
 
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
     element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
@@ -44,7 +45,7 @@ fn read(version: &str, body: &str) -> ForeignScene {
         let texels = image.pixels().map(|pixel| Vec3::from(pixel.0)).collect();
         Some(ImageTexture::from_linear(image.width(), image.height(), texels))
     });
-    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
     let scene = read_scene(&path, &options).unwrap_or_else(|error| panic!("{error}"));
     SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));
     scene
@@ -310,8 +311,10 @@ fn what_the_parser_of_mitsuba_passes_over_is_no_error() {
     assert_eq!((scene.file.objects.len(), told(&scene)), (1, Vec::new()));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.xml");
-    let options =
-        || ForeignOptions { allow_outside: false, defines: Vec::new(), light_images: LightImages::new(|_| None) };
+    let options = || {
+        let light_images = LightImages::new(|_| None);
+        ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() }
+    };
     let text = "\n<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><!DOCTYPE scene>\n<scene version=\"3.0.0\">\n\
                 <!-- ä --> <shape type=\"cone\"/>\n</scene> end\0";
     let utf16 = std::iter::once(0xfeff).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
@@ -472,4 +475,36 @@ fn a_camera_of_another_kind_is_a_perspective_one_in_its_place() {
     let with_fov = format!("{placed}<float name=\"fov\" value=\"90\"/><string name=\"fov_axis\" value=\"y\"/>");
     assert_eq!(looks("codedperspective", &with_fov).1.round(), 90.0);
     assert_ne!(looks("irradiancemeter", placed).0, DVec3::new(1.0, 2.0, 9.0));
+}
+
+#[test]
+fn sheets_of_two_parts_tell_colours_above_one_alone() {
+    let sheet = |reflectance: f32| {
+        surface(&format!(
+            "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/>\
+             <bsdf type=\"twosided\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"{reflectance}\"/></bsdf></bsdf>\
+             <bsdf type=\"principledthin\"><float name=\"eta\" value=\"1\"/><float name=\"diff_trans\" value=\"2\"/>\
+             <float name=\"roughness\" value=\"0.3\"/><float name=\"anisotropic\" value=\"0.5\"/>\
+             <rgb name=\"base_color\" value=\"0.5\"/></bsdf></bsdf>"
+        ))
+    };
+    for (reflectance, kept) in [(1.5, 0.75), (3.0, 1.0)] {
+        let scene = sheet(reflectance);
+        let transmittance = ColorValue::grey(0.25);
+        assert_eq!(*part(&scene, 0), Material::Translucent { reflectance: ColorValue::grey(kept), transmittance });
+        match kept < 1.0 {
+            true => assert_eq!(told(&scene), Vec::<String>::new()),
+            false => tells_only(&scene, &["`reflectance`", "above 1"]),
+        }
+    }
+}
+
+#[test]
+fn bsdfs_in_too_many_others_are_grey() {
+    let masks = |n: usize| {
+        let (begin, end) = ("<bsdf type=\"twosided\">".repeat(n), "</bsdf>".repeat(n));
+        surface(&format!("{begin}<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.25\"/></bsdf>{end}"))
+    };
+    assert_eq!(told(&masks(20)), Vec::<String>::new());
+    tells_only(&masks(60), &["BSDFs are nested more than 32 deep"]);
 }

@@ -1,5 +1,6 @@
 //! A scene of another renderer, read: a scene file, and the meshes that stand inside of the foreign file.
 
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::projection::LightImages;
 use firstlight_files::printable;
 use firstlight_files::stamp::Stamp;
@@ -52,6 +53,8 @@ pub(crate) struct ForeignOptions {
     pub defines: Vec<(String, String)>,
     /// Whose proportions and brightness matter.
     pub light_images: LightImages,
+    /// Of the scene that reads it.
+    pub meshes: Arc<MeshBudget>,
 }
 
 /// A scene with everything that its text says.

@@ -6,6 +6,7 @@ pub(crate) mod cie;
 pub(crate) mod foreign;
 pub(crate) mod imported;
 pub(crate) mod material;
+pub(crate) mod mesh_budget;
 pub(crate) mod number;
 pub mod placing;
 pub(crate) mod polygon;

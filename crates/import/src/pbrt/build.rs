@@ -1,6 +1,7 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
 use crate::model::foreign::{ForeignOptions, cut};
+use crate::model::mesh_budget::MeshBudget;
 use crate::model::placing::{is_placement, transform};
 use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
@@ -27,7 +28,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// Objects that a scene may have: instances of instances are quickly said.
-const MAX_OBJECTS: usize = 1 << 20;
+pub(super) const MAX_OBJECTS: usize = 1 << 20;
 /// Shapes, with the pieces of hair, and those that are left out.
 const MAX_SHAPES: u32 = 1 << 23;
 /// Meshes that formulas make may have this fraction of the bytes of a scene: reading them and building their trees takes
@@ -74,6 +75,7 @@ pub(crate) struct Builder<'a> {
     pub(super) references: References,
     pub(super) allow_outside: bool,
     light_images: &'a LightImages,
+    pub(super) meshes: &'a MeshBudget,
     /// From the world of the file to ours.
     pub world: DMat3,
     pub warnings: Warnings,
@@ -91,13 +93,15 @@ pub(crate) struct Builder<'a> {
     pub(super) is_known: bool,
     /// Names of materials, textures and media that were used and not there.
     pub(super) missing: HashSet<String>,
-    /// Textures that this reading has defined.
-    pub(super) fresh: HashSet<String>,
+    /// What this reading has defined: its kind and its name.
+    pub(super) defined: HashSet<(&'static str, String)>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
-    definitions: HashMap<String, Vec<Item>>,
+    pub(super) definitions: HashMap<String, Vec<Item>>,
+    /// Instances before the definition of their object.
+    pub(super) early: Vec<(String, DAffine3)>,
     /// The object definition that is being read.
-    open: Option<(String, Vec<Item>)>,
+    pub(super) open: Option<(String, Vec<Item>)>,
     pub(super) material_names: Names,
     pub(super) texture_names: Names,
     /// Names of textures by what they are.
@@ -134,6 +138,7 @@ impl<'a> Builder<'a> {
             references: References::of(path, allow_outside),
             allow_outside,
             light_images: &options.light_images,
+            meshes: &options.meshes,
             world: DMat3::IDENTITY,
             warnings: Warnings::default(),
             textures: Textures::default(),
@@ -147,9 +152,10 @@ impl<'a> Builder<'a> {
             named: HashMap::new(),
             is_known: false,
             missing: HashSet::new(),
-            fresh: HashSet::new(),
+            defined: HashSet::new(),
             media: HashMap::new(),
             definitions: HashMap::new(),
+            early: Vec::new(),
             open: None,
             material_names: Names::default(),
             texture_names: Names::default(),
@@ -216,37 +222,6 @@ impl<'a> Builder<'a> {
     /// Like [`Self::file`], for a file that was named before.
     pub(super) fn named_file(&self, name: &str) -> Option<String> {
         self.resolved.get(name).cloned().flatten()
-    }
-
-    pub(crate) fn begin_object(&mut self, name: &str) -> Result<(), &'static str> {
-        if self.open.is_some() {
-            return Err("an object definition inside of another one");
-        }
-        self.open = Some((cut(name).to_owned(), Vec::new()));
-        self.strands.part();
-        Ok(())
-    }
-
-    pub(crate) fn end_object(&mut self) -> Result<(), &'static str> {
-        let (name, items) = self.open.take().ok_or("there is no object definition to end")?;
-        self.definitions.insert(name, items);
-        self.strands.part();
-        Ok(())
-    }
-
-    /// An instance of an object definition.
-    pub(crate) fn instance(&mut self, name: &str, ctm: &DAffine3) -> Result<(), TooMany> {
-        if self.open.is_some() {
-            self.tell(format!("an instance of `{}` inside of an object definition is ignored", printable::name(name)));
-            return Ok(());
-        }
-        let Some(items) = self.definitions.remove(cut(name)) else {
-            self.tell(format!("there is no object `{}` to make an instance of", printable::name(name)));
-            return Ok(());
-        };
-        let all = items.iter().try_for_each(|item| self.place(item, &(*ctm * item.local)));
-        self.definitions.insert(cut(name).to_owned(), items);
-        all
     }
 
     /// A shape.
@@ -334,7 +309,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds an item to the scene.
-    fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
+    pub(super) fn place(&mut self, item: &Item, ctm: &DAffine3) -> Result<(), TooMany> {
         self.n_placed += 1;
         if self.n_placed > MAX_OBJECTS {
             return Err(TooMany);
@@ -467,7 +442,8 @@ mod tests {
     #[test]
     fn shapes_that_are_left_out_are_counted() {
         let light_images = LightImages::new(|_| None);
-        let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+        let options =
+            ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
         let mut builder = Builder::new(Path::new("a.pbrt"), &options);
         builder.n_shapes = MAX_SHAPES - 1;
         let mut shape = || builder.shape("x", &Params::default(), &State::default()).is_ok();

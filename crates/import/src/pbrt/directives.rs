@@ -76,6 +76,8 @@ const DIRECTIVES: &[&str] = &[
 const OF_VERSION_3: [&str; 7] =
     ["AreaLight", "PixelSampler", "Renderer", "SurfaceIntegrator", "Volume", "VolumeIntegrator", "WorldEnd"];
 
+const MORE_THAN_SHOWN: &str = "the scene has more objects than can be shown: use fewer shapes or instances";
+
 /// Textures may consist of later ones to this depth.
 const MOST_READINGS: u32 = 4;
 
@@ -139,6 +141,7 @@ impl<'a> Reader<'a> {
     fn read_all(&mut self) -> Result<(), SceneError> {
         let source = self.text(self.path)?;
         self.run(&source, 0)?;
+        self.builder.finish_instances().map_err(|TooMany| SceneError::in_file(self.path, MORE_THAN_SHOWN))?;
         if self.stack.iter().any(|(saved, _)| *saved == Saved::Object) {
             self.builder.tell("`ObjectBegin` is not ended: what follows it is not shown; is the file cut off?");
         } else if !self.stack.is_empty() {
@@ -466,5 +469,5 @@ impl<'a> Reader<'a> {
 }
 
 fn too_many(cursor: &Cursor, at: usize, TooMany: TooMany) -> SceneError {
-    cursor.wrong(at, "the scene has more objects than can be shown: use fewer shapes or instances")
+    cursor.wrong(at, MORE_THAN_SHOWN)
 }

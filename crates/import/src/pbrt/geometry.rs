@@ -87,13 +87,14 @@ impl Builder<'_> {
         };
         let options = ModelOptions { normals, allow_outside: self.allow_outside, ..ModelOptions::default() };
         let before = stamp(path);
-        let read = load_ply_with(path, &options).map(|model| {
+        let read = self.meshes.before(path).map_err(|error| error.to_string()).and_then(|length| {
+            let model = load_ply_with(path, &options).map_err(|error| error.to_string())?;
+            self.meshes.after(length, &model.mesh).map_err(|error| error.to_string())?;
             self.warnings.append(&model.warnings);
-            Arc::new(oriented(model.mesh, is_reversed))
+            Ok(Arc::new(oriented(model.mesh, is_reversed)))
         });
         // Also if it cannot be read, since it may appear later.
         self.files.push((path.to_owned(), before));
-        let read = read.map_err(|error| error.to_string());
         self.ply.insert(key, read.clone());
         read
     }

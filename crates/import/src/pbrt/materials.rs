@@ -282,7 +282,7 @@ pub(crate) fn material(
                     with_normals(MaterialPart::blend(scope.scalar_value(amount), a, b), first.or(second))
                 }
                 Err(_) => {
-                    scope.tell("its two `materials` are not there: grey is shown");
+                    scope.tell("it has no two `materials` that can be mixed: grey is shown");
                     MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
                 }
             }

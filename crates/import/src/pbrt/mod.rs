@@ -1,7 +1,7 @@
 //! pbrt, version 4: a scene in text, with PLY files beside it.
 //!
 //! Words (`tokens`), arguments (`cursor`, `params`) and directives (`directives`) with the graphics state (`state`); what
-//! they describe is collected (`build`, `geometry`, `area_lights`, `surfaces`) from `shapes`, `materials`, `textures`,
+//! they describe is collected (`build`, `geometry`, `instances`, `area_lights`, `surfaces`) from `shapes`, `materials`, `textures`,
 //! `lights` and `spectrum`, and the camera and film before the world are in `view`. Lengths are metres. Start reading at
 //! [`read`].
 //!
@@ -14,6 +14,7 @@ mod cursor;
 mod curves;
 mod directives;
 mod geometry;
+mod instances;
 mod lights;
 mod materials;
 mod named_spectra;

@@ -21,9 +21,21 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// Materials inside of one another.
-const MAX_DEPTH: u32 = 8;
+const MAX_DEPTH: u32 = 32;
+
+/// Textures of numbers and of colours have names of their own.
+const TEXTURE_KINDS: [&str; 2] = ["texture of colours", "texture of numbers"];
 
 impl Builder<'_> {
+    /// Whether nothing of this kind has this name before; tells of the second, which pbrt refuses.
+    pub(super) fn is_first(&mut self, kind: &'static str, name: &str) -> bool {
+        let is_first = self.defined.insert((kind, cut(name).to_owned()));
+        if !is_first {
+            self.tell(format!("{kind} `{}` is defined more than once: the first counts", printable::name(name)));
+        }
+        is_first
+    }
+
     /// Defines a texture.
     pub(crate) fn define_texture(&mut self, name: &str, is_number: bool, class: &str, params: &Params) {
         if let Some(image) = params.string("filename") {
@@ -31,11 +43,14 @@ impl Builder<'_> {
             self.file(image);
         }
         for part in TEXTURES.into_iter().filter_map(|part| params.texture(part)) {
-            if !self.fresh.contains(cut(part)) {
+            let is_defined = |kind| self.defined.contains(&(kind, cut(part).to_owned()));
+            if !TEXTURE_KINDS.into_iter().any(is_defined) {
                 self.missing.insert(cut(part).to_owned());
             }
         }
-        self.fresh.insert(cut(name).to_owned());
+        if !self.is_first(TEXTURE_KINDS[usize::from(is_number)], name) {
+            return;
+        }
         let mut told = Vec::new();
         let mut textures = std::mem::take(&mut self.textures);
         textures.define(cut(name), is_number, class, params, |name| self.named_file(name), |what| told.push(what));
@@ -48,7 +63,7 @@ impl Builder<'_> {
     /// Describes a material with a name.
     pub(crate) fn describe_material(&mut self, name: &str, params: Params) {
         told_of_long(name).into_iter().for_each(|what| self.tell(what));
-        if self.is_known && self.named.contains_key(cut(name)) {
+        if !self.is_first("material", name) || self.is_known && self.named.contains_key(cut(name)) {
             return;
         }
         let kind = params.string("type").unwrap_or("diffuse").to_owned();
@@ -64,6 +79,9 @@ impl Builder<'_> {
 
     /// A medium: only one that absorbs and does not scatter is modelled, inside of glass.
     pub(crate) fn describe_medium(&mut self, name: &str, params: &Params) {
+        if !self.is_first("medium", name) {
+            return;
+        }
         let quantity = |name: &str| params.spectrum(name).and_then(|spectrum| spectrum.quantity().ok());
         for coefficient in ["sigma_a", "sigma_s"] {
             if let Some(Err(UnknownSpectrum(spectrum))) = params.spectrum(coefficient).map(|it| it.quantity()) {
@@ -274,6 +292,8 @@ impl Builder<'_> {
             return known.clone();
         }
         if self.depth >= MAX_DEPTH {
+            let name = printable::name(&described.name).into_owned();
+            self.tell(format!("material `{name}` lies more than {MAX_DEPTH} mixtures deep: it is left out"));
             return None;
         }
         // A mixture that contains itself finds nothing there.
@@ -293,7 +313,7 @@ impl Builder<'_> {
             && [a, b].iter().filter_map(|name| self.lobes.get(*name)).sum::<usize>() > MAX_LOBES
         {
             let first = self.part(a);
-            let what = "is a mixture of too many materials: the first is shown";
+            let what = format!("is a mixture of more than {MAX_LOBES} materials: the first is shown");
             self.tell(format!("material `{}` {what}", printable::name(&wanted)));
             part = first;
         }
@@ -407,6 +427,7 @@ impl MaterialScope for Scope<'_, '_> {
     fn material(&mut self, name: &str) -> Option<String> {
         let Some(described) = self.builder.named.get(cut(name)).cloned() else {
             self.builder.missing.insert(cut(name).to_owned());
+            self.tell(&format!("there is no material `{}`", printable::name(name)));
             return None;
         };
         self.builder.converted(&described, Vec3::ZERO)

@@ -9,6 +9,7 @@ use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Encoding;
 use glam::{Vec2, Vec3};
 use std::fmt::Write;
+use std::sync::Arc;
 
 const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
 const TRIANGLES: &str =
@@ -26,7 +27,7 @@ fn read(world: &str) -> ForeignScene {
     let path = folder.path().join("a.pbrt");
     std::fs::write(&path, format!("WorldBegin\n{world}")).unwrap();
     let light_images = LightImages::new(|_| None);
-    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images };
+    let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
     let scene = super::read(&path, &options).unwrap_or_else(|error| panic!("{error}"));
     SceneFile::parse(&scene.file.to_ron(), "a.ron").unwrap_or_else(|error| panic!("{error}"));
     scene
@@ -118,14 +119,16 @@ fn heights_have_the_encoding_of_their_image() {
 
 #[test]
 fn negative_factors_are_depths_of_a_relief_and_black_as_colours() {
-    let image = |kind: &str, scale: f32, invert: bool| {
+    let named = |name: &str, kind: &str, scale: f32, invert: bool| {
         format!(
-            "Texture \"t\" \"{kind}\" \"imagemap\" \"string filename\" \"n.png\" \"float scale\" {scale} \
+            "Texture \"{name}\" \"{kind}\" \"imagemap\" \"string filename\" \"n.png\" \"float scale\" {scale} \
              \"bool invert\" {invert}\n"
         )
     };
-    let scaled = |kind: &str, by: f32| {
-        format!("Texture \"t\" \"{kind}\" \"scale\" \"texture tex\" \"t\" \"float scale\" {by}\n")
+    let image = |kind: &str, scale: f32, invert: bool| named("t", kind, scale, invert);
+    let scaled = |kind: &str, scale: f32| {
+        named("image", kind, scale, false)
+            + &format!("Texture \"t\" \"{kind}\" \"scale\" \"texture tex\" \"image\" \"float scale\" -0.5\n")
     };
     let shown = |world: String, parameter: &str| {
         let scene = read(&format!("{world}Material \"diffuse\" \"texture {parameter}\" \"t\"\n{SQUARE}"));
@@ -137,17 +140,17 @@ fn negative_factors_are_depths_of_a_relief_and_black_as_colours() {
     };
     for (world, expected) in [
         (image("float", -0.5, false), (Some(-1.0), 0.5, false)),
-        (image("float", 0.5, false) + &scaled("float", -0.5), (Some(-1.0), 0.25, false)),
-        (image("float", -0.5, false) + &scaled("float", -0.5), (Some(1.0), 0.25, false)),
+        (scaled("float", 0.5), (Some(-1.0), 0.25, false)),
+        (scaled("float", -0.5), (Some(1.0), 0.25, false)),
         // 1 + 0.5 x, and 1 − 0.5 x.
         (image("float", -0.5, true), (Some(1.0), 0.5, false)),
         (image("float", 0.5, true), (Some(1.0), 0.5, true)),
     ] {
         assert_eq!(shown(world.clone(), "displacement"), expected, "{world}");
     }
-    let black = image("spectrum", 1.0, false) + &scaled("spectrum", -0.5);
-    assert_eq!(shown(black, "reflectance"), (None, 0.0, false));
-    let checkers = "Texture \"t\" \"spectrum\" \"checkerboard\"\n".to_owned() + &scaled("spectrum", -2.0);
+    assert_eq!(shown(scaled("spectrum", 1.0), "reflectance"), (None, 0.0, false));
+    let checkers = "Texture \"squares\" \"spectrum\" \"checkerboard\"\n\
+                    Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"squares\" \"float scale\" -2\n";
     let scene = read(&format!("{checkers}Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}"));
     let Some(TextureSource::Checker { a, b, .. }) = scene.file.textures.0.values().next() else { panic!() };
     assert_eq!((a.0, b.0), (Vec3::ZERO, Vec3::ZERO));
@@ -371,4 +374,66 @@ fn textures_of_later_textures_have_their_colours() {
     ));
     let MaterialPart::Diffuse { albedo } = part(&scene) else { panic!("{:?}", part(&scene)) };
     assert_eq!((albedo, told(&scene)), (&ColorValue::Rgb(Vec3::new(0.5, 0.25, 0.125)), Vec::new()));
+}
+
+#[test]
+fn instances_may_stand_before_their_object() {
+    let object = format!("ObjectBegin \"o\"\n{SQUARE}ObjectEnd\n");
+    let scene = read(&format!("Translate 1 2 3 ObjectInstance \"o\" Identity\n{object}ObjectInstance \"o\"\n"));
+    assert_eq!((scene.file.objects.len(), told(&scene)), (2, Vec::new()));
+    let first = read(&format!("{object}Translate 1 2 3 ObjectInstance \"o\"\n")).file.objects;
+    assert!(scene.file.objects.contains(&first[0]), "{first:?}");
+    tells_only(&read(&format!("ObjectInstance \"never\"\n{SQUARE}")), &["there is no object `never`"]);
+}
+
+#[test]
+fn of_two_definitions_of_a_name_the_first_counts() {
+    let red = "\"rgb reflectance\" [1 0 0]";
+    let twice = |more: &str| {
+        read(&format!(
+            "MakeNamedMaterial \"m\" \"string type\" \"diffuse\" {red}\n\
+             NamedMaterial \"m\"\n{SQUARE}MakeNamedMaterial \"m\" \"string type\" \"diffuse\"\n{SQUARE}{more}"
+        ))
+    };
+    // The second reading finds the same as the first.
+    for more in ["", "MakeNamedMaterial \"n\" \"string type\" \"diffuse\"\n"] {
+        let early = if more.is_empty() { String::new() } else { format!("NamedMaterial \"n\"\n{SQUARE}") };
+        let scene = twice(&format!("{early}{more}"));
+        tells_only(&scene, &["material `m` is defined more than once: the first counts"]);
+        let MaterialPart::Diffuse { albedo: ColorValue::Rgb(color) } = named(&scene, "m") else { panic!() };
+        assert_eq!(*color, Vec3::X);
+    }
+    let texture = |kind: &str, value: &str| format!("Texture \"t\" \"{kind}\" \"constant\" {value}\n");
+    let (color, number) = (texture("spectrum", "\"rgb value\" [1 0 0]"), texture("float", "\"float value\" 0.5"));
+    let shown = format!("Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}");
+    // Textures of numbers have names of their own.
+    assert_eq!(told(&read(&format!("{color}{number}{shown}"))), Vec::<String>::new());
+    let scene = read(&format!("{color}{}{shown}", texture("spectrum", "\"rgb value\" [0 1 0]")));
+    tells_only(&scene, &["`t` is defined more than once"]);
+    let MaterialPart::Diffuse { albedo: ColorValue::Rgb(color) } = part(&scene) else { panic!() };
+    assert_eq!(*color, Vec3::X);
+    let object = |shape: &str| format!("ObjectBegin \"o\"\n{shape}ObjectEnd\n");
+    let scene = read(&format!("{}{}ObjectInstance \"o\"\n", object(SQUARE), object("Shape \"sphere\"\n")));
+    tells_only(&scene, &["object `o` is defined more than once"]);
+    assert!(matches!(scene.file.objects[..], [ObjectPart::Mesh { .. }]));
+    let medium = "MakeNamedMedium \"a\" \"string type\" \"homogeneous\" \"rgb sigma_s\" [0 0 0]\n";
+    tells_only(&read(&format!("{medium}{medium}{SQUARE}")), &["medium `a` is defined more than once"]);
+}
+
+#[test]
+fn deep_mixtures_are_told_by_what_they_are() {
+    let mixtures = |n: u32| {
+        let mix = |i: u32| {
+            format!("MakeNamedMaterial \"m{i}\" \"string type\" \"mix\" \"string materials\" [\"m{}\" \"m0\"]\n", i - 1)
+        };
+        let all: String = (1..=n).rev().map(mix).collect();
+        read(&format!("MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"\n{all}NamedMaterial \"m{n}\"\n{SQUARE}"))
+    };
+    assert_eq!(told(&mixtures(7)), Vec::<String>::new());
+    for n in [8, 9, 30] {
+        let told = told(&mixtures(n));
+        assert!(!told.is_empty() && told.iter().all(|told| told.contains("mixture of more than 8")), "{told:#?}");
+    }
+    let told = told(&mixtures(40));
+    assert!(told.iter().any(|told| told.contains("more than 32 mixtures deep")), "{told:#?}");
 }
