@@ -3,6 +3,7 @@
 //! A scene is an ECS world. Objects name the entities of their materials, so one material serves many objects.
 
 use firstlight::prelude::*;
+use std::sync::Arc;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let output = std::env::args().nth(1).unwrap_or_else(|| "build_scene.png".to_owned());
@@ -10,9 +11,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let world = scene.world_mut();
 
     let mut material = |material: Material| world.spawn(SurfaceMaterial(material)).id();
-    let gray = material(Material::Diffuse { albedo: Vec3::splat(0.6).into() });
-    let glass = material(Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 });
-    let light = material(Material::Emissive { radiance: Vec3::splat(12.0).into() });
+    let gray = material(Material::diffuse(Vec3::splat(0.6)));
+    let glass = material(Material::glass(1.5));
+    let light = material(Material::emissive(Vec3::splat(12.0)));
 
     world.spawn((Shape::Plane { normal: DVec3::Y }, MaterialSlots(vec![gray])));
     for i in 0..5 {
@@ -20,6 +21,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let material = if i % 2 == 0 { glass } else { gray };
         world.spawn((Shape::Sphere { radius: 0.4 }, Placement::at(at), MaterialSlots(vec![material])));
     }
+    // A mesh of one's own: positions, and the corners of each face counter-clockwise as seen from outside.
+    let corners = [(-0.4, 0.0, -0.4), (-0.4, 0.0, 0.4), (0.4, 0.0, 0.4), (0.4, 0.0, -0.4), (0.0, 0.7, 0.0)];
+    let faces = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
+    let pyramid = Shape::Mesh(Arc::new(Mesh::from_f64(&corners.map(DVec3::from), faces)?));
+    world.spawn((pyramid, Placement::at(DVec3::new(0.0, 0.0, 1.2)), MaterialSlots(vec![gray])));
+
     let panel = Shape::Quad { edge_u: DVec3::X * 2.0, edge_v: DVec3::Z * 2.0 };
     world.spawn((panel, Placement::at(DVec3::new(-1.0, 3.0, -1.0)), MaterialSlots(vec![light])));
 

@@ -1,7 +1,8 @@
 //! The items that most programs that render a scene need: `use firstlight::prelude::*`.
 
 pub use crate::embed::{Error, Flow, Image, RenderOptions, Scene};
-pub use crate::frame::{Command, Progress, Session, SessionOptions, Stage, Target, write_film};
+pub use crate::frame::{Command, Denoising, Progress, Session, SessionOptions, Stage, Target, write_film};
+pub use crate::mesh::{Mesh, MeshError};
 pub use crate::render::{Display, ErrorMetric, Integrator, PixelFilter, RenderSettings, SampleAllocation};
 pub use crate::scene::{
     ColorParam, DirectionalLight, DisplaySettings, FilmSize, Lens, Material, MaterialSlots, Placement, PointLight,

@@ -1,9 +1,9 @@
 //! Numbers of arrays, which Python passes as bytes in the order of the machine.
 
 use crate::errors::input;
-use firstlight::glam::{DMat3, DVec3, Vec2, Vec3, Vec4};
+use firstlight::glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use firstlight::render::{ImageTexture, Texels};
-use firstlight::scene::{Linear, Placement};
+use firstlight::scene::Placement;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -53,10 +53,8 @@ pub fn slots(bytes: &[u8]) -> Vec<u16> {
 pub fn placements(bytes: &[u8]) -> Vec<Placement> {
     let placement = |m: [f64; 12]| {
         let row = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
-        let linear = DMat3::from_cols(row(0), row(1), row(2)).transpose();
-        // What only moves is described by its position in scene files.
-        let linear = if linear == DMat3::IDENTITY { Linear::default() } else { Linear::Matrix(linear) };
-        Placement { translation: DVec3::new(m[3], m[7], m[11]), linear }
+        let matrix3 = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        Placement::from(DAffine3 { matrix3, translation: DVec3::new(m[3], m[7], m[11]) })
     };
     doubles(bytes).map(placement).collect()
 }

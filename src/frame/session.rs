@@ -32,7 +32,7 @@ use crate::scene::{
     SceneInputs, SceneSource, UpAxis, check_film_size, unpacked_folder,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
-use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
+use bevy_ecs::schedule::{Schedule, ScheduleLabel, SingleThreadedExecutor, SystemSet};
 use bevy_ecs::system::ScheduleSystem;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -168,6 +168,8 @@ impl Session {
         world.init_resource::<Explaining>();
 
         let mut frame = Schedule::new(FrameSchedule);
+        // That of Bevy's features would wait here for the thread pool whose only thread may be the one that calls.
+        frame.set_executor(SingleThreadedExecutor::new());
         frame.configure_sets(
             (
                 Stage::Input,

@@ -4,10 +4,10 @@ use bevy_ecs::component::{Component, Mutable};
 use bevy_ecs::prelude::{Entity, World};
 use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOptions, StopAt, Target, Threads};
 use firstlight::mesh::procedural;
-use firstlight::render::{Environment, Falloff, Integrator, ToneCurve};
+use firstlight::render::{Environment, Integrator, ToneCurve};
 use firstlight::scene::{
-    Balls, ColorParam, DirectionalLight, GREY, ImageFrame, Lens, Linear, Material, MaterialSlots, Placement,
-    PointLight, Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
+    Balls, DirectionalLight, GREY, Lens, Linear, Material, MaterialSlots, Placement, PointLight, Projection, Rendering,
+    SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -33,8 +33,8 @@ impl Stage {
         let options = SessionOptions { width: 16, height: 12, threads: Some(1), target, ..SessionOptions::default() };
         let mut session = Session::new(options).unwrap();
         let world = session.world_mut();
-        let [red, blue, unused] = [Vec3::X, Vec3::Z, Vec3::Y]
-            .map(|rgb| world.spawn(SurfaceMaterial(Material::Diffuse { albedo: ColorParam::Rgb(rgb) })).id());
+        let [red, blue, unused] =
+            [Vec3::X, Vec3::Z, Vec3::Y].map(|rgb| world.spawn(SurfaceMaterial(Material::diffuse(rgb))).id());
         let ball = world.spawn((Shape::Sphere { radius: 1.0 }, MaterialSlots(vec![red]))).id();
         let cube = Arc::new(procedural::cuboid(DVec3::ONE));
         let mesh = world.spawn((Shape::Mesh(cube), MaterialSlots(vec![blue]))).id();
@@ -129,8 +129,7 @@ fn each_component_has_its_level() {
         direction: DVec3::Z,
         inner_angle_deg: 1.0,
         outer_angle_deg: 2.0,
-        falloff: Falloff::Quadratic,
-        image: ImageFrame::default(),
+        ..SpotLight::default()
     };
     let spot = stage.light_of(cone, up);
     let sun = stage.light_of(DirectionalLight { irradiance: Vec3::ONE, direction: DVec3::Z }, up);

@@ -2,7 +2,7 @@
 
 use crate::bad_value::BadValue;
 use crate::bounds::{check_cone, check_image_angle, check_light, check_light_radius};
-use crate::parts::{LightPart, TransformPart};
+use crate::parts::{LightPart, TransformPart, default_outer_angle};
 use crate::placement::Placement;
 use crate::value::Rgb;
 use crate::view::unit_direction;
@@ -39,6 +39,20 @@ pub struct SpotLight {
     pub falloff: Falloff,
     /// How it projects an image.
     pub image: ImageFrame,
+}
+
+impl Default for SpotLight {
+    /// Along −Z of object space, with the cone that scene files have by default.
+    fn default() -> Self {
+        Self {
+            intensity: Vec3::ONE,
+            direction: DVec3::NEG_Z,
+            inner_angle_deg: 0.0,
+            outer_angle_deg: default_outer_angle(),
+            falloff: Falloff::default(),
+            image: ImageFrame::default(),
+        }
+    }
 }
 
 /// How a spot light projects the image of its texture; without one, the image is white.

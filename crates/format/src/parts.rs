@@ -386,7 +386,7 @@ fn default_light_radius() -> f64 {
     0.01
 }
 
-fn default_outer_angle() -> f64 {
+pub(crate) fn default_outer_angle() -> f64 {
     45.0
 }
 

@@ -126,6 +126,15 @@ impl Placement {
     }
 }
 
+impl From<DAffine3> for Placement {
+    fn from(affine: DAffine3) -> Self {
+        // What only moves is described by its position in scene files.
+        let is_moved = affine.matrix3 == DMat3::IDENTITY;
+        let linear = if is_moved { Linear::default() } else { Linear::Matrix(affine.matrix3) };
+        Self { translation: affine.translation, linear }
+    }
+}
+
 /// Sine and cosine; exact for multiples of 90 degrees.
 fn sin_cos_deg(angle: f64) -> (f64, f64) {
     match angle.rem_euclid(360.0) {
@@ -176,6 +185,15 @@ mod tests {
         assert_eq!(Placement::from_part(&matrix.to_part()).affine(), turned.affine());
         assert_eq!(Placement::from_part(&turned.to_part()), turned);
         assert!((turned.even_scale().unwrap() - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_transform_becomes_a_placement() {
+        let moved = Placement::at(DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(Placement::from(moved.affine()), moved);
+        let sheared = DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0), DVec3::Z);
+        let affine = DAffine3 { matrix3: sheared, translation: DVec3::Y };
+        assert_eq!(Placement::from(affine).affine(), affine);
     }
 
     #[test]

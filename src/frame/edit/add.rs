@@ -8,12 +8,11 @@ use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
 use crate::frame::state::selection::Selection;
 use crate::mesh::procedural;
-use crate::render::Falloff;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
-    ColorParam, DirectionalLight, GREY, ImageFrame, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource,
-    Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
+    DirectionalLight, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Shape,
+    SpotLight, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -64,8 +63,7 @@ pub fn add(world: &mut World, new: &NewThing) {
     let up = DVec3::Y * size;
     let entity = match new {
         NewThing::Sphere => {
-            let material =
-                new_material(world, "ball", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.7, 0.35, 0.2)) });
+            let material = new_material(world, "ball", Material::diffuse(Vec3::new(0.7, 0.35, 0.2)));
             spawn(
                 world,
                 "ball",
@@ -73,14 +71,12 @@ pub fn add(world: &mut World, new: &NewThing) {
             )
         }
         NewThing::Plane => {
-            let material =
-                new_material(world, "ground", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) });
+            let material = new_material(world, "ground", Material::diffuse(Vec3::splat(0.5)));
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
         }
         NewThing::AreaLight => {
-            let radiance = ColorParam::Rgb(Vec3::new(12.0, 11.0, 9.5));
-            let material = new_material(world, "light", Material::Emissive { radiance });
+            let material = new_material(world, "light", Material::emissive(Vec3::new(12.0, 11.0, 9.5)));
             let edge = 2.0 * size;
             // u × v points down.
             let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
@@ -103,8 +99,7 @@ pub fn add(world: &mut World, new: &NewThing) {
                 direction: DVec3::NEG_Y,
                 inner_angle_deg: 20.0,
                 outer_angle_deg: 30.0,
-                falloff: Falloff::Quadratic,
-                image: ImageFrame::default(),
+                ..SpotLight::default()
             };
             let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
             spawn(world, "spot light", (light, Placement::at(place + above)))
@@ -116,8 +111,7 @@ pub fn add(world: &mut World, new: &NewThing) {
             spawn(world, "directional light", (light, Placement::at(place + above)))
         }
         NewThing::Cube => {
-            let material =
-                new_material(world, "cube", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.25, 0.4, 0.6)) });
+            let material = new_material(world, "cube", Material::diffuse(Vec3::new(0.25, 0.4, 0.6)));
             let mesh = procedural::cuboid(DVec3::ONE);
             let shape = Shape::Mesh(std::sync::Arc::new(mesh));
             let placement = sized(Placement::at(place + up), 2.0 * size);

@@ -1,6 +1,6 @@
 //! New entities: unique names, the last place in the order of the scene file.
 
-use crate::scene::{ColorParam, Material, Ordinal, Placement, SurfaceMaterial};
+use crate::scene::{Material, Ordinal, Placement, SurfaceMaterial};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
@@ -57,7 +57,7 @@ pub fn plain_name(name: &str) -> &str {
 
 /// Creates a material for objects that come without one.
 pub fn clay(world: &mut World) -> Entity {
-    let clay = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
+    let clay = Material::diffuse(Vec3::new(0.72, 0.56, 0.45));
     new_material(world, "clay", clay)
 }
 

@@ -39,7 +39,10 @@ pub fn files(folder: &str, endings: &[&str]) -> Vec<String> {
             let path = entry.unwrap().path();
             let name = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
             if path.is_dir() {
-                open.push(path);
+                // Packages of their own are built in theirs.
+                if !path.ends_with("target") {
+                    open.push(path);
+                }
             } else if endings.iter().any(|ending| name.ends_with(ending)) {
                 found.push(name);
             }

@@ -279,6 +279,26 @@ impl MaterialKind {
 }
 
 impl<P: Params> Material<P> {
+    /// Returns a diffuse material.
+    pub fn diffuse(albedo: impl Into<P::Color>) -> Self {
+        Self::Diffuse { albedo: albedo.into() }
+    }
+
+    /// Returns a mirror.
+    pub fn mirror(reflectance: impl Into<P::Color>) -> Self {
+        Self::Mirror { reflectance: reflectance.into() }
+    }
+
+    /// Returns clear, smooth glass.
+    pub fn glass(ior: f32) -> Self {
+        Self::Glass { ior, absorption: Vec3::ZERO.into(), dispersion: 0.0 }
+    }
+
+    /// Returns a material that emits light, W·m⁻²·sr⁻¹, and reflects none.
+    pub fn emissive(radiance: impl Into<P::Color>) -> Self {
+        Self::Emissive { radiance: radiance.into() }
+    }
+
     /// Returns a principled material of this colour, with the defaults of a scene file for all other parameters.
     pub fn principled(base_color: P::Color) -> Self {
         Self::of_kind(MaterialKind::Principled, base_color).expect("it is no blend")
