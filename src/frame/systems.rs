@@ -31,7 +31,7 @@ pub fn edit(world: &mut World) {
     for finished in world.resource::<BackgroundTasks>().take() {
         match finished {
             Finished::Mesh(remade) => crate::frame::edit::remesh::take(world, *remade),
-            Finished::Picture { entity, part, result } => crate::frame::edit::take_picture(world, entity, part, result),
+            Finished::Picture { purpose, result } => crate::frame::edit::take_picture(world, purpose, result),
             Finished::Trees(trees) => {
                 let mut shown = world.resource_mut::<RenderState>();
                 let preview = shown.trees.preview().len();

@@ -24,6 +24,8 @@ pub enum DialogPurpose {
     SaveImage,
     /// The folder of the frames of an animation.
     SaveFrames,
+    /// As the light from all around.
+    Environment,
     /// As the texture of this material's colour.
     Texture {
         id: Id,
@@ -37,6 +39,7 @@ impl DialogPurpose {
             Self::AddMesh => "Add a model",
             Self::SaveImage => "Save the image as",
             Self::SaveFrames => "The folder of the frames",
+            Self::Environment => "Choose an environment image",
             Self::Texture { .. } => "Choose a texture image",
         }
     }
@@ -47,7 +50,7 @@ impl DialogPurpose {
             Self::Open => "Scenes, models, saved images",
             Self::AddMesh => "Models",
             Self::SaveFrames => "Folders",
-            Self::SaveImage | Self::Texture { .. } => "Images",
+            Self::SaveImage | Self::Environment | Self::Texture { .. } => "Images",
         }
     }
 
@@ -59,10 +62,10 @@ impl DialogPurpose {
     /// File name patterns in shell syntax.
     fn patterns(self) -> String {
         match self {
-            Self::Open => format!("{} {} *.png *.exr", SceneFormat::patterns(), ModelFormat::patterns()),
+            Self::Open => format!("{} {} *.png *.exr *.hdr", SceneFormat::patterns(), ModelFormat::patterns()),
             Self::AddMesh => ModelFormat::patterns(),
             Self::SaveImage | Self::SaveFrames => "*.png *.jpg *.jpeg *.exr".to_owned(),
-            Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
+            Self::Environment | Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }
     }
 
@@ -75,7 +78,12 @@ impl DialogPurpose {
     pub fn command(self, path: PathBuf) -> Option<Command> {
         Some(match self {
             Self::SaveImage | Self::SaveFrames => return None,
+            // An open scene is lit by such an image; it is no scene itself.
+            Self::Open if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr")) => {
+                return Self::Environment.command(path);
+            }
             Self::Open => Command::Open { path },
+            Self::Environment => Command::Edit(Edit::LightFrom { file: crate::scene::path_to_text(&path) }),
             Self::AddMesh => {
                 let path = crate::scene::path_to_text(&path);
                 Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path))))

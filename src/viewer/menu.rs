@@ -74,6 +74,8 @@ fn scrolled(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
         return contents(ui);
     }
     ui.set_min_width(190.0);
+    // With a bar that is there before one scrolls: else nothing says that there is more.
+    ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
     egui::ScrollArea::vertical().max_height((height - 20.0).max(40.0)).show(ui, contents);
 }
 

@@ -170,8 +170,10 @@ impl Told {
             (_, 0) if parts.is_empty() => parts.push("preparing".to_owned()),
             _ => {}
         }
-        // The first guesses would be wild.
-        if self.share > 0.02 && seconds > 1.0 {
+        // The first guesses would be wild, and what follows the samples takes its own time.
+        if self.share >= 1.0 {
+            parts.push("finishing".to_owned());
+        } else if self.share > 0.02 && seconds > 1.0 {
             parts.push(format!("{} to go", crate::viewer::status::about(seconds * (1.0 / self.share - 1.0))));
         }
         parts.join(", ")
@@ -266,6 +268,7 @@ mod tests {
         assert_eq!(told.line(20.0), "noise 4.0 %, about 60 s to go");
         assert_eq!(Told { frame: Some((3, 60)), ..told }.line(20.0), "frame 3 of 60, about 60 s to go");
         assert_eq!(Told { error: None, share: 0.01, ..told }.line(20.0), "16 samples per pixel");
+        assert_eq!(Told { error: None, share: 1.0, ..told }.line(20.0), "16 samples per pixel, finishing");
         assert_eq!(Told::default().line(0.1), "preparing");
     }
 

@@ -128,6 +128,7 @@ pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
         p if !p.is_finite() => "–".to_owned(),
+        p if p > 100.0 => "over 100 %".to_owned(),
         p if p >= 10.0 => format!("{p:.0} %"),
         p if p >= 1.0 => format!("{p:.1} %"),
         p => format!("{p:.2} %"),

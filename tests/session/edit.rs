@@ -7,11 +7,11 @@ use firstlight::frame::{
     Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
     Selection, Session, SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Inspection, Integrator, MaterialKind};
+use firstlight::render::{Environment, Inspection, Integrator, MaterialKind};
 use firstlight::scene::animation::LightProperty;
 use firstlight::scene::{
     ColorParam, DirectionalLight, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight,
-    Rgb, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
+    Rgb, SceneInputs, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
 
@@ -526,6 +526,15 @@ fn colours_become_textures_and_textures_change() {
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
     // What cannot be read is told, and changes nothing.
+    // It can light the scene from all around, too.
+    let light = |driver: &mut Driver| SceneInputs::of(driver.session.world_mut()).environment;
+    let before = light(&mut driver);
+    driver.edit([Edit::LightFrom { file: file.to_string_lossy().into_owned() }]);
+    driver.run_until(Session::is_idle);
+    let Environment::Image { image, .. } = light(&mut driver).light else { panic!("{:?}", light(&mut driver)) };
+    assert_eq!((image.width, image.height), (4, 4));
+    driver.edit([Edit::Undo]);
+    assert_eq!(light(&mut driver), before);
     let missing = TextureSource::image("nowhere.png".to_owned());
     driver.edit([Edit::Paint { id, part: missing }]);
     driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));

@@ -144,6 +144,11 @@ pub enum Edit {
         /// The texture.
         part: TextureSource,
     },
+    /// Light the scene by an image, which is loaded in the background.
+    LightFrom {
+        /// Its path, as in scene files.
+        file: String,
+    },
     /// Assign an existing material to an object.
     Assign {
         /// The object.
@@ -274,6 +279,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::SetKind { id, kind } => set::set_kind(world, existing(world, id)?, kind)?,
         Edit::SetTexture { id, name } => texture::set_texture(world, existing(world, id)?, &name)?,
         Edit::Paint { id, part } => texture::paint(world, existing(world, id)?, part)?,
+        Edit::LightFrom { file } => texture::light_from(world, file),
         Edit::Assign { id, material } => {
             let (object, material) = (thing(world, id)?, existing(world, material)?);
             if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {

@@ -1,10 +1,11 @@
 //! Environment: its colours, their common strength, and the rotation of its image.
 
 use crate::format::property::SkyProperty;
+use crate::format::sources::EnvironmentLayout;
 use crate::format::units::radians;
 use crate::frame::edit::property::Property;
 use crate::import::sky::clear_sky;
-use crate::render::Environment;
+use crate::render::{Environment, ImageTexture};
 use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment, sky_light};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
@@ -38,6 +39,15 @@ pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), St
         world.insert_resource(changed);
     }
     Ok(())
+}
+
+/// Lights the scene by an image; what absorbs light outside stays.
+pub fn set_image(world: &mut World, file: String, image: Arc<ImageTexture>) {
+    let air = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default().air;
+    let layout = EnvironmentLayout::default();
+    let part = EnvironmentSource::Image { file, scale: Rgb(Vec3::ONE), rotate: 0.0, layout, axes: None };
+    let light = Environment::Image { image, scale: Vec3::ONE, rotation: 0.0 };
+    world.insert_resource(SceneEnvironment { part, light, air });
 }
 
 /// Sets a property of a clear sky.

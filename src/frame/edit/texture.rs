@@ -2,12 +2,13 @@
 
 use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::edit::set::set_if_different;
-use crate::frame::state::background::BackgroundTasks;
+use crate::frame::edit::sky;
+use crate::frame::state::background::{BackgroundTasks, PicturePurpose};
 use crate::frame::state::resources::{Clock, CurrentScene};
 use crate::render::{ImageTexture, TexturePattern};
 use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of};
 use bevy_ecs::prelude::{Entity, World};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Returns all textures of the world's materials.
@@ -47,17 +48,34 @@ pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(
         TextureSource::Checker { .. } | TextureSource::VertexColors { .. } => None,
     };
     if let (TextureSource::Image { file, .. }, None) = (&part, &known) {
-        let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
-        let path = folder.join(crate::scene::text_to_path(file));
-        world.resource::<BackgroundTasks>().read_picture(entity, part, path);
+        let path = path_in_scene(world, file);
+        world.resource::<BackgroundTasks>().read_picture(PicturePurpose::Texture(entity, part), path);
         return Ok(());
     }
     make(world, entity, part, known)
 }
 
-/// Applies an image that has been loaded for this entity.
-pub fn take(world: &mut World, entity: Entity, part: TextureSource, result: Result<ImageTexture, String>) {
-    let put = result.and_then(|picture| make(world, entity, part, Some(Arc::new(picture))));
+/// Lights the scene by an image, which is loaded in the background.
+pub fn light_from(world: &mut World, file: String) {
+    let path = path_in_scene(world, &file);
+    world.resource::<BackgroundTasks>().read_picture(PicturePurpose::Environment(file), path);
+}
+
+/// The path of a file that is named as in the open scene.
+fn path_in_scene(world: &World, file: &str) -> PathBuf {
+    let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
+    folder.join(crate::scene::text_to_path(file))
+}
+
+/// Applies an image that has been loaded.
+pub fn take(world: &mut World, purpose: PicturePurpose, result: Result<ImageTexture, String>) {
+    let put = result.map(Arc::new).and_then(|picture| match purpose {
+        PicturePurpose::Texture(entity, part) => make(world, entity, part, Some(picture)),
+        PicturePurpose::Environment(file) => {
+            sky::set_image(world, file, picture);
+            Ok(())
+        }
+    });
     if let Err(problem) = put {
         let now = world.resource::<Clock>().0;
         world.resource_mut::<Status>().say(now, MessageKind::Error, problem);

@@ -25,12 +25,18 @@ pub enum Finished {
     /// Trees that meshes share.
     Statics(BuiltStatics),
     Mesh(Box<Remade>),
-    /// An image for a material.
     Picture {
-        entity: Entity,
-        part: TextureSource,
+        purpose: PicturePurpose,
         result: Result<ImageTexture, String>,
     },
+}
+
+/// What an image is read for.
+pub enum PicturePurpose {
+    /// The colour of this material.
+    Texture(Entity, TextureSource),
+    /// To light the scene from all around; its path as in scene files.
+    Environment(String),
 }
 
 #[derive(Default)]
@@ -236,8 +242,8 @@ impl BackgroundTasks {
         self.with(|board| board.mesh_in_the_making())
     }
 
-    /// Reads an image for a material.
-    pub fn read_picture(&self, entity: Entity, part: TextureSource, path: PathBuf) {
+    /// Reads an image for an edit.
+    pub fn read_picture(&self, purpose: PicturePurpose, path: PathBuf) {
         self.with(|board| board.reading += 1);
         let this = self.clone();
         let work = move || {
@@ -245,7 +251,7 @@ impl BackgroundTasks {
             let result = result.map(|(picture, _)| picture).map_err(|reason| format!("{}: {reason}", path.display()));
             this.with(|board| {
                 board.reading -= 1;
-                board.finished.push(Finished::Picture { entity, part, result });
+                board.finished.push(Finished::Picture { purpose, result });
             });
             this.wake();
         };

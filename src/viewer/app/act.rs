@@ -189,6 +189,7 @@ impl App {
             }
             Action::OpenDialog => self.ask_for_file(DialogPurpose::Open, now),
             Action::AddDialog => self.ask_for_file(DialogPurpose::AddMesh, now),
+            Action::EnvironmentDialog => self.ask_for_file(DialogPurpose::Environment, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,
             Action::Section(title) => {
                 (self.panel.shown, self.panel.section) = (true, Some(title));

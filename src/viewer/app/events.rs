@@ -2,6 +2,7 @@
 
 use crate::frame::{Command, Edit};
 use crate::viewer::app::{App, FRAME, Wake};
+use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::help::{Help, ListKey};
 use crate::viewer::question::Prompt;
 use crate::viewer::toasts::Tone;
@@ -77,7 +78,7 @@ impl ApplicationHandler<Wake> for App {
                 self.capture_mouse(false, now);
                 self.input.release_all(now);
             }
-            WindowEvent::DroppedFile(path) => self.open(Command::Open { path }, now),
+            WindowEvent::DroppedFile(path) => self.take_file(DialogPurpose::Open, path, now),
             WindowEvent::ModifiersChanged(modifiers) => {
                 self.input.set_modifiers(modifiers.state(), now);
             }

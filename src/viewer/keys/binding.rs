@@ -149,6 +149,8 @@ pub enum Action {
     OpenDialog,
     /// Shows a dialog to choose a model to add.
     AddDialog,
+    /// Shows a dialog to choose an environment image.
+    EnvironmentDialog,
     TogglePanel,
     /// Opens the panel at this section.
     Section(&'static str),

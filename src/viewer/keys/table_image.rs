@@ -97,6 +97,10 @@ pub const FILES: KeyGroup = KeyGroup {
             Trigger::Mouse("Drop a file")
         ),
         row!(
+            "choose an image that lights the scene from all around (.hdr, .exr, .png, .jpg)",
+            item("Environment image …", &[], Action::EnvironmentDialog)
+        ),
+        row!(
             "save the scene",
             ctrl_shifted("s", false, Action::SaveScene { new: false }),
             item("Save the scene", &[Menu::File], Action::SaveScene { new: false })

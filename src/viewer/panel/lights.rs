@@ -8,6 +8,7 @@ use crate::scene::light_of;
 use crate::scene::{
     ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SceneEnvironment, SurfaceMaterial,
 };
+use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::selected::property_row;
 use crate::viewer::panel::state::{Asked, PanelState};
@@ -142,7 +143,13 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             });
         }
     });
-    if !matches!(environment.part, EnvironmentSource::Sky { .. }) && ui.button("clear sky").clicked() {
-        set_sky(asked, Property::ClearSky(SkyProperty::Elevation), DVec3::splat(45.0));
-    }
+    ui.horizontal(|ui| {
+        let is_clear = matches!(environment.part, EnvironmentSource::Sky { .. });
+        if !is_clear && ui.button("clear sky").on_hover_text("sun and sky, as they are outside").clicked() {
+            set_sky(asked, Property::ClearSky(SkyProperty::Elevation), DVec3::splat(45.0));
+        }
+        if ui.button("image …").on_hover_text("light from a panorama (.hdr, .exr, .png, .jpg)").clicked() {
+            asked.dialog = Some(DialogPurpose::Environment);
+        }
+    });
 }
