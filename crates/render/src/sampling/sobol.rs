@@ -38,7 +38,7 @@ pub(crate) type SamplerLanes<S> = SamplerOf<Bits<S>>;
 /// direction at the first vertex of a path, whose noise is directly visible.
 ///
 /// The choices of a light and of a lobe are not among them: what is found depends on them and on these together, and in
-/// some blocks the orders of two dimensions agree by chance. All pixels there would have more noise, alike in both
+/// some blocks the orders of two dimensions agree at random. All pixels there would have more noise, alike in both
 /// halves of their samples, which passes for detail.
 pub(super) const SCREEN_DIMENSIONS: u32 = 4;
 
