@@ -313,22 +313,6 @@ mod tests {
         }
     }
 
-    /// A choice and a point that are found together: a block in which the orders of both agree would have more noise.
-    #[test]
-    fn choices_are_as_noisy_in_all_blocks() {
-        let (point, choice) = (SCREEN_DIMENSIONS - 2, SCREEN_DIMENSIONS);
-        let finds = |sampler: Sampler| sampler.single(choice) < 0.5 && sampler.pair(point).x < 0.5;
-        let square = |x: u32, y: u32| {
-            let found = (0..12).filter(|sample| finds(Sampler::of_pixel(3, x, y, *sample))).count();
-            (found as f64 / 12.0 - 0.25).powi(2)
-        };
-        let side = 1 << LOG_BLOCK;
-        let of_block = |block: u32| (0..BLOCK_PIXELS).map(|i| square(block * side + i % side, i / side)).sum::<f64>();
-        let blocks: Vec<f64> = (0..40).map(of_block).collect();
-        let mean = blocks.iter().sum::<f64>() / blocks.len() as f64;
-        assert!(blocks.iter().all(|of_block| (0.8..1.25).contains(&(of_block / mean))), "{mean}: {blocks:?}");
-    }
-
     /// Neighbours must not share the low digits of their points: their errors would be correlated.
     #[test]
     fn errors_of_neighbours_are_independent_when_samples_have_come_in() {
