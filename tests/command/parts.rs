@@ -259,7 +259,7 @@ fn merging_many_films_takes_no_more_memory_than_merging_two() {
     let path = folder.path();
     std::fs::write(
         path.join("grey.ron"),
-        "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: constant(0.5), film: (width: 700, height: 500))",
+        "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: constant(0.5), film: (width: 500, height: 350))",
     )
     .unwrap();
     for part in 1..=12 {
@@ -272,5 +272,5 @@ fn merging_many_films_takes_no_more_memory_than_merging_two() {
     let [two, all] = [peak(2), peak(12)];
     eprintln!("peak memory of merging 2 films: {two} bytes, of 12: {all} bytes");
     // A film of that size has 76 bytes per pixel in memory.
-    assert!(all < two + 700 * 500 * 76, "{two} and {all} bytes");
+    assert!(all < two + 500 * 350 * 76, "{two} and {all} bytes");
 }

@@ -290,16 +290,16 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         scene.spawn(&mut world);
         let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
         let settings = world.resource::<Rendering>().0;
-        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 2048).0;
+        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 1024).0;
         let truth = LinearPicture::of(&truth);
         let mut held = [0; 4];
         let mut widths = [0.0; 4];
         for seed in 0..seeds {
             let settings = RenderSettings { seed, ..settings };
             let limits = CurveLimits { spp: 32, seconds: None };
-            let steps = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
-            let curve = ConvergenceCurve::measure(&steps, &truth, &Display::default());
-            for step in curve.steps.iter().filter(|step| step.spp >= 4) {
+            let mut steps = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
+            steps.retain(|step| step.spp >= 4);
+            for step in ConvergenceCurve::measure(&steps, &truth, &Display::default()).steps {
                 let (k, told) = (step.spp.ilog2() as usize - 2, step.estimate.unwrap());
                 held[k] += u32::from((told.low..=told.high).contains(&step.error()));
                 widths[k] += (told.high / told.low).sqrt() / f64::from(seeds);

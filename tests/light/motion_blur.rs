@@ -230,7 +230,7 @@ fn few_samples_have_the_right_mean() {
         let mean = |film: &Film| means(film).iter().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / (16.0 * 12.0);
         let few: Vec<f64> =
             (0..RENDERS).map(|k| mean(&blurred(&moments, &settings_of(500 + k), (16, 12), 2))).collect();
-        let truth: Vec<f64> = (0..4).map(|k| mean(&blurred(&moments, &settings_of(k), (16, 12), 4096))).collect();
+        let truth: Vec<f64> = (0..4).map(|k| mean(&blurred(&moments, &settings_of(k), (16, 12), 1024))).collect();
         let of = |values: &[f64]| {
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
@@ -347,7 +347,7 @@ fn the_error_estimate_holds_for_what_moves() {
         ("shadow", moving_shadow, settings),
         ("quad", flying_quad, settings),
     ] {
-        let truth = blurred(&moments, &settings(999), (48, 32), 4096);
+        let truth = blurred(&moments, &settings(999), (48, 32), 2048);
         for spp in [32, 128] {
             let (mut told, mut actual) = (0.0, 0.0);
             for seed in 0..12 {
