@@ -204,7 +204,13 @@ impl Player {
         self.clock = self.clock.max(Duration::try_from_secs_f64(at).unwrap_or_default());
         match command {
             // Opening is part of the replay; commands that change the disk or the timing are not.
-            Command::SaveScene { .. } | Command::SetThreads { .. } | Command::Pause | Command::Resume => {}
+            Command::SaveScene { .. } => {
+                let told = "scenes that were saved during the recording are not saved again";
+                if !self.warnings.iter().any(|warning| warning == told) {
+                    self.warnings.push(told.to_owned());
+                }
+            }
+            Command::SetThreads { .. } | Command::Pause | Command::Resume => {}
             other => self.session.send(other),
         }
     }

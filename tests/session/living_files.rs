@@ -190,13 +190,17 @@ fn a_replay_has_the_mesh_that_was_deleted_and_brought_back() {
         driver.session.send(command);
         driver.frame();
     }
+    driver.session.send(Command::SaveScene { path: folder.path().join("saved.ron") });
     driver.settle();
     let shown = driver.session.film_snapshot().unwrap();
     driver.session.end_record();
     assert!(shown.means() == before.means(), "undo brings all back");
+    std::fs::remove_file(folder.path().join("saved.ron")).unwrap();
     let options = firstlight::frame::ReplayOptions { threads: Some(1), spp: None };
     let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
     assert!(played.film.means() == shown.means());
+    assert!(played.warnings.len() == 1 && played.warnings[0].contains("not saved again"), "{:?}", played.warnings);
+    assert!(!folder.path().join("saved.ron").exists());
 }
 
 /// A session that does a bit of everything, and another one that plays it.

@@ -137,10 +137,11 @@ impl References {
         for part in path.components() {
             match part {
                 Component::CurDir => {}
-                Component::ParentDir if depth == 0 => return Some("a path out of the folder"),
+                Component::ParentDir if depth == 0 => return Some(OUT),
                 Component::ParentDir => depth -= 1,
                 // With `.\\` it is here, as its spelling with `/` says.
                 Component::Normal(part) if part.as_encoded_bytes().starts_with(b".\\") => {}
+                Component::Normal(part) if part.as_encoded_bytes().starts_with(b"..\\") => return Some(OUT),
                 Component::Normal(part) if is_hidden(part) => return Some("a hidden file"),
                 Component::Normal(_) => depth += 1,
                 Component::Prefix(_) | Component::RootDir => return Some(ABSOLUTE),
@@ -227,6 +228,7 @@ fn or_here(folder: &Path) -> &Path {
 }
 
 const ABSOLUTE: &str = "an absolute path";
+const OUT: &str = "a path out of the folder";
 
 fn is_hidden(name: &OsStr) -> bool {
     name.as_encoded_bytes().starts_with(b".")
@@ -349,6 +351,7 @@ mod tests {
         assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));
         assert_eq!(at(".\\moved.png"), Ok("./moved.png".to_owned()));
         assert_eq!(at(".\\.moved.png"), Err("a hidden file"));
+        assert_eq!(at("..\\secret.png"), Err("a path out of the folder"));
         std::fs::create_dir(inner.join(".ssh")).unwrap();
         std::fs::write(inner.join(".ssh/id_rsa"), "").unwrap();
         std::os::unix::fs::symlink(".ssh/id_rsa", inner.join("mesh.bin")).unwrap();
