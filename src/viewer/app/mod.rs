@@ -30,7 +30,9 @@ mod orders;
 pub mod run;
 mod tick;
 
-use crate::frame::{Command, Explaining, Focus, FocusTarget, Projector, Session, SessionOptions, Target, Waker};
+use crate::frame::{
+    Command, Explaining, Focus, FocusTarget, FreeShare, Projector, Session, SessionOptions, Target, Waker,
+};
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
@@ -46,7 +48,7 @@ use crate::viewer::menu::HereMenu;
 use crate::viewer::order_form::OrderForm;
 use crate::viewer::outlines::Outlines;
 use crate::viewer::palette::Palette;
-use crate::viewer::panel::PanelState;
+use crate::viewer::panel::{self, PanelState};
 use crate::viewer::presenter::Presenter;
 use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
@@ -188,9 +190,15 @@ impl App {
         .map_err(|error| ViewerError::Session(error.into()))?;
         if let Some(path) = &options.record {
             session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
+        let mut memory = Memory::of_platform();
+        let panel = PanelState { previews: Previews::new(waker.clone()), ..memory.panel() };
+        if panel.shown && options.width > 0 {
+            // A model is framed before the panel is drawn.
+            let window = options.width as f32;
+            session.world_mut().insert_resource(FreeShare(f64::from(1.0 - panel::width(window) / window)));
+        }
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
-        let mut memory = Memory::of_platform();
         let trouble = memory.begin(&mut session);
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
@@ -216,7 +224,7 @@ impl App {
             palette: Palette::default(),
             here: HereMenu::default(),
             greeting: memory.is_new(),
-            panel: PanelState { previews: Previews::new(waker.clone()), ..memory.panel() },
+            panel,
             handles: Handles::default(),
             grab: None,
             strip: None,
@@ -314,7 +322,7 @@ impl App {
     }
 
     /// Moves the image out of the way of the panel, as it was drawn last, so that its centre is that of the part of the
-    /// window that is free; draws again if that is news. Samples stay.
+    /// window that is free; draws again if that is news. Samples stay; what is framed from now on fits that part.
     fn move_aside(&mut self, now: Instant) {
         let Some(presenter) = &self.presenter else { return };
         let context = presenter.egui_context();
@@ -330,6 +338,12 @@ impl App {
 
     /// Whether focus follows the mouse, and the mouse is not in the panel.
     fn focus_follows(&self) -> bool {
+        let [width, _] = self.input.size();
+        let share = 1.0 - 2.0 * f64::from(aside) / width.max(1.0);
+        if share > 0.0 && share != self.session.world().resource::<FreeShare>().0 {
+            self.session.send(Command::SetFreeShare { share });
+            self.needs_tick = true;
+        }
         let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
         follows && !self.over_widgets
     }
