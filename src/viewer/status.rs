@@ -1,6 +1,6 @@
 //! Text of the status line: what is on the image and how good it is, and settings; and how figures are written.
 
-use crate::frame::{DenoiseFilter, Denoising, Status, Target, f_number, f_stop};
+use crate::frame::{Aperture, DenoiseFilter, Denoising, Status, Target, f_number};
 use crate::render::{Integrator, ToneCurve};
 
 /// Seconds of rendering from which the time to go can be told.
@@ -93,7 +93,10 @@ pub fn settings(status: &Status) -> Vec<String> {
     }
     let lens = status.rig.lens;
     if lens.enabled {
-        let aperture = f_number(f_stop(lens.radius, &status.rig.projection));
+        let aperture = match Aperture::of(lens.radius, &status.rig.projection) {
+            Aperture::FNumber(stop) => f_number(stop),
+            Aperture::Diameter(diameter) => format!("aperture {}", metres(diameter)),
+        };
         parts.push(format!("focus {}, {aperture}", metres(lens.focus_distance)));
     }
     if status.display.exposure_stops != 0.0 {
@@ -227,6 +230,8 @@ mod tests {
     #[test]
     fn units_suit_their_numbers() {
         assert_eq!([seconds(0.04), seconds(61.0), seconds(7325.0)], ["0.0 s", "1:01 min", "2:02 h"]);
+        status.rig.lens = Lens::thin(3.0, 300.0);
+        assert_eq!(settings(&status)[0], "focus 300.00 m, aperture 6.00 m", "a model in millimetres");
         assert_eq!([percent(0.5), percent(0.012), percent(0.0001)], ["50 %", "1.2 %", "0.01 %"]);
         assert_eq!(percent(f64::INFINITY), "–");
         let lengths = [metres(f64::INFINITY), metres(5e6), metres(1234.0), metres(0.5), metres(0.002), metres(2e-6)];
