@@ -139,6 +139,9 @@ impl SceneReport<'_> {
         if let Some(filter) = self.denoised_by() {
             row("denoised", format!("by {filter}; the raw image is in its film, if that was saved"));
         }
+        if let Some(how) = scene.shot.as_ref().and_then(|shot| shot.ended_early.clone()) {
+            row("ended early", how);
+        }
         if let Some(caustics) = self.caustics {
             row("caustics", caustics.to_string());
         }
