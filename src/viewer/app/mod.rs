@@ -36,7 +36,7 @@ use crate::frame::{
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
-use crate::viewer::app::options::{ViewerError, ViewerOptions};
+use crate::viewer::app::options::{ViewerError, ViewerOptions, size_to_keep};
 use crate::viewer::bar::Figures;
 use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
@@ -134,8 +134,10 @@ struct App {
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
     title: String,
-    /// Logical pixels.
+    /// That of the next window, logical pixels.
     window_size: (u32, u32),
+    /// What the monitor had room for when the window was opened, logical pixels.
+    fitted_size: (u32, u32),
     /// When to store the window's size.
     keep_size_at: Option<Instant>,
     occluded: bool,
@@ -188,8 +190,6 @@ impl App {
             waker: Some(waker.clone()),
         })
         .map_err(|error| ViewerError::Session(error.into()))?;
-        if let Some(path) = &options.record {
-            session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         let mut memory = Memory::of_platform();
         let panel = PanelState { previews: Previews::new(waker.clone()), ..memory.panel() };
         if panel.shown && options.width > 0 {
@@ -197,6 +197,8 @@ impl App {
             let window = options.width as f32;
             session.world_mut().insert_resource(FreeShare(f64::from(1.0 - panel::width(window) / window)));
         }
+        if let Some(path) = &options.record {
+            session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
         let trouble = memory.begin(&mut session);
@@ -244,6 +246,7 @@ impl App {
             window: None,
             title: String::new(),
             window_size: (options.width, options.height),
+            fitted_size: (options.width, options.height),
             keep_size_at: None,
             occluded: false,
             needs_tick: true,
@@ -268,7 +271,8 @@ impl App {
         let size = window.inner_size();
         let logical = size.to_logical::<u32>(window.scale_factor());
         if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
-            self.window_size = (logical.width, logical.height);
+            let wanted = (self.options.width, self.options.height);
+            self.window_size = size_to_keep((logical.width, logical.height), self.fitted_size, wanted);
             self.keep_size_at = Some(Instant::now() + RESIZE_DELAY);
         }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
@@ -334,16 +338,16 @@ impl App {
             self.shown_picture = None;
             self.repaint_at = Some(now);
         }
-    }
-
-    /// Whether focus follows the mouse, and the mouse is not in the panel.
-    fn focus_follows(&self) -> bool {
         let [width, _] = self.input.size();
         let share = 1.0 - 2.0 * f64::from(aside) / width.max(1.0);
         if share > 0.0 && share != self.session.world().resource::<FreeShare>().0 {
             self.session.send(Command::SetFreeShare { share });
             self.needs_tick = true;
         }
+    }
+
+    /// Whether focus follows the mouse, and the mouse is not in the panel.
+    fn focus_follows(&self) -> bool {
         let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
         follows && !self.over_widgets
     }
