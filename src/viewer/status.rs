@@ -220,6 +220,7 @@ mod tests {
         let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
         assert_eq!(line(&denoised, target), "noise 5.0 %, denoised");
         assert_eq!([0.2, 43.0, 200.0].map(about), ["about 1 s", "about 45 s", "about 3 min"]);
+        assert_eq!([5000.0, 1e4, 1e6].map(about), ["about 83 min", "about 3 h", "about 12 days"]);
     }
 
     #[test]
@@ -229,13 +230,13 @@ mod tests {
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.display.exposure_stops = -1.0 / 3.0;
         assert_eq!(settings(&status), ["focus 2.50 m, f/1.6", "-0.3 stops"]);
+        status.rig.lens = Lens::thin(3.0, 300.0);
+        assert_eq!(settings(&status)[0], "focus 300.00 m, aperture 6.00 m", "a model in millimetres");
     }
 
     #[test]
     fn units_suit_their_numbers() {
         assert_eq!([seconds(0.04), seconds(61.0), seconds(7325.0)], ["0.0 s", "1:01 min", "2:02 h"]);
-        status.rig.lens = Lens::thin(3.0, 300.0);
-        assert_eq!(settings(&status)[0], "focus 300.00 m, aperture 6.00 m", "a model in millimetres");
         assert_eq!([percent(0.5), percent(0.012), percent(0.0001)], ["50 %", "1.2 %", "0.01 %"]);
         assert_eq!(percent(f64::INFINITY), "–");
         let lengths = [metres(f64::INFINITY), metres(5e6), metres(1234.0), metres(0.5), metres(0.002), metres(2e-6)];

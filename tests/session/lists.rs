@@ -188,7 +188,11 @@ fn any_environment_becomes_a_clear_sky() {
     driver.edit([Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(2.0) }]);
     let EnvironmentSource::Sky { scale, azimuth: 90.0, .. } = sky(&driver).part else { panic!() };
     assert_eq!(scale.0, Vec3::splat(2.0));
-    for _ in 0..4 {
+    // And any becomes one of a single colour.
+    driver.edit([Edit::Set { id: 0, property: Property::Sky, value: DVec3::splat(0.5) }]);
+    assert!(matches!(sky(&driver).light, Environment::Constant(radiance) if radiance == Vec3::splat(0.5)));
+    assert!(matches!(sky(&driver).part, EnvironmentSource::Constant(_)));
+    for _ in 0..5 {
         driver.edit([Edit::Undo]);
     }
     assert!(matches!(sky(&driver).light, Environment::Gradient { .. }));
