@@ -248,6 +248,25 @@ mod tests {
     }
 
     #[test]
+    fn what_is_kept_as_it_stands_says_so() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let (folder, subject) = (tempfile::tempdir().unwrap(), subject());
+        let order = order(folder.path(), Target { error: Some(1e-6), ..Target::default() });
+        let kept = AtomicBool::new(false);
+        let tell = |now: Advance| kept.store(now.error.is_some(), Ordering::Relaxed);
+        let stop = || kept.load(Ordering::Relaxed);
+        let finished = order.render_unless(&|| false, &subject, &stop, tell).unwrap().unwrap();
+        assert!(!finished.is_complete && finished.describe(order.size).ends_with(", ended early"), "{finished:?}");
+        let early = ImageMetadata::read(&order.path).unwrap().ended_early.unwrap();
+        let samples = format!("{} samples per pixel; asked for: noise 0.00 %", finished.spp);
+        assert!(early.starts_with("at noise ") && early.ends_with(&samples), "{early}");
+        // One that is done has nothing to say.
+        let done = Order { target: Target { spp: Some(2), ..Target::default() }, ..order };
+        done.render_unless(&|| false, &subject, &|| false, |_| ()).unwrap().unwrap();
+        assert_eq!(ImageMetadata::read(&done.path).unwrap().ended_early, None);
+    }
+
+    #[test]
     fn what_is_cancelled_at_once_writes_nothing_and_values_are_checked() {
         let (folder, subject) = (tempfile::tempdir().unwrap(), subject());
         let order = order(folder.path(), Target { spp: Some(4), ..Target::default() });

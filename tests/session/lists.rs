@@ -164,6 +164,19 @@ fn the_sky_is_made_stronger_in_proportion() {
 }
 
 #[test]
+fn undo_names_what_has_changed_of_the_camera() {
+    let mut driver = Driver::open();
+    let mut label_of = |command: Command| {
+        driver.session.send(command);
+        driver.frame();
+        driver.session.world().resource::<History>().undo_label().map(str::to_owned)
+    };
+    assert_eq!(label_of(Command::ScaleFocus { factor: 1.5 }).as_deref(), Some("lens"));
+    assert_eq!(label_of(Command::Orbit { yaw_deg: 5.0, pitch_deg: 0.0 }).as_deref(), Some("camera"));
+    assert_eq!(label_of(Command::ToggleDepthOfField).as_deref(), Some("lens"));
+}
+
+#[test]
 fn any_environment_becomes_a_clear_sky() {
     let mut driver = Driver::open();
     let sky = |driver: &Driver| driver.session.inputs().environment.clone();
