@@ -42,6 +42,8 @@ static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
 
 fn write(name: &str, bytes: &[u8]) -> PathBuf {
     let path = FOLDER.path().join(name);
+    // Some file systems write a file to the disk at once that is written again.
+    let _ = std::fs::remove_file(&path);
     std::fs::write(&path, bytes).expect("a temporary file can be written");
     path
 }

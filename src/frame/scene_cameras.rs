@@ -47,6 +47,5 @@ pub(super) fn beside(cameras: Vec<SceneCamera>, rig: &Rig, backwards: bool) -> O
 }
 
 fn shows_the_same(a: &Rig, b: &Rig) -> bool {
-    let pose = |rig: &Rig| (rig.view.eye, rig.view.forward, rig.view.up);
-    pose(a) == pose(b) && a.projection == b.projection
+    a.view.shows_the_same(&b.view) && a.projection.shows_the_same(&b.projection)
 }

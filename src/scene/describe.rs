@@ -6,7 +6,7 @@
 //! original file are lost.
 
 use crate::files::relative::path_to_text;
-use crate::format::camera::camera_part;
+use crate::format::camera::{camera, camera_part};
 use crate::format::film_size::FilmSize;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::names::Names;
@@ -103,7 +103,11 @@ impl Description {
             camera: match &animation {
                 // The one that the tracks move; the one that is shown is in `animation`.
                 Some(animation) if animation_part.edited.camera.is_some() => animation.camera.clone(),
-                Some(animation) => camera_part(&view, &projection, &lens, Some(&animation.camera_at(at))),
+                Some(animation) => {
+                    let (kept, then) = (&animation.camera, animation.camera_at(at));
+                    let is_kept = camera(kept) == (view, projection, lens);
+                    camera_part(&view, &projection, &lens, Some(if is_kept { kept } else { &then }))
+                }
                 None => camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
             },
             cameras: loaded.map(|loaded| loaded.file.cameras.clone()).unwrap_or_default(),

@@ -28,13 +28,15 @@ const SCENE: &str = r#"(
     ),
 )"#;
 
-/// A triangle and a camera that move for two seconds.
+/// A triangle that also changes its shape and a camera, which move for two seconds.
 fn moving_model() -> String {
     let numbers: Vec<f32> = [
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].as_slice(),
         &[0.0, 2.0],
         &[-1.0, 0.0, 0.0, 1.0, 0.5, 0.0],
         &[0.0, 0.0, 4.0, 1.0, 0.0, 5.0],
+        &[0.0, 0.0, -3.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0],
+        &[0.0, 1.0],
     ]
     .concat();
     let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -46,20 +48,25 @@ fn moving_model() -> String {
         "nodes":[{{"name":"still","camera":0,"translation":[0,0,7]}},{{"name":"flying","camera":1,"translation":[0,0,4]}},{{"mesh":0}}],
         "cameras":[{{"name":"still","type":"perspective","perspective":{{"yfov":0.6,"znear":0.1}}}},
                    {{"name":"flying","type":"perspective","perspective":{{"yfov":0.8,"znear":0.1}}}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{{"POSITION":4}}]}}]}}],
         "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
                      {{"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[2]}},
                      {{"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}},
-                     {{"bufferView":3,"componentType":5126,"count":2,"type":"VEC3"}}],
+                     {{"bufferView":3,"componentType":5126,"count":2,"type":"VEC3"}},
+                     {{"bufferView":4,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,-3],"max":[0,0.5,0]}},
+                     {{"bufferView":5,"componentType":5126,"count":2,"type":"SCALAR"}}],
         "animations":[{{"channels":[{{"sampler":0,"target":{{"node":2,"path":"translation"}}}},
-                                    {{"sampler":1,"target":{{"node":1,"path":"translation"}}}}],
-                        "samplers":[{{"input":1,"output":2}},{{"input":1,"output":3}}]}}],
-        "bufferViews":[{},{},{},{}],
+                                    {{"sampler":1,"target":{{"node":1,"path":"translation"}}}},
+                                    {{"sampler":2,"target":{{"node":2,"path":"weights"}}}}],
+                        "samplers":[{{"input":1,"output":2}},{{"input":1,"output":3}},{{"input":1,"output":5}}]}}],
+        "bufferViews":[{},{},{},{},{},{}],
         "buffers":[{{"byteLength":{},"uri":"data:application/octet-stream;base64,{}"}}]}}"#,
         view(0, 9),
         view(9, 2),
         view(11, 6),
         view(17, 6),
+        view(23, 9),
+        view(32, 2),
         bytes.len(),
         STANDARD.encode(&bytes)
     )
@@ -118,12 +125,14 @@ fn an_image_of_a_moving_model_opens_as_what_it_shows() {
         "--camera flying",
         "--camera flying --at 0.75 --shutter 1",
         "--turntable 2 --at 0.75 --shutter 1",
+        "--camera flying --frames 1..3 --fps 2 --shutter 1",
     ]
     .into_iter()
     .enumerate()
     {
         does(path, &format!("render m.gltf {SMALL} {how} -o {i}.exr"));
-        reopens(path, &if how.contains("turntable") { format!("{i}-0002.exr") } else { format!("{i}.exr") });
+        let is_last_of_two = how.contains("turntable") || how.contains("frames");
+        reopens(path, &if is_last_of_two { format!("{i}-0002.exr") } else { format!("{i}.exr") });
     }
 }
 

@@ -104,6 +104,11 @@ impl View {
         self.eye + self.forward * self.pivot_distance
     }
 
+    /// Whether an image of `other` is the same: all is equal but the pivot.
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        *self == Self { pivot_distance: self.pivot_distance, ..*other }
+    }
+
     /// The view with its axes made orthonormal; `forward` keeps its direction.
     ///
     /// Precondition: `up` is not parallel to `forward`.
@@ -173,6 +178,12 @@ impl Projection {
         }
     }
 
+    /// Whether an image by `other` is the same: an orthographic one has no field of view.
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        self.orthographic_height == other.orthographic_height
+            && (self.orthographic_height.is_some() || self.vfov_deg == other.vfov_deg)
+    }
+
     /// Half the height of the visible region at a depth along the view direction; both metres.
     pub fn half_height(&self, depth: f64) -> f64 {
         self.orthographic_height.map_or_else(|| self.tan_half_vfov() * depth, |height| 0.5 * height)
@@ -215,6 +226,12 @@ impl Lens {
     /// A round aperture of `radius`, focused on the plane at `focus_distance`; both metres.
     pub fn thin(radius: f64, focus_distance: f64) -> Self {
         Self { radius, enabled: radius > 0.0, ..Self::pinhole(focus_distance) }
+    }
+
+    /// Whether an image by `other` is the same: a pinhole has no focus.
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        let is_pinhole = |lens: &Self| !lens.enabled || lens.radius == 0.0;
+        self == other || is_pinhole(self) && is_pinhole(other)
     }
 
     /// Interpolates to another lens, `t` in 0..=1: the focus in the reciprocal of its distance, as one focuses by hand.

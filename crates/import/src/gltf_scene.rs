@@ -10,7 +10,7 @@ use crate::gltf::assembly::PlacedLight;
 use crate::gltf::facts::GltfFacts;
 use crate::gltf::mesh::BuiltMesh;
 use crate::gltf_motion::GltfMotion;
-use crate::gltf_parts::{camera_of, light_of};
+use crate::gltf_parts::{camera_of, extend, light_of};
 use crate::model::placing::corners_of;
 use crate::model::placing::{is_placement, transform};
 use firstlight_files::warnings::Warnings;
@@ -96,6 +96,8 @@ impl Maker<'_> {
 
         let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
         let mut shown = Vec::new();
+        // As for the moments of `GltfMotion`.
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let mut framing = Framing::new(DVec3::ONE, self.wish.aspect);
         let mut built: HashMap<_, Option<(Arc<BuiltMesh>, _)>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
@@ -121,6 +123,7 @@ impl Maker<'_> {
             }
             framing.add(&mesh.mesh, *corners, &placed.world);
             shown.push((i, *corners));
+            extend(&mut bounds, *corners, &placed.world);
             let names: Vec<String> = (mesh.keys.iter())
                 .map(|key| {
                     let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
@@ -159,8 +162,7 @@ impl Maker<'_> {
             warnings.push(self.told(&format!("extensions that are not modelled: {}", unknown.join(", "))));
         }
 
-        let (min, max) = framing.bounds();
-        let center = 0.5 * (min + max);
+        let center = 0.5 * (bounds.0 + bounds.1);
         let of_file = assembly.cameras.iter();
         let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), camera_of(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;

@@ -46,7 +46,11 @@ impl Animation {
         let lights = inputs.lights.iter().zip(&then.lights).filter(|(a, b)| a != b).map(|(a, _)| a.entity);
         let materials = inputs.materials.iter().zip(&then.materials).filter(|(a, b)| a != b).map(|(a, _)| a.entity);
         let entities = objects.chain(lights).chain(materials).collect();
-        Edited { camera: inputs.camera != then.camera, entities }
+        let stays = match (&inputs.camera, &then.camera) {
+            (Some(now), Some(then)) => now.shows_the_same(then),
+            (now, then) => now.is_none() && then.is_none(),
+        };
+        Edited { camera: !stays, entities }
     }
 
     /// The animation of everything else.

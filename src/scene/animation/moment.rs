@@ -162,8 +162,9 @@ pub fn camera_follows(world: &mut World) -> bool {
     let seen = SceneInputs::of(world).camera;
     let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
     let animation = world.get_resource::<Animation>().filter(|animation| animation.moves_camera());
-    animation.zip(seen).is_some_and(|(animation, CameraInput { view, projection, lens, .. })| {
-        camera(&animation.camera_at(shown)) == (view, projection, lens)
+    animation.zip(seen).is_some_and(|(animation, seen)| {
+        let (view, projection, lens) = camera(&animation.camera_at(shown));
+        seen.shows_the_same(&CameraInput { view, projection, lens, ..seen })
     })
 }
 

@@ -81,6 +81,14 @@ pub struct CameraInput {
 }
 
 impl CameraInput {
+    /// Whether an image by `other` is the same.
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        self.entity == other.entity
+            && self.view.shows_the_same(&other.view)
+            && self.projection.shows_the_same(&other.projection)
+            && self.lens.shows_the_same(&other.lens)
+    }
+
     /// # Errors
     /// If one of its components is invalid.
     pub fn check(&self) -> Result<(), BadValue> {
