@@ -194,7 +194,7 @@ fn steps_repeat_and_toggles_do_not() {
 fn a_drag_orbits_a_model_until_another_use_is_chosen_and_a_captured_mouse_looks() {
     let (mut input, start) = input();
     input.set_model(true);
-    let mut orbits = |input: &mut Input| {
+    let orbits = |input: &mut Input| {
         input.button(MouseButton::Left, true, start);
         let [x, y] = input.cursor_place();
         input.cursor(x + 40.0, y);
