@@ -8,7 +8,7 @@ use crate::cli::info_materials;
 use crate::cli::info_objects::ObjectList;
 use crate::cli::number::{counted, two_digits};
 use clap::Args;
-use firstlight::frame::{DenoiseFilter, PictureLayer, f_number, f_stop};
+use firstlight::frame::{Aperture, DenoiseFilter, PictureLayer, f_number};
 use firstlight::printable;
 use firstlight::render::{CausticChoice, Emission, Environment, Film, caustic_choice};
 use firstlight::scene::animation::Shutter;
@@ -139,6 +139,9 @@ impl SceneReport<'_> {
         if let Some(filter) = self.denoised_by() {
             row("denoised", format!("by {filter}; the raw image is in its film, if that was saved"));
         }
+        if let Some(how) = scene.shot.as_ref().and_then(|shot| shot.ended_early.clone()) {
+            row("ended early", how);
+        }
         if let Some(caustics) = self.caustics {
             row("caustics", caustics.to_string());
         }
@@ -256,10 +259,14 @@ impl SceneReport<'_> {
         self.inputs.camera.map_or_else(Lens::default, |camera| camera.lens)
     }
 
-    /// As an f-number.
+    /// Its size, also as an f-number if there are such lenses.
     fn aperture(&self) -> String {
-        let stop = self.inputs.camera.map_or(0.0, |camera| f_stop(camera.lens.radius, &camera.projection));
-        format!("{}, lens radius {} m", f_number(stop), two_digits(self.lens().radius))
+        let aperture = self.inputs.camera.map(|camera| Aperture::of(camera.lens.radius, &camera.projection));
+        let radius = format!("lens radius {} m", two_digits(self.lens().radius));
+        match aperture {
+            Some(Aperture::FNumber(stop)) => format!("{}, {radius}", f_number(stop)),
+            _ => radius,
+        }
     }
 
     fn projection(&self) -> String {

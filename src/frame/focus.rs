@@ -42,8 +42,29 @@ pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<S
 }
 
 /// Returns the f-number of a lens radius in metres, for a film 24 mm high and the field of view in perspective.
-pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
+fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * lens_radius)
+}
+
+/// How the size of an aperture is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aperture {
+    /// As an f-number.
+    FNumber(f64),
+    /// As a diameter in metres, or what the scene has in their place: no photographer knows such an f-number.
+    Diameter(f64),
+}
+
+/// F-numbers from the fastest lenses to a pinhole. Others come from scenes that are not in metres.
+const F_NUMBERS: std::ops::RangeInclusive<f64> = 0.5..=128.0;
+
+impl Aperture {
+    /// That of a lens with this radius, metres. Parallel rays have no f-number.
+    pub fn of(lens_radius: f64, projection: &Projection) -> Self {
+        let stop = f_stop(lens_radius, projection);
+        let is_usual = projection.orthographic_height.is_none() && F_NUMBERS.contains(&stop);
+        if is_usual { Self::FNumber(stop) } else { Self::Diameter(2.0 * lens_radius) }
+    }
 }
 
 /// Formats an f-number with two significant digits.
@@ -161,5 +182,16 @@ mod tests {
         let projection = Projection::perspective(2.0 * (12.0_f64 / 50.0).atan().to_degrees());
         assert!((f_stop(0.0125, &projection) - 2.0).abs() < 1e-12);
         assert!((radius_of_f_stop(2.0, &projection) - 0.0125).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_no_lens_has_is_told_as_a_diameter() {
+        let projection = Projection::perspective(40.0);
+        assert!(matches!(Aperture::of(0.01, &projection), Aperture::FNumber(stop) if (1.6..1.7).contains(&stop)));
+        // A model in millimetres, from 300 of them away; and one in kilometres.
+        assert_eq!(Aperture::of(3.0, &projection), Aperture::Diameter(6.0));
+        assert_eq!(Aperture::of(1e-5, &projection), Aperture::Diameter(2e-5));
+        let plan = Projection { orthographic_height: Some(4.0), ..projection };
+        assert_eq!(Aperture::of(0.01, &plan), Aperture::Diameter(0.02));
     }
 }

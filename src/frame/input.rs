@@ -13,8 +13,8 @@ use crate::frame::scene_cameras::{beside, cameras_of};
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::Explaining;
 use crate::frame::state::resources::{
-    Clock, CurrentScene, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState, Renderer,
-    StopAt, Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState,
+    Renderer, StopAt, Threads, ViewMode, WantedMoment,
 };
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
@@ -42,6 +42,7 @@ pub struct CommandParams<'w, 's> {
     display_settings: ResMut<'w, DisplaySettings>,
     rendering: ResMut<'w, Rendering>,
     size: ResMut<'w, PictureSize>,
+    free: ResMut<'w, FreeShare>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
     hidden: ResMut<'w, Hidden>,
@@ -122,7 +123,7 @@ impl CommandParams<'_, '_> {
             Command::FrameAll => {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
-                    let framed = navigation::frame_rig(&rig, self.size.aspect(), &points);
+                    let framed = navigation::frame_rig(&rig, self.free.aspect(*self.size), &points);
                     let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
                     self.set_rig(Rig { lens, ..framed });
                 }
@@ -207,6 +208,7 @@ impl CommandParams<'_, '_> {
                 self.set_tone_curve(next);
             }
             Command::Resize { width, height } => self.resize(PictureSize { width, height }),
+            Command::SetFreeShare { share } => drop(self.free.set_if_neq(FreeShare(share))),
             Command::Pause => drop(self.paused.set_if_neq(Paused(true))),
             Command::Resume => drop(self.paused.set_if_neq(Paused(false))),
             Command::Restart => self.shown.restart = Some("requested"),
@@ -222,7 +224,7 @@ impl CommandParams<'_, '_> {
             Command::Open { path } => match SceneSource::parse(&path) {
                 Ok(source) => {
                     let choice = ModelChoice::default();
-                    let (how, aspect, pool) = ((self.up.0, None), self.size.aspect(), self.renderer.0.pool());
+                    let (how, aspect, pool) = ((self.up.0, None), self.free.aspect(*self.size), self.renderer.0.pool());
                     self.beside.load(source, how, choice, aspect, pool, None);
                 }
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),

@@ -64,7 +64,8 @@ pub use crate::frame::state::explain::{
 pub use crate::frame::state::history::History;
 pub use crate::frame::state::remake::MeshMeasure;
 pub use crate::frame::state::resources::{
-    CurrentScene, FrameChanges, Hidden, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads, ViewMode,
+    CurrentScene, FrameChanges, FreeShare, Hidden, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads,
+    ViewMode,
 };
 pub use crate::frame::state::selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use camera_path::{along, turntable};
@@ -73,7 +74,7 @@ pub use command::Command;
 #[doc(hidden)]
 pub use core::oidn;
 pub use edit::{Edit, Id, NewThing, Property, PropertyError, set_by_name, sky_strength, textures};
-pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
+pub use focus::{Aperture, Focus, FocusTarget, SharpZone, f_number, f_number_decimals, radius_of_f_stop, sharp_zone};
 pub use material_preview::MaterialPreview;
 pub use object_map::{ObjectMap, ObjectMapSource, Outline};
 pub use recording::check_recordable;

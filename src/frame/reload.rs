@@ -11,7 +11,7 @@ use crate::frame::input::ModelUp;
 use crate::frame::saving::SavedAs;
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{Clock, CurrentScene, PictureSize, PlayRange, Renderer, WantedMoment};
+use crate::frame::state::resources::{Clock, CurrentScene, FreeShare, PictureSize, PlayRange, Renderer, WantedMoment};
 use crate::frame::watch::Watch;
 use crate::scene::{
     Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
@@ -167,7 +167,8 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     }
     let choice = ModelChoice { at, ..current.choice.clone() };
     let how = (current.up.or(world.resource::<ModelUp>().0), current.environment.clone());
-    let (aspect, pool) = (world.resource::<PictureSize>().aspect(), world.resource::<Renderer>().0.pool());
+    let aspect = world.resource::<FreeShare>().aspect(*world.resource::<PictureSize>());
+    let pool = world.resource::<Renderer>().0.pool();
     let known = Some(current.clone());
     world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);
 }

@@ -5,7 +5,7 @@ use crate::frame::core::offline::{Target, render_offline_until};
 use crate::frame::core::status::MessageKind;
 use crate::frame::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
 use crate::frame::state::background::BackgroundTasks;
-use crate::frame::state::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
+use crate::frame::state::resources::{CurrentScene, FreeShare, PictureSize, RenderState, SceneGeneration, StopAt};
 use crate::frame::{Command, Session, SessionOptions};
 use crate::render::{ErrorMetric, Film, Room, SampleAllocation};
 use crate::scene::{
@@ -40,6 +40,7 @@ impl Session {
             width,
             height,
             seed: self.world().resource::<Rendering>().0.seed,
+            free: Some(self.world().resource::<FreeShare>().0).filter(|share| *share < 1.0),
         };
         // Replaces an older recording only once the first line is complete; further lines are appended.
         let first = ron::to_string(&header).expect("a line is plain data") + "\n";
@@ -124,6 +125,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         yielding: false,
         waker: None,
     })?;
+    session.world_mut().insert_resource(FreeShare(header.free.unwrap_or(1.0)));
     session.open(source);
     let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
     let (mut end, mut last, mut commands) = (None, 0, 0);

@@ -19,8 +19,8 @@ use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::{Explaining, explain_pixel};
 use crate::frame::state::history::{History, notice, remember};
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState,
-    Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, FrameChanges, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
+    RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
 use crate::frame::state::selection::{OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
@@ -153,6 +153,7 @@ impl Session {
         world.init_resource::<SavedAs>();
         world.init_resource::<WantedMoment>();
         world.init_resource::<PlayRange>();
+        world.init_resource::<FreeShare>();
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
         world.insert_resource(HotReload::new(waker));
@@ -209,7 +210,7 @@ impl Session {
 
     /// Like [`Self::open_lit_by`], for a model with several cameras, times or variants.
     pub fn open_choice(&mut self, source: SceneSource, environment: Option<PathBuf>, choice: ModelChoice) {
-        let aspect = self.world.resource::<PictureSize>().aspect();
+        let aspect = self.world.resource::<FreeShare>().aspect(*self.world.resource::<PictureSize>());
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
         self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool, None);

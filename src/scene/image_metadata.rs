@@ -121,6 +121,9 @@ pub struct ImageMetadata {
     /// Name of the denoiser of the layer `denoised`, if the image has one beside its raw pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub denoised_layer: Option<String>,
+    /// What the image has and what was asked for, if it was written before that was reached.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended_early: Option<String>,
     /// The scene itself, if it had unsaved changes; paths are relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,

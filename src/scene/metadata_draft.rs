@@ -114,6 +114,7 @@ impl MetadataDraft {
             uneven: samples.uneven,
             denoised: None,
             denoised_layer: None,
+            ended_early: None,
             // An image of the image has the same text.
             text: has_changed.then(|| SceneFile { film, display, ..file.clone() }.to_ron()),
         };

@@ -18,8 +18,9 @@ impl Browser {
     /// - `name`: of the file to be saved, as a proposal.
     pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, name: &str, screen: egui::Vec2) {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-        let size = egui::vec2(720.0, 440.0).min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));
-        let extensions = purpose.extensions();
+        // Long names and lists have room in a large window.
+        let wanted = egui::vec2(720.0, 440.0).max(0.7 * screen);
+        let size = wanted.min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));
         let mut dialog = FileDialog::new()
             .title(purpose.title())
             .initial_directory(folder)
@@ -29,11 +30,18 @@ impl Browser {
             // Creating folders is no part of choosing a file to open.
             .show_new_folder_button(purpose.saves())
             .default_file_name(name)
-            .show_left_panel(screen.x >= 560.0)
-            .add_file_filter(purpose.files(), Arc::new(move |path: &Path| is_one(path, &extensions)))
-            .default_file_filter(purpose.files());
+            .show_left_panel(screen.x >= 560.0);
+        for (i, (name, extensions)) in purpose.kinds().into_iter().enumerate() {
+            if i == 0 {
+                dialog = dialog.default_file_filter(name);
+            }
+            if let (DialogPurpose::SaveScene, [extension]) = (purpose, &extensions[..]) {
+                dialog = dialog.add_save_extension(name, extension).default_save_extension(name);
+            }
+            dialog = dialog.add_file_filter(name, Arc::new(move |path: &Path| is_one(path, &extensions)));
+        }
         match purpose {
-            DialogPurpose::SaveImage => dialog.save_file(),
+            DialogPurpose::SaveScene | DialogPurpose::SaveImage => dialog.save_file(),
             DialogPurpose::SaveFrames => dialog.pick_directory(),
             _ => dialog.pick_file(),
         }
@@ -67,7 +75,7 @@ mod tests {
 
     #[test]
     fn files_of_any_case_are_shown_and_others_are_not() {
-        let extensions = DialogPurpose::Open.extensions();
+        let (_, extensions) = DialogPurpose::Open.kinds().swap_remove(0);
         for (name, shown) in
             [("a.obj", true), ("A.GLB", true), ("room.ron", true), ("notes.txt", false), ("obj", false)]
         {

@@ -20,6 +20,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 pub enum DialogPurpose {
     Open,
     AddMesh,
+    /// The file that the scene is saved to.
+    SaveScene,
     /// The file of an image that is to be rendered.
     SaveImage,
     /// The folder of the frames of an animation.
@@ -37,6 +39,7 @@ impl DialogPurpose {
         match self {
             Self::Open => "Open a scene, a model or an image",
             Self::AddMesh => "Add a model",
+            Self::SaveScene => "Save the scene as",
             Self::SaveImage => "Save the image as",
             Self::SaveFrames => "The folder of the frames",
             Self::Environment => "Choose an environment image",
@@ -44,19 +47,23 @@ impl DialogPurpose {
         }
     }
 
-    /// The kinds of files in words.
-    pub fn files(self) -> &'static str {
+    /// The kinds of files, the first one chosen at first: in words, and their extensions.
+    pub fn kinds(self) -> Vec<(&'static str, Vec<String>)> {
+        let kind = |name, patterns: &str| {
+            (name, patterns.split(' ').map(|pattern| pattern.trim_start_matches("*.").to_owned()).collect())
+        };
         match self {
-            Self::Open => "Scenes, models, saved images",
-            Self::AddMesh => "Models",
-            Self::SaveFrames => "Folders",
-            Self::SaveImage | Self::Environment | Self::Texture { .. } => "Images",
+            Self::Open => vec![
+                kind("All that opens", &self.patterns()),
+                kind("Scenes", &SceneFormat::patterns()),
+                kind("Models", &ModelFormat::patterns()),
+                kind("Images", "*.png *.exr *.hdr"),
+            ],
+            Self::AddMesh => vec![kind("Models", &self.patterns())],
+            Self::SaveScene => vec![kind("Scene files", &self.patterns())],
+            Self::SaveFrames => vec![kind("Folders", &self.patterns())],
+            Self::SaveImage | Self::Environment | Self::Texture { .. } => vec![kind("Images", &self.patterns())],
         }
-    }
-
-    /// File name extensions.
-    pub fn extensions(self) -> Vec<String> {
-        self.patterns().split(' ').map(|pattern| pattern.trim_start_matches("*.").to_owned()).collect()
     }
 
     /// File name patterns in shell syntax.
@@ -64,6 +71,7 @@ impl DialogPurpose {
         match self {
             Self::Open => format!("{} {} *.png *.exr *.hdr", SceneFormat::patterns(), ModelFormat::patterns()),
             Self::AddMesh => ModelFormat::patterns(),
+            Self::SaveScene => "*.ron".to_owned(),
             Self::SaveImage | Self::SaveFrames => "*.png *.jpg *.jpeg *.exr".to_owned(),
             Self::Environment | Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }
@@ -71,10 +79,10 @@ impl DialogPurpose {
 
     /// Whether something is to be written there.
     pub fn saves(self) -> bool {
-        matches!(self, Self::SaveImage | Self::SaveFrames)
+        matches!(self, Self::SaveScene | Self::SaveImage | Self::SaveFrames)
     }
 
-    /// The command for the chosen file; `None` if it is written, not read.
+    /// The command for the chosen file; `None` if an image or frames are to be written there.
     pub fn command(self, path: PathBuf) -> Option<Command> {
         Some(match self {
             Self::SaveImage | Self::SaveFrames => return None,
@@ -83,6 +91,14 @@ impl DialogPurpose {
                 return Self::Environment.command(path);
             }
             Self::Open => Command::Open { path },
+            Self::SaveScene if path.extension().is_some_and(|extension| extension == "ron") => {
+                Command::SaveScene { path }
+            }
+            Self::SaveScene => {
+                let mut name = path.into_os_string();
+                name.push(".ron");
+                Command::SaveScene { path: name.into() }
+            }
             Self::Environment => Command::Edit(Edit::LightFrom { file: crate::scene::path_to_text(&path) }),
             Self::AddMesh => {
                 let path = crate::scene::path_to_text(&path);
@@ -208,6 +224,17 @@ mod tests {
             words(DialogKind::Kdialog, DialogPurpose::AddMesh),
             ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl *.glb *.gltf"]
         );
+    }
+
+    #[test]
+    fn a_scene_is_saved_under_the_name_that_was_typed() {
+        for (typed, file) in
+            [("/a/room.ron", "/a/room.ron"), ("/a/room", "/a/room.ron"), ("/a/room.v2", "/a/room.v2.ron")]
+        {
+            let command = DialogPurpose::SaveScene.command(typed.into());
+            assert_eq!(command, Some(Command::SaveScene { path: file.into() }));
+        }
+        assert_eq!(DialogPurpose::SaveScene.kinds(), [("Scene files", vec!["ron".to_owned()])]);
     }
 
     #[cfg(unix)]

@@ -13,6 +13,8 @@ const OTHERS: Color32 = Color32::from_rgba_premultiplied(170, 118, 46, 170);
 pub const AXES: [Color32; 3] =
     [Color32::from_rgb(235, 85, 85), Color32::from_rgb(125, 205, 85), Color32::from_rgb(85, 140, 245)];
 const MIDDLE: Color32 = Color32::from_gray(235);
+/// Points that a pressed mouse may move without moving anything.
+const CLICK_TOLERANCE: f64 = 4.0;
 const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
 
 /// The overlays to be drawn, computed before drawing.
@@ -24,6 +26,8 @@ pub struct Handles {
     projector: Option<Projector>,
     hovered: Option<Handle>,
     grabbed: Option<Grabbed>,
+    /// Where a selected object itself was pressed, while that may still be a click.
+    pressed: Option<DVec2>,
     /// The selected object if it is out of view: its name and its centre.
     out_of_view: Option<(String, DVec3)>,
 }
@@ -84,6 +88,19 @@ impl Handles {
         handle.is_some()
     }
 
+    /// Handles a mouse press on a selected object itself, which moves it once the mouse moves.
+    pub fn press_body(&mut self, mouse: DVec2) {
+        self.pressed = self.gizmo.filter(|(gizmo, _)| gizmo.mode == Mode::Move).map(|_| mouse);
+    }
+
+    /// Handles a mouse movement after [`Self::press_body`]; returns whether a drag begins with it.
+    pub fn grab_body(&mut self, mouse: DVec2) -> bool {
+        let Some(from) = self.pressed.take_if(|from| (mouse - *from).length() > CLICK_TOLERANCE) else { return false };
+        let grabbed = |(gizmo, _)| Grabbed { gizmo, handle: Handle::Middle, from, now: None };
+        self.grabbed = self.gizmo.map(grabbed);
+        self.grabbed.is_some()
+    }
+
     /// Handles a mouse movement; returns the command of a drag, and whether the handles must be redrawn.
     pub fn mouse_at(&mut self, mouse: DVec2, snap: bool) -> (Option<Command>, bool) {
         let Some((gizmo, projector)) = self.gizmo else { return (None, false) };
@@ -108,6 +125,7 @@ impl Handles {
 
     /// Handles a mouse release; returns whether a handle was grabbed.
     pub fn release(&mut self) -> bool {
+        self.pressed = None;
         self.grabbed.take().is_some()
     }
 

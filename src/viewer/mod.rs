@@ -22,7 +22,7 @@
 //! | `thumbnails`, `previews` | small images of recent scenes; spheres of materials |
 //! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
 //! | `saver` | saving of images in the background |
-//! | `order`, `order_form`, `renders` | images and frames that are rendered to files beside the window |
+//! | `order`, `order_form`, `renders`, `trend` | images and frames that are rendered to files beside the window |
 //! | `dialog`, `browser`, `file_manager` | file dialogs, of the desktop or inside the window; the desktop's view of a folder |
 //! | `question`, `greeting` | questions before edits are lost; that of the first start |
 //! | [`display`] | detection of the display server |
@@ -61,6 +61,7 @@ mod story;
 mod thumbnails;
 mod time_line;
 mod toasts;
+mod trend;
 
 pub use app::options::{ViewerError, ViewerOptions};
 pub use app::run::run;

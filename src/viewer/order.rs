@@ -10,7 +10,9 @@ use crate::render::{DenoiseSource, Film, GuideGatherer, Prepared, RenderSettings
 use crate::scene::whole_file::Replace;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
 use crate::viewer::status::percent;
+use crate::viewer::trend::{Outlook, Trend};
 use glam::{UVec2, Vec3};
+use std::cell::RefCell;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -43,8 +45,10 @@ pub struct Advance {
     /// Estimated, 0..1.
     pub share: f64,
     pub spp: u32,
-    /// Relative error of the samples, once it is known.
+    /// Relative error, once it is known: of the denoised image where that is the goal, else of the samples.
     pub error: Option<f64>,
+    /// The error has all but stopped to fall: the goal may be out of reach.
+    pub is_flat: bool,
 }
 
 /// A finished image.
@@ -97,7 +101,7 @@ impl Order {
     /// If there is not enough memory, or the file cannot be written.
     pub fn render_unless(
         &self,
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
         subject: &Subject,
         stop: &(dyn Fn() -> bool + Sync),
         mut tell: impl FnMut(Advance),
@@ -107,9 +111,9 @@ impl Order {
         if scene.features().caustics {
             film.reserve_light().map_err(|error| error.to_string())?;
         }
+        let trend = RefCell::new(Trend::default());
         let told = |now: Progress| {
-            let error = now.error.map(|error| error.relative);
-            tell(Advance { share: self.share(&now), spp: now.spp, error });
+            tell(self.advance(&now, &trend.borrow()));
             true
         };
         let mut guides = GuideGatherer::default();
@@ -117,45 +121,67 @@ impl Order {
         if let Some(filter) = self.denoiser.filter(|_| self.target.error.is_some()) {
             let mut error_of = |film: &Film| {
                 let found = denoise(filter, scene, settings, film, &mut guides, stop)?;
+                trend.borrow_mut().add(film.spp(), found.error);
                 Some(denoised.insert((film.spp(), found)).1.error)
             };
             render_measured_until(scene, settings, &mut film, self.target, &mut error_of, stop, told);
         } else {
             render_offline_until(scene, settings, &mut film, self.target, stop, told);
         }
+        // Rendering ends by the target, or by `stop`.
+        let is_complete = !stop();
+        let mut denoised = denoised.filter(|(spp, _)| *spp == film.spp()).map(|(_, found)| found);
+        if let Some(filter) = self.denoiser.filter(|_| denoised.is_none() && film.spp() > 0) {
+            denoised = denoise(filter, scene, settings, &film, &mut guides, cancelled);
+        }
         if film.spp() == 0 || cancelled() {
             return Ok(None);
         }
-        let mut denoised = denoised.filter(|(spp, _)| *spp == film.spp()).map(|(_, found)| found);
-        if let Some(filter) = self.denoiser.filter(|_| denoised.is_none()) {
-            denoised = denoise(filter, scene, settings, &film, &mut guides, &|| false);
-        }
+        let error = denoised.as_ref().map(|found| found.error).or(film.error_estimate().map(|error| error.relative));
+        let finished = Finished { spp: film.spp(), error, is_complete };
         let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
         let display = draft.display();
         let mut note = draft.note(&self.path, self.size, samples, display.into());
-        if let Some(denoised) = &denoised
-            && let Ok(raw) = ImageMetadata::from_note(&note)
-        {
-            note = raw.denoised_by(Some(denoised.by.name().to_owned()), false).to_note();
+        if let Ok(raw) = ImageMetadata::from_note(&note) {
+            let by = denoised.as_ref().map(|denoised| denoised.by.name().to_owned());
+            let ended_early = (!is_complete).then(|| self.shortfall(&finished));
+            note = ImageMetadata { ended_early, ..raw.denoised_by(by, false) }.to_note();
         }
         let colors = denoised.as_ref().map(|denoised| &denoised.color[..]);
         let print = Print { film: &film, display: &display, size: self.size, note: Some(&note), denoised: colors };
         print.write(&self.path, Replace::AllButFilms).map_err(|error| error.to_string())?;
-        let error = denoised.map(|found| found.error).or(film.error_estimate().map(|error| error.relative));
-        // Rendering ends by the target, or by `stop`.
-        Ok(Some(Finished { spp: film.spp(), error, is_complete: !stop() }))
+        Ok(Some(finished))
     }
 
-    /// Share of the work that is done, by the limit that is nearest.
-    fn share(&self, now: &Progress) -> f64 {
+    /// What an image that ended early has, and what was asked for, for its metadata.
+    fn shortfall(&self, finished: &Finished) -> String {
+        let noise = finished.error.map_or("unknown noise".to_owned(), |error| format!("noise {}", percent(error)));
+        let Target { spp, seconds, error } = self.target;
+        let asked = [
+            error.map(|error| format!("noise {}", percent(error))),
+            spp.map(|spp| format!("{spp} samples per pixel")),
+            seconds.map(|seconds| format!("{seconds} s")),
+        ];
+        let asked: Vec<String> = asked.into_iter().flatten().collect();
+        format!("at {noise}, {} samples per pixel; asked for: {}", finished.spp, asked.join(" or "))
+    }
+
+    /// - `trend`: of the error of the denoised image.
+    fn advance(&self, now: &Progress, trend: &Trend) -> Advance {
         let by_spp = self.target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp.max(1)));
         let by_time = self.target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
-        let by_error = self.target.error.zip(now.error).map_or(0.0, |(goal, error)| {
-            // Denoising is worth several times as many samples.
-            let worth = if self.denoiser.is_some() { 4.0 } else { 1.0 };
-            worth * f64::from(now.spp) / f64::from(error.spp_for(goal).max(1))
-        });
-        by_spp.max(by_time).max(by_error).min(1.0)
+        let of_samples = now.error.map(|error| error.relative);
+        let (error, outlook) = match (self.target.error, self.denoiser) {
+            (Some(goal), Some(_)) => (trend.error().or(of_samples), trend.to(goal)),
+            (Some(goal), None) => (of_samples, now.error.map(|error| Outlook::Samples(f64::from(error.spp_for(goal))))),
+            (None, _) => (of_samples, None),
+        };
+        let by_error = match outlook {
+            Some(Outlook::Samples(needed)) => f64::from(now.spp) / needed.max(1.0),
+            Some(Outlook::Flat) | None => 0.0,
+        };
+        let share = by_spp.max(by_time).max(by_error).min(1.0);
+        Advance { share, spp: now.spp, error, is_flat: outlook == Some(Outlook::Flat) }
     }
 }
 
@@ -219,6 +245,25 @@ mod tests {
         let denoised = order.render_unless(&|| false, &subject, &|| false, |_| ()).unwrap().unwrap();
         assert!(denoised.error.unwrap() <= 0.2 && denoised.spp < raw.spp, "{denoised:?}");
         assert_eq!(ImageMetadata::read(&order.path).unwrap().denoised.as_deref(), Some("own"));
+    }
+
+    #[test]
+    fn what_is_kept_as_it_stands_says_so() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let (folder, subject) = (tempfile::tempdir().unwrap(), subject());
+        let order = order(folder.path(), Target { error: Some(1e-6), ..Target::default() });
+        let kept = AtomicBool::new(false);
+        let tell = |now: Advance| kept.store(now.error.is_some(), Ordering::Relaxed);
+        let stop = || kept.load(Ordering::Relaxed);
+        let finished = order.render_unless(&|| false, &subject, &stop, tell).unwrap().unwrap();
+        assert!(!finished.is_complete && finished.describe(order.size).ends_with(", ended early"), "{finished:?}");
+        let early = ImageMetadata::read(&order.path).unwrap().ended_early.unwrap();
+        let samples = format!("{} samples per pixel; asked for: noise 0.00 %", finished.spp);
+        assert!(early.starts_with("at noise ") && early.ends_with(&samples), "{early}");
+        // One that is done has nothing to say.
+        let done = Order { target: Target { spp: Some(2), ..Target::default() }, ..order };
+        done.render_unless(&|| false, &subject, &|| false, |_| ()).unwrap().unwrap();
+        assert_eq!(ImageMetadata::read(&done.path).unwrap().ended_early, None);
     }
 
     #[test]

@@ -26,6 +26,48 @@ enum Limit {
     Time,
 }
 
+/// What ends an image, and the values of each.
+#[derive(Clone, Copy, Debug)]
+struct Ending {
+    limit: Limit,
+    /// Per cent.
+    error: f64,
+    spp: u32,
+    seconds: f64,
+}
+
+impl Default for Ending {
+    fn default() -> Self {
+        Self { limit: Limit::Error, error: 2.0, spp: 64, seconds: 60.0 }
+    }
+}
+
+impl Ending {
+    fn target(&self) -> Target {
+        match self.limit {
+            Limit::Error => Target { error: Some(self.error / 100.0), ..Target::default() },
+            Limit::Samples => Target { spp: Some(self.spp), ..Target::default() },
+            Limit::Time => Target { seconds: Some(self.seconds), ..Target::default() },
+        }
+    }
+
+    fn show(&mut self, ui: &mut Ui) {
+        for (limit, name, about) in [
+            (Limit::Error, "noise", "until the noise of the saved image is as low as this"),
+            (Limit::Samples, "samples", "so many samples per pixel"),
+            (Limit::Time, "time", "so many seconds for each image"),
+        ] {
+            ui.selectable_value(&mut self.limit, limit, name).on_hover_text(about);
+        }
+        let value = match self.limit {
+            Limit::Error => DragValue::new(&mut self.error).range(0.01..=50.0).speed(0.02).suffix(" %"),
+            Limit::Samples => DragValue::new(&mut self.spp).range(1..=1_000_000).speed(1.0),
+            Limit::Time => DragValue::new(&mut self.seconds).range(0.1..=1e6).speed(0.5).suffix(" s"),
+        };
+        ui.add(value.update_while_editing(false));
+    }
+}
+
 /// What the form asks the window for.
 pub enum Wish {
     Begin(Order),
@@ -40,11 +82,9 @@ pub struct OrderForm {
     scene: String,
     size: (u32, u32),
     of_scene: (u32, u32),
-    limit: Limit,
-    /// Per cent.
-    error: f64,
-    spp: u32,
-    seconds: f64,
+    /// Of an image, and of frames: one of many is done sooner.
+    of_image: Ending,
+    of_frames: Ending,
     denoised: bool,
     filter: DenoiseFilter,
     format: PictureFormat,
@@ -62,10 +102,8 @@ impl Default for OrderForm {
             scene: String::new(),
             size: SIZES[0],
             of_scene: SIZES[0],
-            limit: Limit::Error,
-            error: 2.0,
-            spp: 64,
-            seconds: 60.0,
+            of_image: Ending::default(),
+            of_frames: Ending::default(),
             denoised: true,
             filter: DenoiseFilter::default(),
             format: PictureFormat::Png,
@@ -141,16 +179,14 @@ impl OrderForm {
         if self.frames.is_some() { &self.folder } else { &self.file }
     }
 
-    fn order(&self) -> Order {
-        let mut target = Target::default();
-        match self.limit {
-            Limit::Error => target.error = Some(self.error / 100.0),
-            Limit::Samples => target.spp = Some(self.spp),
-            Limit::Time => target.seconds = Some(self.seconds),
-        }
+    fn ending(&mut self) -> &mut Ending {
+        if self.frames.is_some() { &mut self.of_frames } else { &mut self.of_image }
+    }
+
+    fn order(&mut self) -> Order {
         Order {
             size: self.size,
-            target,
+            target: self.ending().target(),
             denoiser: self.denoised.then_some(self.filter),
             format: self.format,
             path: self.path().to_owned(),
@@ -221,21 +257,7 @@ impl OrderForm {
         });
         ui.end_row();
         ui.label("until");
-        ui.horizontal(|ui| {
-            for (limit, name, about) in [
-                (Limit::Error, "noise", "until the noise of the saved image is as low as this"),
-                (Limit::Samples, "samples", "so many samples per pixel"),
-                (Limit::Time, "time", "so many seconds for each image"),
-            ] {
-                ui.selectable_value(&mut self.limit, limit, name).on_hover_text(about);
-            }
-            let value = match self.limit {
-                Limit::Error => DragValue::new(&mut self.error).range(0.01..=50.0).speed(0.02).suffix(" %"),
-                Limit::Samples => DragValue::new(&mut self.spp).range(1..=1_000_000).speed(1.0),
-                Limit::Time => DragValue::new(&mut self.seconds).range(0.1..=1e6).speed(0.5).suffix(" s"),
-            };
-            ui.add(value.update_while_editing(false));
-        });
+        ui.horizontal(|ui| self.ending().show(ui));
         ui.end_row();
         ui.label("denoised");
         ui.checkbox(&mut self.denoised, "").on_hover_text("filter what noise is left");
@@ -305,10 +327,11 @@ mod tests {
         form.place(DialogPurpose::SaveImage, PathBuf::from("/a/room.v2"));
         assert_eq!(form.file, Path::new("/a/room.v2.exr"));
         assert_eq!(form.order().target.error, Some(0.02));
-        form.limit = Limit::Samples;
+        form.of_image.limit = Limit::Samples;
         let order = form.order();
         assert_eq!((order.target.spp, order.target.error, order.frames), (Some(64), None, None));
         form.frames = Some((2, 9));
+        assert_eq!(form.order().target.error, Some(0.02), "frames have a limit of their own");
         form.place(DialogPurpose::SaveFrames, PathBuf::from("/b"));
         assert_eq!((form.order().path, form.order().frames), (PathBuf::from("/b"), Some(2..=9)));
     }

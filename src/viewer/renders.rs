@@ -8,7 +8,7 @@ use crate::render::{RenderSettings, worker_threads};
 use crate::viewer::order::{Advance, Order, Subject};
 use crate::viewer::overlay::{self, GLASS, TEXT_SIZE};
 use crate::viewer::status::percent;
-use egui::{Align2, Area, Context, CornerRadius, Frame, Margin, Order as Layer, Rect, RichText};
+use egui::{Align2, Area, Button, Context, CornerRadius, Frame, Label, Margin, Order as Layer, Rect, RichText, Ui};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -47,6 +47,10 @@ struct Running {
     title: String,
     told: Arc<Mutex<Told>>,
     cancelled: Arc<AtomicBool>,
+    /// What there is by now is to be written.
+    kept: Arc<AtomicBool>,
+    /// The error to be reached.
+    goal: Option<f64>,
     since: Instant,
     thread: JoinHandle<()>,
 }
@@ -57,6 +61,7 @@ struct Told {
     share: f64,
     spp: u32,
     error: Option<f64>,
+    is_flat: bool,
     /// The frame, counted from 1, and their number.
     frame: Option<(u32, u32)>,
 }
@@ -84,10 +89,12 @@ impl Renders {
     /// # Errors
     /// If the system has no thread for it.
     pub fn begin(&mut self, order: Order, source: Source, stem: String, threads: usize) -> Result<(), String> {
-        let (told, cancelled) = (Arc::new(Mutex::new(Told::default())), Arc::new(AtomicBool::default()));
+        let (told, goal) = (Arc::new(Mutex::new(Told::default())), order.target.error);
+        let (cancelled, kept) = (Arc::new(AtomicBool::default()), Arc::new(AtomicBool::default()));
         let work = Work {
             told: told.clone(),
             cancelled: cancelled.clone(),
+            kept: kept.clone(),
             moving: self.moving.clone(),
             ending: self.ending.clone(),
             waker: self.waker.clone(),
@@ -110,7 +117,7 @@ impl Renders {
         };
         let thread = std::thread::Builder::new().name("save".to_owned()).spawn(run);
         let thread = thread.map_err(|error| format!("the image was not saved: cannot start a thread: {error}"))?;
-        self.running.push(Running { title, told, cancelled, since: Instant::now(), thread });
+        self.running.push(Running { title, told, cancelled, kept, goal, since: Instant::now(), thread });
         Ok(())
     }
 
@@ -130,51 +137,78 @@ impl Renders {
         self.receiver.try_iter().collect()
     }
 
-    /// Draws the progress at the lower right of `free`, each with a button that ends it.
+    /// Draws the progress at the lower right of `free`, each with buttons that end it.
     pub fn show(&self, context: &Context, free: Rect) {
+        let mut corner = free.right_bottom() - egui::vec2(10.0, 8.0);
         for (i, running) in self.running.iter().enumerate() {
-            let told = *running.told.lock().unwrap_or_else(PoisonError::into_inner);
-            let corner = free.right_bottom() - egui::vec2(10.0, 8.0 + 74.0 * i as f32);
             let area = Area::new(egui::Id::new(("render", i))).order(Layer::Foreground);
-            area.fixed_pos(corner).pivot(Align2::RIGHT_BOTTOM).show(context, |ui| {
+            let shown = area.fixed_pos(corner).pivot(Align2::RIGHT_BOTTOM).show(context, |ui| {
                 let frame = Frame::NONE.fill(GLASS).corner_radius(CornerRadius::same(4));
                 frame.inner_margin(Margin::symmetric(9, 6)).show(ui, |ui| {
                     ui.set_width(WIDTH.min(0.6 * free.width()));
-                    ui.horizontal(|ui| {
-                        ui.label(RichText::new(format!("Rendering {}", running.title)).size(TEXT_SIZE).strong());
-                        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                            if ui.button("Cancel").on_hover_text("stop; nothing of it is saved").clicked() {
-                                running.cancelled.store(true, Ordering::Relaxed);
-                            }
-                        });
-                    });
-                    overlay::progress(ui, ui.available_width(), told.share as f32);
-                    let text = told.line(running.since.elapsed().as_secs_f64());
-                    ui.label(RichText::new(text).size(TEXT_SIZE - 1.0));
+                    running.show(ui);
                 });
             });
+            corner.y = shown.response.rect.top() - 6.0;
         }
     }
 }
 
+impl Running {
+    fn show(&self, ui: &mut Ui) {
+        let told = *self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let title = RichText::new(format!("Rendering {}", self.title)).size(TEXT_SIZE).strong();
+        ui.add(Label::new(title).truncate());
+        overlay::progress(ui, ui.available_width(), told.share as f32);
+        let is_kept = self.kept.load(Ordering::Relaxed);
+        let text = match is_kept {
+            true => "saving what there is".to_owned(),
+            false => told.line(self.goal, self.since.elapsed().as_secs_f64()),
+        };
+        let text = ui.label(RichText::new(text).size(TEXT_SIZE - 1.0));
+        if told.is_flat {
+            text.on_hover_text("four times the samples took less than a third of the noise away");
+        }
+        ui.horizontal(|ui| {
+            let (keep, cancel) = match told.frame {
+                None => ("write the image with the noise that it has now", "stop; nothing of it is saved"),
+                Some(_) => ("write this frame with the noise that it has now, and stop", "stop; whole frames stay"),
+            };
+            // Before every pixel has a sample there is nothing.
+            let button = Button::new("Keep what there is");
+            if ui.add_enabled(told.spp > 0 && !is_kept, button).on_hover_text(keep).clicked() {
+                self.kept.store(true, Ordering::Relaxed);
+            }
+            if ui.button("Cancel").on_hover_text(cancel).clicked() {
+                self.cancelled.store(true, Ordering::Relaxed);
+            }
+        });
+    }
+}
+
 impl Told {
-    /// - `seconds`: since the order began.
-    fn line(&self, seconds: f64) -> String {
+    /// - `goal`: the error to be reached; `seconds`: since the order began.
+    fn line(&self, goal: Option<f64>, seconds: f64) -> String {
         let mut parts = Vec::new();
         if let Some((frame, n)) = self.frame {
             parts.push(format!("frame {frame} of {n}"));
         }
         match (self.error, self.spp) {
-            (Some(error), _) if self.frame.is_none() => parts.push(format!("noise {}", percent(error))),
+            (Some(error), _) if self.frame.is_none() || self.is_flat => {
+                parts.push(format!("noise {}", percent(error)));
+            }
             (_, spp) if spp > 0 && self.frame.is_none() => parts.push(format!("{spp} samples per pixel")),
             (_, 0) if parts.is_empty() => parts.push("preparing".to_owned()),
             _ => {}
         }
-        // The first guesses would be wild, and what follows the samples takes its own time.
+        let to = goal.filter(|_| self.frame.is_none()).map_or("go".to_owned(), percent);
+        // What follows the samples takes its own time.
         if self.share >= 1.0 {
             parts.push("finishing".to_owned());
-        } else if self.share > 0.02 && seconds > 1.0 {
-            parts.push(format!("{} to go", crate::viewer::status::about(seconds * (1.0 / self.share - 1.0))));
+        } else if let Some(goal) = goal.filter(|_| self.is_flat) {
+            parts.push(format!("{} may be out of reach", percent(goal)));
+        } else if self.share > 0.0 && seconds > 1.0 {
+            parts.push(format!("{} to {to}", crate::viewer::status::about(seconds * (1.0 / self.share - 1.0))));
         }
         parts.join(", ")
     }
@@ -184,6 +218,7 @@ impl Told {
 struct Work {
     told: Arc<Mutex<Told>>,
     cancelled: Arc<AtomicBool>,
+    kept: Arc<AtomicBool>,
     moving: Arc<AtomicBool>,
     ending: Arc<AtomicBool>,
     waker: Waker,
@@ -192,14 +227,17 @@ struct Work {
 impl Work {
     /// Whether the samples are to end. While the view moves, each worker rests here.
     fn stops(&self) -> bool {
-        let stops = self.cancelled.load(Ordering::Relaxed) || self.ending.load(Ordering::Relaxed);
+        let stops = [&self.cancelled, &self.kept, &self.ending].iter().any(|flag| flag.load(Ordering::Relaxed));
         if !stops && self.moving.load(Ordering::Relaxed) {
             std::thread::sleep(REST);
         }
         stops
     }
 
-    fn tell(&self, told: Told) {
+    /// - `share`: of all frames; `frame`: the one of `now`, and their number.
+    fn tell(&self, now: Advance, share: f64, frame: Option<(u32, u32)>) {
+        let Advance { spp, error, is_flat, .. } = now;
+        let told = Told { share, spp, error, is_flat, frame };
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = told;
         (self.waker)();
     }
@@ -208,9 +246,7 @@ impl Work {
     fn run(&self, order: &Order, source: Source, stem: &str) -> Result<Option<String>, String> {
         match source {
             Source::Still(subject) => {
-                let tell = |now: Advance| {
-                    self.tell(Told { share: now.share, spp: now.spp, error: now.error, frame: None });
-                };
+                let tell = |now: Advance| self.tell(now, now.share, None);
                 let cancelled = || self.cancelled.load(Ordering::Relaxed);
                 let Some(finished) = order.render_unless(&cancelled, &subject, &|| self.stops(), tell)? else {
                     return Ok(None);
@@ -233,27 +269,30 @@ impl Work {
         std::fs::create_dir_all(&order.path).map_err(|error| format!("{}: {error}", order.path.display()))?;
         let mut reel = reel.open()?;
         let is_ended = || self.cancelled.load(Ordering::Relaxed) || self.ending.load(Ordering::Relaxed);
-        let mut saved = 0;
+        let (mut saved, mut short) = (0, String::new());
         for number in frames {
             let done = number - first;
             let (extraction, draft) = reel.at(f64::from(number) / fps)?;
             let subject = Subject { scene: extraction.prepared, settings, draft };
             let tell = |now: Advance| {
-                let share = (f64::from(done) + now.share) / f64::from(n);
-                self.tell(Told { share, spp: now.spp, error: now.error, frame: Some((done + 1, n)) });
+                self.tell(now, (f64::from(done) + now.share) / f64::from(n), Some((done + 1, n)));
             };
             let one = Order { path: order.frame_path(stem, number), ..order.clone() };
-            // Half a frame is none.
-            if one.render_unless(&is_ended, &subject, &|| self.stops(), tell)?.is_none() {
+            // Half a frame is none, unless somebody keeps it.
+            let Some(frame) = one.render_unless(&is_ended, &subject, &|| self.stops(), tell)? else { break };
+            saved += 1;
+            if !frame.is_complete {
+                short = format!(" (the last one: {})", frame.describe(order.size));
+            }
+            if self.kept.load(Ordering::Relaxed) {
                 break;
             }
-            saved += 1;
         }
         let folder = order.path.display();
         Ok(Some(match saved {
-            1 if n == 1 => format!("saved 1 frame in {folder}"),
-            saved if saved == n => format!("saved {n} frames in {folder}"),
-            saved => format!("saved {saved} of {n} frames in {folder}"),
+            1 if n == 1 => format!("saved 1 frame in {folder}{short}"),
+            saved if saved == n => format!("saved {n} frames in {folder}{short}"),
+            saved => format!("saved {saved} of {n} frames in {folder}{short}"),
         }))
     }
 }
@@ -264,12 +303,24 @@ mod tests {
 
     #[test]
     fn progress_is_told_in_words() {
-        let told = Told { share: 0.25, spp: 16, error: Some(0.04), frame: None };
-        assert_eq!(told.line(20.0), "noise 4.0 %, about 60 s to go");
-        assert_eq!(Told { frame: Some((3, 60)), ..told }.line(20.0), "frame 3 of 60, about 60 s to go");
-        assert_eq!(Told { error: None, share: 0.01, ..told }.line(20.0), "16 samples per pixel");
-        assert_eq!(Told { error: None, share: 1.0, ..told }.line(20.0), "16 samples per pixel, finishing");
-        assert_eq!(Told::default().line(0.1), "preparing");
+        let told = Told { share: 0.25, spp: 16, error: Some(0.04), ..Told::default() };
+        assert_eq!(told.line(None, 20.0), "noise 4.0 %, about 60 s to go");
+        assert_eq!(told.line(Some(0.02), 20.0), "noise 4.0 %, about 60 s to 2.0 %");
+        assert_eq!(Told { frame: Some((3, 60)), ..told }.line(Some(0.02), 20.0), "frame 3 of 60, about 60 s to go");
+        assert_eq!(Told { error: None, share: 0.0, ..told }.line(None, 20.0), "16 samples per pixel");
+        assert_eq!(Told { error: None, share: 1.0, ..told }.line(None, 20.0), "16 samples per pixel, finishing");
+        assert_eq!(Told::default().line(None, 0.1), "preparing");
+    }
+
+    #[test]
+    fn a_goal_that_is_far_has_an_estimate_or_is_said_to_be_out_of_reach() {
+        let far = Told { share: 2e-3, spp: 16, error: Some(0.3), ..Told::default() };
+        assert_eq!(far.line(Some(0.02), 20.0), "noise 30 %, about 3 h to 2.0 %");
+        assert_eq!(Told { share: 1e-5, ..far }.line(Some(0.02), 20.0), "noise 30 %, about 23 days to 2.0 %");
+        let flat = Told { share: 0.0, is_flat: true, ..far };
+        assert_eq!(flat.line(Some(0.02), 20.0), "noise 30 %, 2.0 % may be out of reach");
+        let frame = Told { frame: Some((1, 60)), ..flat };
+        assert_eq!(frame.line(Some(0.02), 20.0), "frame 1 of 60, noise 30 %, 2.0 % may be out of reach");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Text of the status line: what is on the image and how good it is, and settings; and how figures are written.
 
-use crate::frame::{DenoiseFilter, Denoising, Status, Target, f_number, f_stop};
+use crate::frame::{Aperture, DenoiseFilter, Denoising, Status, Target, f_number};
 use crate::render::{Integrator, ToneCurve};
 
 /// Seconds of rendering from which the time to go can be told.
@@ -8,7 +8,7 @@ const MIN_SECONDS: f64 = 0.5;
 
 /// Seconds for which somebody may wait.
 const PATIENCE: f64 = 1800.0;
-/// Errors worth waiting for where the target is farther away.
+/// Errors on the way to a target that is farther away.
 const MILESTONES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 
 /// What is on the image, how good it is, and how long it will take: one noise, that of what is shown.
@@ -50,10 +50,10 @@ pub fn line(status: &Status, target: Target) -> String {
             let to = target.error.filter(|_| denoised.is_none()).map_or("go".to_owned(), percent);
             return Some(format!(", {} to {to}", about(seconds)));
         }
-        // A goal that is days away says little: the best one that is not.
+        // A goal that is days away says little: the next one on the way there, which stays until it is reached.
         let error = status.estimated_error.filter(|_| denoised.is_none())?;
-        let within = |goal: &&f64| **goal < 0.8 * error && seconds_to(status.seconds, error, **goal) <= PATIENCE;
-        let goal = MILESTONES.iter().find(within)?;
+        let end = target.error.unwrap_or_default();
+        let goal = MILESTONES.iter().rfind(|goal| (end..error).contains(*goal))?;
         Some(format!(", {} to {}", about(seconds_to(status.seconds, error, *goal)), percent(*goal)))
     });
     let loading = loading.map(|loading| loading + "   ").unwrap_or_default();
@@ -81,7 +81,9 @@ pub fn about(seconds: f64) -> String {
     match seconds {
         s if s < 9.5 => format!("about {:.0} s", s.max(1.0)),
         s if s < 95.0 => format!("about {:.0} s", (s / 5.0).round() * 5.0),
-        s => format!("about {:.0} min", s / 60.0),
+        s if s < 5400.0 => format!("about {:.0} min", s / 60.0),
+        s if s < 48.0 * 3600.0 => format!("about {:.0} h", s / 3600.0),
+        s => format!("about {:.0} days", s / 86_400.0),
     }
 }
 
@@ -93,7 +95,10 @@ pub fn settings(status: &Status) -> Vec<String> {
     }
     let lens = status.rig.lens;
     if lens.enabled {
-        let aperture = f_number(f_stop(lens.radius, &status.rig.projection));
+        let aperture = match Aperture::of(lens.radius, &status.rig.projection) {
+            Aperture::FNumber(stop) => f_number(stop),
+            Aperture::Diameter(diameter) => format!("aperture {}", metres(diameter)),
+        };
         parts.push(format!("focus {}, {aperture}", metres(lens.focus_distance)));
     }
     if status.display.exposure_stops != 0.0 {
@@ -209,10 +214,13 @@ mod tests {
         assert_eq!(target(None, None, Some(0.05)), None, "reached");
         let far = Status { spp: 1, seconds: 10.0, estimated_error: Some(0.5), ..Status::default() };
         let target = Target { error: Some(0.005), ..Target::default() };
-        assert_eq!(line(&far, target), "noise 50 %, about 16 min to 5.0 %", "the target is a day away");
+        assert_eq!(line(&far, target), "noise 50 %, about 55 s to 20 %", "the target is a day away");
+        let later = Status { spp: 5, seconds: 50.0, estimated_error: Some(0.22), ..far.clone() };
+        assert_eq!(line(&later, target), "noise 22 %, about 10 s to 20 %", "the goal stays");
         let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
         assert_eq!(line(&denoised, target), "noise 5.0 %, denoised");
         assert_eq!([0.2, 43.0, 200.0].map(about), ["about 1 s", "about 45 s", "about 3 min"]);
+        assert_eq!([5000.0, 1e4, 1e6].map(about), ["about 83 min", "about 3 h", "about 12 days"]);
     }
 
     #[test]
@@ -222,6 +230,8 @@ mod tests {
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.display.exposure_stops = -1.0 / 3.0;
         assert_eq!(settings(&status), ["focus 2.50 m, f/1.6", "-0.3 stops"]);
+        status.rig.lens = Lens::thin(3.0, 300.0);
+        assert_eq!(settings(&status)[0], "focus 300.00 m, aperture 6.00 m", "a model in millimetres");
     }
 
     #[test]

@@ -164,6 +164,19 @@ fn the_sky_is_made_stronger_in_proportion() {
 }
 
 #[test]
+fn undo_names_what_has_changed_of_the_camera() {
+    let mut driver = Driver::open();
+    let mut label_of = |command: Command| {
+        driver.session.send(command);
+        driver.frame();
+        driver.session.world().resource::<History>().undo_label().map(str::to_owned)
+    };
+    assert_eq!(label_of(Command::ScaleFocus { factor: 1.5 }).as_deref(), Some("lens"));
+    assert_eq!(label_of(Command::Orbit { yaw_deg: 5.0, pitch_deg: 0.0 }).as_deref(), Some("camera"));
+    assert_eq!(label_of(Command::ToggleDepthOfField).as_deref(), Some("lens"));
+}
+
+#[test]
 fn any_environment_becomes_a_clear_sky() {
     let mut driver = Driver::open();
     let sky = |driver: &Driver| driver.session.inputs().environment.clone();
@@ -188,7 +201,11 @@ fn any_environment_becomes_a_clear_sky() {
     driver.edit([Edit::Set { id: 0, property: Property::SkyStrength, value: DVec3::splat(2.0) }]);
     let EnvironmentSource::Sky { scale, azimuth: 90.0, .. } = sky(&driver).part else { panic!() };
     assert_eq!(scale.0, Vec3::splat(2.0));
-    for _ in 0..4 {
+    // And any becomes one of a single colour.
+    driver.edit([Edit::Set { id: 0, property: Property::Sky, value: DVec3::splat(0.5) }]);
+    assert!(matches!(sky(&driver).light, Environment::Constant(radiance) if radiance == Vec3::splat(0.5)));
+    assert!(matches!(sky(&driver).part, EnvironmentSource::Constant(_)));
+    for _ in 0..5 {
         driver.edit([Edit::Undo]);
     }
     assert!(matches!(sky(&driver).light, Environment::Gradient { .. }));

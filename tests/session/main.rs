@@ -2,6 +2,7 @@
 
 mod driver;
 mod edit;
+mod framing;
 mod keys;
 mod lists;
 mod living_files;

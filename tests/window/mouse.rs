@@ -310,3 +310,77 @@ fn a_command_is_found_by_its_name() {
     program.key("Return");
     assert!(program.ended().success());
 }
+
+#[test]
+fn a_selected_object_is_dragged_by_itself_and_the_scene_saved_under_another_name() {
+    let Some(desktop) = Desktop::start() else { return };
+    std::fs::write(desktop.folder().join("room.ron"), ROOM).expect("a file");
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    let before = crate::views::camera(&program);
+    // The ball, away from the handles at its middle. A click with the handles shown is still one.
+    let side = (430, 235);
+    click(&program, 1, side);
+    std::thread::sleep(Duration::from_millis(300));
+    program.key("g");
+    click(&program, 1, side);
+    std::thread::sleep(Duration::from_millis(500));
+    program.drag(1, side, (60, 0));
+    title_is(&program, "*room.ron");
+    assert_eq!(crate::views::camera(&program), before, "the camera stays");
+    program.key("ctrl+shift+s");
+    let browser = (300, 450);
+    until("the browser to open", || is_dark(&program, browser).then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    program.type_text("other");
+    program.key("Return");
+    title_is(&program, "other.ron");
+    let text = std::fs::read_to_string(desktop.folder().join("other.ron")).expect("the scene");
+    let file = SceneFile::parse(&text, "other.ron").expect("a scene");
+    let center = moved_sphere(&file);
+    assert!(center.x > 0.3 && center.x < 0.7 && (center.y - 1.5).abs() < 0.05, "to the right: {center}");
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+/// The centre of the first object, a sphere.
+fn moved_sphere(file: &SceneFile) -> glam::DVec3 {
+    match &file.objects[0] {
+        firstlight::scene::file::ObjectPart::Sphere { center, .. } => *center,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn an_image_whose_goal_is_far_is_kept_as_it_stands() {
+    let Some(desktop) = Desktop::start() else { return };
+    std::fs::write(desktop.folder().join("room.ron"), ROOM).expect("a file");
+    let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
+    title_is(&program, "room.ron");
+    seen(&program);
+    program.key("ctrl+e");
+    let form = (300, 380);
+    until("the form", || is_dark(&program, form).then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    // The goal in its row, typed over.
+    click(&program, 1, (475, 269));
+    std::thread::sleep(Duration::from_millis(500));
+    program.key("ctrl+a");
+    program.type_text("0.01");
+    program.key("Return");
+    std::thread::sleep(Duration::from_millis(300));
+    click(&program, 1, (522, 380));
+    // The button is there as soon as every pixel has a sample.
+    let image = desktop.folder().join("room-0001.png");
+    until("the image", || {
+        click(&program, 1, (590, 551));
+        std::thread::sleep(Duration::from_secs(1));
+        image.is_file().then_some(())
+    });
+    let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
+    let early = shot.ended_early.expect("it is said");
+    assert!(early.starts_with("at noise ") && early.ends_with("asked for: noise 0.01 %"), "{early}");
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}

@@ -25,7 +25,7 @@ pub struct PropertyInfo {
     pub help: &'static str,
     /// The range in which a number can be set, in its unit.
     pub range: [f64; 2],
-    /// The unit of a number, as it is written behind it.
+    /// The unit of a number or of a colour, as it is written behind it.
     pub unit: &'static str,
 }
 
@@ -125,9 +125,9 @@ properties! {
         /// degrees about X, then Y, then Z
         Rotate = "rotate": Rotation, "rotation °", ANY, "°";
         /// radiant intensity, W·sr⁻¹
-        Intensity = "intensity": Color, "intensity", [0.0, f64::INFINITY], "";
+        Intensity = "intensity": Color, "intensity", [0.0, f64::INFINITY], " W/sr";
         /// irradiance of a surface that faces the light, W·m⁻²
-        Irradiance = "irradiance": Color, "irradiance", [0.0, f64::INFINITY], "";
+        Irradiance = "irradiance": Color, "irradiance", [0.0, f64::INFINITY], " W/m²";
         /// of the sphere that emits; 0: a point, which no camera sees
         Radius = "radius": Number, "radius", [0.0, 1e9], " m";
         /// from the axis of the cone, from which on the intensity falls off; at most the outer angle

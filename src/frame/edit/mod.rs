@@ -206,9 +206,14 @@ pub struct EditQueue(pub Vec<Edit>);
 /// Reads [`EditQueue`]; writes entities, [`Selection`], [`History`], [`Status`].
 pub fn edit_scene(world: &mut World) {
     for edit in std::mem::take(&mut world.resource_mut::<EditQueue>().0) {
+        // With nothing to do it on, an edit does no harm.
+        let kind = match edit {
+            Edit::Undo | Edit::Redo | Edit::SelectUsers { .. } | Edit::Dress { .. } => MessageKind::Note,
+            _ => MessageKind::Warning,
+        };
         if let Err(problem) = carry_out(world, edit) {
             let now = world.resource::<Clock>().0;
-            world.resource_mut::<Status>().say(now, MessageKind::Warning, problem);
+            world.resource_mut::<Status>().say(now, kind, problem);
         }
     }
     // Removed entities are deselected.

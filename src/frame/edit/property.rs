@@ -16,7 +16,7 @@ pub enum Property {
     SphereRadius,
     /// A number, colour or choice of a material; limited to the values that it may have.
     Material(MaterialProperty),
-    /// Radiance of a constant environment.
+    /// Radiance of a constant environment, which any other environment becomes by it.
     Sky,
     /// Radiance of a gradient at the zenith.
     Zenith,

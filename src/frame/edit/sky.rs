@@ -83,7 +83,8 @@ fn is_clear(sky: &SceneEnvironment) -> bool {
 
 fn with_color(sky: &Environment, property: Property, value: Vec3) -> Option<Environment> {
     match (property, sky) {
-        (Property::Sky, Environment::Black | Environment::Constant(_)) => Some(Environment::Constant(value)),
+        // In place of whatever there was.
+        (Property::Sky, _) => Some(Environment::Constant(value)),
         (Property::Zenith, &Environment::Gradient { horizon, ground, .. }) => {
             Some(Environment::Gradient { zenith: value, horizon, ground })
         }

@@ -407,7 +407,12 @@ fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     if !Arc::ptr_eq(&old.entities, &new.entities) && old.entities != new.entities {
         return what_changed_in_entities(&old.entities, &new.entities);
     }
-    let (label, goes_on) = if old.environment != new.environment { ("environment", false) } else { ("camera", true) };
+    let without_lens = |state: &State| state.camera.map(|(entity, rig)| (entity, rig.view, rig.projection));
+    let (label, goes_on) = match () {
+        () if old.environment != new.environment => ("environment", false),
+        () if without_lens(old) == without_lens(new) => ("lens", true),
+        () => ("camera", true),
+    };
     (label.to_owned(), goes_on.then(|| label.to_owned()))
 }
 

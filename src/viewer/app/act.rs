@@ -125,7 +125,8 @@ impl App {
             }
             Action::Screenshot { linear } => self.screenshot(linear),
             Action::RenderTo { frames } => self.open_form(frames, now),
-            Action::SaveScene { new } => self.save_scene(new),
+            Action::SaveScene { new: false } => self.save_scene(),
+            Action::SaveScene { new: true } => self.choose_place(DialogPurpose::SaveScene, &self.scene_path(true)),
             Action::CopyView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
                 // Whoever started from a desktop has no terminal.
@@ -220,9 +221,9 @@ impl App {
         self.repaint_at = Some(now);
     }
 
-    /// Saves to the scene's own file, or to a new one.
-    pub(super) fn save_scene(&mut self, new: bool) {
-        let path = self.scene_path(new);
+    /// Saves to the scene's own file, or to a new one if it has none.
+    pub(super) fn save_scene(&mut self) {
+        let path = self.scene_path(false);
         self.session.send(Command::SaveScene { path });
     }
 

@@ -1,11 +1,12 @@
 //! Window events: most of them are only recorded, and executed by the next tick.
 
-use crate::frame::{Command, Edit};
+use crate::frame::{Command, Edit, Selection};
 use crate::viewer::app::{App, FRAME, Wake};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::help::{Help, ListKey};
 use crate::viewer::question::Prompt;
 use crate::viewer::toasts::Tone;
+use glam::DVec2;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 use winit::application::ApplicationHandler;
@@ -104,6 +105,11 @@ impl ApplicationHandler<Wake> for App {
                 }
             }
             WindowEvent::CursorMoved { position, .. } => {
+                let mouse = DVec2::new(position.x, position.y) / self.scale();
+                if self.handles.grab_body(mouse) {
+                    self.input.drop_drag();
+                    self.session.send(Command::Edit(Edit::Begin));
+                }
                 self.input.set_focuses(self.focus_follows() && !response.consumed);
                 self.input.cursor(position.x, position.y);
                 if self.input.is_dragging() || self.handles.is_grabbed() {
@@ -148,6 +154,10 @@ impl ApplicationHandler<Wake> for App {
                 self.session.send(Command::Edit(Edit::Begin));
             }
             WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
+                let is_plain = self.input.modifiers().is_empty() && !self.input.is_captured();
+                if button == MouseButton::Left && state.is_pressed() && is_plain && self.is_selected_at_mouse() {
+                    self.handles.press_body(self.mouse());
+                }
                 if self.input.button(button, state.is_pressed(), now) {
                     self.open_menu_here();
                 }
@@ -205,6 +215,13 @@ impl ApplicationHandler<Wake> for App {
 }
 
 impl App {
+    /// Whether what is under the mouse is selected.
+    fn is_selected_at_mouse(&self) -> bool {
+        let [x, y] = self.input.place();
+        let selected = &self.session.world().resource::<Selection>().0;
+        !selected.is_empty() && self.session.entity_at(x, y).is_some_and(|entity| selected.contains(&entity))
+    }
+
     /// Outlines what is under the mouse; returns whether that is news.
     fn hover(&mut self, now: Instant) -> bool {
         let is_elsewhere = self.over_widgets

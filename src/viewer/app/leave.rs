@@ -108,7 +108,7 @@ impl App {
         self.needs_tick = true;
         match (question, answer) {
             (Prompt::Leave { then, .. }, PromptAnswer::Yes) => {
-                self.save_scene(false);
+                self.save_scene();
                 self.leaving.saving = Some(then);
             }
             (Prompt::Leave { then: Some(command), .. }, PromptAnswer::No) => self.session.send(command),

@@ -30,11 +30,13 @@ mod orders;
 pub mod run;
 mod tick;
 
-use crate::frame::{Command, Explaining, Focus, FocusTarget, Projector, Session, SessionOptions, Target, Waker};
+use crate::frame::{
+    Command, Explaining, Focus, FocusTarget, FreeShare, Projector, Session, SessionOptions, Target, Waker,
+};
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
-use crate::viewer::app::options::{ViewerError, ViewerOptions};
+use crate::viewer::app::options::{ViewerError, ViewerOptions, size_to_keep};
 use crate::viewer::bar::Figures;
 use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
@@ -46,7 +48,7 @@ use crate::viewer::menu::HereMenu;
 use crate::viewer::order_form::OrderForm;
 use crate::viewer::outlines::Outlines;
 use crate::viewer::palette::Palette;
-use crate::viewer::panel::PanelState;
+use crate::viewer::panel::{self, PanelState};
 use crate::viewer::presenter::Presenter;
 use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
@@ -132,8 +134,10 @@ struct App {
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
     title: String,
-    /// Logical pixels.
+    /// That of the next window, logical pixels.
     window_size: (u32, u32),
+    /// What the monitor had room for when the window was opened, logical pixels.
+    fitted_size: (u32, u32),
     /// When to store the window's size.
     keep_size_at: Option<Instant>,
     occluded: bool,
@@ -186,11 +190,17 @@ impl App {
             waker: Some(waker.clone()),
         })
         .map_err(|error| ViewerError::Session(error.into()))?;
+        let mut memory = Memory::of_platform();
+        let panel = PanelState { previews: Previews::new(waker.clone()), ..memory.panel() };
+        if panel.shown && options.width > 0 {
+            // A model is framed before the panel is drawn.
+            let window = options.width as f32;
+            session.world_mut().insert_resource(FreeShare(f64::from(1.0 - panel::width(window) / window)));
+        }
         if let Some(path) = &options.record {
             session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
-        let mut memory = Memory::of_platform();
         let trouble = memory.begin(&mut session);
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
@@ -216,7 +226,7 @@ impl App {
             palette: Palette::default(),
             here: HereMenu::default(),
             greeting: memory.is_new(),
-            panel: PanelState { previews: Previews::new(waker.clone()), ..memory.panel() },
+            panel,
             handles: Handles::default(),
             grab: None,
             strip: None,
@@ -236,6 +246,7 @@ impl App {
             window: None,
             title: String::new(),
             window_size: (options.width, options.height),
+            fitted_size: (options.width, options.height),
             keep_size_at: None,
             occluded: false,
             needs_tick: true,
@@ -260,7 +271,8 @@ impl App {
         let size = window.inner_size();
         let logical = size.to_logical::<u32>(window.scale_factor());
         if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
-            self.window_size = (logical.width, logical.height);
+            let wanted = (self.options.width, self.options.height);
+            self.window_size = size_to_keep((logical.width, logical.height), self.fitted_size, wanted);
             self.keep_size_at = Some(Instant::now() + RESIZE_DELAY);
         }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
@@ -314,7 +326,7 @@ impl App {
     }
 
     /// Moves the image out of the way of the panel, as it was drawn last, so that its centre is that of the part of the
-    /// window that is free; draws again if that is news. Samples stay.
+    /// window that is free; draws again if that is news. Samples stay; what is framed from now on fits that part.
     fn move_aside(&mut self, now: Instant) {
         let Some(presenter) = &self.presenter else { return };
         let context = presenter.egui_context();
@@ -325,6 +337,12 @@ impl App {
             self.input.set_aside(aside);
             self.shown_picture = None;
             self.repaint_at = Some(now);
+        }
+        let [width, _] = self.input.size();
+        let share = 1.0 - 2.0 * f64::from(aside) / width.max(1.0);
+        if share > 0.0 && share != self.session.world().resource::<FreeShare>().0 {
+            self.session.send(Command::SetFreeShare { share });
+            self.needs_tick = true;
         }
     }
 

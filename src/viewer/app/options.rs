@@ -52,3 +52,22 @@ pub enum ViewerError {
     #[error(transparent)]
     Present(#[from] PresentError),
 }
+
+/// The size that the next window has, where this one has the size `now`: one that was cut down to the monitor, as one
+/// with large dots is, and stayed so is no wish of the user.
+pub(super) fn size_to_keep(now: (u32, u32), fitted: (u32, u32), wanted: (u32, u32)) -> (u32, u32) {
+    // Dots are whole.
+    let is_as_fitted = now.0.abs_diff(fitted.0) <= 1 && now.1.abs_diff(fitted.1) <= 1;
+    if is_as_fitted { wanted } else { now }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_that_was_cut_down_to_its_monitor_is_as_large_as_before_where_there_is_room() {
+        assert_eq!(size_to_keep((784, 435), (784, 436), (1280, 720)), (1280, 720));
+        assert_eq!(size_to_keep((600, 400), (784, 436), (1280, 720)), (600, 400), "as the user has made it");
+    }
+}

@@ -18,7 +18,7 @@ const SETTLED: Duration = Duration::from_millis(300);
 impl App {
     pub(super) fn open_form(&mut self, frames: bool, now: Instant) {
         if let Err(reason) = self.form.open(&self.session, frames, &self.options.folder) {
-            self.toasts.add(Tone::Problem, reason, now);
+            self.toasts.add(Tone::News, reason, now);
         }
     }
 
@@ -30,7 +30,10 @@ impl App {
                     self.toasts.add(Tone::Problem, reason, now);
                 }
             }
-            Wish::Choose(purpose) => self.choose_place(purpose),
+            Wish::Choose(purpose) => {
+                let path = self.form.path().to_owned();
+                self.choose_place(purpose, &path);
+            }
         }
         self.repaint_at = Some(now);
         self.needs_tick = true;
@@ -51,9 +54,11 @@ impl App {
         self.renders.begin(order, source, stem, threads)
     }
 
-    /// Shows the browser for the place of the image or of the frames.
-    fn choose_place(&mut self, purpose: DialogPurpose) {
-        let path = std::path::absolute(self.form.path()).unwrap_or_else(|_| self.form.path().to_owned());
+    /// Shows the browser for the place of the scene, of the image or of the frames.
+    ///
+    /// - `path`: the proposal.
+    pub(super) fn choose_place(&mut self, purpose: DialogPurpose, path: &Path) {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let folder = path.parent().unwrap_or(Path::new("."));
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let screen = self.presenter.as_ref().map(|presenter| presenter.egui_context().content_rect().size());

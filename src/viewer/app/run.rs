@@ -97,6 +97,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
 impl App {
     pub(super) fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
         let size = fitting(event_loop, self.options.width, self.options.height);
+        self.fitted_size = (size.width as u32, size.height as u32);
         self.title = title(&self.options.source.title(), false);
         let attributes = Window::default_attributes().with_title(&self.title).with_inner_size(size);
         let window = Arc::new(event_loop.create_window(attributes).map_err(ViewerError::NoWindow)?);

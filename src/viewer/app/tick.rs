@@ -1,6 +1,7 @@
 //! A tick: passes input to the session, advances it, and checks for anything new to show.
 
-use crate::frame::{MessageKind, Selection};
+use crate::frame::{CurrentScene, MessageKind, Selection};
+use crate::scene::SceneSource;
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::toasts::{Toasts, Tone};
@@ -31,6 +32,8 @@ impl App {
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
         }
+        let scene = self.session.world().get_resource::<CurrentScene>();
+        self.input.set_model(scene.is_some_and(|scene| matches!(scene.0.source, SceneSource::Model(_))));
         let status = self.session.status();
         match (status.opening, self.opening_since) {
             // A scene that is there at once would only flash.

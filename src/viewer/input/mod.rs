@@ -60,8 +60,10 @@ pub struct Input {
     spin: Option<Instant>,
     /// Until when the time of the animation has been advanced, if it plays.
     play: Option<Instant>,
-    /// Whether a drag with the left button orbits the pivot instead of turning the camera.
-    orbits: bool,
+    /// Whether a drag with the left button orbits the pivot instead of turning the camera, if the user has chosen that.
+    orbits: Option<bool>,
+    /// What is looked at is a model alone, which is seen from outside.
+    is_model: bool,
     /// Whether the mouse moves the view without a button.
     captured: bool,
     /// Whether focus follows the mouse.
@@ -115,7 +117,8 @@ impl Input {
             speed: 1.0,
             spin: None,
             play: None,
-            orbits: false,
+            orbits: None,
+            is_model: false,
             captured: false,
             focuses: false,
             sum: Sum::default(),
@@ -187,12 +190,24 @@ impl Input {
 
     /// Toggles whether a plain drag orbits the pivot or looks around; returns true for orbiting.
     pub fn toggle_orbits(&mut self) -> bool {
-        self.orbits = !self.orbits;
-        self.orbits
+        let orbits = !self.orbits();
+        self.orbits = Some(orbits);
+        orbits
     }
 
+    /// Whether a plain drag orbits the pivot: as the user has chosen, else about a model.
     pub fn orbits(&self) -> bool {
-        self.orbits
+        self.orbits.unwrap_or(self.is_model)
+    }
+
+    /// Tells whether what is looked at is a model alone.
+    pub fn set_model(&mut self, is_model: bool) {
+        self.is_model = is_model;
+    }
+
+    /// Ends a drag of which another use is made.
+    pub fn drop_drag(&mut self) {
+        self.drag = None;
     }
 
     /// Sets whether the mouse moves the view without a button, by [`Self::mouse_moved`].
@@ -214,7 +229,7 @@ impl Input {
     pub fn mouse_moved(&mut self, x: f64, y: f64) {
         if self.captured {
             let height = self.size[1].max(1.0);
-            self.turn([x / height, y / height], self.orbits);
+            self.turn([x / height, y / height], self.orbits == Some(true));
         }
     }
 
@@ -386,7 +401,7 @@ impl Input {
         let (kind, ctrl) = (drag.kind, drag.ctrl);
         match kind {
             // Window managers intercept drags with Alt, but not those with Ctrl.
-            DragKind::Look => self.turn([dx, dy], self.orbits || ctrl),
+            DragKind::Look => self.turn([dx, dy], self.orbits() || ctrl),
             DragKind::Fly => self.turn([dx, dy], false),
             // Up and to the right moves nearer.
             DragKind::Zoom => self.sum.dolly -= (dx - dy) * ZOOM_DRAG,

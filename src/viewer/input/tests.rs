@@ -191,6 +191,32 @@ fn steps_repeat_and_toggles_do_not() {
 }
 
 #[test]
+fn a_drag_orbits_a_model_until_another_use_is_chosen_and_a_captured_mouse_looks() {
+    let (mut input, start) = input();
+    input.set_model(true);
+    let orbits = |input: &mut Input| {
+        input.button(MouseButton::Left, true, start);
+        let [x, y] = input.cursor_place();
+        input.cursor(x + 40.0, y);
+        input.button(MouseButton::Left, false, start);
+        matches!(input.take(start)[..], [Command::Orbit { .. }])
+    };
+    assert!(orbits(&mut input));
+    input.set_captured(true);
+    input.mouse_moved(40.0, 0.0);
+    assert!(matches!(input.take(start)[..], [Command::Turn { .. }]));
+    input.set_captured(false);
+    assert!(!input.toggle_orbits() && !orbits(&mut input), "Space");
+    input.set_model(false);
+    assert!(input.toggle_orbits() && orbits(&mut input));
+    // A drag of which another use is made turns nothing.
+    input.button(MouseButton::Left, true, start);
+    input.drop_drag();
+    input.cursor(0.0, 0.0);
+    assert_eq!(input.take(start), []);
+}
+
+#[test]
 fn a_drag_looks_or_orbits_and_a_captured_mouse_needs_no_button() {
     let (mut input, start) = input();
     assert!(input.toggle_orbits());

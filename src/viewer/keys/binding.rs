@@ -106,7 +106,7 @@ pub enum Action {
     RenderTo {
         frames: bool,
     },
-    /// Saves as a scene file: the open one, or a new one.
+    /// Saves as a scene file: the open one, or a new one whose name is asked for.
     SaveScene {
         new: bool,
     },

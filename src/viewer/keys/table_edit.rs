@@ -33,6 +33,7 @@ pub const EDIT: KeyGroup = KeyGroup {
             item("Rotate with the mouse", &[], Action::Grab(gizmo::Mode::Turn)),
             item("Scale with the mouse", &[], Action::Grab(gizmo::Mode::Scale))
         ),
+        row!("with the handles to move: move the selected object in the plane of the image", Trigger::Mouse("Drag it")),
         row!("move in steps: 15 degrees, a tenth of the size", Trigger::Mouse("Ctrl, dragging a handle")),
         row!(
             "duplicate the selection",

@@ -106,9 +106,9 @@ pub const FILES: KeyGroup = KeyGroup {
             item("Save the scene", &[Menu::File], Action::SaveScene { new: false })
         ),
         row!(
-            "save the scene as a new scene file",
+            "save the scene under a name of your choice",
             ctrl_shifted("s", true, Action::SaveScene { new: true }),
-            item("Save as a new scene", &[Menu::File], Action::SaveScene { new: true })
+            item("Save the scene as …", &[Menu::File], Action::SaveScene { new: true })
         ),
         row!(
             "screenshot: save the image as it is now as a new PNG file",

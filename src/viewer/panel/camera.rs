@@ -2,7 +2,7 @@
 
 use crate::files::printable;
 use crate::frame::{
-    Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop,
+    Aperture, Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals,
     radius_of_f_stop, sharp_zone,
 };
 use crate::scene::{Lens, Projection, View};
@@ -198,8 +198,21 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             return;
         }
         row(ui, "aperture", |ui| {
-            let stop = f_stop(lens.radius, &rig.projection);
-            let hint = format!("f-number for a sensor 24 mm high; lens radius {}", metres(lens.radius));
+            let stop = match Aperture::of(lens.radius, &rig.projection) {
+                Aperture::FNumber(stop) => stop,
+                Aperture::Diameter(diameter) => {
+                    let mut new = diameter;
+                    let drag = egui::DragValue::new(&mut new).suffix(" m wide").speed(0.01 * diameter);
+                    let drag = drag.range(0.0..=1e9).max_decimals(f_number_decimals(diameter) + 1);
+                    let hint =
+                        "diameter of the lens; an f-number if that is between 0.5 and 128 on a sensor 24 mm high";
+                    if ui.add(drag.update_while_editing(false)).on_hover_text(hint).changed() {
+                        asked.send(Command::SetAperture { radius: 0.5 * new });
+                    }
+                    return;
+                }
+            };
+            let hint = format!("f-number for a sensor 24 mm high; diameter of the lens {}", metres(2.0 * lens.radius));
             let mut new = stop;
             let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6);
             let drag = drag.max_decimals(f_number_decimals(stop));

@@ -14,7 +14,7 @@ const HINTS: &[(&str, &str)] = &[
     ("field of view", "vertical angle that the image shows: smaller is a longer lens"),
     ("fly speed", "factor of the speed of W A S D; the distance to what is under the mouse counts too"),
     ("focus distance", "distance of what is sharp, along the view"),
-    ("aperture", "f-number: a smaller one opens the lens and blurs more"),
+    ("aperture", "f-number: a smaller one opens the lens and blurs more; its diameter where no lens has such a number"),
     ("blades", "blades of the aperture, which shape blurred highlights; 0 is round"),
     ("blade rotation", "turns the polygon of the blades"),
     ("exposure", "brightness in stops: one more is twice as bright"),

@@ -12,7 +12,9 @@ use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::selected::property_row;
 use crate::viewer::panel::state::{Asked, PanelState};
-use crate::viewer::panel::widgets::{color, number, row, row_with_hint, rows, selectable, short_color, strength_drag};
+use crate::viewer::panel::widgets::{
+    RADIANCE, color, number, row, row_with_hint, rows, selectable, short_color, strength_drag,
+};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -61,7 +63,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     let world = session.world();
     ui.spacing_mut().interact_size.x = 30.0;
     if let Some(light) = light_of(world, entry.entity) {
-        if let Some(value) = short_color(ui, light.strength(), true) {
+        if let Some(value) = short_color(ui, light.strength(), Some(LightProperty::strength_of(&light).info().unit)) {
             let property = LightProperty::strength_of(&light);
             asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Light(property), value });
         }
@@ -70,7 +72,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     let Some(material) = entry.material else { return };
     match SurfaceMaterial::of(world, material) {
         Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
-            if let Some(value) = short_color(ui, *rgb, true) {
+            if let Some(value) = short_color(ui, *rgb, Some(RADIANCE)) {
                 let main = MaterialProperty::main_color(MaterialKind::Emissive).expect("it has a radiance");
                 let property = Property::Material(main);
                 asked.edit(Edit::Set { id: material.to_bits(), property, value });
@@ -98,9 +100,13 @@ fn set_sky(asked: &mut Asked, property: Property, value: DVec3) {
 }
 
 fn one_color(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: Property) {
+    color_row(ui, asked, name, value, property, Some(RADIANCE));
+}
+
+fn color_row(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: Property, unit: Option<&str>) {
     row(ui, name, |ui| {
         ui.horizontal(|ui| {
-            if let Some(value) = color(ui, value, true) {
+            if let Some(value) = color(ui, value, unit) {
                 set_sky(asked, property, value);
             }
         })
@@ -124,7 +130,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                     let value = property.get(&environment.part).map(DVec3::splat);
                     property_row(ui, 0, Property::ClearSky(*property), property.info(), value, asked);
                 }
-                return one_color(ui, asked, "ground", ground.0, Property::Ground);
+                return color_row(ui, asked, "ground", ground.0, Property::Ground, None);
             }
             let (file, angle_deg) = match &environment.part {
                 EnvironmentSource::Image { file, rotate, .. } => (file.as_str(), *rotate),
@@ -145,6 +151,11 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     });
     ui.horizontal(|ui| {
         let is_clear = matches!(environment.part, EnvironmentSource::Sky { .. });
+        let is_even = matches!(environment.light, Environment::Black | Environment::Constant(_));
+        if !is_even && ui.button("one colour").on_hover_text("the same light from everywhere").clicked() {
+            let strength = sky_strength(&environment.light).min(1.0);
+            set_sky(asked, Property::Sky, DVec3::splat(f64::from(strength)));
+        }
         if !is_clear && ui.button("clear sky").on_hover_text("sun and sky, as they are outside").clicked() {
             set_sky(asked, Property::ClearSky(SkyProperty::Elevation), DVec3::splat(45.0));
         }

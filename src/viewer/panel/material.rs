@@ -12,7 +12,7 @@ use crate::scene::{
 };
 use crate::viewer::panel::state::Asked;
 use crate::viewer::panel::texture;
-use crate::viewer::panel::widgets::{color, row, row_with_hint, rows, slider, vector};
+use crate::viewer::panel::widgets::{RADIANCE, color, row, row_with_hint, rows, slider, vector};
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
 use glam::DVec3;
@@ -126,12 +126,16 @@ fn property_row(
         |ui: &mut Ui, contents: &mut dyn FnMut(&mut Ui)| row_with_hint(ui, property.label, property.help, contents);
     match param {
         Param::Color(paint) => {
-            let is_bright = matches!(property.domain, Domain::Radiance | Domain::Factor);
+            let unit = match property.domain {
+                Domain::Radiance => Some(RADIANCE),
+                Domain::Factor => Some(""),
+                _ => None,
+            };
             labelled(ui, &mut |ui| {
                 ui.horizontal(|ui| {
                     match paint {
                         ColorParam::Rgb(rgb) => {
-                            if let Some(value) = color(ui, *rgb, is_bright) {
+                            if let Some(value) = color(ui, *rgb, unit) {
                                 set(asked, value);
                             }
                         }

@@ -46,6 +46,11 @@ use egui::{Context, RichText, Ui};
 
 const WIDTH: f32 = 288.0;
 
+/// Width of the panel in a window of this width, points.
+pub fn width(window: f32) -> f32 {
+    WIDTH.min(0.6 * window)
+}
+
 /// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
     // Opaque: the image has moved aside, and ends below it.
@@ -57,7 +62,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
     });
     let before = asked.commands.len();
     state.change.follow(session);
-    let width = WIDTH.min(0.6 * context.content_rect().width());
+    let width = width(context.content_rect().width());
     let panel = egui::SidePanel::right("panel").frame(frame).resizable(false).exact_width(width);
     let response = panel.show(context, |ui| {
         style(ui);

@@ -55,7 +55,7 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
             row(ui, "colours", |ui| {
                 ui.horizontal(|ui| {
                     for paint in [a, b] {
-                        if let Some(value) = color(ui, paint.0, false) {
+                        if let Some(value) = color(ui, paint.0, None) {
                             *paint = Rgb(value.as_vec3());
                         }
                     }

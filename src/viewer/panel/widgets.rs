@@ -116,24 +116,29 @@ pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, log
     ui.add(slider).changed().then_some(new)
 }
 
-/// A linear colour. If it may be brighter than white, it is edited as a hue and a strength.
-pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
-    color_with(ui, value, bright, true)
+/// The unit of radiance, as it is written behind a number.
+pub const RADIANCE: &str = " W/m²sr";
+
+/// A linear colour.
+///
+/// - `unit`: of one that may be brighter than white, which is edited as a hue and a strength.
+pub fn color(ui: &mut Ui, value: Vec3, unit: Option<&str>) -> Option<DVec3> {
+    color_with(ui, value, unit, true)
 }
 
 /// Like [`color`], where there is no room for its code.
-pub fn short_color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
-    color_with(ui, value, bright, false)
+pub fn short_color(ui: &mut Ui, value: Vec3, unit: Option<&str>) -> Option<DVec3> {
+    color_with(ui, value, unit, false)
 }
 
-fn color_with(ui: &mut Ui, value: Vec3, bright: bool, has_code: bool) -> Option<DVec3> {
-    let strength = if bright { value.max_element() } else { 1.0 };
+fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> Option<DVec3> {
+    let strength = if unit.is_some() { value.max_element() } else { 1.0 };
     // Black has no hue: it becomes white when its strength is raised.
     let hue = if strength > 0.0 { value / strength } else { Vec3::ONE };
     let mut rgb = hue.to_array();
     let picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
     let new_hue = if has_code { picked.or(hex_field(ui, hue)) } else { picked };
-    let new_strength = if bright { strength_drag(ui, f64::from(strength), "× ", "") } else { None };
+    let new_strength = unit.and_then(|unit| strength_drag(ui, f64::from(strength), "× ", unit));
     if new_hue.is_none() && new_strength.is_none() {
         return None;
     }

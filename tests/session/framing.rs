@@ -1,0 +1,51 @@
+//! Models and selections are framed for the part of the image that nothing covers.
+
+use crate::driver::{Drive, Driver};
+use firstlight::frame::{Command, Projector, SessionOptions, Target};
+use firstlight::scene::SceneSource;
+use glam::{DVec2, DVec3};
+
+/// The leftmost and the rightmost place of a wide bar, as fractions of the width of the image.
+fn seen(driver: &Driver) -> (f64, f64) {
+    let projector = Projector::new(&driver.session.status().rig, DVec2::new(2.0, 1.0));
+    let corner = |i: u32| DVec3::new(f64::from(i & 1) * 8.0, f64::from(i >> 1 & 1), f64::from(i >> 2 & 1));
+    let places = (0..8).map(|i| 0.5 * projector.place(corner(i)).expect("it is in front of the camera").x);
+    places.fold((1.0, 0.0), |(left, right), x| (x.min(left), x.max(right)))
+}
+
+#[test]
+fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bar.obj");
+    let corners = ["0 0 0", "8 0 0", "8 1 0", "0 1 0", "0 0 1", "8 0 1", "8 1 1", "0 1 1"].map(|v| format!("v {v}\n"));
+    std::fs::write(&path, corners.concat() + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n")
+        .unwrap();
+    let options = SessionOptions {
+        width: 64,
+        height: 32,
+        threads: Some(2),
+        target: Target { spp: Some(1), ..Target::default() },
+        ..SessionOptions::default()
+    };
+    let mut driver = Driver::new(options, SceneSource::Model(path.clone()));
+    driver.settle();
+    let (left, right) = seen(&driver);
+    assert!(left > 0.0 && left < 0.15 && right > 0.85 && right < 1.0, "all of the image: {left} to {right}");
+    let is_between = |driver: &Driver, from: f64, to: f64| {
+        let (left, right) = seen(driver);
+        assert!(left > from && left < from + 0.1 && right < to && right > to - 0.1, "{left} to {right}");
+    };
+    driver.session.send(Command::SetFreeShare { share: 0.6 });
+    driver.session.send(Command::FrameAll);
+    driver.frame();
+    is_between(&driver, 0.2, 0.8);
+    driver.session.send(Command::SetFreeShare { share: 0.4 });
+    let before = driver.session.n_adopted();
+    driver.session.send(Command::Open { path });
+    driver.run_until(|session| session.n_adopted() > before && session.is_idle());
+    is_between(&driver, 0.3, 0.7);
+    // Nothing else is a share.
+    for share in [0.0, -1.0, 1.5, f64::NAN] {
+        assert!(Command::SetFreeShare { share }.check().is_err());
+    }
+}
