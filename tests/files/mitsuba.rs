@@ -319,6 +319,39 @@ fn the_back_of_an_open_surface_is_black_unless_it_is_twosided() {
 }
 
 #[test]
+fn the_back_of_a_body_is_black_where_it_is_seen() {
+    let is_backed = |sensor: &str, shape: &str| {
+        let scene = opened(&format!("<emitter type=\"constant\"/>{sensor}<shape type=\"cube\">{shape}</shape>"));
+        let part = scene.file.materials.get(scene.file.objects[0].material().unwrap()).unwrap().clone();
+        matches!(part, Material::Blend { by_side: true, .. })
+    };
+    let sensor_at = |z: f64| {
+        let look = format!("<lookat origin=\"0,0,{z}\" target=\"0,0,-9\" up=\"0,1,0\"/>");
+        format!("<sensor type=\"perspective\"><transform name=\"to_world\">{look}</transform></sensor>")
+    };
+    assert!(!is_backed("", "") && !is_backed(&sensor_at(4.0), ""));
+    assert!(is_backed(&sensor_at(0.5), ""), "the camera is inside");
+    assert!(is_backed("", "<boolean name=\"flip_normals\" value=\"true\"/>"));
+    let moved = "<transform name=\"to_world\"><translate z=\"4\"/></transform>";
+    assert!(is_backed(&sensor_at(4.0), moved) && !is_backed(&sensor_at(0.5), moved));
+}
+
+#[test]
+fn metals_and_skies_of_old_versions_have_their_own_defaults() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.xml");
+    let body = r#"<scene version="0.6.0"><shape type="sphere"><bsdf type="conductor"/></shape>
+        <emitter type="sunsky"><vector name="sunDirection" x="0" y="0.7" z="0.3"/></emitter></scene>"#;
+    std::fs::write(&path, body).unwrap();
+    let scene = load(&SceneSource::Foreign(path), &LoadOptions::default()).unwrap();
+    let metal = scene.file.materials.iter().next().unwrap().1;
+    // Copper.
+    assert!(matches!(metal, Material::Conductor { eta, .. } if eta.0.x < 0.4), "{metal:?}");
+    let EnvironmentSource::Sky { elevation, sun, .. } = &scene.file.environment else { panic!() };
+    assert!((elevation - 0.7f64.atan2(0.3).to_degrees()).abs() < 1e-6 && *sun == 1.0, "{elevation}");
+}
+
+#[test]
 fn textures_keep_their_place() {
     let scene = opened(
         r#"<emitter type="constant"/>

@@ -189,7 +189,7 @@ fn layered() -> [Material; 4] {
 
 /// Plastics, with normals by a map and with holes, a relief, conductors, a leaf, and surfaces of Disney; they use textures 1
 /// to 6 of the room.
-fn shiny() -> [Material; 15] {
+fn shiny() -> [Material; 16] {
     let plastic = |diffuse, alpha, beckmann, nonlinear| Material::Plastic {
         diffuse,
         alpha,
@@ -225,6 +225,10 @@ fn shiny() -> [Material; 15] {
         clearcoat: ScalarInput::Constant(0.8),
         clearcoat_gloss: ScalarInput::Texture(4),
     };
+    let mut sheet = disney(ColorInput::Texture(1), none, none);
+    if let Material::Disney { thin_walled, .. } = &mut sheet {
+        *thin_walled = true;
+    }
     let mut with_holes = Material::blend(ScalarInput::Constant(0.0), 19, 19);
     if let Material::Blend { opacity, .. } = &mut with_holes {
         *opacity = ScalarInput::Texture(4);
@@ -252,6 +256,7 @@ fn shiny() -> [Material; 15] {
         disney(ColorInput::Constant(Vec3::new(0.1, 0.6, 0.3)), ScalarInput::Texture(3), none),
         disney(ColorInput::Texture(5), narrow, wide),
         with_holes,
+        sheet,
     ]
 }
 

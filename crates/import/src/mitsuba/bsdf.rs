@@ -203,7 +203,8 @@ impl Converter<'_> {
 
     fn conductor(&mut self, node: Node) -> Result<Surface, SceneError> {
         let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
-        let material = node.text("material")?.unwrap_or("none");
+        let usual = if node.object().is_old { "Cu" } else { "none" };
+        let material = node.text("material")?.unwrap_or(usual);
         let (eta, k) = if !node.has("eta") && !node.has("k") && material != "none" {
             ior::conductor(material).ok_or_else(|| {
                 let hint = suggestion(material, ior::conductor_names());

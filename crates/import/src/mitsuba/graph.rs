@@ -93,6 +93,8 @@ pub(crate) struct Object {
     pub place: Place,
     pub parameters: Vec<Parameter>,
     pub children: Vec<Child>,
+    /// Whether its file has a version before 2.
+    pub is_old: bool,
     /// Whether the conversion has looked at it.
     visited: Cell<bool>,
     /// Whether it is left out as a whole, which was told.
@@ -100,10 +102,10 @@ pub(crate) struct Object {
 }
 
 impl Object {
-    pub(crate) fn new(tag: &str, plugin: String, id: Option<String>, place: Place) -> Self {
+    pub(crate) fn new(tag: &str, plugin: String, id: Option<String>, place: Place, is_old: bool) -> Self {
         let (parameters, children) = (Vec::new(), Vec::new());
         let (visited, skipped) = (Cell::new(false), Cell::new(false));
-        Self { tag: tag.to_owned(), plugin, id, place, parameters, children, visited, skipped }
+        Self { tag: tag.to_owned(), plugin, id, place, parameters, children, is_old, visited, skipped }
     }
 }
 

@@ -6,7 +6,8 @@
 //!
 //! Source: <https://mitsuba.readthedocs.io>
 
-pub(crate) mod bsdf;
+pub(crate) mod backs;
+mod bsdf;
 pub(crate) mod camera;
 mod converter;
 pub(crate) mod emitter;

@@ -239,7 +239,7 @@ impl Reader<'_> {
         };
         let id = element.attribute("id").map(|text| self.substitute(text, place)).transpose()?;
         let index = self.graph.objects.len();
-        self.graph.objects.push(Object::new(tag, plugin, id.clone(), place));
+        self.graph.objects.push(Object::new(tag, plugin, id.clone(), place, self.old));
         if let Some(id) = id {
             self.define(id, index, place)?;
         }

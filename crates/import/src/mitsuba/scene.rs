@@ -111,7 +111,7 @@ impl<'a> Converter<'a> {
         }
         let files = self.requests.iter().filter_map(|(request, &number)| Some((number, request.geometry.file()?)));
         let part_files = files.map(|(number, file)| (number, (file.to_owned(), stamp(file)))).collect();
-        let parts = self.make_meshes();
+        let parts = self.make_meshes(has_camera);
         if !has_camera {
             let (min, max) = self.bounds(&parts);
             self.file.camera = default_camera(min, max);
@@ -144,7 +144,7 @@ impl<'a> Converter<'a> {
     /// Chooses our world so that environment and camera are ones that we have.
     fn turn_world(&mut self, emitters: &[Node], sensor: Option<Node>) -> Result<(), SceneError> {
         let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
-        let is_sky = |emitter: &&Node| SKIES.iter().any(|(plugin, _)| *plugin == emitter.plugin());
+        let is_sky = |emitter: &&Node| SKIES.contains(&emitter.plugin());
         // The last environment is the one that is shown.
         if let Some(envmap) = emitters.iter().rfind(|emitter| emitter.plugin() == "envmap") {
             if let Some(axes) = orthonormal(DMat3::from_mat4(envmap.transform("to_world")?)) {
@@ -212,7 +212,7 @@ impl<'a> Converter<'a> {
     }
 
     /// Makes the meshes in parallel; objects of broken ones are left out.
-    fn make_meshes(&mut self) -> HashMap<u32, Arc<Mesh>> {
+    fn make_meshes(&mut self, has_camera: bool) -> HashMap<u32, Arc<Mesh>> {
         let mut requests: Vec<(&MeshRequest, u32)> = self.requests.iter().map(|(request, n)| (request, *n)).collect();
         requests.sort_by_key(|(_, number)| *number);
         let serialized = requests.iter().filter_map(|(request, _)| match &request.geometry {
@@ -240,17 +240,7 @@ impl<'a> Converter<'a> {
             ObjectPart::Mesh { source: MeshSource::Part { shape, .. }, .. } => Some(*shape),
             _ => None,
         };
-        let is_open: HashMap<u32, bool> = parts.iter().map(|(number, mesh)| (*number, is_open(mesh))).collect();
-        for index in std::mem::take(&mut self.one_sided) {
-            let shape = part_of(&self.file.objects[index]);
-            let name = self.file.objects[index].material().map(str::to_owned);
-            if let (Some(true), Some(name)) = (shape.and_then(|shape| is_open.get(&shape)), name) {
-                let backed = self.with_black_back(&name);
-                if let ObjectPart::Mesh { material, .. } = &mut self.file.objects[index] {
-                    *material = Some(backed);
-                }
-            }
-        }
+        self.blacken_backs(&parts, has_camera);
         let mut plain: Vec<usize> = (self.colored.iter())
             .filter(|(number, _)| parts.get(number).is_some_and(|mesh: &Arc<Mesh>| mesh.colors.is_empty()))
             .map(|(_, &index)| index)
@@ -263,12 +253,4 @@ impl<'a> Converter<'a> {
         self.file.objects.retain(|object| part_of(object).is_none_or(|shape| !lost.contains(&shape)));
         parts
     }
-}
-
-/// Whether a mesh is no closed body: then its vectors of area do not sum to zero.
-fn is_open(mesh: &Mesh) -> bool {
-    let areas = (0..mesh.triangles.len()).into_par_iter().map(|triangle| mesh.doubled_area_normal(triangle));
-    let pairs = areas.map(|area| (area, area.length()));
-    let (sum, total) = pairs.reduce(|| (DVec3::ZERO, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-    sum.length() > 1e-3 * total
 }

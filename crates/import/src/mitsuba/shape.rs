@@ -189,9 +189,9 @@ impl Converter<'_> {
         };
         let Some(transform) = self.placement(node, placed) else { return Ok(()) };
         let next = self.requests.len() as u32;
-        let is_file = request.geometry.file().is_some();
+        let may_be_body = !matches!(request.geometry, Geometry::Rectangle | Geometry::Disk | Geometry::Cylinder);
         let shape = *self.requests.entry(request).or_insert(next);
-        if is_file && !material.two_sided && !material.has_holes {
+        if may_be_body && !material.two_sided && !material.has_holes {
             self.one_sided.push(self.file.objects.len());
         }
         if material.attribute.is_some() {

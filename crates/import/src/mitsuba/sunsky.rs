@@ -9,8 +9,13 @@ use firstlight_format::value::Rgb;
 use glam::{DMat4, DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
-/// Plugins that are a clear sky, and the direction of each that points to the zenith; the last two are of version 0.x.
-pub(crate) const SKIES: [(&str, DVec3); 3] = [("sunsky", DVec3::Z), ("sky", DVec3::Y), ("sun", DVec3::Y)];
+/// Plugins that are a clear sky; the last two are of version 0.x.
+pub(crate) const SKIES: [&str; 3] = ["sunsky", "sky", "sun"];
+
+/// Whether the zenith of a sky is at +Y, as in version 0.x, and not at +Z.
+fn is_y_up(sky: Node) -> bool {
+    sky.object().is_old || sky.plugin() != "sunsky"
+}
 
 impl Converter<'_> {
     pub(crate) fn clear_sky(&mut self, node: Node) -> Result<(), SceneError> {
@@ -18,7 +23,11 @@ impl Converter<'_> {
         let to_world = node.transform("to_world")?;
         let direction = match node.vector("sun_direction")? {
             Some(direction) => direction,
-            None => to_world.transform_vector3(sun_at(node)?),
+            None => {
+                let at = sun_at(node)?;
+                // There, the north is at -Z.
+                to_world.transform_vector3(if is_y_up(node) { DVec3::new(-at.y, at.z, at.x) } else { at })
+            }
         };
         let to_sun = self.world.transform_vector3(direction).try_normalize();
         let to_sun = to_sun.ok_or_else(|| node.error("`sun_direction` needs a length"))?;
@@ -57,7 +66,7 @@ impl Converter<'_> {
 
 /// From directions of the world of a scene to those in which its sky has the zenith at +Y.
 pub(crate) fn upright(sky: Node) -> Result<DMat4, SceneError> {
-    let pole = SKIES.iter().find(|(plugin, _)| *plugin == sky.plugin()).map_or(DVec3::Y, |(_, pole)| *pole);
+    let pole = if is_y_up(sky) { DVec3::Y } else { DVec3::Z };
     let pole = sky.transform("to_world")?.transform_vector3(pole).try_normalize();
     Ok(pole.map_or(DMat4::IDENTITY, |pole| DMat4::from_quat(glam::DQuat::from_rotation_arc(pole, DVec3::Y))))
 }

@@ -89,7 +89,9 @@ impl LayerTable {
         match material {
             Material::Metal { .. } | Material::Conductor { .. } => return Some(MaterialKind::Metal as usize),
             Material::Plastic { .. } | Material::Translucent { .. } => return Some(material.kind() as usize),
-            Material::Disney { .. } if !material.scatters_through() => return Some(material.kind() as usize),
+            Material::Disney { thin_walled: false, .. } if !material.scatters_through() => {
+                return Some(material.kind() as usize);
+            }
             _ => {}
         }
         let Material::Principled {
