@@ -226,8 +226,8 @@ impl SceneReport<'_> {
     fn not_modelled(&self) -> Vec<String> {
         let Some(facts) = &self.scene.facts else {
             // For other formats they are in the warnings.
-            let warnings = self.scene.warnings.iter().filter(|warning| warning.contains("not modelled"));
-            return warnings.map(Warning::to_string).collect();
+            let says = |warning: &&Warning| ["not modelled", "left out"].iter().any(|words| warning.contains(words));
+            return self.scene.warnings.iter().filter(says).map(Warning::to_string).collect();
         };
         let extensions = facts.unknown_extensions.iter().map(|name| format!("extension {}", printable::name(name)));
         let notes = facts.notes.iter().map(|(material, note)| format!("{}: {note}", printable::name(material)));

@@ -41,9 +41,15 @@ fn info_has_one_line_for_all_instances_of_a_mesh_and_the_size_of_the_scene() {
         property float confidence\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
         0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n";
     std::fs::write(path.join("scan.ply"), ply).unwrap();
-    let told = does(path, "info scan.ply").out().to_owned();
-    let line = told.lines().find(|line| line.trim_start().starts_with("not modelled")).unwrap();
+    let not_modelled = |name: &str| {
+        let told = does(path, &format!("info {name}")).out().to_owned();
+        told.lines().find(|line| line.trim_start().starts_with("not modelled")).unwrap().to_owned()
+    };
+    let line = not_modelled("scan.ply");
     assert!(line.contains("confidence") && !line.contains("polarisation"), "{line}");
+    let scene = "WorldBegin\nShape \"sphere\"\nShape \"plymesh\" \"string filename\" [\"absent.ply\"]\n";
+    std::fs::write(path.join("half.pbrt"), scene).unwrap();
+    assert!(not_modelled("half.pbrt").contains("left out"), "{}", not_modelled("half.pbrt"));
 }
 
 #[test]
