@@ -146,9 +146,18 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         }
     }
     player.update();
-    let Player { mut session, mut warnings, .. } = player;
+    let Player { mut session, mut warnings, clock, .. } = player;
     session.send(Command::Pause);
-    session.update(Duration::MAX);
+    // As after a rest, when what was moved shares its tree with what stands still, as it does when the image is opened.
+    let rested = clock + Duration::from_secs(1);
+    session.update(rested);
+    while !session.world().resource::<BackgroundTasks>().is_idle() {
+        if stop() {
+            return Err(failed("the replay was stopped".to_owned()));
+        }
+        std::thread::sleep(Duration::from_millis(2));
+        session.update(rested);
+    }
     let spp = options.spp.or(end.map(|end| end.min(MOST_SAMPLES))).unwrap_or(0);
     if options.spp.is_none() && end > Some(MOST_SAMPLES) {
         let more = "--spp renders more";

@@ -101,8 +101,8 @@ impl Description {
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
             camera: match &animation {
-                // The one that the tracks move; the one that is shown is in `animation`.
-                Some(animation) if animation_part.edited.camera.is_some() => animation.camera.clone(),
+                // The one that the tracks move; the one that is shown, if it is another one, is in `animation`.
+                Some(animation) if animation.has_camera_track() => animation.camera.clone(),
                 Some(animation) => {
                     let (kept, then) = (&animation.camera, animation.camera_at(at));
                     let is_kept = camera(kept) == (view, projection, lens);

@@ -1,12 +1,15 @@
 //! A hash that tells whether two loaded scenes have the same contents.
 
 use crate::files::hash::Fingerprint;
+use crate::format::animation::TrackPart;
 use crate::format::camera::CameraPart;
 use crate::format::parts::{DisplayPart, FilmPart, ObjectPart};
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
+use crate::import::gltf_motion::GltfMotion;
 use crate::mesh::Mesh;
 use crate::render::{Environment, ImageTexture, Integrator, Texels, TexturePattern};
+use crate::scene::animation::Animation;
 use crate::scene::describe::Description;
 use crate::scene::loaded::LoadedScene;
 use crate::scene::world::components::{Shape, SurfaceTexture, textures_of};
@@ -78,13 +81,20 @@ pub struct SceneContent {
     file: SceneFile,
     meshes: Vec<Arc<Mesh>>,
     pictures: Vec<Arc<ImageTexture>>,
+    /// The animations of a glTF file that things move by during the exposure.
+    motion: Option<Arc<GltfMotion>>,
 }
 
 impl SceneContent {
     /// The contents of `world`, which `description` describes.
     pub fn of(world: &mut World, description: &Description) -> Self {
         let mut file = description.file.clone();
+        let CameraPart { look_at, forward, .. } = file.camera;
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
+        if file.animation.tracks.iter().any(|track| matches!(track, TrackPart::Camera { .. })) {
+            // A camera on its way is turned towards a point, or is not.
+            (file.camera.look_at, file.camera.forward) = (look_at, forward);
+        }
         (file.cameras, file.animation.edited.camera) = Default::default();
         (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
         (file.integrator, file.max_depth) = (Integrator::default(), None);
@@ -126,7 +136,10 @@ impl SceneContent {
         if let Environment::Image { image, .. } = &inputs.environment.light {
             pictures.push(image.clone());
         }
-        Self { file, meshes, pictures }
+        let is_exposed = file.animation.shutter.is_some() || file.animation.shutter_seconds.is_some();
+        let animation = world.get_resource::<Animation>().filter(|_| is_exposed);
+        let model = animation.and_then(|animation| animation.model.as_ref());
+        Self { file, meshes, pictures, motion: model.map(|model| model.motion.clone()) }
     }
 
     /// Reads each vertex and each texel once, however often they are used.
@@ -134,6 +147,7 @@ impl SceneContent {
         let parts = of_each(&self.meshes, of_mesh).into_iter();
         let parts = parts.chain(of_each(&self.pictures, of_picture));
         let file = Fingerprint::of(self.file.to_ron().as_bytes());
+        let parts = parts.chain(self.motion.iter().map(|motion| motion.fingerprint()));
         parts.fold(file, |print, part| print.with(bytemuck::bytes_of(&part.0)))
     }
 }

@@ -206,7 +206,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     let shot = ImageMetadata::read(path).map_err(failed)?;
     let source = shot.source(path).map_err(failed)?;
     let options = LoadOptions { up: options.up.or(shot.up()), ..*options };
-    let mut scene = match (&shot.text, source) {
+    let (mut scene, moves) = match (&shot.text, source) {
         (Some(text), source) => {
             let start = Instant::now();
             // Its paths are relative to the folder of the scene.
@@ -216,7 +216,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                 SceneSource::Builtin(_) => PathBuf::new(),
                 file => file.path().and_then(Path::parent).map(Path::to_path_buf).unwrap_or_default(),
             };
-            let mut scene = {
+            let (mut scene, moves) = {
                 let documents = Documents::new(options.choice());
                 let file = SceneFile::parse(text, path)?;
                 let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
@@ -228,19 +228,19 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                         source.title()
                     )),
                 }
-                scene.move_as_model(shot.model_camera(), &documents)?;
-                scene
+                let moves = scene.move_as_model(shot.model_camera(), &documents)?;
+                (scene, moves)
             };
             scene.load_seconds = start.elapsed().as_secs_f64();
             let start = Instant::now();
             scene.build_trees(&options)?;
             scene.build_seconds = start.elapsed().as_secs_f64();
-            scene
+            (scene, moves)
         }
-        (None, Some(source)) => load(&source, &options)?,
+        (None, Some(source)) => (load(&source, &options)?, true),
         (None, None) => return Err(SceneError::in_file(path, "its metadata names no scene")),
     };
-    if scene.content_fingerprint().to_string() != shot.fingerprint {
+    if moves && scene.content_fingerprint().to_string() != shot.fingerprint {
         let what = match &scene.source {
             SceneSource::Picture(_) => "a file of its scene".to_owned(),
             source => source.title(),
@@ -416,15 +416,15 @@ impl LoadedScene {
         }
     }
 
-    /// Moves a glTF model from an image with motion blur as its file does.
+    /// Moves a glTF model from an image with motion blur as its file does; false, and a warning, if it has other objects.
     ///
     /// - `camera`: name of the camera of the model that the image was opened with.
-    fn move_as_model(&mut self, camera: Option<&str>, documents: &Documents) -> Result<(), SceneError> {
+    fn move_as_model(&mut self, camera: Option<&str>, documents: &Documents) -> Result<bool, SceneError> {
         let animation = &self.file.animation;
         let is_exposed = animation.shutter.is_some() || animation.shutter_seconds.is_some();
-        let SceneSource::Model(path) = &self.source else { return Ok(()) };
+        let SceneSource::Model(path) = &self.source else { return Ok(true) };
         if !is_exposed || !animation.tracks.is_empty() || ModelFormat::of(path) != Some(ModelFormat::Gltf) {
-            return Ok(());
+            return Ok(true);
         }
         let meshes = |file: &SceneFile| -> Vec<MeshSource> {
             let sources = file.objects.iter().filter_map(|object| match object {
@@ -445,7 +445,7 @@ impl LoadedScene {
             let title = self.source.title();
             self.warnings.push(format!("{title}: the image has edited objects, and is shown without motion blur"));
         }
-        Ok(())
+        Ok(is_same)
     }
 
     /// Sets the chosen exposure time; warns if nothing can move.

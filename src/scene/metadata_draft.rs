@@ -102,7 +102,7 @@ impl MetadataDraft {
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
             fingerprint: content.to_string(),
-            camera: shown_camera(file).clone(),
+            camera: shown_camera(file),
             film,
             integrator: file.integrator,
             max_depth: file.max_depth,

@@ -50,7 +50,7 @@ impl LoadedScene {
         let mut ordinals = (0..).map(Ordinal);
         let mut next = move || ordinals.next().expect("fewer entities than numbers");
         let (entities, _) = self.spawn_parts(world, HashMap::new(), &mut next);
-        let (view, projection, lens) = camera(shown_camera(&self.file));
+        let (view, projection, lens) = camera(&shown_camera(&self.file));
         world.spawn((view, projection, lens, Name::new("camera"), next()));
         self.put_environment(world);
         self.put_settings(world);

@@ -1,7 +1,7 @@
 //! An image opens again as the scene that it shows, through the program: scenes with tracks, cuts, motion blur, cameras of
 //! their own, models and archives. What is rendered of an image has the same bytes as the image.
 
-use super::parts::{does, equal, run_in};
+use super::parts::{does, equal, fails, run_in};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
@@ -29,12 +29,14 @@ const SCENE: &str = r#"(
 )"#;
 
 /// A triangle that also changes its shape and a camera, which move for two seconds.
-fn moving_model() -> String {
+///
+/// - `flight`: of the second camera, from where to where; it has the speed of the motion blur.
+fn moving_model(flight: [f32; 6]) -> String {
     let numbers: Vec<f32> = [
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].as_slice(),
         &[0.0, 2.0],
         &[-1.0, 0.0, 0.0, 1.0, 0.5, 0.0],
-        &[0.0, 0.0, 4.0, 1.0, 0.0, 5.0],
+        &flight,
         &[0.0, 0.0, -3.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0],
         &[0.0, 1.0],
     ]
@@ -71,6 +73,8 @@ fn moving_model() -> String {
         STANDARD.encode(&bytes)
     )
 }
+
+const FLIGHT: [f32; 6] = [0.0, 0.0, 4.0, 1.0, 0.0, 5.0];
 
 /// Rendering the image gives the image; so does, but for its note, the scene that is saved of it.
 fn reopens(path: &Path, name: &str) {
@@ -117,7 +121,7 @@ fn an_image_opens_as_what_it_shows_whatever_its_tracks_say() {
 fn an_image_of_a_moving_model_opens_as_what_it_shows() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    std::fs::write(path.join("m.gltf"), moving_model()).unwrap();
+    std::fs::write(path.join("m.gltf"), moving_model(FLIGHT)).unwrap();
     for (i, how) in [
         "",
         "--at 0.75",
@@ -133,6 +137,48 @@ fn an_image_of_a_moving_model_opens_as_what_it_shows() {
         does(path, &format!("render m.gltf {SMALL} {how} -o {i}.exr"));
         let is_last_of_two = how.contains("turntable") || how.contains("frames");
         reopens(path, &if is_last_of_two { format!("{i}-0002.exr") } else { format!("{i}.exr") });
+    }
+}
+
+/// At 0.75 s the camera of both versions is at the same place, and flies at another speed.
+#[test]
+fn another_motion_is_another_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let slow = [0.1875, 0.0, 4.1875, 0.6875, 0.0, 4.6875];
+    let how = "--camera flying --at 0.75 --shutter 1 --size 16x12 --threads 2";
+    for (name, samples, flight) in [("a", "0..2", FLIGHT), ("b", "2..4", slow)] {
+        std::fs::write(path.join("m.gltf"), moving_model(flight)).unwrap();
+        does(path, &format!("render m.gltf {how} --samples {samples} --film {name}-film.exr -o {name}.exr"));
+    }
+    let said = fails(path, "merge a-film.exr b-film.exr -o c.exr", 1);
+    assert!(said.contains("version of the scene"), "{said}");
+    let said = does(path, "render a.exr -o again.exr --threads 2");
+    assert!(said.contains("has changed since"), "{said}");
+}
+
+/// What is moved has a tree of its own until it rests; an image is one of what rests. The focus of a pinhole whose eye has
+/// a track is no edit: it still looks at its target when the image is opened.
+#[test]
+fn an_image_of_a_replay_opens_as_what_it_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let camera = "camera: (eye: (0, 1.9, 6.2), look_at: (0, 0.6, 0), lens_radius: 0.05, depth_of_field: false)";
+    let torus = "mesh(source: builtin(\"torus\"), material: \"m\", transform: (rotate: (90, 0, 0), scale: 0.7))";
+    let track =
+        "camera(property: eye, interpolation: smooth, keys: [(0, (-5, 1, 0)), (0.5, (0, 1.3, 5)), (1, (5, 1, 0))])";
+    let rest =
+        "environment: gradient(zenith: 0.6, horizon: 0.4, ground: 0.1), materials: { \"m\": diffuse(albedo: 0.5) }";
+    let scene =
+        format!("({camera}, {rest}, objects: [{torus}], animation: (fps: 24, shutter: 0.5, tracks: [{track}]))");
+    std::fs::write(path.join("s.ron"), scene).unwrap();
+    let moved = "Do(2,2.2,Edit(SelectAll))\nDo(3,2.3,Edit(Move(by:(-0.35,0.43,0.0))))";
+    let focused = "Do(2,2.2,SetMoment(seconds:Some(0.2916666666666667)))\nDo(3,2.3,SetFocus(distance:3.7))";
+    for (name, commands) in [("moved.exr", moved), ("focused.exr", focused)] {
+        let header = "(format:1,program:\"firstlight\",scene:File(\"s.ron\"),up:None,width:40,height:30,seed:0)";
+        std::fs::write(path.join("a.rec"), format!("{header}\nOpened(1,1,\"\")\n{commands}\nEnd(4,4)\n")).unwrap();
+        does(path, &format!("--replay a.rec -o {name}"));
+        reopens(path, name);
     }
 }
 

@@ -257,6 +257,25 @@ fn a_camera_that_was_moved_by_hand_keeps_what_has_no_keys() {
     assert_eq!((camera.view.eye, camera.projection.vfov_deg), (DVec3::new(4.0, 2.0, 4.0), 20.0));
 }
 
+/// Neither the focus of a pinhole, nor an aperture that is closed, is an edit: what is written is the camera on its way.
+#[test]
+fn what_a_pinhole_hides_changes_nothing_of_a_camera_with_tracks() {
+    let pinhole = MOVING.replace("lens_radius: 0.01", "lens_radius: 0.01, depth_of_field: false");
+    let opening = MOVING.replace(", lens_radius: 0.01", ", focus_distance: 2").replace(
+        "camera(property: vfov, keys: [(0, 40), (4, 20)])",
+        "camera(property: lens_radius, keys: [(0.29, 0), (4, 1)])",
+    );
+    for (text, radius) in [(pinhole, 0.01), (opening, 0.373)] {
+        let (mut world, loaded) = open_at(&text, Some(0.29));
+        let camera = SceneInputs::of(&mut world).camera.unwrap();
+        assert!(!camera.lens.enabled);
+        let lens = firstlight::scene::Lens { radius, focus_distance: 3.7, ..camera.lens };
+        world.entity_mut(camera.entity).insert(lens);
+        let file = Description::of(&mut world, Some(&loaded)).file;
+        assert_eq!((file.camera, file.animation.edited.camera), (loaded.file.camera.clone(), None));
+    }
+}
+
 /// A scene with one track more, or another line in its animation.
 fn with(line: &str) -> String {
     MOVING.replace("        tracks: [\n", &format!("        tracks: [\n            {line}\n"))

@@ -7,6 +7,7 @@ use crate::gltf::assembly::{MeshKey, Posed};
 use crate::gltf_parts::{camera_of, extend, light_of};
 use crate::model::imported::ModelNormals;
 use crate::model::placing::transform;
+use firstlight_files::hash::Fingerprint;
 use firstlight_format::camera::CameraPart;
 use firstlight_format::light::LightKind;
 use firstlight_format::parts::LightPart;
@@ -72,6 +73,11 @@ impl GltfMotion {
         moment.camera =
             self.camera.and_then(|camera| Some(camera_of(assembly.cameras.get(camera)?, 0.5 * (bounds.0 + bounds.1))));
         Some(moment)
+    }
+
+    /// Of all animations of the file, and of which camera is looked through.
+    pub fn fingerprint(&self) -> Fingerprint {
+        self.opened.document.animation_fingerprint().with(format!("{:?}", self.camera).as_bytes())
     }
 
     /// The meshes of skins and morph targets at a moment, by the index of their object.

@@ -75,8 +75,9 @@ impl Animation {
 }
 
 /// The camera that is shown, in a file that describes a world.
-pub(in crate::scene) fn shown_camera(file: &SceneFile) -> &CameraPart {
-    file.animation.edited.camera.as_ref().unwrap_or(&file.camera)
+pub(in crate::scene) fn shown_camera(file: &SceneFile) -> CameraPart {
+    let edited = file.animation.edited.camera.clone();
+    edited.unwrap_or_else(|| animation_of_camera(file).camera_at(file.animation.at))
 }
 
 /// Shows this camera at the time of the file, whatever its tracks say.

@@ -7,6 +7,8 @@
 use crate::error::gltf::{GltfProblem, Located, place};
 use crate::gltf::document::Document;
 use crate::gltf::json;
+use bytemuck::{bytes_of, cast_slice};
+use firstlight_files::hash::Fingerprint;
 use glam::{DQuat, DVec3};
 use std::collections::{BTreeSet, HashMap};
 use std::rc::Rc;
@@ -44,6 +46,11 @@ enum SamplerInterpolation {
     CubicSpline,
 }
 
+/// Of no keys if they cannot be read.
+fn of_keys<const N: usize>(keys: Result<Vec<[f32; N]>, Located>) -> Fingerprint {
+    Fingerprint::of(cast_slice(keys.unwrap_or_default().as_flattened()))
+}
+
 impl Document {
     /// The time at which the last animation ends, seconds; `None` without animations.
     pub(crate) fn animation_length(&self) -> Option<f64> {
@@ -51,6 +58,33 @@ impl Document {
         let inputs: BTreeSet<u32> = samplers.map(|sampler| sampler.input).collect();
         let ends = inputs.into_iter().filter_map(|input| self.floats::<1>(input).ok()?.last().copied());
         ends.map(|[end]| f64::from(end)).reduce(f64::max)
+    }
+
+    /// Of what all animations move, and of their keys.
+    pub(crate) fn animation_fingerprint(&self) -> Fingerprint {
+        let mut known = HashMap::new();
+        let mut keys = |index: u32, n_numbers: usize| {
+            *known.entry((index, n_numbers)).or_insert_with(|| match n_numbers {
+                1 => of_keys(self.raw_floats::<1>(index)),
+                3 => of_keys(self.raw_floats::<3>(index)),
+                _ => of_keys(self.raw_floats::<4>(index)),
+            })
+        };
+        let mut print = Fingerprint::of(b"");
+        for animation in &self.root.animations {
+            for json::Channel { sampler, target } in &animation.channels {
+                let Some(sampler) = animation.samplers.get(*sampler as usize) else { continue };
+                let what = format!("{:?} {} {:?}", target.node, target.path, sampler.interpolation);
+                let n_numbers = match target.path.as_str() {
+                    "weights" => 1,
+                    "rotation" => 4,
+                    _ => 3,
+                };
+                let keys = [keys(sampler.input, 1), keys(sampler.output, n_numbers)];
+                print = keys.iter().fold(print.with(what.as_bytes()), |print, of| print.with(bytes_of(&of.0)));
+            }
+        }
+        print
     }
 
     /// The pose of all nodes; without a time, the stored one. Broken channels are left out.
