@@ -5,7 +5,8 @@
 //! 1280 × 720 on the processor of the first measurement, so that the result does not depend on the machine.
 //!
 //! `-- [SCENE[:WAY]…]…` takes other scenes and ways: `gallery:6:8+3:8+3+12` smooths a film divided by 6; then puts the light
-//! of one divided by 8 on surfaces divided by 3; then mixes it with that of up to 12 images before.
+//! of one divided by 8 on surfaces divided by 3; then mixes it with that of up to 12 images before. A way that ends with `s`
+//! begins with the reference of the first image, as the window does with what it shows at rest.
 //!
 //! FLIP and relMSE are means over four of the images against 32 samples per pixel, denoised, both as they are displayed;
 //! flicker is the mean change of a surface from image to image, in units of 1/255. With `FIRSTLIGHT_BENCH_IMAGES=FOLDER`
@@ -15,8 +16,8 @@ mod common;
 
 use common::{scenes, world_of};
 use firstlight::render::{
-    Camera, Display, Film, MovingImage, Prepared, RenderSettings, advance, decode_srgb, denoise_film, develop_colors,
-    gather_features, gather_guides, relight, smooth_film,
+    Camera, Display, Film, MovingImage, Prepared, Relighting, RenderSettings, advance, decode_srgb, denoise_film,
+    develop_colors, gather_features, gather_guides, relight, smooth_film,
 };
 use firstlight::report::{cpu_seconds, flip};
 use firstlight::scene::{Extraction, SceneInputs};
@@ -29,11 +30,11 @@ const REFERENCE_SAMPLES: u32 = 32;
 
 fn main() {
     let usual = [
-        "gallery:6:6+6+12:8+4:8+4+12",
-        "cornell:4:4+4+12:6+2:6+2+12",
-        "everything:8:8+8+12:8+6:8+6+12",
-        "kd-tree:6:6+6+12:8+4:8+4+12",
-        "dof-balls:3:3+3+12:4+3:4+3+12",
+        "gallery:6:8+4:8+4+12:8+4+12s",
+        "cornell:4:6+2:6+2+12:6+2+12s",
+        "everything:8:8+6:8+6+12:8+6+12s",
+        "kd-tree:6:8+4:8+4+12:8+4+12s",
+        "dof-balls:3:4+3:4+3+12:4+3+12s",
     ];
     println!("| scene | divided by | FLIP | relMSE | flicker | CPU ms |");
     println!("|---|---|---:|---:|---:|---:|");
@@ -57,8 +58,14 @@ fn rows(name: &str, ways: &[&str]) {
     let positions: Vec<Vec<Vec3>> = views.iter().map(|view| features(view, SIZE).position).collect();
     let references: Vec<Vec<Vec3>> =
         COMPARED.iter().map(|&i| reference(&views[i], &format!("{title}-{i:02}-reference"))).collect();
+    let first = reference(&views[0], &format!("{title}-00-reference"));
     for way in ways {
-        let (mut moving, before) = (MovingImage::default(), cpu_seconds().unwrap_or(f64::NAN));
+        let mut moving = MovingImage::default();
+        if way.ends_with('s') {
+            image(&mut moving, &views[0], 0, way);
+            moving.settle(&first, SIZE, &views[0].camera, Display::default().exposure());
+        }
+        let before = cpu_seconds().unwrap_or(f64::NAN);
         let images: Vec<Vec<Vec3>> = (0..IMAGES).map(|i| image(&mut moving, &views[i], i as u32, way)).collect();
         let took = 1e3 * (cpu_seconds().unwrap_or(f64::NAN) - before) / IMAGES as f64;
         let mean = |of: &dyn Fn(&[Vec3], &[Vec3]) -> f64| {
@@ -95,7 +102,8 @@ fn camera(from: &Camera, pivot: f32, image: usize) -> Camera {
 ///
 /// - `number`: of the image, whose noise is its own; `way`: see the head of this file.
 fn image(moving: &mut MovingImage, view: &Prepared, number: u32, way: &str) -> Vec<Vec3> {
-    let numbers: Vec<u32> = way.split('+').map(|text| text.parse().expect("ways are numbers")).collect();
+    let numbers: Vec<u32> =
+        way.trim_end_matches('s').split('+').map(|text| text.parse().expect("ways are numbers")).collect();
     let size_of = |divider: u32| UVec2::new(SIZE.x.div_ceil(divider), SIZE.y.div_ceil(divider));
     let size = size_of(numbers[0]);
     let seed = if numbers.len() == 1 { 1 } else { number };
@@ -109,8 +117,10 @@ fn image(moving: &mut MovingImage, view: &Prepared, number: u32, way: &str) -> V
     }
     let smooth = smooth_film(&mut moving.filter, view, &settings, &film, &|| false).expect("surfaces are noted");
     let [_, surfaces, ..] = numbers[..] else { return displayed(smooth, size.into()) };
-    let size = size_of(surfaces);
-    displayed(relight(moving, view, &settings, &film, (size, 1.0), &|| false).expect("nothing stops it"), size.into())
+    let how =
+        Relighting { surfaces: size_of(surfaces), weight: 1.0, window: SIZE, exposure: Display::default().exposure() };
+    let (image, size) = relight(moving, view, &settings, &film, &how, &|| false).expect("nothing stops it");
+    displayed(image, size.into())
 }
 
 /// - `title`: of its file.

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use firstlight::render::{
-    ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, MovingImage, Prepared,
+    ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, MovingImage, Prepared, Relighting,
     RenderSettings, SurfaceGuides, advance, denoise_film, gather_features, gather_guides, relight, smooth_film,
 };
 use glam::{UVec2, Vec3};
@@ -216,9 +216,11 @@ fn coarse_light_is_put_on_surfaces_of_the_full_resolution() {
     let coarse = smooth_film(&mut image.filter, &scene, &settings, &film, &|| false).expect("surfaces are noted");
     let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| y / 4 * width + x / 4));
     let enlarged: Vec<Vec3> = pixels.map(|i| coarse[i as usize]).collect();
-    let size = (SIZE.into(), 1.0);
-    assert_eq!(relight(&mut image, &scene, &settings, &film, size, &|| true), None);
-    let relit = relight(&mut image, &scene, &settings, &film, size, &|| false).expect("nothing stops it");
+    let window = SIZE.into();
+    let how = Relighting { surfaces: window, weight: 1.0, window, exposure: 1.0 };
+    assert_eq!(relight(&mut image, &scene, &settings, &film, &how, &|| true), None);
+    let (relit, size) = relight(&mut image, &scene, &settings, &film, &how, &|| false).expect("nothing stops it");
+    assert_eq!(size, window);
     let [coarse, error] = [&enlarged[..], relit].map(|colors| relative_mse(colors, &reference.means()));
     assert!(error < 0.4 * coarse, "{error} of {coarse}");
 }

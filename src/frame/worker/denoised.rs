@@ -12,7 +12,8 @@ use crate::frame::worker::shared::lock;
 use crate::frame::worker::thread::Loop;
 use crate::frame::worker::views::{Settled, ViewKey};
 use crate::render::{
-    DenoiseSource, Film, Inspection, MovingImage, develop, develop_colors, guide_samples, relight, smooth_film,
+    DenoiseSource, Film, Inspection, MovingImage, Relighting, develop, develop_colors, guide_samples, relight,
+    smooth_film,
 };
 use glam::UVec2;
 use std::sync::atomic::Ordering;
@@ -52,9 +53,14 @@ impl Loop<'_> {
             );
             self.views.settle_again = Some(Instant::now() + SAMPLES_FIRST * settled.took);
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
-            self.views.settled = Some(settled);
             // This view will not be smoothed any more. Coarse images need little memory.
             self.moving.forget_image();
+            if let Some(job) = &self.job {
+                let (colors, exposure) = (&settled.denoised.color, self.display.exposure());
+                let take_over = || self.moving.settle(colors, settled.key.size, &job.prepared.camera, exposure);
+                lock(&self.shared.pool).clone().install(take_over);
+            }
+            self.views.settled = Some(settled);
             self.views.smooth_again = None;
             if let Some((_, film)) = &mut self.film {
                 film.forget_surfaces();
@@ -163,10 +169,6 @@ impl Loop<'_> {
             return Some(Developed { settled: of_settled, is_mixed: true, ..Developed::as_is(wanted) });
         }
         let surfaces = self.scheduler.surfaces(divider);
-        let size = match settled {
-            Some(_) => key.size,
-            None => UVec2::new(job.width.div_ceil(surfaces), job.height.div_ceil(surfaces)),
-        };
         let (mut smoothing, mut relighting) = (None, None);
         let smoothed = match settled {
             Some(_) => None,
@@ -176,9 +178,14 @@ impl Loop<'_> {
                 let start = Instant::now();
                 let is_smooth = smooth_film(&mut moving.filter, &job.prepared, &job.settings, film, &stop).is_some();
                 smoothing = is_smooth.then(|| start.elapsed());
-                let weight = film.spp() as f32 * self.scheduler.weight(divider);
+                let how = Relighting {
+                    surfaces: UVec2::new(job.width.div_ceil(surfaces), job.height.div_ceil(surfaces)),
+                    weight: film.spp() as f32 * self.scheduler.weight(divider),
+                    window: UVec2::new(job.width, job.height),
+                    exposure: self.display.exposure(),
+                };
                 let relit = match is_smooth {
-                    true => relight(moving, &job.prepared, &job.settings, film, (size, weight), &stop),
+                    true => relight(moving, &job.prepared, &job.settings, film, &how, &stop),
                     false => None,
                 };
                 if relit.is_some() {
@@ -191,8 +198,8 @@ impl Loop<'_> {
                 relit
             }
         };
-        let colors = settled.map(|settled| settled.denoised.color.as_slice()).or(smoothed);
-        let Some(colors) = colors else {
+        let colors = settled.map(|settled| (settled.denoised.color.as_slice(), key.size)).or(smoothed);
+        let Some((colors, size)) = colors else {
             if stop() {
                 return None;
             }

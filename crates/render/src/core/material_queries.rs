@@ -81,6 +81,27 @@ impl Material {
         }
     }
 
+    /// Whether it scatters no light, as far as that is the same everywhere: what lies beyond is seen in it or through it.
+    pub(crate) fn is_purely_specular(&self, materials: &[Self]) -> bool {
+        let whole = |input: &ScalarInput| !matches!(input, ScalarInput::Constant(share) if *share < 1.0);
+        match self {
+            Self::Phong { specular, transparency, .. } => {
+                *transparency >= 1.0 || matches!(specular, ScalarInput::Constant(share) if *share >= 1.0)
+            }
+            Self::Blend { weight, a, b, .. } => {
+                // A part without weight does not count.
+                [(*a, 1.0), (*b, 0.0)].into_iter().all(|(id, without)| {
+                    matches!(weight, ScalarInput::Constant(weight) if *weight == without)
+                        || materials[id as usize].is_purely_specular(materials)
+                })
+            }
+            Self::Principled { metallic, transmission, .. } => {
+                self.is_specular(materials) && (whole(metallic) || whole(transmission))
+            }
+            _ => self.is_specular(materials),
+        }
+    }
+
     /// The material that scatters: of a blend that adds nothing but holes and a normal map to one opaque part, that part.
     pub(crate) fn scattering<'a>(&'a self, materials: &'a [Self]) -> &'a Self {
         match self {

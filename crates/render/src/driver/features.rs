@@ -16,7 +16,7 @@ use crate::integrators::path::CameraPath;
 use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -104,13 +104,13 @@ impl<'a> Look<'a> {
         settings.check().unwrap_or_else(|error| panic!("{error}"));
         snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
         let (camera, even_samples) = (&snapshot.camera, settings.techniques.even_samples);
-        let lens = CameraRays { camera, size, filter, seed: settings.seed, even_samples, in_middle: false };
+        let lens = CameraRays { camera, size, filter, seed: settings.seed, even_samples, at: None };
         Self { snapshot, settings, lens }
     }
 
-    /// The same with rays through the middle of pixels and of the lens.
-    pub fn in_middle(self) -> Self {
-        Self { lens: CameraRays { in_middle: true, ..self.lens }, ..self }
+    /// The same with rays through this place in pixels, 0..1, and the middle of the lens.
+    pub fn at(self, place: Vec2) -> Self {
+        Self { lens: CameraRays { at: Some(place), ..self.lens }, ..self }
     }
 }
 

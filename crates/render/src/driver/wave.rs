@@ -222,7 +222,7 @@ impl<'a> Pass<'a> {
     pub fn lens(&self) -> CameraRays<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
         let (camera, filter) = (&self.snapshot.camera, &self.filter);
-        CameraRays { camera, size: self.size, filter, seed, even_samples, in_middle: false }
+        CameraRays { camera, size: self.size, filter, seed, even_samples, at: None }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::denoise::{APART, MARGIN, SmoothRow, divided_by};
 use crate::driver::relight::past::{SeenPast, store};
 use crate::integrators::common::seen::Seen;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Truth, Vector, dispatch, select};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 /// Planes of [`FineRow`]: albedo, emitted radiance, normal, position, depth and object.
 const N_PLANES: usize = 14;
@@ -59,6 +59,8 @@ pub struct FinePlace<'a> {
     pub camera: &'a Camera,
     /// Column and row of the first pixel.
     pub first: UVec2,
+    /// Where in each pixel its ray goes through, 0..1.
+    pub at: Vec2,
     /// Of the fine image, pixels.
     pub size: UVec2,
     /// Number of earlier images that the present one counts as.
@@ -166,7 +168,7 @@ fn number_of<S: Simd>(s: S, surfaces: &FineRow, plane: usize, at: usize) -> Floa
 
 #[inline(always)]
 fn relight<S: Simd>(s: S, place: FinePlace, coarse: &Coarse, surfaces: &FineRow, to: &mut [Vec3], to_past: &mut [f32]) {
-    let FinePlace { camera, first, size, weight } = place;
+    let FinePlace { camera, first, at: in_pixel, size, weight } = place;
     let counted = Bits::load(s, &std::array::from_fn(|lane| lane as u32)).to_float();
     let (zero, one) = (counted.all(0.0), counted.all(1.0));
     let [above, below] = [1.0 - coarse.below, coarse.below];
@@ -175,7 +177,7 @@ fn relight<S: Simd>(s: S, place: FinePlace, coarse: &Coarse, surfaces: &FineRow,
         let [normal, position] = [surface_of(s, surfaces, 6, at), surface_of(s, surfaces, 9, at)];
         let [depth, object] = [number_of(s, surfaces, DEPTH, at), number_of(s, surfaces, OBJECT, at)];
         let by_plane = counted.all(1.0 / PLANE_TOLERANCE) / position.dot(position).sqrt().at_least(1e-20);
-        let column = counted + ((first.x as usize + at) as f32 + 0.5);
+        let column = counted + ((first.x as usize + at) as f32 + in_pixel.x);
         // One more than the left one of the next columns, so that it is positive and truncated downwards.
         let u = (column * coarse.scale + (coarse.offset + 0.5)).at_least(0.0);
         let left = u.truncate();
@@ -211,19 +213,19 @@ fn relight<S: Simd>(s: S, place: FinePlace, coarse: &Coarse, surfaces: &FineRow,
         let inverse = one / taps.total.at_least(1e-30);
         let mut light = taps.light * inverse;
         // Light of other surfaces counts less, so that it is soon replaced.
-        let mut images = taps.total * weight;
+        let (mut images, mut seen) = (taps.total * weight, zero);
         if let Some(past) = coarse.past {
-            let points = camera.points([column, one * (first.y as f32 + 0.5)], size.as_vec2(), depth);
+            let points = camera.points([column, one * (first.y as f32 + in_pixel.y)], size.as_vec2(), depth);
             let away = points - Vector::splat(s, camera.eye);
-            let (before, count) = past.light_of(s, points, away.dot(normal) / away.length(), object);
+            let (old, [count, was_seen]) = past.light_of(s, points, away.dot(normal) / away.length(), object);
             let sum = images + count;
             let share = select(zero.lt(sum), images / sum, one);
             // The more images there are, the less is this one smoothed.
             let present = light * share + taps.narrow * inverse * (one - share);
-            light = before * (one - share) + present * share;
-            images = sum;
+            light = old * (one - share) + present * share;
+            (images, seen) = (sum, was_seen);
         }
-        store(to_past, first.x as usize + at, light, images, depth, object);
+        store(to_past, first.x as usize + at, light, [images, depth, object, seen]);
         let mut color = light.times(albedo) + emitted;
         if camera.lens_radius > 0.0 {
             let share = (confusion * (1.0 / (LARGE * coarse.pixel))).at_most(1.0);
@@ -243,10 +245,10 @@ mod tests {
     use crate::driver::relight::MovingImage;
     use crate::film::surfaces::PixelSurface;
     use crate::sampling::{hash_combine, hash_u32};
-    use glam::Vec2;
 
     const COARSE: UVec2 = UVec2::new(40, 24);
     const FINE: UVec2 = UVec2::new(160, 96);
+    const MIDDLE: Vec2 = Vec2::splat(0.5);
     const FLOOR: u32 = 0;
     const WALL: u32 = 1;
 
@@ -303,17 +305,18 @@ mod tests {
         let input = MovingInput { width, height: COARSE.y as usize, read: &read, eye: camera.eye };
         filter.filter.smooth(&input, set, &|| false).expect("nothing stops it");
         let fine = surfaces(camera, wall, FINE);
-        let (mut colors, mut present) = filter.take_finer(FINE);
+        let (mut colors, mut present) = filter.take_finer(FINE, MIDDLE);
         let (mut row, length) = (FineRow::default(), present.row_length());
         let width = FINE.x as usize;
         let rows = colors.chunks_mut(width).zip(present.rows_mut().chunks_mut(length)).zip(fine.chunks(width));
         for (y, ((to, to_past), fine)) in rows.enumerate() {
             row.fill(fine, camera.eye);
-            let place = FinePlace { camera, first: UVec2::new(0, y as u32), size: FINE, weight: 1.0 };
+            let place = FinePlace { camera, first: UVec2::new(0, y as u32), at: MIDDLE, size: FINE, weight: 1.0 };
             filter.relight_row(set, place, &row, to, to_past);
         }
         present.finish(camera);
-        filter.keep_finer(colors, present).to_vec()
+        (filter.finer, filter.present) = (colors, present);
+        filter.finer.clone()
     }
 
     /// Root of the mean squared relative error.

@@ -6,13 +6,14 @@
 
 use crate::core::camera::Camera;
 use firstlight_simd::{Bits, Float, LANES, Real, Simd, Vector, select};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
-/// Planes of a row: light, number of images, depth and object.
-pub const N_PAST: usize = 6;
+/// Planes of a row: light, number of images, depth, object, and how the surface was seen in the image before.
+pub const N_PAST: usize = 7;
 const IMAGES: usize = 3;
 const DEPTH: usize = 4;
 const OBJECT: usize = 5;
+const SEEN: usize = 6;
 
 /// The light of an image.
 #[derive(Default)]
@@ -20,14 +21,18 @@ pub struct Past {
     /// Planes of a row lie together.
     numbers: Vec<f32>,
     size: UVec2,
+    /// Where in its pixel each ray went through, 0..1.
+    at: Vec2,
     /// `None` if there is no image.
     camera: Option<Camera>,
 }
 
 impl Past {
     /// Begins with an image of this size; there is none until [`Self::finish`].
-    pub fn start(&mut self, size: UVec2) {
-        (self.size, self.camera) = (size, None);
+    ///
+    /// - `at`: where in its pixel each ray goes through, 0..1.
+    pub fn start(&mut self, size: UVec2, at: Vec2) {
+        (self.size, self.at, self.camera) = (size, at, None);
         let n = size.y as usize * self.row_length();
         if self.numbers.len() != n {
             self.numbers = vec![0.0; n];
@@ -54,6 +59,32 @@ impl Past {
         N_PAST * self.stride()
     }
 
+    /// Pixels.
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// Where in its pixel each ray goes through, 0..1.
+    pub fn at(&self) -> Vec2 {
+        self.at
+    }
+
+    /// Depths of a row, metres.
+    pub fn depths(&self, y: usize) -> &[f32] {
+        self.row(DEPTH, y)
+    }
+
+    /// How the surfaces of a row were seen in the image before: above 0 if all rays around show them, below 0 if none shows
+    /// their object, 0 else.
+    pub fn seen_before(&self, y: usize) -> &[f32] {
+        self.row(SEEN, y)
+    }
+
+    fn row(&self, plane: usize, y: usize) -> &[f32] {
+        let row = &self.numbers[y * self.row_length()..];
+        &row[plane * self.stride()..][..self.size.x as usize]
+    }
+
     pub fn rows_mut(&mut self) -> &mut [f32] {
         &mut self.numbers
     }
@@ -68,7 +99,15 @@ impl Past {
     pub fn seen(&self, most: f32) -> Option<SeenPast<'_>> {
         let camera = self.camera.as_ref().filter(|_| self.size.min_element() > 1)?;
         let pixel = camera.pixel_size(self.size.as_vec2());
-        Some(SeenPast { numbers: &self.numbers, size: self.size, stride: self.stride(), camera, pixel, most })
+        Some(SeenPast {
+            numbers: &self.numbers,
+            size: self.size,
+            at: self.at,
+            stride: self.stride(),
+            camera,
+            pixel,
+            most,
+        })
     }
 }
 
@@ -77,6 +116,7 @@ impl Past {
 pub struct SeenPast<'a> {
     numbers: &'a [f32],
     size: UVec2,
+    at: Vec2,
     stride: usize,
     camera: &'a Camera,
     /// Side of a pixel on the film of the camera.
@@ -84,11 +124,14 @@ pub struct SeenPast<'a> {
     most: f32,
 }
 
+/// Share of the rays around that may show something else, for rounding.
+const NEARLY_NONE: f32 = 1e-3;
 /// Distance from the expected depth that counts as the same surface, over the depth.
 const DEPTH_TOLERANCE: f32 = 0.003;
 
 impl SeenPast<'_> {
-    /// Light of points in the image, and the number of images that it is the mean of; zero where they cannot be seen.
+    /// Light of points in the image, and the number of images that it is the mean of, zero where they cannot be seen; and how
+    /// they are seen, as for [`Past::seen_before`].
     ///
     /// - `points`: in the frame of the snapshot; `cos`: between their normals and the way to the camera; `objects`: their
     ///   objects.
@@ -99,11 +142,11 @@ impl SeenPast<'_> {
         points: Vector<S>,
         cos: Float<S>,
         objects: Float<S>,
-    ) -> (Vector<S>, Float<S>) {
+    ) -> (Vector<S>, [Float<S>; 2]) {
         let (zero, one) = (cos.all(0.0), cos.all(1.0));
         let size = self.size.as_vec2();
         let found = self.camera.connections([zero, zero], points, size);
-        let [u, v] = [found.film[0] - 0.5, found.film[1] - 0.5];
+        let [u, v] = [found.film[0] - self.at.x, found.film[1] - self.at.y];
         let is_inside = zero.lt(found.depth)
             & u.lt(zero.all(size.x - 0.5))
             & v.lt(zero.all(size.y - 0.5))
@@ -121,13 +164,14 @@ impl SeenPast<'_> {
         };
         let tolerance = across / cos.abs().at_least(0.05) + found.depth * DEPTH_TOLERANCE;
         let mut light = Vector::splat(s, Vec3::ZERO);
-        let (mut images, mut total) = (zero, zero);
+        let (mut images, mut total, mut is_hidden) = (zero, zero, is_inside);
         let unknown = zero.all(u32::MAX as f32);
         for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let share = if dx == 0 { one - right } else { right } * if dy == 0 { one - below } else { below };
             let index = corner + (dx + dy * row_length);
             let object = self.plane(OBJECT, index);
             let is_object = object.equals(objects) | unknown.le(objects) | unknown.le(object);
+            is_hidden &= !is_object;
             let is_near = (self.plane(DEPTH, index) - found.depth).abs().le(tolerance);
             let is_same = is_inside & is_object & is_near;
             let weight = select(is_same, share, zero);
@@ -137,7 +181,9 @@ impl SeenPast<'_> {
             total += weight;
         }
         let inverse = select(zero.lt(total), one / total, zero);
-        (light * inverse, (images * inverse).at_most(self.most))
+        let is_whole = one.lt(total + NEARLY_NONE);
+        let seen = select(is_whole, one, select(is_hidden, -one, zero));
+        (light * inverse, [(images * inverse).at_most(self.most), seen])
     }
 
     #[inline(always)]
@@ -154,13 +200,25 @@ pub fn store<S: Simd>(
     row: &mut [f32],
     at: usize,
     light: Vector<S>,
-    images: Float<S>,
-    depth: Float<S>,
-    object: Float<S>,
+    [images, depth, object, seen]: [Float<S>; N_PAST - 3],
 ) {
     let stride = row.len() / N_PAST;
-    let planes = [light.x, light.y, light.z, images, depth, object];
+    let planes = [light.x, light.y, light.z, images, depth, object, seen];
     for (k, numbers) in planes.into_iter().enumerate() {
         numbers.store(row[k * stride + at..].first_chunk_mut().expect("rows are padded"));
+    }
+}
+
+#[cfg(test)]
+impl Past {
+    /// An image whose rays all end at this depth, on surfaces that were seen so in the image before.
+    pub fn of_depth(size: UVec2, at: Vec2, depth: f32, seen: f32) -> Self {
+        let mut past = Self::default();
+        past.start(size, at);
+        let stride = past.stride();
+        for (plane, numbers) in past.numbers.chunks_exact_mut(stride).enumerate() {
+            numbers.fill(if plane % N_PAST == DEPTH { depth } else { seen });
+        }
+        past
     }
 }

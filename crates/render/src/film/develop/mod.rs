@@ -30,7 +30,12 @@ impl Display {
     /// Converts linear radiance to linear display light, 0..1 per channel.
     #[inline]
     pub fn tone_mapped(&self, radiance: Vec3) -> Vec3 {
-        self.tone_curve.apply((radiance * self.exposure_stops.exp2()).max(Vec3::ZERO))
+        self.tone_curve.apply((radiance * self.exposure()).max(Vec3::ZERO))
+    }
+
+    /// What radiance is multiplied by.
+    pub fn exposure(&self) -> f32 {
+        self.exposure_stops.exp2()
     }
 }
 
@@ -117,7 +122,7 @@ impl Row {
 
 #[inline(always)]
 fn develop_row<S: Simd>(s: S, row: &[Vec<f32>; 3], display: Display, rgba: &mut [u8]) {
-    let exposure = display.exposure_stops.exp2();
+    let exposure = display.exposure();
     let encoder = srgb::Encoder::new(s);
     let [r, g, b] = row;
     let chunks = r.chunks_exact(LANES).zip(g.chunks_exact(LANES)).zip(b.chunks_exact(LANES));

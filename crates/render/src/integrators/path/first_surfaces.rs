@@ -98,7 +98,7 @@ impl FirstSurfaces {
     ) -> bool {
         let Some(hit) = hits.get(i) else { return false };
         let slot = paths.slot[i] as usize;
-        let is_specular = scene.shading.materials[material as usize].is_specular(&scene.shading.materials)
+        let is_specular = scene.shading.materials[material as usize].is_purely_specular(&scene.shading.materials)
             && scene.tables.emission[material as usize].is_none();
         if is_specular && depth > 1 {
             return true;

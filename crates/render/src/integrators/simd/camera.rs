@@ -28,15 +28,15 @@ pub(crate) struct CameraRays<'a> {
     pub filter: &'a FilterSampler,
     pub seed: u32,
     pub even_samples: bool,
-    /// Whether rays go through the middle of pixels and of the lens, in place of random positions.
-    pub in_middle: bool,
+    /// Where in its pixel each ray goes through, 0..1, and through the middle of the lens; `None` for random positions.
+    pub at: Option<Vec2>,
 }
 
 impl CameraRays<'_> {
     /// Whether [`Self::start_paths`] supports filter and aperture.
     pub fn is_plain(&self) -> bool {
         let Self { camera, filter, .. } = self;
-        self.in_middle || (filter.is_plain() && (camera.lens_radius == 0.0 || camera.has_round_lens()))
+        self.at.is_some() || (filter.is_plain() && (camera.lens_radius == 0.0 || camera.has_round_lens()))
     }
 
     /// Samples a ray through a film position, by the pixel's filter, and a lens position; returns it with its sampler
@@ -45,8 +45,8 @@ impl CameraRays<'_> {
     pub fn ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
         let new_sampler = if self.even_samples { Sampler::of_pixel } else { Sampler::independent };
         let sampler = new_sampler(self.seed, pixel.x, pixel.y, sample);
-        if self.in_middle {
-            return (self.camera.middle_ray(pixel.as_vec2() + 0.5, self.size.as_vec2()), sampler, 1.0);
+        if let Some(at) = self.at {
+            return (self.camera.middle_ray(pixel.as_vec2() + at, self.size.as_vec2()), sampler, 1.0);
         }
         let (offset, weight) = self.filter.sample(sampler.pair(0));
         let film = pixel.as_vec2() + offset;
@@ -90,8 +90,11 @@ fn start<S: Simd>(
         } else {
             SamplerLanes::all_independent(lens.seed, [x, y], sample)
         };
-        let [dx, dy] = if lens.in_middle { [one.all(0.5); 2] } else { lens.filter.sample_lanes(sampler.pair(0)) };
-        let aperture = (camera.lens_radius > 0.0 && !lens.in_middle).then(|| uniform_disc(sampler.pair(1)));
+        let [dx, dy] = match lens.at {
+            Some(at) => at.to_array().map(|x| one.all(x)),
+            None => lens.filter.sample_lanes(sampler.pair(0)),
+        };
+        let aperture = (camera.lens_radius > 0.0 && lens.at.is_none()).then(|| uniform_disc(sampler.pair(1)));
         let (origin, dir) = camera.rays([x.to_float() + dx, y.to_float() + dy], size, aperture);
         let path = PathLanes {
             throughput: Vector::splat(s, Vec3::ONE),
