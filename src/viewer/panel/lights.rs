@@ -39,7 +39,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
         let hint = "radiance of the brightest colour, or scale factor of the image";
         row_with_hint(ui, "environment", hint, |ui| {
             ui.horizontal(|ui| {
-                if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "× ", "") {
+                if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
                 }
                 ui.label(RichText::new(kind_of_sky(environment)).size(11.0).weak());
@@ -138,7 +138,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             };
             row(ui, "image", |ui| ui.add(egui::Label::new(file).truncate()));
             row(ui, "strength", |ui| {
-                if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "× ", "") {
+                if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
                 }
             });
