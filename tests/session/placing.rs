@@ -1,8 +1,12 @@
-//! Where the camera stops.
+//! Where things go that are added, and where the camera stops.
 
 use crate::driver::{Drive, Driver};
-use firstlight::frame::{Command, Edit, SessionOptions, Target};
-use firstlight::scene::{Placement, SceneSource, View};
+use firstlight::frame::{Command, Edit, NewThing, Projector, SessionOptions, Target};
+use firstlight::scene::{
+    ColorParam, DirectionalLight, Material, MaterialSlots, Placement, PointLight, SceneSource, Shape, SpotLight,
+    SurfaceMaterial, View,
+};
+use glam::{DVec2, DVec3};
 use std::path::Path;
 
 const PYRAMID: &str =
@@ -22,6 +26,11 @@ fn model(folder: &Path, size: f64) -> Driver {
     let mut driver = Driver::new(options, SceneSource::Model(path));
     driver.settle();
     driver
+}
+
+/// Where a point is in an image of 480 × 320.
+fn place(driver: &Driver, point: DVec3) -> Option<DVec2> {
+    Projector::new(&driver.session.status().rig, DVec2::new(480.0, 320.0)).place(point)
 }
 
 #[test]
@@ -53,5 +62,65 @@ fn an_orbit_about_a_model_stops_above_the_ground_it_stands_on() {
         driver.session.send(Command::Home);
         driver.frame();
         assert!(!below(&driver));
+    }
+}
+
+/// White would have this irradiance by the light alone, W/m², if it faced it.
+fn irradiance(driver: &Driver, thing: &NewThing, subject: DVec3) -> f64 {
+    let fall = |position: DVec3| (subject - position).length_squared();
+    match thing {
+        NewThing::PointLight => {
+            let at: Placement = driver.get("point light");
+            f64::from(driver.get::<PointLight>("point light").intensity.x) / fall(at.translation)
+        }
+        NewThing::SpotLight => {
+            let (light, at): (SpotLight, Placement) = (driver.get("spot light"), driver.get("spot light"));
+            let way = (subject - at.translation).normalize();
+            assert!(way.dot(light.direction) > 1.0 - 1e-6, "it points to it");
+            f64::from(light.intensity.x) / fall(at.translation)
+        }
+        NewThing::DirectionalLight => f64::from(driver.get::<DirectionalLight>("directional light").irradiance.x),
+        _ => {
+            let (shape, at): (Shape, Placement) = (driver.get("area light"), driver.get("area light"));
+            let Shape::Quad { edge_u, edge_v } = shape else { panic!("{shape:?}") };
+            let center = at.translation + 0.5 * (edge_u + edge_v);
+            let normal = edge_u.cross(edge_v);
+            assert!(normal.normalize().dot((subject - center).normalize()) > 1.0 - 1e-6, "it faces it");
+            let material = driver.get::<MaterialSlots>("area light").0[0];
+            let material = driver.session.world().get::<SurfaceMaterial>(material).expect("a material");
+            let Material::Emissive { radiance: ColorParam::Rgb(radiance) } = &material.0 else {
+                panic!("{material:?}")
+            };
+            f64::from(radiance.max_element()) * normal.length() / fall(center)
+        }
+    }
+}
+
+#[test]
+fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        for thing in [NewThing::AreaLight, NewThing::PointLight, NewThing::SpotLight, NewThing::DirectionalLight] {
+            for chosen in [false, true] {
+                let mut driver = model(folder.path(), size);
+                // The model is in the middle of the image, too.
+                let object = driver.named("model");
+                let subject = driver.session.box_of(object).expect("its box").middle();
+                if chosen {
+                    driver.select("model");
+                }
+                driver.edit([Edit::Add(thing.clone())]);
+                let entity = driver.selected().active().expect("what is new is selected");
+                let at = driver.session.world().get::<Placement>(entity).expect("a place").translation;
+                let View { eye, .. } = driver.session.status().rig.view;
+                assert!(at.y > subject.y && at.y < 4.0 * size, "{thing:?} of {size}: {at}");
+                assert!((at - subject).length() < (eye - subject).length(), "{thing:?} of {size}: {at}");
+                let middle = driver.session.box_of(entity).expect("its box").middle();
+                let seen = place(&driver, middle).expect("in front of the camera");
+                assert!(seen.cmpge(DVec2::ZERO).all() && seen.cmple(DVec2::new(480.0, 320.0)).all(), "{seen}");
+                let irradiance = irradiance(&driver, &thing, subject);
+                assert!((4.0..8.0).contains(&irradiance), "{thing:?} of {size}, chosen {chosen}: {irradiance}");
+            }
+        }
     }
 }
