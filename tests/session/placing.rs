@@ -1,10 +1,12 @@
 //! Where things go that are added, and where the camera stops.
 
 use crate::driver::{Drive, Driver};
-use firstlight::frame::{Command, Edit, NewThing, Projector, SessionOptions, Target};
+use firstlight::format::property::SkyProperty;
+use firstlight::frame::{Command, Edit, NewThing, Projector, Property, SessionOptions, Target};
+use firstlight::render::Environment;
 use firstlight::scene::{
-    ColorParam, DirectionalLight, Material, MaterialSlots, Placement, PointLight, SceneSource, Shape, SpotLight,
-    SurfaceMaterial, View,
+    ColorParam, DirectionalLight, EnvironmentSource, GRADIENT, Material, MaterialSlots, Placement, PointLight, Rgb,
+    SceneEnvironment, SceneSource, Shape, SpotLight, SurfaceMaterial, View,
 };
 use glam::{DVec2, DVec3};
 use std::path::Path;
@@ -122,5 +124,19 @@ fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
                 assert!((4.0..8.0).contains(&irradiance), "{thing:?} of {size}, chosen {chosen}: {irradiance}");
             }
         }
+    }
+}
+
+#[test]
+fn any_environment_becomes_a_gradient_again() {
+    let mut driver = Driver::builtin("gallery");
+    let sky = |driver: &Driver| driver.session.world().resource::<SceneEnvironment>().clone();
+    let [zenith, horizon, ground] = GRADIENT;
+    for other in [Property::Sky, Property::ClearSky(SkyProperty::Elevation)] {
+        driver.edit([Edit::Set { id: 0, property: other, value: DVec3::splat(0.5) }]);
+        assert!(!matches!(sky(&driver).light, Environment::Gradient { .. }), "{other:?}");
+        driver.edit([Edit::Set { id: 0, property: Property::Zenith, value: zenith.as_dvec3() }]);
+        let part = EnvironmentSource::Gradient { zenith: Rgb(zenith), horizon: Rgb(horizon), ground: Rgb(ground) };
+        assert_eq!(sky(&driver).part, part);
     }
 }
