@@ -3,10 +3,11 @@
 //! Their lines are those of the table of [`keys`](crate::viewer::keys), scenes and recent files aside.
 
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
-use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
+use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::thumbnails::Thumbnails;
+use crate::viewer::time_line::NOTHING_MOVES;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
 
 /// What menus show.
@@ -107,7 +108,9 @@ fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
     let key = shortcut(input.navigation, &item.action).unwrap_or_default();
     let button = Button::new(name_of(input.session, item)).shortcut_text(RichText::new(key).weak());
     let line = ui.add_enabled(is_possible(input.session, &item.action), button);
-    let is_clicked = line.on_hover_text(effect_of(&item.action)).clicked();
+    let effect = effect_of(&item.action);
+    let why_not = if is_about_frames(&item.action) { NOTHING_MOVES } else { effect };
+    let is_clicked = line.on_hover_text(effect).on_disabled_hover_text(why_not).clicked();
     is_clicked.then(|| item.action.clone())
 }
 
@@ -137,6 +140,11 @@ pub fn hint(input: &MenuInput, action: &Action) -> String {
     format!("{name}{key}: {}", binding.effect)
 }
 
+/// Whether a command is about the frames of an animation.
+fn is_about_frames(action: &Action) -> bool {
+    matches!(action, Action::RenderTo { frames: true })
+}
+
 /// Whether a command would do anything now.
 pub fn is_possible(session: &Session, action: &Action) -> bool {
     let history = session.world().resource::<History>();
@@ -148,6 +156,7 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
             !session.world().resource::<Selection>().0.is_empty()
         }
+        action if is_about_frames(action) => session.world().get_resource::<Animation>().is_some_and(Animation::moves),
         _ => true,
     }
 }
