@@ -128,6 +128,23 @@ fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
 }
 
 #[test]
+fn a_copy_stands_beside_its_original() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        let mut driver = model(folder.path(), size);
+        driver.select("model");
+        let before: Placement = driver.get("model");
+        driver.edit([Edit::Duplicate]);
+        driver.settle();
+        let step = driver.get::<Placement>("model 2").translation - before.translation;
+        let wide = step.abs().max_element();
+        assert!(wide > size && wide < 1.5 * size && step.length() == wide, "{step} at {size}");
+        let at = |point: DVec3| place(&driver, point).expect("in front of the camera").x;
+        assert!(at(before.translation + step) > at(before.translation), "to the right, as it is seen");
+    }
+}
+
+#[test]
 fn any_environment_becomes_a_gradient_again() {
     let mut driver = Driver::builtin("gallery");
     let sky = |driver: &Driver| driver.session.world().resource::<SceneEnvironment>().clone();

@@ -6,13 +6,14 @@
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
-use crate::frame::state::selection::Selection;
+use crate::frame::state::resources::RenderState;
+use crate::frame::state::selection::{Selection, box_of};
 use crate::mesh::procedural;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
     DirectionalLight, DisplaySettings, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
-    PointLight, Shape, SpotLight, SurfaceMaterial,
+    PointLight, Shape, SpotLight, SurfaceMaterial, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -161,19 +162,34 @@ pub fn delete(world: &mut World) {
 
 pub fn duplicate(world: &mut World) {
     let selected = world.resource::<Selection>().0.clone();
-    let step = spot::find(world).size;
+    let step = step_aside(world, &selected);
     let mut copies = Vec::new();
     for entity in selected {
         let mut state = EntityState::of(world, entity);
         let name = state.name.as_ref().map_or("copy", |name| plain_name(name.as_str()));
         (state.name, state.ordinal) = (Some(Name::new(free_name(world, name, false))), Some(next_ordinal(world)));
         // Offset, because the copy would otherwise be invisible.
-        state.placement.get_or_insert_default().translation.x += step;
+        state.placement.get_or_insert_default().translation += step;
         let copy = world.spawn_empty().id();
         state.put(world, copy);
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;
+}
+
+/// The way from the original to its copy: to its right as it is seen, along an axis of the world, by a little more than
+/// its width.
+fn step_aside(world: &mut World, selected: &[Entity]) -> DVec3 {
+    /// A tenth of the width stays free.
+    const GAP: f64 = 1.1;
+    let view = world.resource::<RenderState>().inputs.camera.map_or_else(View::default, |camera| camera.view);
+    let right = view.right();
+    let axis = if right.x.abs() >= right.z.abs() { DVec3::X * right.x.signum() } else { DVec3::Z * right.z.signum() };
+    let corners = selected.iter().filter_map(|&entity| box_of(world, entity)).flat_map(|own| own.corners());
+    let along = corners.map(|corner| corner.dot(axis));
+    let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    // What has no width, such as a plane or a point of light, is moved as far as a new object is wide.
+    axis * if high > low { GAP * (high - low) } else { 2.0 * spot::find(world).size }
 }
 
 /// Gives `object` its own copy of its first material; plain grey if it has none.
