@@ -139,6 +139,7 @@ impl Session {
             home: Rig::default(),
             turning: Turning::default(),
             pace: None,
+            ground: None,
         };
         world.insert_resource(around);
         world.init_resource::<Clock>();

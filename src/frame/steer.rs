@@ -3,8 +3,8 @@
 use crate::frame::command::Command;
 use crate::frame::core::rig::Rig;
 use crate::frame::navigation::{
-    Surroundings, dolly, fly, focus_at, level, orbit, pan, roll, scale_aperture, scale_focus, set_aperture, stride,
-    toggle_depth_of_field, turn, zoom,
+    Surroundings, dolly, fly, focus_at, level, orbit_above, pan, roll, scale_aperture, scale_focus, set_aperture,
+    stride, toggle_depth_of_field, turn, zoom,
 };
 use glam::DVec3;
 
@@ -21,7 +21,8 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
             with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius, around.pace)))
         }
         Command::Orbit { yaw_deg, pitch_deg } => {
-            with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
+            let (yaw, pitch) = (yaw_deg.to_radians(), pitch_deg.to_radians());
+            with_view(orbit_above(&view, yaw, pitch, around.turning, around.ground))
         }
         Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
         // With parallel rays, approaching does not enlarge.
@@ -64,6 +65,7 @@ mod tests {
             aspect: 1.5,
             turning,
             pace: None,
+            ground: None,
         }
     }
     #[test]

@@ -4,7 +4,7 @@ use crate::frame::adopt::{adopt, adopt_moment};
 use crate::frame::core::reset::{Changes, Level, compare, compare_displays, compare_settings};
 use crate::frame::core::status::{MessageKind, Picture, Status};
 use crate::frame::navigation;
-use crate::frame::scene_bounds::SceneBounds;
+use crate::frame::scene_bounds::{SceneBounds, ground_below};
 use crate::frame::state::background::{BackgroundTasks, Finished};
 use crate::frame::state::resources::{
     Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
@@ -130,6 +130,7 @@ pub fn rebuild(
         if is_another_list(&shown.inputs, &inputs) {
             shown.revision += 1;
         }
+        around.ground = ground_below(&inputs, around.home.view.eye);
         shown.inputs = inputs;
         let RenderState { inputs, extraction, trees, extents, unsettled_since, .. } = &mut *shown;
         let is_elsewhere = extraction.as_ref().is_some_and(|extraction| extraction.origin != origin);

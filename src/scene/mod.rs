@@ -69,6 +69,7 @@ pub use crate::import::meshes::MeshBase;
 pub use crate::import::picture::{PictureError, read_picture, read_picture_within};
 #[cfg(feature = "cli")]
 pub(crate) use crate::import::picture::{decode_picture, picture_reader};
+pub use crate::scene::default_scene::SKY as GRADIENT;
 pub use crate::scene::world::components::{
     Balls, ColorParam, DisplaySettings, GREY, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal, Rendering,
     ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,

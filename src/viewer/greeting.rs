@@ -6,7 +6,11 @@ use egui::{Align2, Button, Context, Label, RichText, Vec2, Window};
 const CHOICES: [(Navigation, &str, &str); 3] = [
     (Navigation::Blender, "Blender", "Middle drag orbits. G, R, S: move, rotate, scale."),
     (Navigation::Maya, "Maya", "Alt+drag orbits. W, E, R: move, rotate, scale."),
-    (Navigation::Firstlight, "Neither", "Drag looks around, right drag pans. W, A, S, D fly."),
+    (
+        Navigation::Firstlight,
+        "Neither",
+        "Drag orbits a model, and looks around in a scene. Right drag pans. W, A, S, D fly.",
+    ),
 ];
 
 /// Draws the question; returns the answer, which is firstlight's own preset when the question is closed.

@@ -5,7 +5,7 @@ use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
 use crate::scene::{Placement, light_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
-use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke};
+use egui::{Align2, Color32, Context, CursorIcon, FontId, Pos2, Rect, Stroke};
 use glam::{DVec2, DVec3};
 
 const SELECTED: Color32 = Color32::from_rgb(255, 178, 70);
@@ -127,6 +127,15 @@ impl Handles {
     pub fn release(&mut self) -> bool {
         self.pressed = None;
         self.grabbed.take().is_some()
+    }
+
+    /// The shape of the mouse.
+    ///
+    /// - `is_over_body`: whether it is on a selected object, which a drag would move.
+    pub fn cursor(&self, is_over_body: bool) -> Option<CursorIcon> {
+        let moves = self.gizmo.is_some_and(|(gizmo, _)| gizmo.mode == Mode::Move);
+        let is_body = self.grabbed.as_ref().map_or(is_over_body, |grabbed| grabbed.handle == Handle::Middle);
+        (moves && is_body).then_some(CursorIcon::Move)
     }
 
     pub fn is_grabbed(&self) -> bool {
@@ -285,6 +294,23 @@ mod tests {
     use crate::frame::navigation::Rig;
     use crate::scene::View;
     use glam::DAffine3;
+
+    #[test]
+    fn the_mouse_says_what_a_drag_would_move() {
+        let view = View::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y).unwrap();
+        let projector = Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        let with = |mode| Gizmo::at(DVec3::ZERO, mode, DVec3::AXES, &projector).map(|gizmo| (gizmo, projector));
+        let mut handles = Handles { gizmo: with(Mode::Move), ..Handles::default() };
+        assert_eq!([true, false].map(|on| handles.cursor(on)), [Some(CursorIcon::Move), None]);
+        // While it is dragged, wherever the mouse is.
+        handles.press_body(DVec2::new(500.0, 400.0));
+        assert!(handles.grab_body(DVec2::new(520.0, 400.0)));
+        assert_eq!(handles.cursor(false), Some(CursorIcon::Move));
+        for mode in [None, Some(Mode::Turn), Some(Mode::Scale)] {
+            let handles = Handles { gizmo: mode.and_then(with), ..Handles::default() };
+            assert_eq!(handles.cursor(true), None, "{mode:?}: a drag moves the camera");
+        }
+    }
 
     #[test]
     fn what_is_beside_the_picture_or_behind_the_eye_is_not_seen() {

@@ -3,10 +3,11 @@
 //! Their lines are those of the table of [`keys`](crate::viewer::keys), scenes and recent files aside.
 
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
-use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
+use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::thumbnails::Thumbnails;
+use crate::viewer::time_line::NOTHING_MOVES;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
 
 /// What menus show.
@@ -38,25 +39,21 @@ pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
         for (i, item) in menu(Menu::File).enumerate() {
             choose(line(ui, input, item));
             if i == 0 {
-                ui.menu_button("Open recent", |ui| {
-                    scrolled(ui, |ui| choose(openable::recent(ui, input.session, input.recent).map(Action::Send)));
+                part(ui, "Open recent", |ui| {
+                    choose(openable::recent(ui, input.session, input.recent).map(Action::Send));
                 });
-                ui.menu_button("Scenes", |ui| {
-                    scrolled(ui, |ui| choose(openable::scenes(ui, input.recent.thumbnails).map(Action::Send)))
-                });
+                part(ui, "Scenes", |ui| choose(openable::scenes(ui, input.recent.thumbnails).map(Action::Send)));
             }
         }
         ui.separator();
-        for (title, part) in PARTS {
-            ui.menu_button(title, |ui| {
-                scrolled(ui, |ui| {
-                    for item in menu(part) {
-                        choose(line(ui, input, item));
-                    }
-                    if part == Menu::Add {
-                        ui.menu_button("Built-in mesh", |ui| choose(built_in_mesh(ui)));
-                    }
-                });
+        for (title, of) in PARTS {
+            part(ui, title, |ui| {
+                for item in menu(of) {
+                    choose(line(ui, input, item));
+                }
+                if of == Menu::Add {
+                    part(ui, "Built-in mesh", |ui| choose(built_in_mesh(ui)));
+                }
             });
         }
         ui.separator();
@@ -67,8 +64,15 @@ pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
     chosen
 }
 
-/// Scrolls what is taller than the window.
+/// A line of a menu that is a menu itself.
+fn part(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
+    ui.menu_button(title, |ui| scrolled(ui, contents));
+}
+
+/// The lines of a menu; scrolls what is taller than the window.
 fn scrolled(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    // A menu is as wide as when it was open last: a longer name makes it wider, and is not broken.
+    ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let height = ui.ctx().content_rect().height();
     if height >= TALL {
         return contents(ui);
@@ -103,10 +107,10 @@ fn dress(name: &str) -> Action {
 fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
     let key = shortcut(input.navigation, &item.action).unwrap_or_default();
     let button = Button::new(name_of(input.session, item)).shortcut_text(RichText::new(key).weak());
-    // A long name makes the menu wider, and moves no line.
-    let button = button.wrap_mode(egui::TextWrapMode::Extend);
     let line = ui.add_enabled(is_possible(input.session, &item.action), button);
-    let is_clicked = line.on_hover_text(effect_of(&item.action)).clicked();
+    let effect = effect_of(&item.action);
+    let why_not = if is_about_frames(&item.action) { NOTHING_MOVES } else { effect };
+    let is_clicked = line.on_hover_text(effect).on_disabled_hover_text(why_not).clicked();
     is_clicked.then(|| item.action.clone())
 }
 
@@ -136,6 +140,11 @@ pub fn hint(input: &MenuInput, action: &Action) -> String {
     format!("{name}{key}: {}", binding.effect)
 }
 
+/// Whether a command is about the frames of an animation.
+fn is_about_frames(action: &Action) -> bool {
+    matches!(action, Action::RenderTo { frames: true })
+}
+
 /// Whether a command would do anything now.
 pub fn is_possible(session: &Session, action: &Action) -> bool {
     let history = session.world().resource::<History>();
@@ -147,6 +156,7 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
             !session.world().resource::<Selection>().0.is_empty()
         }
+        action if is_about_frames(action) => session.world().get_resource::<Animation>().is_some_and(Animation::moves),
         _ => true,
     }
 }
@@ -185,10 +195,8 @@ impl HereMenu {
                 for item in menu(Menu::Here) {
                     chosen = chosen.take().or(line(ui, input, item));
                 }
-                ui.menu_button("Material", |ui| {
-                    scrolled(ui, |ui| chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails)));
-                });
-                ui.menu_button("Add", |ui| {
+                part(ui, "Material", |ui| chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails)));
+                part(ui, "Add", |ui| {
                     for item in menu(Menu::Add) {
                         chosen = chosen.take().or(line(ui, input, item));
                     }
@@ -224,4 +232,39 @@ pub fn all(input: &MenuInput) -> Vec<(String, String, String, Action)> {
         (format!("Material: {name}"), "give it to the selection".to_owned(), String::new(), dress(name))
     });
     lines.chain(materials).chain(scenes).chain(files).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A list that was looked at while it was empty has remembered a width that its names do not fit into.
+    #[test]
+    fn a_menu_that_has_grown_breaks_no_line() {
+        for height in [900.0, 300.0] {
+            let context = Context::default();
+            let screen = egui::Rect::from_min_size(Pos2::ZERO, egui::vec2(800.0, height));
+            let heights = |names: &[&str]| {
+                let mut heights = Vec::new();
+                for _ in 0..3 {
+                    heights.clear();
+                    let _ =
+                        context.run(egui::RawInput { screen_rect: Some(screen), ..Default::default() }, |context| {
+                            egui::Area::new(Id::new("menu")).show(context, |ui| {
+                                scrolled(ui, |ui| {
+                                    for name in names {
+                                        let button = Button::new(*name).shortcut_text("in a folder");
+                                        heights.push(ui.add(button).rect.height());
+                                    }
+                                });
+                            });
+                        });
+                }
+                heights
+            };
+            let empty = heights(&["none"]);
+            let long = "a scene whose name is longer than everything else.ron";
+            assert_eq!(heights(&["none", long]), [empty[0]; 2], "in a window of height {height}");
+        }
+    }
 }

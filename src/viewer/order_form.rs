@@ -246,12 +246,16 @@ impl OrderForm {
             for side in [&mut self.size.0, &mut self.size.1] {
                 ui.add(DragValue::new(side).range(1..=32_768).speed(2.0).update_while_editing(false));
             }
-            ComboBox::from_id_salt("size").selected_text("presets").width(86.0).show_ui(ui, |ui| {
-                let named = [("scene: ", self.of_scene), ("window: ", window)];
-                for (name, size) in named.into_iter().chain(SIZES.map(|size| ("", size))) {
-                    if ui.selectable_label(self.size == size, format!("{name}{} × {}", size.0, size.1)).clicked() {
-                        self.size = size;
-                    }
+            let sizes = sizes(self.of_scene, window);
+            let used = sizes.iter().find(|(_, size)| *size == self.size);
+            let used = used.map_or("other".to_owned(), |(name, size)| match &name[..] {
+                "" => as_text(*size),
+                name => name.to_owned(),
+            });
+            ComboBox::from_id_salt("size").selected_text(used).width(96.0).show_ui(ui, |ui| {
+                for (name, size) in sizes {
+                    let colon = if name.is_empty() { "" } else { ": " };
+                    ui.selectable_value(&mut self.size, size, format!("{name}{colon}{}", as_text(size)));
                 }
             });
         });
@@ -302,6 +306,20 @@ impl OrderForm {
     }
 }
 
+fn as_text((width, height): (u32, u32)) -> String {
+    format!("{width} × {height}")
+}
+
+/// The sizes to choose from, each once, and whose it is.
+fn sizes(scene: (u32, u32), window: (u32, u32)) -> Vec<(String, (u32, u32))> {
+    let named = match scene == window {
+        true => vec![("scene, window", scene)],
+        false => vec![("scene", scene), ("window", window)],
+    };
+    let others = SIZES.into_iter().filter(|size| *size != scene && *size != window).map(|size| ("", size));
+    named.into_iter().chain(others).map(|(name, size)| (name.to_owned(), size)).collect()
+}
+
 /// The size of the scene, or that of the window where it has more pixels: an image is not coarser than what is seen.
 fn larger(scene: (u32, u32), window: (u32, u32)) -> (u32, u32) {
     let pixels = |size: (u32, u32)| u64::from(size.0) * u64::from(size.1);
@@ -317,6 +335,21 @@ mod tests {
         assert_eq!(larger((640, 360), (1280, 720)), (1280, 720));
         assert_eq!(larger((3840, 2160), (1280, 720)), (3840, 2160));
         assert_eq!(larger((640, 360), (0, 0)), (640, 360));
+    }
+
+    #[test]
+    fn each_size_is_offered_once() {
+        for (scene, window, n) in [
+            ((640, 360), (1280, 720), 6),
+            ((640, 360), (640, 360), 5),
+            ((1920, 1080), (1280, 720), 5),
+            ((1920, 1080), (3840, 2160), 4),
+            ((1920, 1080), (1920, 1080), 4),
+        ] {
+            let sizes = sizes(scene, window);
+            assert_eq!(sizes.len(), n, "{sizes:?}");
+            assert!((0..n).all(|i| !sizes[..i].iter().any(|(_, size)| *size == sizes[i].1)), "{sizes:?}");
+        }
     }
 
     #[test]

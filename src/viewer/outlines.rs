@@ -73,6 +73,11 @@ impl Outlines {
         std::mem::replace(&mut self.hovered, entity) != entity
     }
 
+    /// What is under the mouse.
+    pub fn hovered(&self) -> Option<Entity> {
+        self.hovered
+    }
+
     /// When to [`follow`](Self::follow) again even if nothing happens.
     pub fn wake_at(&self) -> Option<Instant> {
         self.hover_until.into_iter().chain(self.trace_at).min()

@@ -17,7 +17,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 impl Driver {
     /// A small picture of a scene, with two samples a pixel.
-    fn builtin(name: &str) -> Self {
+    pub fn builtin(name: &str) -> Self {
         let target = Target { spp: Some(2), ..Target::default() };
         let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
         let mut driver = Self::new(options, SceneSource::Builtin(name.to_owned()));
@@ -25,7 +25,7 @@ impl Driver {
         driver
     }
 
-    fn named(&self, name: &str) -> Entity {
+    pub fn named(&self, name: &str) -> Entity {
         let inputs = self.session.inputs();
         let objects = inputs.objects.iter().map(|object| (object.entity, &object.name));
         let lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
@@ -34,17 +34,17 @@ impl Driver {
         all.find(|(_, other)| other.as_deref() == Some(name)).unwrap_or_else(|| panic!("no {name}")).0
     }
 
-    fn select(&mut self, name: &str) -> u64 {
+    pub fn select(&mut self, name: &str) -> u64 {
         let id = self.named(name).to_bits();
         self.edit([Edit::Select { id, add: false }]);
         id
     }
 
-    fn selected(&self) -> &Selection {
+    pub fn selected(&self) -> &Selection {
         self.session.world().resource()
     }
 
-    fn get<T: Component + Clone>(&self, name: &str) -> T {
+    pub fn get<T: Component + Clone>(&self, name: &str) -> T {
         self.session.world().get::<T>(self.named(name)).unwrap_or_else(|| panic!("{name} has none")).clone()
     }
 }

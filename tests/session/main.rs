@@ -6,6 +6,7 @@ mod framing;
 mod keys;
 mod lists;
 mod living_files;
+mod placing;
 #[path = "../common/program.rs"]
 mod program;
 mod properties;

@@ -6,18 +6,20 @@
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
-use crate::frame::state::selection::Selection;
+use crate::frame::state::resources::RenderState;
+use crate::frame::state::selection::{Selection, box_of};
 use crate::mesh::procedural;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
-    DirectionalLight, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Shape,
-    SpotLight, SurfaceMaterial,
+    DirectionalLight, DisplaySettings, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
+    PointLight, Shape, SpotLight, SurfaceMaterial, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// What can be added. `spot` finds its position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,13 +28,13 @@ pub enum NewThing {
     Sphere,
     /// A horizontal, infinite plane.
     Plane,
-    /// An emissive square above, facing down.
+    /// An emissive square beside what is selected or seen, facing it.
     AreaLight,
-    /// A point light above.
+    /// A point light beside it.
     PointLight,
-    /// A spot light above, pointing straight down.
+    /// A spot light beside it, pointing at it.
     SpotLight,
-    /// Parallel light from above, at an angle.
+    /// Parallel light from above, from the right of the camera.
     DirectionalLight,
     /// A diffuse cube on the ground.
     Cube,
@@ -59,9 +61,65 @@ pub fn is_thing(world: &World, entity: Entity) -> bool {
 }
 
 pub fn add(world: &mut World, new: &NewThing) {
+    let entity = match add_light(world, new) {
+        Some(light) => light,
+        None => match add_object(world, new) {
+            Some(object) => object,
+            // It comes later.
+            None => return,
+        },
+    };
+    world.resource_mut::<Selection>().choose(entity, false);
+}
+
+/// Irradiance of what a new light is made for, W/m²: white becomes twice as bright as the white of the display, so that
+/// the difference is seen in other light.
+const NEW_IRRADIANCE: f64 = 2.0 * PI;
+
+/// Adds a light, as bright as its distance needs; `None` for everything else.
+fn add_light(world: &mut World, new: &NewThing) -> Option<Entity> {
+    use NewThing::{AreaLight, DirectionalLight as Parallel, PointLight as Point, SpotLight as Spot};
+    if !matches!(new, AreaLight | Point | Spot | Parallel) {
+        return None;
+    }
+    let spot = spot::find_for_light(world);
+    let (way, distance) = (spot.way(), spot.way().length());
+    let direction = way.try_normalize().unwrap_or(DVec3::NEG_Y);
+    let irradiance = NEW_IRRADIANCE / f64::from(world.resource::<DisplaySettings>().0.exposure_stops).exp2();
+    let intensity = Vec3::splat((irradiance * distance * distance) as f32);
+    let placement = Placement::at(spot.place);
+    Some(match new {
+        AreaLight => {
+            // Its light is soft, and its own shadow small.
+            let edge = 0.8 * spot.radius;
+            let white = (irradiance * (distance / edge).powi(2)) as f32;
+            let material = new_material(world, "light", Material::emissive(white * Vec3::new(1.0, 0.92, 0.8)));
+            // u × v points to what it lights.
+            let u = direction.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);
+            let (edge_u, edge_v) = (edge * u, edge * direction.cross(u));
+            let corner = Placement::at(spot.place - 0.5 * (edge_u + edge_v));
+            spawn(world, "area light", (Shape::Quad { edge_u, edge_v }, corner, MaterialSlots(vec![material])))
+        }
+        Point => {
+            let light = PointLight { intensity, radius: 0.1 * spot.radius };
+            spawn(world, "point light", (light, placement))
+        }
+        Spot => {
+            let angles = SpotLight { inner_angle_deg: 30.0, outer_angle_deg: 40.0, ..SpotLight::default() };
+            spawn(world, "spot light", (SpotLight { intensity, direction, ..angles }, placement))
+        }
+        _ => {
+            let light = DirectionalLight { irradiance: Vec3::splat(irradiance as f32), direction };
+            spawn(world, "directional light", (light, placement))
+        }
+    })
+}
+
+/// Adds an object; `None` for one that is loaded in the background.
+fn add_object(world: &mut World, new: &NewThing) -> Option<Entity> {
     let Spot { foot: place, size } = spot::find(world);
     let up = DVec3::Y * size;
-    let entity = match new {
+    Some(match new {
         NewThing::Sphere => {
             let material = new_material(world, "ball", Material::diffuse(Vec3::new(0.7, 0.35, 0.2)));
             spawn(
@@ -74,41 +132,6 @@ pub fn add(world: &mut World, new: &NewThing) {
             let material = new_material(world, "ground", Material::diffuse(Vec3::splat(0.5)));
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
-        }
-        NewThing::AreaLight => {
-            let material = new_material(world, "light", Material::emissive(Vec3::new(12.0, 11.0, 9.5)));
-            let edge = 2.0 * size;
-            // u × v points down.
-            let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
-            let corner =
-                place + spot::headroom(world, place, 6.0 * size) * DVec3::Y - 0.5 * edge * (DVec3::X + DVec3::Z);
-            spawn(world, "area light", (shape, Placement::at(corner), MaterialSlots(vec![material])))
-        }
-        NewThing::PointLight => {
-            let intensity = Vec3::splat((50.0 * size * size) as f32);
-            let light = PointLight { intensity, radius: 0.1 * size };
-            spawn(
-                world,
-                "point light",
-                (light, Placement::at(place + spot::headroom(world, place, 5.0 * size) * DVec3::Y)),
-            )
-        }
-        NewThing::SpotLight => {
-            let light = SpotLight {
-                intensity: Vec3::splat((100.0 * size * size) as f32),
-                direction: DVec3::NEG_Y,
-                inner_angle_deg: 20.0,
-                outer_angle_deg: 30.0,
-                ..SpotLight::default()
-            };
-            let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
-            spawn(world, "spot light", (light, Placement::at(place + above)))
-        }
-        NewThing::DirectionalLight => {
-            let direction = DVec3::new(-1.0, -2.0, -1.0).normalize();
-            let light = DirectionalLight { irradiance: Vec3::splat(3.0), direction };
-            let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
-            spawn(world, "directional light", (light, Placement::at(place + above)))
         }
         NewThing::Cube => {
             let material = new_material(world, "cube", Material::diffuse(Vec3::new(0.25, 0.4, 0.6)));
@@ -125,10 +148,10 @@ pub fn add(world: &mut World, new: &NewThing) {
         }
         NewThing::Mesh(source) => {
             crate::frame::edit::remesh::start_new(world, source.clone(), place, size);
-            return;
+            return None;
         }
-    };
-    world.resource_mut::<Selection>().choose(entity, false);
+        _ => return None,
+    })
 }
 
 pub fn delete(world: &mut World) {
@@ -139,19 +162,34 @@ pub fn delete(world: &mut World) {
 
 pub fn duplicate(world: &mut World) {
     let selected = world.resource::<Selection>().0.clone();
-    let step = spot::find(world).size;
+    let step = step_aside(world, &selected);
     let mut copies = Vec::new();
     for entity in selected {
         let mut state = EntityState::of(world, entity);
         let name = state.name.as_ref().map_or("copy", |name| plain_name(name.as_str()));
         (state.name, state.ordinal) = (Some(Name::new(free_name(world, name, false))), Some(next_ordinal(world)));
         // Offset, because the copy would otherwise be invisible.
-        state.placement.get_or_insert_default().translation.x += step;
+        state.placement.get_or_insert_default().translation += step;
         let copy = world.spawn_empty().id();
         state.put(world, copy);
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;
+}
+
+/// The way from the original to its copy: to its right as it is seen, along an axis of the world, by a little more than
+/// its width.
+fn step_aside(world: &mut World, selected: &[Entity]) -> DVec3 {
+    /// A tenth of the width stays free.
+    const GAP: f64 = 1.1;
+    let view = world.resource::<RenderState>().inputs.camera.map_or_else(View::default, |camera| camera.view);
+    let right = view.right();
+    let axis = if right.x.abs() >= right.z.abs() { DVec3::X * right.x.signum() } else { DVec3::Z * right.z.signum() };
+    let corners = selected.iter().filter_map(|&entity| box_of(world, entity)).flat_map(|own| own.corners());
+    let along = corners.map(|corner| corner.dot(axis));
+    let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    // What has no width, such as a plane or a point of light, is moved as far as a new object is wide.
+    axis * if high > low { GAP * (high - low) } else { 2.0 * spot::find(world).size }
 }
 
 /// Gives `object` its own copy of its first material; plain grey if it has none.

@@ -18,7 +18,7 @@ pub enum Property {
     Material(MaterialProperty),
     /// Radiance of a constant environment, which any other environment becomes by it.
     Sky,
-    /// Radiance of a gradient at the zenith.
+    /// Radiance of a gradient at the zenith, which any other environment becomes by it.
     Zenith,
     /// Radiance of a gradient at the horizon.
     Horizon,

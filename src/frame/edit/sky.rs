@@ -6,7 +6,7 @@ use crate::format::units::radians;
 use crate::frame::edit::property::Property;
 use crate::import::sky::clear_sky;
 use crate::render::{Environment, ImageTexture};
-use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment, sky_light};
+use crate::scene::{EnvironmentSource, GRADIENT, Rgb, SceneEnvironment, sky_light};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -86,6 +86,11 @@ fn with_color(sky: &Environment, property: Property, value: Vec3) -> Option<Envi
         // In place of whatever there was.
         (Property::Sky, _) => Some(Environment::Constant(value)),
         (Property::Zenith, &Environment::Gradient { horizon, ground, .. }) => {
+            Some(Environment::Gradient { zenith: value, horizon, ground })
+        }
+        // In place of whatever there was, too.
+        (Property::Zenith, _) => {
+            let [_, horizon, ground] = GRADIENT;
             Some(Environment::Gradient { zenith: value, horizon, ground })
         }
         (Property::Horizon, &Environment::Gradient { zenith, ground, .. }) => {

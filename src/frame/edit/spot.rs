@@ -1,15 +1,15 @@
-//! Positions of new objects: on the surface in the centre of the image, of a size that suits its distance, and without
-//! overlap.
+//! Positions of new things. Objects go on the surface in the centre of the image, of a size that suits its distance, and
+//! without overlap; lights go beside what they are to light.
 //!
 //! The space in front of the camera is free up to the first visible surface. So positions are tried along the view
 //! axis, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
 use crate::frame::state::resources::{PictureSize, RenderState};
-use crate::frame::state::selection::pick;
+use crate::frame::state::selection::{Selection, box_of, pick};
 use crate::geometry::Ray;
-use crate::scene::{Extraction, View};
-use bevy_ecs::prelude::World;
+use crate::scene::{Extraction, Shape, View};
+use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -36,14 +36,8 @@ const TOUCH: f64 = 0.97;
 pub fn find(world: &World) -> Spot {
     let shown = world.resource::<RenderState>();
     let view = shown.inputs.camera.map_or_else(View::default, |camera| camera.view);
-    let aspect = world.resource::<PictureSize>().aspect();
-    let Some(scene) = &shown.extraction else {
-        return Spot { foot: view.pivot(), size: SHARE * view.pivot_distance };
-    };
-    let hit = pick(scene, 0.5, 0.5, aspect);
-    // A surface far behind the pivot is a wall, or the ground near the horizon.
-    let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
-    let (place, distance) = hit.map_or((view.pivot(), view.pivot_distance), |hit| (hit.point, hit.depth));
+    let (place, distance, _) = seen(world, &view);
+    let Some(scene) = &shown.extraction else { return Spot { foot: place, size: SHARE * distance } };
     let mut share = SHARE;
     for _ in 0..SHRINKS {
         let step = 0.5 * share * distance;
@@ -61,12 +55,69 @@ pub fn find(world: &World) -> Spot {
     Spot { foot: place, size: SHARE * distance }
 }
 
-/// Returns the height above `foot` at which something may hang, metres: `wanted`, or less below a ceiling.
-pub fn headroom(world: &World, foot: DVec3, wanted: f64) -> f64 {
-    let Some(scene) = &world.resource::<RenderState>().extraction else { return wanted };
-    // Starts above `foot`, because the ray would otherwise hit the ground itself.
-    let start = 0.1 * wanted;
-    distance(scene, foot + start * DVec3::Y, DVec3::Y).map_or(wanted, |free| wanted.min(0.8 * (start + free)))
+/// A position for a light, and what it is to light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSpot {
+    pub place: DVec3,
+    /// Centre of what is to be lit.
+    pub subject: DVec3,
+    /// Half of its width, metres.
+    pub radius: f64,
+}
+
+impl LightSpot {
+    /// From the light to what it lights.
+    pub fn way(&self) -> DVec3 {
+        self.subject - self.place
+    }
+}
+
+/// Finds a position for a light: beside and above the selected objects, or else what is in the middle of the image, and
+/// in view with them. The way to it from the camera is free of walls and ceilings.
+pub fn find_for_light(world: &mut World) -> LightSpot {
+    /// To the right, up, and to the camera, relative to the size of what is lit: an area light shows its front.
+    const OFFSET: [f64; 3] = [1.0, 0.5, 0.2];
+    /// Part of the way to an obstacle.
+    const SHORT_OF: f64 = 0.8;
+    let shown = world.resource::<RenderState>();
+    let (view, projection) = shown.inputs.camera.map(|camera| (camera.view, camera.projection)).unwrap_or_default();
+    let chosen = world.resource::<Selection>().0.clone();
+    let (subject, radius) = ball_around(world, &chosen).unwrap_or_else(|| {
+        let (place, depth, object) = seen(world, &view);
+        // A wall or the ground is lit where it is seen.
+        let near = object.and_then(|object| ball_around(world, &[object])).filter(|(_, radius)| *radius < 0.5 * depth);
+        near.unwrap_or((place, 0.6 * projection.half_height(depth)))
+    });
+    // Level, whatever the camera does.
+    let right = DVec3::new(view.right().x, 0.0, view.right().z).try_normalize().unwrap_or(DVec3::X);
+    let axes = [right, DVec3::Y, right.cross(DVec3::Y)];
+    let place = subject + radius * (0..3).map(|i| OFFSET[i] * axes[i]).sum::<DVec3>();
+    let (way, away) = (place - view.eye, (place - view.eye).length());
+    let scene = world.resource::<RenderState>().extraction.as_ref();
+    let free = scene.and_then(|scene| distance(scene, view.eye, way / away));
+    let share = free.map_or(1.0, |free| (SHORT_OF * free / away).min(1.0));
+    LightSpot { place: view.eye + share * way, subject, radius }
+}
+
+/// Centre and radius of a ball around the boxes of objects; `None` without any that has an end.
+fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
+    let objects = entities.iter().filter_map(|&entity| {
+        world.get::<Shape>(entity)?;
+        box_of(world, entity)
+    });
+    let corners = objects.flat_map(|own| own.corners()).map(|corner| (corner, corner));
+    let (min, max) = corners.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))?;
+    (min != max).then_some((0.5 * (min + max), 0.5 * (max - min).length()))
+}
+
+/// The point in the middle of the image, its depth and its object: the pivot where nothing near is seen.
+fn seen(world: &World, view: &View) -> (DVec3, f64, Option<Entity>) {
+    let pivot = (view.pivot(), view.pivot_distance, None);
+    let Some(scene) = &world.resource::<RenderState>().extraction else { return pivot };
+    let hit = pick(scene, 0.5, 0.5, world.resource::<PictureSize>().aspect());
+    // A surface far behind the pivot is a wall, or the ground near the horizon.
+    let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
+    hit.map_or(pivot, |hit| (hit.point, hit.depth, Some(hit.entity)))
 }
 
 /// Returns the position of an object after dropping it from here, if there is space for it.

@@ -10,7 +10,7 @@ mod lens;
 mod moves;
 
 pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
-pub use moves::{VERTICAL, dolly, fly, frame_points, frame_rig, level, orbit, pan, roll, turn, zoom};
+pub use moves::{VERTICAL, dolly, fly, frame_points, frame_rig, level, orbit, orbit_above, pan, roll, turn, zoom};
 
 pub use crate::frame::core::rig::{Rig, Turning};
 
@@ -32,6 +32,8 @@ pub struct Surroundings {
     pub turning: Turning,
     /// Distance to the target of flying in metres, if known.
     pub pace: Option<f64>,
+    /// Height of the ground that orbits stay above, metres.
+    pub ground: Option<f64>,
 }
 
 /// Distance flown per second at speed 1, metres: half of the distance to the target. If that is unknown, half of the

@@ -32,6 +32,31 @@ pub fn orbit(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
     finite_or(view, View { eye: view.pivot() - turned.forward * view.pivot_distance, ..turned })
 }
 
+/// Like [`orbit`], but a camera above `ground` stays above it: below, the image would show nothing but its back.
+///
+/// - `ground`: height of a horizontal plane, metres.
+pub fn orbit_above(view: &View, yaw: f64, pitch: f64, turning: Turning, ground: Option<f64>) -> View {
+    /// Height that remains, relative to the distance to the pivot: the ground still looks like one.
+    const CLEARANCE: f64 = 1.0 / 64.0;
+    /// Halvings of the angle.
+    const STEPS: u32 = 32;
+    let whole = orbit(view, yaw, pitch, turning);
+    let Some(ground) = ground.filter(|ground| view.eye.y > *ground) else { return whole };
+    let least = (ground + CLEARANCE * view.pivot_distance).min(view.eye.y);
+    if whole.eye.y >= least {
+        return whole;
+    }
+    let part = |share: f64| orbit(view, yaw, share * pitch, turning);
+    let (mut possible, mut too_much) = (0.0, 1.0);
+    for _ in 0..STEPS {
+        let middle = 0.5 * (possible + too_much);
+        *if part(middle).eye.y >= least { &mut possible } else { &mut too_much } = middle;
+    }
+    let stopped = part(possible);
+    // A view that leans may lose height by its yaw alone.
+    if stopped.eye.y > ground { stopped } else { *view }
+}
+
 /// Moves along the view's axes: x right, y up, z forward, metres.
 pub fn fly(view: &View, step: DVec3) -> View {
     finite_or(view, View { eye: view.eye + view.right() * step.x + view.up * step.y + view.forward * step.z, ..*view })
@@ -281,6 +306,37 @@ mod tests {
         assert!(up.up.y > 0.0 && up.right().y.abs() < 1e-12, "neither upside down nor leaning: {up:?}");
         let free = turn(&start(), 0.0, PI, Turning::Free);
         assert!(free.up.y < 0.0, "free turning goes over the top");
+    }
+
+    #[test]
+    fn an_orbit_stops_above_the_ground_and_slides_along_it() {
+        let (ground, down) = (-0.75, (0.0, -0.4));
+        let mut view = start();
+        for _ in 0..20 {
+            view = orbit_above(&view, down.0, down.1, Turning::Turntable, Some(ground));
+        }
+        let height = view.eye.y - ground;
+        assert!(height > 0.0 && height < 0.02 * view.pivot_distance, "{height}");
+        assert!(close(view.pivot(), start().pivot(), 1e-12) && view.pivot_distance == start().pivot_distance);
+        let along = orbit_above(&view, 0.3, -0.2, Turning::Turntable, Some(ground));
+        assert!(close(along.eye, orbit(&view, 0.3, 0.0, Turning::Turntable).eye, 1e-6), "it does not stick");
+        assert_eq!(
+            orbit_above(&view, 0.3, 0.2, Turning::Turntable, Some(ground)),
+            orbit(&view, 0.3, 0.2, Turning::Turntable)
+        );
+        for (turning, lean) in [(Turning::Free, 0.0), (Turning::Free, 0.8), (Turning::Turntable, 0.8)] {
+            let (mut view, mut state) = (roll(&start(), lean), 3);
+            for _ in 0..1000 {
+                view = orbit_above(&view, wander(&mut state), wander(&mut state), turning, Some(ground));
+                assert!(view.eye.y > ground, "{turning:?}: {view:?}");
+            }
+        }
+        // Without a ground, and from below one.
+        let below = orbit(&start(), 0.0, -1.2, Turning::Turntable);
+        assert!(below.eye.y < ground);
+        assert_eq!(orbit_above(&start(), 0.0, -1.2, Turning::Turntable, None), below);
+        let on = orbit(&below, 0.1, 0.2, Turning::Turntable);
+        assert_eq!(orbit_above(&below, 0.1, 0.2, Turning::Turntable, Some(ground)), on);
     }
 
     #[test]

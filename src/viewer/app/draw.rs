@@ -1,10 +1,11 @@
 //! Drawing of the image and the overlays to the window.
 
-use crate::frame::{Explaining, SceneBounds, Selection, StopAt, ViewMode};
+use crate::frame::{Command, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
 use crate::viewer::bar::Figures;
+use crate::viewer::keys::{self, Action};
 use crate::viewer::menu::MenuInput;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::time_line::Strip;
@@ -100,6 +101,10 @@ impl App {
                 }
                 let image = context.content_rect().translate(egui::vec2(-aside, 0.0));
                 outlines.draw(context, image);
+                let is_over_body = outlines.hovered().is_some_and(|entity| selected.contains(&entity));
+                if let Some(cursor) = handles.cursor(is_over_body) {
+                    context.set_cursor_icon(cursor);
+                }
                 handles.draw(context, |entity| outlines.has(entity));
                 if let Some(grab) = grab {
                     grab.draw(context);
@@ -120,6 +125,8 @@ impl App {
                     overlay::legend(context, &format!("{}: working …", inspection.label()), None);
                 } else if picture.inspection != Inspection::Picture {
                     overlay::legend(context, picture.inspection.label(), picture.legend);
+                } else if session.world().resource::<SceneBounds>().is_below_ground(session.status().rig.view.eye) {
+                    overlay::legend(context, &below_ground(navigation), None);
                 }
                 clicked = clicked.take().or(overlay::toasts(context, toasts));
             }
@@ -216,6 +223,12 @@ impl App {
         self.failure = Some(error.into());
         event_loop.exit();
     }
+}
+
+/// What is said of an empty image, and the way out of it.
+fn below_ground(navigation: Navigation) -> String {
+    let key = keys::shortcut(navigation, &Action::Send(Command::Home));
+    format!("below the ground: {} goes back", key.as_deref().unwrap_or("View, Initial view"))
 }
 
 /// Memory of the process in bytes, if the system reports it.

@@ -6,7 +6,7 @@ use crate::render::{Environment, MaterialKind};
 use crate::scene::animation::LightProperty;
 use crate::scene::light_of;
 use crate::scene::{
-    ColorParam, EnvironmentSource, LightEntry, Material, MaterialProperty, SceneEnvironment, SurfaceMaterial,
+    ColorParam, EnvironmentSource, GRADIENT, LightEntry, Material, MaterialProperty, SceneEnvironment, SurfaceMaterial,
 };
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::list::{Listed, Which, list};
@@ -39,7 +39,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
         let hint = "radiance of the brightest colour, or scale factor of the image";
         row_with_hint(ui, "environment", hint, |ui| {
             ui.horizontal(|ui| {
-                if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "× ", "") {
+                if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
                 }
                 ui.label(RichText::new(kind_of_sky(environment)).size(11.0).weak());
@@ -95,6 +95,14 @@ fn kind_of_sky(environment: &SceneEnvironment) -> &'static str {
     }
 }
 
+fn strength_row(ui: &mut Ui, asked: &mut Asked, scale: Vec3) {
+    row(ui, "strength", |ui| {
+        if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "") {
+            set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
+        }
+    });
+}
+
 fn set_sky(asked: &mut Asked, property: Property, value: DVec3) {
     asked.edit(Edit::Set { id: 0, property, value });
 }
@@ -111,6 +119,14 @@ fn color_row(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: 
             }
         })
     });
+}
+
+/// Strength of a clear sky with which white in full sun is the white of the display.
+const IN_THE_SUN: f64 = 2.0;
+
+/// Azimuth of a direction, whole degrees from -Z, clockwise as seen from above.
+fn azimuth_of(direction: DVec3) -> f64 {
+    direction.x.atan2(-direction.z).to_degrees().round()
 }
 
 /// The colours of the environment one by one, or its image.
@@ -130,6 +146,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                     let value = property.get(&environment.part).map(DVec3::splat);
                     property_row(ui, 0, Property::ClearSky(*property), property.info(), value, asked);
                 }
+                strength_row(ui, asked, *scale);
                 return color_row(ui, asked, "ground", ground.0, Property::Ground, None);
             }
             let (file, angle_deg) = match &environment.part {
@@ -137,11 +154,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 _ => ("?", f64::from(rotation.to_degrees())),
             };
             row(ui, "image", |ui| ui.add(egui::Label::new(file).truncate()));
-            row(ui, "strength", |ui| {
-                if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "× ", "") {
-                    set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
-                }
-            });
+            strength_row(ui, asked, *scale);
             row(ui, "rotation", |ui| {
                 if let Some(angle_deg) = number(ui, angle_deg, 0.5, -360.0..=360.0, "°") {
                     set_sky(asked, Property::SkyRotation, DVec3::splat(angle_deg));
@@ -156,11 +169,32 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             let strength = sky_strength(&environment.light).min(1.0);
             set_sky(asked, Property::Sky, DVec3::splat(f64::from(strength)));
         }
+        let is_gradient = matches!(environment.light, Environment::Gradient { .. });
+        let hint = "from zenith to horizon, and another colour below";
+        if !is_gradient && ui.button("gradient").on_hover_text(hint).clicked() {
+            set_sky(asked, Property::Zenith, GRADIENT[0].as_dvec3());
+        }
         if !is_clear && ui.button("clear sky").on_hover_text("sun and sky, as they are outside").clicked() {
+            let status = session.status();
             set_sky(asked, Property::ClearSky(SkyProperty::Elevation), DVec3::splat(45.0));
+            let azimuth = SkyProperty::Azimuth;
+            set_sky(asked, Property::ClearSky(azimuth), DVec3::splat(azimuth_of(status.rig.view.right())));
+            let strength = IN_THE_SUN / f64::from(status.display.exposure_stops).exp2();
+            set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
         }
         if ui.button("image …").on_hover_text("light from a panorama (.hdr, .exr, .png, .jpg)").clicked() {
             asked.dialog = Some(DialogPurpose::Environment);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn azimuths_go_clockwise_from_north() {
+        let of = |x: f64, z: f64| azimuth_of(DVec3::new(x, 0.3, z));
+        assert_eq!([of(0.0, -1.0), of(1.0, 0.0), of(0.0, 1.0), of(-2.0, 0.0)], [0.0, 90.0, 180.0, -90.0]);
+    }
 }

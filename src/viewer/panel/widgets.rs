@@ -116,12 +116,13 @@ pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, log
     ui.add(slider).changed().then_some(new)
 }
 
-/// The unit of radiance, as it is written behind a number.
-pub const RADIANCE: &str = " W/m²sr";
+/// The unit of radiance.
+pub const RADIANCE: &str = "W/m²sr";
 
 /// A linear colour.
 ///
-/// - `unit`: of one that may be brighter than white, which is edited as a hue and a strength.
+/// - `unit`: of one that may be brighter than white, which is edited as a hue and a strength. There is no room for it
+///   beside both: it is in the hint.
 pub fn color(ui: &mut Ui, value: Vec3, unit: Option<&str>) -> Option<DVec3> {
     color_with(ui, value, unit, true)
 }
@@ -138,7 +139,7 @@ fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> O
     let mut rgb = hue.to_array();
     let picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
     let new_hue = if has_code { picked.or(hex_field(ui, hue)) } else { picked };
-    let new_strength = unit.and_then(|unit| strength_drag(ui, f64::from(strength), "× ", unit));
+    let new_strength = unit.and_then(|unit| strength_drag(ui, f64::from(strength), unit));
     if new_hue.is_none() && new_strength.is_none() {
         return None;
     }
@@ -192,11 +193,17 @@ pub fn selectable<T: Listed>(ui: &mut Ui, item: &T, selection: &Selection, asked
     });
 }
 
-/// A number of any magnitude: each step of a drag changes it by the same ratio.
-pub fn strength_drag(ui: &mut Ui, value: f64, prefix: &str, suffix: &str) -> Option<f64> {
+/// A factor of any magnitude: each step of a drag changes it by the same ratio.
+///
+/// - `unit`: of what the factor 1 stands for; empty if it has none.
+pub fn strength_drag(ui: &mut Ui, value: f64, unit: &str) -> Option<f64> {
     let mut new = value;
-    let drag = egui::DragValue::new(&mut new).speed(proportional(value)).range(0.0..=1e9).prefix(prefix).suffix(suffix);
-    ui.add(drag.max_decimals(decimals(value)).update_while_editing(false)).changed().then_some(new)
+    let drag = egui::DragValue::new(&mut new).speed(proportional(value)).range(0.0..=1e9).prefix("× ");
+    let mut drag = ui.add(drag.max_decimals(decimals(value)).update_while_editing(false));
+    if !unit.is_empty() {
+        drag = drag.on_hover_text(format!("strength, in {}: drag it, or click it and type", unit.trim()));
+    }
+    drag.changed().then_some(new)
 }
 
 /// Drag speed per pixel, proportional to the value: doubling takes about 140 pixels at any magnitude. Starts slowly

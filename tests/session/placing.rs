@@ -1,0 +1,159 @@
+//! Where things go that are added, and where the camera stops.
+
+use crate::driver::{Drive, Driver};
+use firstlight::format::property::SkyProperty;
+use firstlight::frame::{Command, Edit, NewThing, Projector, Property, SessionOptions, Target};
+use firstlight::render::Environment;
+use firstlight::scene::{
+    ColorParam, DirectionalLight, EnvironmentSource, GRADIENT, Material, MaterialSlots, Placement, PointLight, Rgb,
+    SceneEnvironment, SceneSource, Shape, SpotLight, SurfaceMaterial, View,
+};
+use glam::{DVec2, DVec3};
+use std::path::Path;
+
+const PYRAMID: &str =
+    "v -0.5 0 -0.5\nv 0.5 0 -0.5\nv 0.5 0 0.5\nv -0.5 0 0.5\nv 0 1 0\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nf 1 4 3 2\n";
+
+/// A model of this many metres, opened by itself.
+fn model(folder: &Path, size: f64) -> Driver {
+    let scaled = |word: &str| word.parse().map_or(word.to_owned(), |x: f64| (size * x).to_string());
+    let lines = PYRAMID.lines().map(|line| match line.strip_prefix("v ") {
+        Some(numbers) => format!("v {}\n", numbers.split(' ').map(scaled).collect::<Vec<_>>().join(" ")),
+        None => format!("{line}\n"),
+    });
+    let path = folder.join("pyramid.obj");
+    std::fs::write(&path, lines.collect::<String>()).unwrap();
+    let target = Target { spp: Some(2), ..Target::default() };
+    let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
+    let mut driver = Driver::new(options, SceneSource::Model(path));
+    driver.settle();
+    driver
+}
+
+/// Where a point is in an image of 480 × 320.
+fn place(driver: &Driver, point: DVec3) -> Option<DVec2> {
+    Projector::new(&driver.session.status().rig, DVec2::new(480.0, 320.0)).place(point)
+}
+
+#[test]
+fn an_orbit_about_a_model_stops_above_the_ground_it_stands_on() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        let mut driver = model(folder.path(), size);
+        let ground = driver.get::<Placement>("ground").translation.y;
+        let below = |driver: &Driver| driver.session.status().rig.view.eye.y < ground;
+        let orbit = |driver: &mut Driver| {
+            for _ in 0..20 {
+                driver.session.send(Command::Orbit { yaw_deg: 1.0, pitch_deg: -8.0 });
+                driver.frame();
+            }
+        };
+        orbit(&mut driver);
+        let View { eye, pivot_distance, .. } = driver.session.status().rig.view;
+        assert!(eye.y > ground && eye.y - ground < 0.02 * pivot_distance, "{eye} above {ground}");
+        // Who wants to see the model from below takes the ground away.
+        driver.select("ground");
+        driver.edit([Edit::Delete]);
+        orbit(&mut driver);
+        assert!(below(&driver));
+        // Below a ground, for whatever reason, one may go on, and go home.
+        driver.edit([Edit::Undo]);
+        driver.session.send(Command::Orbit { yaw_deg: 10.0, pitch_deg: -1.0 });
+        driver.frame();
+        assert!(below(&driver));
+        driver.session.send(Command::Home);
+        driver.frame();
+        assert!(!below(&driver));
+    }
+}
+
+/// White would have this irradiance by the light alone, W/m², if it faced it.
+fn irradiance(driver: &Driver, thing: &NewThing, subject: DVec3) -> f64 {
+    let fall = |position: DVec3| (subject - position).length_squared();
+    match thing {
+        NewThing::PointLight => {
+            let at: Placement = driver.get("point light");
+            f64::from(driver.get::<PointLight>("point light").intensity.x) / fall(at.translation)
+        }
+        NewThing::SpotLight => {
+            let (light, at): (SpotLight, Placement) = (driver.get("spot light"), driver.get("spot light"));
+            let way = (subject - at.translation).normalize();
+            assert!(way.dot(light.direction) > 1.0 - 1e-6, "it points to it");
+            f64::from(light.intensity.x) / fall(at.translation)
+        }
+        NewThing::DirectionalLight => f64::from(driver.get::<DirectionalLight>("directional light").irradiance.x),
+        _ => {
+            let (shape, at): (Shape, Placement) = (driver.get("area light"), driver.get("area light"));
+            let Shape::Quad { edge_u, edge_v } = shape else { panic!("{shape:?}") };
+            let center = at.translation + 0.5 * (edge_u + edge_v);
+            let normal = edge_u.cross(edge_v);
+            assert!(normal.normalize().dot((subject - center).normalize()) > 1.0 - 1e-6, "it faces it");
+            let material = driver.get::<MaterialSlots>("area light").0[0];
+            let material = driver.session.world().get::<SurfaceMaterial>(material).expect("a material");
+            let Material::Emissive { radiance: ColorParam::Rgb(radiance) } = &material.0 else {
+                panic!("{material:?}")
+            };
+            f64::from(radiance.max_element()) * normal.length() / fall(center)
+        }
+    }
+}
+
+#[test]
+fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        for thing in [NewThing::AreaLight, NewThing::PointLight, NewThing::SpotLight, NewThing::DirectionalLight] {
+            for chosen in [false, true] {
+                let mut driver = model(folder.path(), size);
+                // The model is in the middle of the image, too.
+                let object = driver.named("model");
+                let subject = driver.session.box_of(object).expect("its box").middle();
+                if chosen {
+                    driver.select("model");
+                }
+                driver.edit([Edit::Add(thing.clone())]);
+                let entity = driver.selected().active().expect("what is new is selected");
+                let at = driver.session.world().get::<Placement>(entity).expect("a place").translation;
+                let View { eye, .. } = driver.session.status().rig.view;
+                assert!(at.y > subject.y && at.y < 4.0 * size, "{thing:?} of {size}: {at}");
+                assert!((at - subject).length() < (eye - subject).length(), "{thing:?} of {size}: {at}");
+                let middle = driver.session.box_of(entity).expect("its box").middle();
+                let seen = place(&driver, middle).expect("in front of the camera");
+                assert!(seen.cmpge(DVec2::ZERO).all() && seen.cmple(DVec2::new(480.0, 320.0)).all(), "{seen}");
+                let irradiance = irradiance(&driver, &thing, subject);
+                assert!((4.0..8.0).contains(&irradiance), "{thing:?} of {size}, chosen {chosen}: {irradiance}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_copy_stands_beside_its_original() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        let mut driver = model(folder.path(), size);
+        driver.select("model");
+        let before: Placement = driver.get("model");
+        driver.edit([Edit::Duplicate]);
+        driver.settle();
+        let step = driver.get::<Placement>("model 2").translation - before.translation;
+        let wide = step.abs().max_element();
+        assert!(wide > size && wide < 1.5 * size && step.length() == wide, "{step} at {size}");
+        let at = |point: DVec3| place(&driver, point).expect("in front of the camera").x;
+        assert!(at(before.translation + step) > at(before.translation), "to the right, as it is seen");
+    }
+}
+
+#[test]
+fn any_environment_becomes_a_gradient_again() {
+    let mut driver = Driver::builtin("gallery");
+    let sky = |driver: &Driver| driver.session.world().resource::<SceneEnvironment>().clone();
+    let [zenith, horizon, ground] = GRADIENT;
+    for other in [Property::Sky, Property::ClearSky(SkyProperty::Elevation)] {
+        driver.edit([Edit::Set { id: 0, property: other, value: DVec3::splat(0.5) }]);
+        assert!(!matches!(sky(&driver).light, Environment::Gradient { .. }), "{other:?}");
+        driver.edit([Edit::Set { id: 0, property: Property::Zenith, value: zenith.as_dvec3() }]);
+        let part = EnvironmentSource::Gradient { zenith: Rgb(zenith), horizon: Rgb(horizon), ground: Rgb(ground) };
+        assert_eq!(sky(&driver).part, part);
+    }
+}
