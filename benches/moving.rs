@@ -16,8 +16,8 @@ mod common;
 
 use common::{scenes, world_of};
 use firstlight::render::{
-    Camera, Display, Film, MovingImage, Prepared, Relighting, RenderSettings, advance, decode_srgb, denoise_film,
-    develop_colors, gather_features, gather_guides, relight, smooth_film,
+    Camera, Display, Film, MovingImage, Prepared, Relighting, RenderSettings, StillImage, advance, decode_srgb,
+    denoise_film, develop_colors, gather_features, gather_guides, relight, smooth_film,
 };
 use firstlight::report::{cpu_seconds, flip};
 use firstlight::scene::{Extraction, SceneInputs};
@@ -63,7 +63,7 @@ fn rows(name: &str, ways: &[&str]) {
         let mut moving = MovingImage::default();
         if way.ends_with('s') {
             image(&mut moving, &views[0], 0, way);
-            moving.settle(&first, SIZE, &views[0].camera, Display::default().exposure());
+            moving.settle(StillImage::new(&first, SIZE, &views[0].camera, Display::default().exposure()));
         }
         let before = cpu_seconds().unwrap_or(f64::NAN);
         let images: Vec<Vec<Vec3>> = (0..IMAGES).map(|i| image(&mut moving, &views[i], i as u32, way)).collect();

@@ -42,7 +42,7 @@ impl Loop<'_> {
 
     /// Takes over a denoised image of the current view.
     pub(super) fn take_settled(&mut self) {
-        let Some(settled) = self.denoiser.take() else { return };
+        let Some(mut settled) = self.denoiser.take() else { return };
         if self.settled_key().is_some_and(|key| key == settled.key) && settled.filter == self.look.filter {
             tracing::debug!(
                 "denoised {} samples per pixel with guides of {}, in {:.2} s, {:.2} s after the restart",
@@ -55,10 +55,8 @@ impl Loop<'_> {
             self.redraw |= self.wanted_denoising() != Denoising::Raw;
             // This view will not be smoothed any more. Coarse images need little memory.
             self.moving.forget_image();
-            if let Some(job) = &self.job {
-                let (colors, exposure) = (&settled.denoised.color, self.display.exposure());
-                let take_over = || self.moving.settle(colors, settled.key.size, &job.prepared.camera, exposure);
-                lock(&self.shared.pool).clone().install(take_over);
+            if let Some(still) = settled.still.take() {
+                self.moving.settle(still);
             }
             self.views.settled = Some(settled);
             self.views.smooth_again = None;
@@ -124,7 +122,12 @@ impl Loop<'_> {
             if film.spp() == 0 || !is_due || is_awaited {
                 return;
             }
-            Some(ToDenoise { filter: self.look.filter, source: pool.install(|| DenoiseSource::of(film)), spp })
+            Some(ToDenoise {
+                filter: self.look.filter,
+                source: pool.install(|| DenoiseSource::of(film)),
+                spp,
+                exposure: self.display.exposure(),
+            })
         };
         self.denoiser.request(Request {
             key,

@@ -8,7 +8,7 @@
 use crate::frame::core::denoising::DenoiseFilter;
 use crate::frame::worker::shared::{DENOISE, DENOISE_NICENESS, NICENESS, lock, make_pool};
 use crate::frame::worker::views::{Settled, ViewKey};
-use crate::render::{DenoiseSource, GuideGatherer, Prepared, RenderSettings};
+use crate::render::{DenoiseSource, GuideGatherer, Prepared, RenderSettings, StillImage};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -35,6 +35,8 @@ pub struct ToDenoise {
     pub source: DenoiseSource,
     /// Samples per pixel of the source.
     pub spp: u32,
+    /// What radiance is multiplied by for the display.
+    pub exposure: f32,
 }
 
 /// Guides of the latest view, as good as they are so far.
@@ -157,11 +159,12 @@ fn run(shared: &DenoiserState, yielding: bool, tell: &dyn Fn()) {
         let stop = || shared.quit.load(Ordering::Relaxed) || shared.wanted.load(Ordering::Relaxed) != key.generation;
         let work = || {
             known.gather(&request, &stop)?;
-            let Some(ToDenoise { filter, source, spp }) = image else { return Some(None) };
+            let Some(ToDenoise { filter, source, spp, exposure }) = image else { return Some(None) };
             let start = Instant::now();
             let (by, denoised) = filter.denoise(&source, known.gatherer.guides(), &stop)?;
             let (guide_samples, took) = (known.gatherer.samples(), start.elapsed());
-            Some(Some(Settled { key, filter, by, spp, guide_samples, denoised, took }))
+            let still = StillImage::new(&denoised.color, key.size, &request.prepared.camera, exposure);
+            Some(Some(Settled { key, filter, by, spp, guide_samples, denoised, still: Some(still), took }))
         };
         let made = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
         match made {

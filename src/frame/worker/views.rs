@@ -1,7 +1,7 @@
 //! Cached results computed from the film or the scene.
 
 use crate::frame::core::denoising::DenoiseFilter;
-use crate::render::{Denoised, Inspected, Inspection};
+use crate::render::{Denoised, Inspected, Inspection, StillImage};
 use glam::UVec2;
 use std::time::{Duration, Instant};
 
@@ -41,6 +41,8 @@ pub struct Settled {
     /// Samples per pixel of its guides.
     pub guide_samples: u32,
     pub denoised: Denoised,
+    /// The same for images of the next views, until it is taken.
+    pub still: Option<StillImage>,
     /// Without the feature buffers, which are gathered once per view.
     pub took: Duration,
 }

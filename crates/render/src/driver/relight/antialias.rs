@@ -52,6 +52,18 @@ struct Means {
     exposure: f32,
 }
 
+/// An image with next to no noise, as one that images of the next views are mixed with: it counts as as many as may be.
+pub struct StillImage(Means);
+
+impl StillImage {
+    /// - `colors`: radiance; `size`: pixels; `camera`: of its view; `exposure`: what radiance is multiplied by for the
+    ///   display.
+    pub fn new(colors: &[Vec3], size: UVec2, camera: &Camera, exposure: f32) -> Self {
+        let list = colors.par_iter().map(|color| compressed(*color, exposure).extend(COUNTLESS)).collect();
+        Self(Means { size, list, camera: Some(*camera), exposure })
+    }
+}
+
 /// An image by one ray per pixel.
 pub struct Rays<'a> {
     /// Radiance.
@@ -87,12 +99,9 @@ impl Antialiased {
         }
     }
 
-    /// Takes over an image of the present view that has next to no noise, radiance: it counts as as many images as may be.
-    pub fn settle(&mut self, colors: &[Vec3], size: UVec2, camera: &Camera, exposure: f32) {
-        let Means { list, .. } = &mut self.present;
-        list.clear();
-        list.par_extend(colors.par_iter().map(|color| compressed(*color, exposure).extend(COUNTLESS)));
-        (self.present.size, self.present.camera, self.present.exposure) = (size, Some(*camera), exposure);
+    /// Takes over an image of the present view.
+    pub fn settle(&mut self, still: StillImage) {
+        self.present = still.0;
     }
 
     /// Mixes an image with those before; returns the result, of `size` pixels, radiance, or `None` if `stop` returned
@@ -134,12 +143,6 @@ impl Antialiased {
     /// The latest image, radiance, and its size.
     pub fn latest(&self) -> (&[Vec3], UVec2) {
         (&self.colors, self.present.size)
-    }
-
-    /// Frees the memory of all but what the next image is mixed with.
-    pub fn forget_image(&mut self) {
-        let (present, past) = (std::mem::take(&mut self.present), std::mem::take(&mut self.past));
-        *self = Self { present, past, ..Self::default() };
     }
 }
 
@@ -405,7 +408,7 @@ mod tests {
         let (mut image, camera) = (Antialiased::default(), moved_camera(0.0));
         let pixels = (0..SIZE.y).flat_map(|y| (0..SIZE.x).map(move |x| UVec2::new(x, y).as_vec2() + 0.5));
         let settled: Vec<Vec3> = pixels.map(|film| wall(&camera, film, SIZE.as_vec2())).collect();
-        image.settle(&settled, SIZE, &camera, 1.0);
+        image.settle(StillImage::new(&settled, SIZE, &camera, 1.0));
         let camera = moved_camera(0.013);
         let color = |film| wall(&camera, film, RAYS.as_vec2());
         let next = |image: &mut Antialiased| error(&mix(image, &camera, Vec2::splat(0.5), 12.0, color), &camera);

@@ -7,7 +7,6 @@ mod antialias;
 mod finer;
 mod past;
 
-use crate::core::camera::Camera;
 use crate::core::filter::{FilterSampler, PixelFilter};
 use crate::core::settings::RenderSettings;
 use crate::denoise::MovingFilter;
@@ -24,6 +23,8 @@ use crate::sampling::Sampler;
 use firstlight_simd::InstructionSet;
 use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
+
+pub use crate::driver::relight::antialias::StillImage;
 
 /// The middle of a pixel.
 const MIDDLE: Vec2 = Vec2::splat(0.5);
@@ -66,16 +67,13 @@ impl MovingImage {
     /// Frees memory: of all but the light that the next image takes over.
     pub fn forget_image(&mut self) {
         let (present, past) = (std::mem::take(&mut self.present), std::mem::take(&mut self.past));
-        let mut antialiased = std::mem::take(&mut self.antialiased);
-        antialiased.forget_image();
+        let antialiased = std::mem::take(&mut self.antialiased);
         *self = Self { present, past, antialiased, most: self.most, number: self.number, ..Self::default() };
     }
 
-    /// Takes over an image of the present view that has next to no noise, radiance: those of the next views begin with it.
-    ///
-    /// - `size`: of the image, pixels; `camera`: of the view; `exposure`: what radiance is multiplied by for the display.
-    pub fn settle(&mut self, colors: &[Vec3], size: UVec2, camera: &Camera, exposure: f32) {
-        self.antialiased.settle(colors, size, camera, exposure);
+    /// Takes over an image of the present view: those of the next views begin with it.
+    pub fn settle(&mut self, still: StillImage) {
+        self.antialiased.settle(still);
     }
 
     /// Where in pixels the rays of the present image go through: those of consecutive images fill the pixel evenly.
