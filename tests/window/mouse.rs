@@ -377,7 +377,7 @@ fn an_image_whose_goal_is_far_is_kept_as_it_stands() {
     until("the form", || is_dark(&program, form).then_some(()));
     std::thread::sleep(Duration::from_millis(500));
     // The goal in its row, typed over.
-    click(&program, 1, (475, 269));
+    click(&program, 1, (475, 275));
     std::thread::sleep(Duration::from_millis(500));
     program.key("ctrl+a");
     program.type_text("0.01");
