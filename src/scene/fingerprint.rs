@@ -1,7 +1,6 @@
 //! A hash that tells whether two loaded scenes have the same contents.
 
 use crate::files::hash::Fingerprint;
-use crate::format::animation::TrackPart;
 use crate::format::camera::CameraPart;
 use crate::format::parts::{DisplayPart, FilmPart, ObjectPart};
 use crate::format::scene_file::SceneFile;
@@ -89,9 +88,13 @@ impl SceneContent {
     /// The contents of `world`, which `description` describes.
     pub fn of(world: &mut World, description: &Description) -> Self {
         let mut file = description.file.clone();
+        let animation = world.get_resource::<Animation>();
+        let is_exposed = file.animation.shutter.is_some() || file.animation.shutter_seconds.is_some();
+        let model = animation.filter(|_| is_exposed).and_then(|animation| animation.model.as_ref());
+        let motion = model.map(|model| model.motion.clone());
         let CameraPart { look_at, forward, .. } = file.camera;
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
-        if file.animation.tracks.iter().any(|track| matches!(track, TrackPart::Camera { .. })) {
+        if animation.is_some_and(Animation::has_camera_track) {
             // A camera on its way is turned towards a point, or is not.
             (file.camera.look_at, file.camera.forward) = (look_at, forward);
         }
@@ -136,10 +139,7 @@ impl SceneContent {
         if let Environment::Image { image, .. } = &inputs.environment.light {
             pictures.push(image.clone());
         }
-        let is_exposed = file.animation.shutter.is_some() || file.animation.shutter_seconds.is_some();
-        let animation = world.get_resource::<Animation>().filter(|_| is_exposed);
-        let model = animation.and_then(|animation| animation.model.as_ref());
-        Self { file, meshes, pictures, motion: model.map(|model| model.motion.clone()) }
+        Self { file, meshes, pictures, motion }
     }
 
     /// Reads each vertex and each texel once, however often they are used.
@@ -181,6 +181,24 @@ mod tests {
             of(&[1, 2, 3, 4], 2, 2, 1),
         ];
         assert!(all.iter().enumerate().all(|(i, print)| all[..i].iter().all(|other| other != print)), "{all:?}");
+    }
+
+    /// The view at the moment is no content, but how the camera turns on its way is.
+    #[test]
+    fn the_aim_of_a_camera_counts_if_it_moves() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.ron");
+        let print = |target: f64, tracks: &str| {
+            let camera =
+                format!("(camera: (eye: (0, 0, 4), look_at: (0, 0, {target})), animation: (tracks: [{tracks}]))");
+            std::fs::write(&path, camera).unwrap();
+            let loaded = load(&SceneSource::Scene(path.clone()), &LoadOptions::default());
+            loaded.unwrap_or_else(|error| panic!("{error}")).content_fingerprint()
+        };
+        assert_eq!(print(0.0, ""), print(2.0, ""));
+        let track = "camera(property: eye, keys: [(0, (0, 0, 4)), (1, (2, 0, 4))])";
+        assert_eq!(print(0.0, track), print(0.0, track));
+        assert_ne!(print(0.0, track), print(2.0, track));
     }
 
     #[test]

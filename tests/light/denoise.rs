@@ -3,7 +3,8 @@
 use crate::common::*;
 use firstlight::render::{
     ColorInput, Denoised, Environment, Film, GuideGatherer, Material, MovingFilter, MovingImage, Prepared, Relighting,
-    RenderSettings, SurfaceGuides, advance, denoise_film, gather_features, gather_guides, relight, smooth_film,
+    RenderSettings, ScalarInput, SurfaceGuides, advance, denoise_film, gather_features, gather_guides, relight,
+    smooth_film,
 };
 use glam::{UVec2, Vec3};
 
@@ -223,6 +224,32 @@ fn coarse_light_is_put_on_surfaces_of_the_full_resolution() {
     assert_eq!(size, window);
     let [coarse, error] = [&enlarged[..], relit].map(|colors| relative_mse(colors, &reference.means()));
     assert!(error < 0.4 * coarse, "{error} of {coarse}");
+}
+
+/// What its paths meet after it scatters them, here nothing, is not what is seen in it.
+#[test]
+fn a_surface_that_reflects_a_share_of_the_light_is_no_mirror() {
+    let phong = Material::Phong {
+        diffuse: ColorInput::Constant(Vec3::splat(0.5)),
+        ambient: 0.0,
+        specular: ScalarInput::Constant(0.1),
+        shininess: 20.0,
+        transparency: 0.0,
+        ior: 1.5,
+        absorption: Vec3::ZERO,
+    };
+    let over = camera(Vec3::new(0.0, 3.0, 0.1), Vec3::ZERO, 40.0);
+    for (material, takes_part) in [(phong, true), (mirror(), false)] {
+        let floor = vec![(plane(Vec3::ZERO, Vec3::Y), 0)];
+        let scene = scene(floor, vec![material], Environment::Constant(Vec3::ONE), over);
+        let mut film = Film::new(SIZE.0, SIZE.1);
+        film.note_surfaces();
+        advance(&scene, &RenderSettings::default(), &mut film, 1, &|| false);
+        let mut filter = MovingFilter::default();
+        smooth_film(&mut filter, &scene, &RenderSettings::default(), &film, &|| false).expect("surfaces are noted");
+        let pixels = (0..SIZE.1 as usize).flat_map(|y| (0..SIZE.0 as usize).map(move |x| (x, y)));
+        assert!(pixels.into_iter().all(|(x, y)| filter.takes_part(x, y) == takes_part), "{takes_part}");
+    }
 }
 
 /// The same samples in other tiles, in two films, and by other threads.

@@ -64,7 +64,7 @@ impl MovingImage {
         self.filter.keep_narrow(self.past.is_there() && self.most > 0.0);
     }
 
-    /// Frees memory: of all but the light that the next image takes over.
+    /// Frees memory: of all but what the next image takes over, and the image itself.
     pub fn forget_image(&mut self) {
         let (present, past) = (std::mem::take(&mut self.present), std::mem::take(&mut self.past));
         let antialiased = std::mem::take(&mut self.antialiased);
