@@ -1,9 +1,12 @@
 //! The list of commands: found by typing, run by Enter or a click.
 
 use crate::viewer::keys::{Action, finds};
-use crate::viewer::menu::{self, MenuInput};
 use crate::viewer::overlay::KEY;
+use egui::text_edit::TextEditState;
 use egui::{Align2, Button, Context, Event, Id, Key, Modifiers, RichText, TextEdit, Vec2, Window};
+
+/// A command: its name, what it does, its key, and the command itself.
+type Line = (String, String, String, Action);
 
 /// State of the list of commands.
 #[derive(Default)]
@@ -20,16 +23,14 @@ impl Palette {
         *self = Self { open: true, is_new: true, ..Self::default() };
     }
 
-    /// Draws the list; returns the command to run.
-    pub fn show(&mut self, context: &Context, input: &MenuInput) -> Option<Action> {
+    /// Draws the list of all commands; returns the one to run.
+    pub fn show(&mut self, context: &Context, all: impl FnOnce() -> Vec<Line>) -> Option<Action> {
         if !self.open {
             return None;
         }
-        let is_new = std::mem::take(&mut self.is_new);
-        if is_new {
-            // The key that opened the list is no part of the search.
-            let is_key = |event: &Event| matches!(event, Event::Text(text) if text == "/");
-            context.input_mut(|input| input.events.retain(|event| !is_key(event)));
+        let id = Id::new("search of the commands");
+        if std::mem::take(&mut self.is_new) {
+            self.take_letters(context, id);
         }
         let pressed = |key| context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let (up, down, enter) = (pressed(Key::ArrowUp), pressed(Key::ArrowDown), pressed(Key::Enter));
@@ -37,9 +38,7 @@ impl Palette {
             self.open = false;
             return None;
         }
-        let found = matches(menu::all(input), &self.search);
-        self.chosen = (self.chosen + usize::from(down)).saturating_sub(usize::from(up)).min(found.len().max(1) - 1);
-        let mut run = found.get(self.chosen).filter(|_| enter).map(|(_, _, _, action)| action.clone());
+        let mut run = None;
         let screen = context.content_rect();
         let width = 460.0_f32.min(screen.width() - 30.0).max(60.0);
         let mut open = true;
@@ -50,7 +49,6 @@ impl Palette {
             .resizable(false)
             .fixed_size(Vec2::new(width, 0.6 * screen.height()))
             .show(context, |ui| {
-                let id = Id::new("search of the commands");
                 // Before the field is drawn, so that what has been typed already is not lost.
                 ui.memory_mut(|memory| memory.request_focus(id));
                 let field = TextEdit::singleline(&mut self.search).id(id);
@@ -58,6 +56,11 @@ impl Palette {
                 if field.changed() {
                     self.chosen = 0;
                 }
+                // After the field has read the keys: letters and the Enter behind them may come in one frame.
+                let found = matches(all(), &self.search);
+                self.chosen =
+                    (self.chosen + usize::from(down)).saturating_sub(usize::from(up)).min(found.len().max(1) - 1);
+                run = found.get(self.chosen).filter(|_| enter).map(|(_, _, _, action)| action.clone());
                 ui.add_space(4.0);
                 egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     if found.is_empty() {
@@ -82,10 +85,27 @@ impl Palette {
         self.open = open && run.is_none();
         run
     }
+
+    /// Takes what was typed before the list is drawn for the first time: its field reads no keys in that frame.
+    fn take_letters(&mut self, context: &Context, field: Id) {
+        TextEditState::default().store(context, field);
+        let events = context.input_mut(|input| std::mem::take(&mut input.events));
+        let mut rest = Vec::new();
+        let mut is_first = true;
+        for event in events {
+            match event {
+                // The key that opened the list is no part of the search.
+                Event::Text(letter) if letter == "/" && std::mem::take(&mut is_first) => {}
+                Event::Text(letter) => self.search.push_str(&letter),
+                other => rest.push(other),
+            }
+        }
+        context.input_mut(|input| input.events = rest);
+    }
 }
 
 /// The lines that a search finds: those whose name has it first.
-fn matches(lines: Vec<(String, String, String, Action)>, search: &str) -> Vec<(String, String, String, Action)> {
+fn matches(lines: Vec<Line>, search: &str) -> Vec<Line> {
     let is_named = |name: &str| finds(name, search);
     let (mut named, others): (Vec<_>, Vec<_>) = lines.into_iter().partition(|(name, ..)| is_named(name));
     named.extend(others.into_iter().filter(|(name, effect, ..)| finds(&format!("{name} {effect}"), search)));
@@ -95,6 +115,30 @@ fn matches(lines: Vec<(String, String, String, Action)>, search: &str) -> Vec<(S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui::RawInput;
+
+    /// A slow frame gets all that was typed since the last one, and Enter with it.
+    #[test]
+    fn enter_runs_what_was_typed_in_the_same_frame() {
+        let lines = || {
+            let line = |name: &str, action| (name.to_owned(), String::new(), String::new(), action);
+            vec![line("Focus", Action::FocusHere), line("Play", Action::TogglePlay), line("Brush", Action::Brush)]
+        };
+        let (context, mut palette) = (Context::default(), Palette::default());
+        palette.open();
+        let enter = Event::Key {
+            key: Key::Enter,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let letters = ["/", "B", "r", "u"].map(|letter| Event::Text(letter.to_owned()));
+        let input = RawInput { events: letters.into_iter().chain([enter]).collect(), ..RawInput::default() };
+        let mut run = None;
+        let _ = context.run(input, |context| run = palette.show(context, lines));
+        assert_eq!(run, Some(Action::Brush));
+    }
 
     #[test]
     fn a_name_comes_before_what_only_mentions_it() {

@@ -6,7 +6,7 @@ use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
 use crate::viewer::bar::Figures;
 use crate::viewer::keys::{self, Action};
-use crate::viewer::menu::MenuInput;
+use crate::viewer::menu::{self, MenuInput};
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::time_line::Strip;
 use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story, time_line};
@@ -140,7 +140,7 @@ impl App {
             }
             wish = form.show(context, window_size);
             file = browser.show(context);
-            let found = palette.show(context, &menu_input);
+            let found = palette.show(context, || menu::all(&menu_input));
             clicked = clicked.take().or(found);
             if help.open {
                 key_list::draw(context, help, navigation);
