@@ -187,7 +187,7 @@ fn keep_panel(desktop: &Desktop, open: &[&str]) {
 fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     let Some(desktop) = Desktop::start() else { return };
     let path = desktop.folder().join("room.ron");
-    std::fs::write(&path, ROOM.replace("environment:", "film: (width: 1920, height: 1080), environment:"))
+    std::fs::write(&path, ROOM.replace("environment:", "film: (width: 960, height: 540), environment:"))
         .expect("a file");
     keep_panel(&desktop, &["Lights", "Environment"]);
     let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
@@ -228,13 +228,13 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     program.hold("w", 300);
     let image = desktop.folder().join("room-0001.png");
     until("the image", || image.is_file().then_some(()));
-    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (1920, 1080));
+    assert_eq!(image::image_dimensions(&image).expect("a PNG"), (960, 540));
     let shot = firstlight::scene::ImageMetadata::read(&image).expect("it opens again");
     // The camera may still have glided a little; flying goes much farther.
     let moved = shot.camera.eye.distance(camera.eye);
     assert!(moved < 0.01 && shot.denoised.as_deref() == Some("own"), "as it was seen: {moved} m");
     until("its path", || {
-        (program.output() + &program.errors()).contains("room-0001.png (1920 × 1080, noise ").then_some(())
+        (program.output() + &program.errors()).contains("room-0001.png (960 × 540, noise ").then_some(())
     });
     program.key("ctrl+q");
     assert!(program.ended().success());
@@ -320,7 +320,7 @@ fn a_command_is_found_by_its_name() {
     program.key("slash");
     until("the list of commands", || is_dark(&program, list).then_some(()));
     // Faster than a frame.
-    program.xdotool("type --delay 0 Quit\n");
+    program.xdotool("key --delay 0 Q u i t Return");
     assert!(program.ended().success());
 }
 
