@@ -90,6 +90,16 @@ pub fn pbrt(bytes: &[u8]) {
     open(SceneSource::Foreign(write("fuzz.pbrt", bytes)), None);
 }
 
+/// A scene of Tungsten, or a mesh of one.
+pub fn tungsten(bytes: &[u8]) {
+    const SCENE: &[u8] = br#"{"primitives": [{"type": "mesh", "file": "fuzz.wo3", "smooth": true}]}"#;
+    let is_text = bytes.first().is_some_and(|first| b"{ \n".contains(first));
+    if !is_text {
+        write("fuzz.wo3", bytes);
+    }
+    open(SceneSource::Foreign(write("fuzz.json", if is_text { bytes } else { SCENE })), None);
+}
+
 /// A scene of Mitsuba.
 pub fn mitsuba(bytes: &[u8]) {
     open(SceneSource::Foreign(write("fuzz.xml", bytes)), None);

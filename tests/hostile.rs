@@ -175,6 +175,7 @@ assaults! {
     scenes: scene, 4000, 2 * MIB, 64;
     pbrt_scenes: pbrt, 2500, 64 * MIB, 512;
     mitsuba_scenes: mitsuba, 2500, 64 * MIB, 512;
+    tungsten_scenes: tungsten, 2500, 64 * MIB, 512;
     pictures: picture, 2500, 4 * MIB + 32 * drive::LIMITS.picture_pixels as usize, 8;
     whole_scenes_to_the_last_pixel: render, 3000, 64 * MIB, 64;
     films: film, 2000, 8 * MIB, 1200;

@@ -425,7 +425,7 @@ fn kind_of_shape(shape: &Shape) -> &'static str {
 
 fn environment(environment: &SceneEnvironment) -> String {
     if let EnvironmentSource::Sky { elevation, azimuth, turbidity, .. } = &environment.part {
-        return format!("clear sky, sun at {elevation}°, azimuth {azimuth}°, turbidity {turbidity}");
+        return format!("clear sky, sun at {elevation:.1}°, azimuth {azimuth:.1}°, turbidity {turbidity}");
     }
     match &environment.light {
         Environment::Black => "black".to_owned(),

@@ -6,8 +6,7 @@ use crate::cli::console::{inform, tell};
 use crate::cli::failure::Failure;
 use crate::cli::waiting::Waiting;
 use clap::Args;
-use firstlight::export::export;
-use firstlight::format::scene_format::SceneFormat;
+use firstlight::export::{ExportFormat, export};
 use firstlight::scene::{Description, WriteError, whole_scene};
 use std::path::PathBuf;
 
@@ -26,10 +25,10 @@ pub struct SaveArgs {
 }
 
 pub fn run(args: &SaveArgs) -> Result<(), Failure> {
-    let format = SceneFormat::of(&args.output);
+    let format = ExportFormat::of(&args.output);
     if format.is_none() && !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
-        let extensions = SceneFormat::extensions();
-        return Err(Failure::Usage(format!("{}: the name of a scene must end in {extensions}", args.output.display())));
+        let path = args.output.display();
+        return Err(Failure::Usage(format!("{path}: the name of a scene must end in .ron, .pbrt, .xml")));
     }
     let mut files = OverwriteArgs::default().files();
     if let Some(path) = args.scene.source()?.path() {

@@ -334,9 +334,11 @@ fn scene_in(comment: &[u8], sums: &BTreeMap<String, String>) -> Result<(String, 
         names.next().filter(|_| names.next().is_none()).cloned()
     };
     let is_scene = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron"));
-    let is_foreign = |path: &Path| SceneFormat::of(path).is_some();
+    // Many a file is JSON that is no scene.
+    let is_json = |path: &Path| SceneFormat::of(path) == Some(SceneFormat::Tungsten);
+    let is_foreign = |path: &Path| SceneFormat::of(path).is_some() && !is_json(path);
     let is_model = |path: &Path| ModelFormat::of(path).is_some();
-    let kinds: [&dyn Fn(&Path) -> bool; 3] = [&is_scene, &is_foreign, &is_model];
+    let kinds: [&dyn Fn(&Path) -> bool; 4] = [&is_scene, &is_foreign, &is_model, &is_json];
     let kind = kinds.into_iter().find(|kind| sums.keys().any(|name| kind(Path::new(name))));
     let found = kind.and_then(only);
     found.map(|scene| (scene, None)).ok_or(UnpackError::NoScene)

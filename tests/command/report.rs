@@ -290,7 +290,7 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         scene.spawn(&mut world);
         let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
         let settings = world.resource::<Rendering>().0;
-        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 1024).0;
+        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 512).0;
         let truth = LinearPicture::of(&truth);
         let mut held = [0; 4];
         let mut widths = [0.0; 4];

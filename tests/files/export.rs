@@ -1,9 +1,8 @@
 //! Scenes that are saved as files of pbrt and Mitsuba open again, with the same surfaces and the same light.
 
 use bevy_ecs::prelude::World;
-use firstlight::export::export;
+use firstlight::export::{ExportFormat, export};
 use firstlight::format::property::SkyProperty;
-use firstlight::format::scene_format::SceneFormat;
 use firstlight::format::value::{ColorValue, ScalarValue};
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::{Film, Material};
@@ -24,7 +23,7 @@ fn open(source: SceneSource) -> (World, LoadedScene) {
 }
 
 /// Writes a scene and opens it again; returns what was told as well.
-fn there_and_back(from: SceneSource, format: SceneFormat, folder: &Path) -> (World, LoadedScene, Vec<String>) {
+fn there_and_back(from: SceneSource, format: ExportFormat, folder: &Path) -> (World, LoadedScene, Vec<String>) {
     let (mut world, scene) = open(from);
     let path = folder.join(format!("out.{}", format.file_extension()));
     let told = export(&whole_scene(&mut world, &scene), format, &path, true).unwrap();
@@ -49,7 +48,7 @@ fn every_built_in_scene_is_written_and_opens_again() {
         }
         let (mut world, scene) = open(SceneSource::Builtin((*name).to_owned()));
         let whole = whole_scene(&mut world, &scene);
-        for format in SceneFormat::ALL {
+        for format in ExportFormat::ALL {
             let path = folder.path().join(format!("{name}.{}", format.file_extension()));
             export(&whole, format, &path, false).unwrap_or_else(|error| panic!("{name}: {error}"));
             let again = export(&whole, format, &path, false).unwrap_err().to_string();
@@ -94,7 +93,7 @@ const SURFACES: [&[&str]; 3] = [
 
 #[test]
 fn surfaces_come_back_with_all_their_numbers() {
-    for (format, own) in [(SceneFormat::Mitsuba, 1), (SceneFormat::Pbrt, 2)] {
+    for (format, own) in [(ExportFormat::Mitsuba, 1), (ExportFormat::Pbrt, 2)] {
         let surfaces: Vec<&str> = SURFACES[0].iter().chain(SURFACES[own]).copied().collect();
         let materials: String = surfaces.iter().enumerate().map(|(i, it)| format!("\"m{i}\": {it},")).collect();
         let ball = |i| format!("sphere(center: ({}, 1, 0), radius: 0.25, material: \"m{i}\"),", i);
@@ -122,7 +121,7 @@ fn surfaces_come_back_with_all_their_numbers() {
 #[test]
 fn holes_come_back_as_they_are_cut() {
     let image = image::GrayImage::from_fn(2, 2, |x, y| image::Luma([[[100, 200], [120, 140]][y as usize][x as usize]]));
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         for (opacity, share) in [("\"image\"", 0.5), ("\"squares\"", 0.5), ("0.4", 0.0)] {
             let leaf = |kind: &str| format!("{kind}, opacity: {opacity}, opacity_cutoff: 0.5)");
             let text = format!(
@@ -181,7 +180,7 @@ fn a_translucent_surface_comes_back_from_a_blend_of_mitsuba() {
         let folder = tempfile::tempdir().unwrap();
         image.save(folder.path().join("image.exr")).unwrap();
         let from = written(folder.path(), &text);
-        let (mut world, after, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        let (mut world, after, told) = there_and_back(from, ExportFormat::Mitsuba, folder.path());
         assert!(told.is_empty() && after.warnings.is_empty(), "{given}: {told:?} {:?}", after.warnings);
         let whole = whole_scene(&mut world, &after);
         let part = whole.file.materials.get(whole.file.objects[0].material().unwrap()).unwrap();
@@ -265,7 +264,7 @@ fn the_light_of_every_quarter_of_the_image_stays() {
     let from = written(folder.path(), PLACES);
     let (mut world, scene) = open(from.clone());
     let wanted = quarters(&mut world, &scene);
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
         let found = quarters(&mut world, &scene);
         for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
@@ -290,8 +289,8 @@ fn patterns_stay_where_they_are() {
              material: \"m\")"
         )
     };
-    let all = SceneFormat::ALL.map(|format| (format, bare.to_owned()));
-    let of_mitsuba = [30, 90, 130, -50].map(|degrees| (SceneFormat::Mitsuba, turned(degrees)));
+    let all = ExportFormat::ALL.map(|format| (format, bare.to_owned()));
+    let of_mitsuba = [30, 90, 130, -50].map(|degrees| (ExportFormat::Mitsuba, turned(degrees)));
     for (format, what) in all.into_iter().chain(of_mitsuba) {
         let text = format!(
             "(camera: (eye: (1, 0.5, 6), look_at: (0.8, 0, 0), vfov: 40), film: (width: 64, height: 48), max_depth: 2,
@@ -327,7 +326,7 @@ fn what_firstlight_leaves_out_of_its_own_files_is_told() {
         );
         let folder = tempfile::tempdir().unwrap();
         let from = written(folder.path(), &text);
-        let (_, _, told) = there_and_back(from, SceneFormat::Mitsuba, folder.path());
+        let (_, _, told) = there_and_back(from, ExportFormat::Mitsuba, folder.path());
         assert!(told.len() == 1 && told[0].contains(expected), "{material}: {told:?}");
     }
 }
@@ -340,9 +339,9 @@ fn projected_images_stay_where_they_are() {
     let slide = image::RgbImage::from_fn(4, 2, |x, y| image::Rgb([60 * x as u8, 200 * y as u8, 90]));
     slide.save(folder.path().join("slide.png")).unwrap();
     for (format, light) in [
-        (SceneFormat::Mitsuba, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60, even: true"),
-        (SceneFormat::Mitsuba, "outer_angle: 35, inner_angle: 10, falloff: linear"),
-        (SceneFormat::Pbrt, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60"),
+        (ExportFormat::Mitsuba, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60, even: true"),
+        (ExportFormat::Mitsuba, "outer_angle: 35, inner_angle: 10, falloff: linear"),
+        (ExportFormat::Pbrt, "outer_angle: 60, inner_angle: 60, image_width: 70, image_height: 60"),
     ] {
         let text = format!(
             "(camera: (eye: (0, 4, 4), look_at: (0, 0, 0)), film: (width: 64, height: 48), max_depth: 2,
@@ -379,7 +378,7 @@ fn a_clear_sky_stays_one_or_becomes_an_image() {
         )
     };
     let from = written(folder.path(), &scene(false));
-    let (_, again, told) = there_and_back(from.clone(), SceneFormat::Mitsuba, folder.path());
+    let (_, again, told) = there_and_back(from.clone(), ExportFormat::Mitsuba, folder.path());
     assert!(told.is_empty(), "{told:?}");
     let sky = open(from).1.file.environment;
     for property in SkyProperty::ALL {
@@ -392,7 +391,7 @@ fn a_clear_sky_stays_one_or_becomes_an_image() {
     let from = written(folder.path(), &scene(true));
     let (mut world, loaded) = open(from.clone());
     let wanted = quarters(&mut world, &loaded);
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let (mut world, scene, _) = there_and_back(from.clone(), format, folder.path());
         let found = quarters(&mut world, &scene);
         for (k, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
@@ -416,7 +415,7 @@ fn scenes_with_any_names_open_again() {
          materials: {{ {materials} }}, objects: [ {objects} ])"
     );
     let (mut world, scene) = open(written(folder.path(), &text));
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let path = folder.path().join(format!("out $(y) \" &.{}", format.file_extension()));
         export(&whole_scene(&mut world, &scene), format, &path, true).unwrap();
         let again = open(SceneSource::Foreign(path)).1;
@@ -448,7 +447,7 @@ fn nothing_beside_a_scene_is_replaced() {
                      mesh(name: \"table\", source: obj(\"out-pbrt/chair.obj\"), material: \"m\") ])",
     ));
     let whole = whole_scene(&mut world, &scene);
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let path = at(&format!("out.{}", format.file_extension()));
         let mut names = Vec::new();
         for _ in 0..2 {
@@ -470,7 +469,7 @@ fn a_scene_that_cannot_be_written_leaves_no_folder() {
     let folder = tempfile::tempdir().unwrap();
     let (mut world, scene) = open(SceneSource::Builtin("models".into()));
     let whole = whole_scene(&mut world, &scene);
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let path = folder.path().join(format!("out.{}", format.file_extension()));
         std::fs::create_dir(&path).unwrap();
         assert!(export(&whole, format, &path, true).is_err());
@@ -488,7 +487,7 @@ fn a_mesh_that_was_left_out_is_not_written() {
                 Shape \"plymesh\" \"string filename\" \"missing.ply\"\n\
                 Shape \"trianglemesh\" \"point3 P\" [0 0 3 1 0 3 0 1 3] \"integer indices\" [0 1 2]\n";
     std::fs::write(&path, text).unwrap();
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let (_, after, _) = there_and_back(SceneSource::Foreign(path.clone()), format, folder.path());
         assert_eq!(after.file.objects.len(), 1, "{format:?}");
     }
@@ -503,7 +502,7 @@ fn pbrt_has_no_checkers_above_1_which_is_told() {
              materials: {{ \"m\": diffuse(albedo: \"c\") }}, environment: constant(1),\n\
              objects: [ quad(corner: (0, 0, 0), edge_u: (1, 0, 0), edge_v: (0, 1, 0), material: \"m\") ])"
         );
-        let told = there_and_back(written(folder.path(), &text), SceneFormat::Pbrt, folder.path()).2;
+        let told = there_and_back(written(folder.path(), &text), ExportFormat::Pbrt, folder.path()).2;
         assert_eq!(told.iter().filter(|line| line.contains("above 1")).count(), n_told, "{told:?}");
     }
 }
@@ -524,9 +523,9 @@ fn materials_and_textures_keep_apart_whose_names_are_written_alike() {
     let spheres = all(&|i, name| format!("sphere(center: ({i}, 0, 0), radius: 0.1, material: \"{name}\"),\n"));
     let absorbs = |i: usize| format!("glass(ior: 1.5, absorption: {})", value(i));
     for (format, surface) in [
-        (SceneFormat::Mitsuba, &(|i, _: &str| format!("diffuse(albedo: {})", value(i))) as &dyn Fn(usize, &str) -> _),
-        (SceneFormat::Pbrt, &|i, _: &str| absorbs(i)),
-        (SceneFormat::Pbrt, &|_, name: &str| format!("diffuse(albedo: \"{name}\")")),
+        (ExportFormat::Mitsuba, &(|i, _: &str| format!("diffuse(albedo: {})", value(i))) as &dyn Fn(usize, &str) -> _),
+        (ExportFormat::Pbrt, &|i, _: &str| absorbs(i)),
+        (ExportFormat::Pbrt, &|_, name: &str| format!("diffuse(albedo: \"{name}\")")),
     ] {
         let materials = all(&|i, name| format!("\"{name}\": {},\n", surface(i, name)));
         let text = format!(
@@ -586,9 +585,9 @@ fn layered_surfaces_are_as_bright_as_they_were() {
         let from = written(folder.path(), &furnace(&surface));
         let (mut world, scene) = open(from.clone());
         let wanted = quarters(&mut world, &scene).iter().sum::<Vec3>();
-        for format in SceneFormat::ALL {
+        for format in ExportFormat::ALL {
             // The reader returns what metals of Mitsuba lose.
-            if format == SceneFormat::Mitsuba && is_metal == 1 {
+            if format == ExportFormat::Mitsuba && is_metal == 1 {
                 continue;
             }
             let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
@@ -596,9 +595,9 @@ fn layered_surfaces_are_as_bright_as_they_were() {
             assert!(told.is_empty(), "{told:?}");
             // It cuts texels above 1, too.
             let most = match format {
-                SceneFormat::Mitsuba if surface.contains("\"t\"") => 0.1,
-                SceneFormat::Mitsuba => 0.08,
-                SceneFormat::Pbrt => 0.03,
+                ExportFormat::Mitsuba if surface.contains("\"t\"") => 0.1,
+                ExportFormat::Mitsuba => 0.08,
+                ExportFormat::Pbrt => 0.03,
             };
             assert!((ratio - 1.0).abs().max_element() < most, "{format:?}, {surface}: {ratio}");
         }
@@ -632,7 +631,7 @@ fn images_of_lights_and_normals_stay_where_they_are() {
             let from = written(folder.path(), &placed_texture(texture, material));
             let (mut world, scene) = open(from.clone());
             let wanted = quarters(&mut world, &scene);
-            let (mut world, scene, told) = there_and_back(from, SceneFormat::Pbrt, folder.path());
+            let (mut world, scene, told) = there_and_back(from, ExportFormat::Pbrt, folder.path());
             for (k, (wanted, found)) in wanted.iter().zip(&quarters(&mut world, &scene)).enumerate() {
                 let ratio = *found / *wanted;
                 let of = format!("{texture}, {material}, quarter {k}");
@@ -661,7 +660,7 @@ fn normal_maps_of_mirrored_meshes_stay_upright() {
     let from = written(folder.path(), &scene.replace(quad, mesh));
     let (mut world, scene) = open(from.clone());
     let wanted = quarters(&mut world, &scene)[0];
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let (mut world, scene, told) = there_and_back(from.clone(), format, folder.path());
         let ratio = quarters(&mut world, &scene)[0] / wanted;
         assert!((ratio - 1.0).abs().max_element() < 0.03, "{format:?}: {ratio}, told {told:?}");
@@ -679,7 +678,7 @@ fn scenes_that_cannot_be_opened_again_are_told() {
         );
         let (mut world, scene) = open(written(folder.path(), &text));
         let whole = whole_scene(&mut world, &scene);
-        let exported = export(&whole, SceneFormat::Mitsuba, &folder.path().join("g.xml"), true).unwrap();
+        let exported = export(&whole, ExportFormat::Mitsuba, &folder.path().join("g.xml"), true).unwrap();
         assert_eq!(exported.warnings.iter().any(|told| told.contains("firstlight opens 4194304")), is_told);
     }
 }
@@ -698,7 +697,7 @@ fn folders_lie_beside_their_scenes_where_they_can_be_read() {
     let is_whole = |path: std::path::PathBuf| {
         !open(SceneSource::Foreign(path)).1.warnings.iter().any(|told| told.contains("left out"))
     };
-    for format in SceneFormat::ALL {
+    for format in ExportFormat::ALL {
         let extension = format.file_extension();
         let [hidden, link, target] =
             [".x", "link", "deep/scene"].map(|name| folder.path().join(format!("{name}.{extension}")));

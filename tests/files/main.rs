@@ -26,3 +26,4 @@ mod save;
 mod scene;
 mod shared_lists;
 mod strangers;
+mod tungsten;

@@ -29,6 +29,34 @@ pub struct Exported {
     pub warnings: Warnings,
 }
 
+/// A format of scenes that can be written, besides our own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// pbrt, version 4.
+    Pbrt,
+    /// Mitsuba 3.
+    Mitsuba,
+}
+
+impl ExportFormat {
+    /// All formats.
+    pub const ALL: [Self; 2] = [Self::Pbrt, Self::Mitsuba];
+
+    /// File extension, in lower case and without the dot.
+    pub fn file_extension(self) -> &'static str {
+        match self {
+            Self::Pbrt => SceneFormat::Pbrt.file_extension(),
+            Self::Mitsuba => SceneFormat::Mitsuba.file_extension(),
+        }
+    }
+
+    /// The format for the extension of a path, case-insensitive.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?;
+        Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.file_extension()))
+    }
+}
+
 /// Writes a scene in the format of another renderer, with a new folder of meshes and images beside it. The scene is
 /// written last, so that whatever happens it and its files belong together.
 ///
@@ -36,7 +64,7 @@ pub struct Exported {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: bool) -> Result<Exported, WriteError> {
+pub fn export(scene: &WholeScene, format: ExportFormat, path: &Path, overwrite: bool) -> Result<Exported, WriteError> {
     if !overwrite && path.exists() {
         return Err(WriteError::Exists(path.to_path_buf()));
     }
@@ -52,11 +80,11 @@ pub fn export(scene: &WholeScene, format: SceneFormat, path: &Path, overwrite: b
             warnings.push(format!("`{link}` is a link: the scene opens as `{target}`, which has the folder beside it"));
         }
         let text = match format {
-            SceneFormat::Pbrt => {
+            ExportFormat::Pbrt => {
                 let image = path.file_stem().map(|stem| path_to_text(stem.as_ref())).unwrap_or_default() + ".exr";
                 pbrt::text(scene, &mut folder, &mut warnings, &image)?
             }
-            SceneFormat::Mitsuba => mitsuba::text(scene, &mut folder, &mut warnings)?,
+            ExportFormat::Mitsuba => mitsuba::text(scene, &mut folder, &mut warnings)?,
         };
         match folder.finish() {
             Err(WriteError::Exists(_)) if attempts < ATTEMPTS => {}

@@ -12,17 +12,20 @@ pub enum SceneFormat {
     Pbrt,
     /// Mitsuba 3: XML with meshes in files of their own.
     Mitsuba,
+    /// Tungsten: JSON with meshes in files of their own.
+    Tungsten,
 }
 
 impl SceneFormat {
     /// All formats, in the order of listing.
-    pub const ALL: [Self; 2] = [Self::Pbrt, Self::Mitsuba];
+    pub const ALL: [Self; 3] = [Self::Pbrt, Self::Mitsuba, Self::Tungsten];
 
     /// File extension, in lower case and without the dot.
     pub fn file_extension(self) -> &'static str {
         match self {
             Self::Pbrt => "pbrt",
             Self::Mitsuba => "xml",
+            Self::Tungsten => "json",
         }
     }
 
@@ -32,12 +35,12 @@ impl SceneFormat {
         Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.file_extension()))
     }
 
-    /// List of extensions for messages, with that of our own scenes: `.ron, .pbrt, .xml`.
+    /// List of extensions for messages, with that of our own scenes: `.ron, .pbrt, .xml, .json`.
     pub fn extensions() -> String {
         Self::each(".").join(", ")
     }
 
-    /// List of shell patterns, likewise: `*.ron *.pbrt *.xml`.
+    /// List of shell patterns, likewise: `*.ron *.pbrt *.xml *.json`.
     pub fn patterns() -> String {
         Self::each("*.").join(" ")
     }

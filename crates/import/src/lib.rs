@@ -28,6 +28,7 @@ pub mod ply;
 pub(crate) mod read_scene;
 pub mod sky;
 pub mod stl;
+pub(crate) mod tungsten;
 pub mod up_axis;
 
 pub use error::{ModelError, ModelProblem, Place};

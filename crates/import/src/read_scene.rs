@@ -6,6 +6,7 @@
 use crate::mitsuba;
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::pbrt;
+use crate::tungsten;
 use firstlight_format::error::SceneError;
 use firstlight_format::scene_format::SceneFormat;
 use std::path::Path;
@@ -22,6 +23,7 @@ pub(crate) fn read_scene(path: &Path, options: &ForeignOptions) -> Result<Foreig
     let scene = match format {
         SceneFormat::Pbrt => pbrt::read(path, options)?,
         SceneFormat::Mitsuba => mitsuba::read_scene(path, options)?,
+        SceneFormat::Tungsten => tungsten::read(path, options)?,
     };
     scene.file.check().map_err(|error| SceneError::in_file(path, error.to_string()))?;
     Ok(scene)

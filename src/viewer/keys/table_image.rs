@@ -93,7 +93,7 @@ pub const FILES: KeyGroup = KeyGroup {
     bindings: &[
         row!("choose a file to open", ctrl("o", Action::OpenDialog), item("Open …", &[Menu::File], Action::OpenDialog)),
         row!(
-            "open a scene (.ron, .pbrt, .xml), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
+            "open a scene (.ron, .pbrt, .xml, .json), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
             Trigger::Mouse("Drop a file")
         ),
         row!(

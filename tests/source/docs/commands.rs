@@ -18,7 +18,8 @@ impl TempFolder {
         Self(path)
     }
 
-    /// With the files that pages speak of: `model.obj`, `scene.ron`, `scene.pbrt`, `scene.xml`, `wood.png` and `environment.hdr`.
+    /// With the files that pages speak of: `model.obj`, `scene.ron`, `scene.pbrt`, `scene.xml`,
+    /// `scene.json`, `wood.png` and `environment.hdr`.
     pub fn with_files(name: &str) -> Self {
         let folder = Self::new(name);
         fs::write(folder.0.join("model.obj"), octahedron()).unwrap();
@@ -26,6 +27,8 @@ impl TempFolder {
         let mitsuba = "<scene version=\"3.0.0\"><default name=\"spp\" value=\"4\"/><emitter type=\"constant\"/>\
                        <shape type=\"sphere\"/></scene>";
         fs::write(folder.0.join("scene.xml"), mitsuba).unwrap();
+        let tungsten = "{\"primitives\": [{\"type\": \"sphere\"}]}";
+        fs::write(folder.0.join("scene.json"), tungsten).unwrap();
         fs::copy(root().join("assets/scenes/cornell.ron"), folder.0.join("scene.ron")).unwrap();
         let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
         hdr.extend([128, 120, 110, 129].repeat(8));

@@ -5,10 +5,10 @@
 use crate::mitsuba::converter::Reads;
 use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
-use crate::mitsuba::ior;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::words::numbers;
 use crate::model::foreign::tinted;
+use crate::model::ior;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::parts::MaterialPart;

@@ -12,7 +12,6 @@ pub(crate) mod camera;
 mod converter;
 pub(crate) mod emitter;
 pub(crate) mod graph;
-pub(crate) mod ior;
 mod lenient;
 pub(crate) mod meshes;
 mod parameters;

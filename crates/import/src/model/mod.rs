@@ -5,6 +5,7 @@ pub(crate) mod assemble;
 pub(crate) mod cie;
 pub(crate) mod foreign;
 pub(crate) mod imported;
+pub(crate) mod ior;
 pub(crate) mod material;
 pub(crate) mod mesh_budget;
 pub(crate) mod number;

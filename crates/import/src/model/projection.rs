@@ -4,7 +4,7 @@ use firstlight_files::relative::text_to_path;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::Rgb;
-use firstlight_render::{Falloff, ImageTexture};
+use firstlight_render::{Falloff, ImageTexture, Texels};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
@@ -40,6 +40,16 @@ impl LightImages {
         let is_coloured = |Vec3 { x, y, z }| x != y || y != z;
         let image = (self.read)(&folder.join(text_to_path(file)));
         image.is_some_and(|image| (0..image.len()).any(|i| is_coloured(image.linear(i))))
+    }
+
+    /// Whether an image has an alpha channel; `false` if it cannot be read.
+    ///
+    /// - `folder`: of the scene.
+    pub fn has_alpha(&self, folder: &Path, file: &str) -> bool {
+        let image = (self.read)(&folder.join(text_to_path(file)));
+        image.is_some_and(|image| {
+            matches!(image.texels, Texels::U8 { channels: 2 | 4, .. } | Texels::U16 { channels: 2 | 4, .. })
+        })
     }
 
     /// The image of a texture; `None` if it cannot be read, which is told when it is loaded.
