@@ -186,25 +186,45 @@ impl SceneArgs {
         progress: &(dyn Fn(&str) + Sync),
     ) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
-        let given = Path::new(&self.scene);
-        if is_archive(given) && given.is_file() {
-            files.read(given)?;
-        }
-        if let Some(path) = source.path() {
-            files.read(path)?;
+        files.read_all(self.own_files(&source))?;
+        if source.path().is_some() {
             check_film_source(&source)?;
         }
         self.tell_ignored(&source);
+        let scene = self.opened(&source, aspect, progress)?;
+        files.read_all(scene.files())?;
+        tell(&scene.warnings);
+        Ok(scene)
+    }
+
+    /// All files that [`load`](Self::load) reads.
+    pub fn files(&self) -> Result<Vec<PathBuf>, Failure> {
+        let source = self.source()?;
+        let mut files = self.own_files(&source);
+        files.extend(self.opened(&source, None, &|_| ())?.files());
+        Ok(files)
+    }
+
+    /// The files of the command line.
+    fn own_files(&self, source: &SceneSource) -> Vec<PathBuf> {
+        let given = Path::new(&self.scene);
+        let archive = (is_archive(given) && given.is_file()).then_some(given);
+        archive.into_iter().chain(source.path()).map(Path::to_path_buf).collect()
+    }
+
+    fn opened(
+        &self,
+        source: &SceneSource,
+        aspect: Option<f64>,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Result<LoadedScene, Failure> {
         let environment = self.environment()?;
         let environment = environment.as_deref();
         let Opening { up, choice } = self.opening()?;
         let told = |_, text: &str| progress(text);
         let (progress, choice): (Option<&(dyn Fn(_, &str) + Sync)>, _) = (Some(&told), Some(&choice));
         let options = LoadOptions { up, aspect, environment, progress, choice, ..LoadOptions::default() };
-        let scene = load(&source, &options).map_err(Failure::from)?;
-        files.read_all(scene.files())?;
-        tell(&scene.warnings);
-        Ok(scene)
+        load(source, &options).map_err(Failure::from)
     }
 
     /// The image that lights the scene instead of its own environment: of the option, or of the archive.

@@ -64,8 +64,9 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     for job in &jobs {
         job.picture_format()?;
     }
+    let inputs = inputs(&jobs)?;
     for (i, job) in jobs.iter().enumerate() {
-        run_one(job, stop)?;
+        render_one(job, &inputs, stop)?;
         if job.has_next {
             stop.has_saved(format!("{} of {} images are saved", i + 1, jobs.len()));
             stop.rest();
@@ -74,8 +75,27 @@ pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     Ok(())
 }
 
+/// All files that several scenes read, if an image of one of them may replace one: none of them is written.
+fn inputs(jobs: &[RenderArgs]) -> Result<Vec<PathBuf>, Failure> {
+    let may_replace = |job: &RenderArgs| job.is_sequence() || job.output.exists();
+    if jobs.len() < 2 || !jobs.iter().any(may_replace) {
+        return Ok(Vec::new());
+    }
+    let inputs = jobs.iter().map(|job| job.scene.files()).collect::<Result<Vec<_>, _>>()?.concat();
+    // Before the first of them is rendered.
+    let mut files = jobs[0].overwrite.files();
+    files.read_all(inputs.iter().cloned())?;
+    jobs.iter().filter(|job| !job.is_sequence()).try_for_each(|job| files.write(&job.output))?;
+    Ok(inputs)
+}
+
 /// Renders one scene.
 pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
+    render_one(args, &[], stop)
+}
+
+/// - `inputs`: files that are not written, besides those of the scene.
+fn render_one(args: &RenderArgs, inputs: &[PathBuf], stop: &Stop) -> Result<(), Failure> {
     args.picture_format()?;
     check_stdout(args)?;
     let sequence = Sequence::of(args)?;
@@ -87,6 +107,7 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     let film_path = film_path(args)?.filter(|_| sequence.is_none());
     // Outputs that cannot be written are reported before rendering.
     let mut files = args.overwrite.files();
+    files.read_all(inputs.iter().cloned())?;
     if let Some(path) = args.scene.source()?.path() {
         files.read(path)?;
     }

@@ -5,6 +5,7 @@ use crate::cli::args::{FilterArg, IntegratorArg, SceneArgs, open_options};
 use crate::cli::console::inform;
 use crate::cli::failure::Failure;
 use crate::cli::frames::{FramesArg, parse_frames};
+use crate::cli::job::scaled;
 use crate::cli::number::{
     at_least_one, between, counted, parse_fps, parse_positive, parse_share, parse_size, parse_stops, samples_per_pixel,
 };
@@ -154,6 +155,8 @@ pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
         None => PathBuf::from(format!("firstlight-job-{title}")),
     };
     check_is_free(&folder)?;
+    // Of a scene that says its size, at least that of one pixel.
+    scaled(args.look.size.unwrap_or((1, 1)), args.look.scale)?;
     let spp = args.spp.unwrap_or(match args.error {
         Some(_) => Job::first_round(args.parts, args.max_spp),
         None => crate::cli::render_args::DEFAULT_SPP,

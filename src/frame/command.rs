@@ -19,6 +19,7 @@ use std::path::PathBuf;
 /// Positions in the image are fractions of its size, `(0, 0)` the upper left corner, `(1, 1)` the lower right, so that
 /// they are independent of the resolution.
 #[derive(Clone, Debug, PartialEq, Message, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum Command {
     /// Turn the camera about its position, degrees; positive yaw turns to the right, positive pitch upwards.
     Turn {

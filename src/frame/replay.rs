@@ -185,9 +185,9 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
 }
 
 impl Replayed {
-    /// All files of the scene at the end.
+    /// All files that were read: of the scenes that were open, and of edits.
     pub fn files(&self) -> Vec<PathBuf> {
-        self.session.world().get_resource::<CurrentScene>().map_or_else(Vec::new, |current| current.0.files())
+        self.session.world().resource::<BackgroundTasks>().files_read()
     }
 
     /// Display settings at the end.

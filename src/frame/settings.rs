@@ -193,7 +193,7 @@ impl SettingsStore {
             Ok(value) => (value, None),
             Err(error) => {
                 // Renamed, so that its contents are not lost when new settings are written.
-                let aside = path.with_extension("broken");
+                let aside = free_aside(&path);
                 let kept = match std::fs::rename(&path, &aside) {
                     Ok(()) => format!("the file was renamed to {}", aside.display()),
                     Err(_) => "the file was left in place".to_owned(),
@@ -243,6 +243,14 @@ fn bookmark_file(source: &SceneSource) -> String {
     format!("bookmarks/{plain}-{}.ron", Fingerprint::of(name.as_bytes()))
 }
 
+/// A name beside a file that cannot be understood, free unless there are many.
+fn free_aside(path: &Path) -> PathBuf {
+    const MOST: u32 = 100;
+    let numbered = (2..MOST).map(|i| path.with_extension(format!("broken-{i}")));
+    let mut names = std::iter::once(path.with_extension("broken")).chain(numbered);
+    names.find(|name| !name.exists()).unwrap_or_else(|| path.with_extension("broken"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,7 +283,10 @@ mod tests {
             std::fs::write(&path, &damaged).unwrap();
             let trouble = store.settings().1.unwrap();
             assert!(trouble.contains("renamed to"), "{trouble}");
-            assert!(std::fs::read(path.with_extension("broken")).unwrap() == damaged);
+            let (_, aside) = trouble.rsplit_once("renamed to ").unwrap();
+            assert!(std::fs::read(aside).unwrap() == damaged);
+            let first = std::fs::read_to_string(path.with_extension("broken")).unwrap();
+            assert_eq!(first, "(window: (800, ", "what was renamed before stays");
         }
         // Unknown fields of a newer version do not invalidate the rest.
         std::fs::write(&path, "(window: (3, 4), theme: \"dark\")").unwrap();

@@ -101,6 +101,49 @@ fn nothing_that_a_command_reads_is_written_over() {
     }
 }
 
+/// Of several scenes, and of all that a recording opens and edits.
+#[test]
+fn an_image_replaces_no_input_of_another_scene_or_of_a_replay() {
+    let (_folder, path) = room();
+    does(&path, "render cornell -o photo.png --spp 1 --size 16x12");
+    std::fs::create_dir(path.join("out")).unwrap();
+    std::fs::copy(path.join("photo.png"), path.join("out/cornell.png")).unwrap();
+    let lit =
+        r#"(environment: image(file: "out/cornell.png"), objects: [], camera: (eye: (0, 0, 5), look_at: (0, 0, 0)))"#;
+    std::fs::write(path.join("lit.ron"), lit).unwrap();
+    let header = |scene: &str| {
+        format!("(format:1,program:\"firstlight\",scene:File(\"{scene}\"),up:None,width:16,height:12,seed:0)")
+    };
+    let recordings = [
+        ("image.rec", header("photo.png") + "\nOpened(1,1,\"\")\nEnd(3,1)\n"),
+        (
+            "light.rec",
+            header("room.ron") + "\nOpened(1,1,\"\")\nDo(2,1.0,Edit(LightFrom(file:\"photo.png\")))\nEnd(9,1)\n",
+        ),
+        (
+            "left.rec",
+            header("room.ron") + "\nOpened(1,1,\"\")\nDo(2,1.0,Open(path:\"lit.ron\"))\nOpened(3,2,\"\")\nEnd(9,1)\n",
+        ),
+    ];
+    for (name, text) in recordings {
+        std::fs::write(path.join(name), text).unwrap();
+    }
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    for (line, input) in [
+        ("render cornell lit.ron -o out --spp 1 --size 16x12", "out/cornell.png"),
+        ("render lit.ron cornell -o out --spp 1 --size 16x12", "out/cornell.png"),
+        ("--replay image.rec -o photo.png", "photo.png"),
+        ("--replay light.rec -o photo.png", "photo.png"),
+        ("--replay left.rec -o wall.png", "wall.png"),
+    ] {
+        let before = bytes(input);
+        let said = refused(&path, line, 2);
+        assert!(said.contains(input) && said.contains("is also an input of this command"), "{line}: {said}");
+        assert!(bytes(input) == before, "{line}");
+    }
+    does(&path, "--replay left.rec -o other.png");
+}
+
 #[test]
 fn a_film_is_replaced_by_nothing_that_lacks_its_samples() {
     let (_folder, path) = room();

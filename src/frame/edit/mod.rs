@@ -54,6 +54,7 @@ pub type Id = u64;
 
 /// One change of the scene, or of the selection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum Edit {
     /// Select what is at this position in the image, fractions as in [`crate::frame::Command`]. With `add`, adds to the
     /// selection, or removes from it.

@@ -7,10 +7,11 @@ use crate::render::ImageTexture;
 use crate::scene::hit_spaces::{BuiltStatics, StaticJob};
 use crate::scene::{
     LoadOptions, LoadStage, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees,
-    UpAxis, load, read_picture,
+    UpAxis, load, read_picture, text_to_path,
 };
 use bevy_ecs::prelude::{Entity, Resource};
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A result of background work.
@@ -58,6 +59,8 @@ struct TaskBoard {
     reading: usize,
     /// Input of the last mesh.
     base: Option<MeshBase>,
+    /// Files that were read so far.
+    read: BTreeSet<PathBuf>,
 }
 
 impl TaskBoard {
@@ -134,7 +137,10 @@ impl BackgroundTasks {
                 })
             })
             .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
+            let of_scene = result.as_ref().map_or_else(|_| Vec::new(), LoadedScene::files);
             this.with(|board| {
+                board.read.extend(of_scene);
+                board.read.extend(source.path().map(Path::to_path_buf).into_iter().chain(environment));
                 if board.newest_load == number {
                     board.progress = None;
                     board.finished.push(Finished::Scene { source, again, result: result.map(Box::new) });
@@ -195,6 +201,7 @@ impl BackgroundTasks {
         let makes_meshes = self.with(|board| {
             board.newest_remake += 1;
             board.remaking.retain(|(_, other)| other.for_whom != job.for_whom);
+            board.read.extend(job.source.file().map(|file| job.folder.join(text_to_path(file))));
             board.remaking.push((board.newest_remake, job));
             std::mem::replace(&mut board.makes_meshes, true)
         });
@@ -244,7 +251,10 @@ impl BackgroundTasks {
 
     /// Reads an image for an edit.
     pub fn read_picture(&self, purpose: PicturePurpose, path: PathBuf) {
-        self.with(|board| board.reading += 1);
+        self.with(|board| {
+            board.reading += 1;
+            board.read.insert(path.clone());
+        });
         let this = self.clone();
         let work = move || {
             let result = guarded(|| read_picture(&path)).and_then(|read| read.map_err(String::from));
@@ -256,6 +266,11 @@ impl BackgroundTasks {
             this.wake();
         };
         self.spawn("firstlight image", work, |board, _| board.reading -= 1);
+    }
+
+    /// All files that scenes and edits have read so far.
+    pub fn files_read(&self) -> Vec<PathBuf> {
+        self.with(|board| board.read.iter().cloned().collect())
     }
 
     /// Returns whether a mesh, an image or a kd-tree that an edit needs is still under way, or waits to be taken.
