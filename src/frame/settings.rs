@@ -107,6 +107,8 @@ pub struct SceneBookmarks {
     pub scene: String,
     /// Views by number, 1 to 9.
     pub views: BTreeMap<u8, Rig>,
+    /// The view at which the window was left, if it is not the one that the scene opens with.
+    pub left: Option<Rig>,
 }
 
 /// Data of files that users may have edited.
@@ -123,7 +125,7 @@ impl KeptSettings for Settings {
 
 impl KeptSettings for SceneBookmarks {
     fn check(&self) -> Result<(), BadValue> {
-        self.views.values().try_for_each(Rig::check)
+        self.views.values().chain(&self.left).try_for_each(Rig::check)
     }
 }
 
@@ -175,7 +177,7 @@ impl SettingsStore {
     /// # Errors
     /// If the file cannot be written.
     pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), WriteError> {
-        let bookmarks = SceneBookmarks { scene: scene_name(source), views: bookmarks.views.clone() };
+        let bookmarks = SceneBookmarks { scene: scene_name(source), ..bookmarks.clone() };
         self.write(&bookmark_file(source), &bookmarks)
     }
 

@@ -3,10 +3,11 @@
 use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Target, ViewMode};
 use crate::scene::{Animation, FilmSize};
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
 use crate::viewer::saver::{file_stem, new_file};
 use crate::viewer::time_line::{NOTHING_MOVES, Strip};
-use egui::{Align2, Button, ComboBox, Context, DragValue, Grid, RichText, Ui, Vec2, Window};
+use egui::{Align2, Button, ComboBox, Context, DragValue, Grid, RichText, TextureHandle, Ui, Vec2, Window};
 use std::path::{Path, PathBuf};
 
 /// Sizes beside those of the scene and of the window.
@@ -27,7 +28,7 @@ enum Limit {
 }
 
 /// What ends an image, and the values of each.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Ending {
     limit: Limit,
     /// Per cent.
@@ -36,9 +37,12 @@ struct Ending {
     seconds: f64,
 }
 
+/// Of a saved image where the window has none that is better, per cent.
+const NOISE: f64 = 1.0;
+
 impl Default for Ending {
     fn default() -> Self {
-        Self { limit: Limit::Error, error: 2.0, spp: 64, seconds: 60.0 }
+        Self { limit: Limit::Error, error: NOISE, spp: 64, seconds: 60.0 }
     }
 }
 
@@ -82,9 +86,10 @@ pub struct OrderForm {
     scene: String,
     size: (u32, u32),
     of_scene: (u32, u32),
-    /// Of an image, and of frames: one of many is done sooner.
     of_image: Ending,
     of_frames: Ending,
+    /// Nobody has chosen yet what ends an image.
+    is_usual: bool,
     denoised: bool,
     filter: DenoiseFilter,
     format: PictureFormat,
@@ -104,6 +109,7 @@ impl Default for OrderForm {
             of_scene: SIZES[0],
             of_image: Ending::default(),
             of_frames: Ending::default(),
+            is_usual: true,
             denoised: true,
             filter: DenoiseFilter::default(),
             format: PictureFormat::Png,
@@ -122,6 +128,11 @@ impl OrderForm {
 
     pub fn close(&mut self) {
         self.is_open = false;
+    }
+
+    /// Width and height of what is to be saved, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
     }
 
     /// Opens the form for the scene of the session.
@@ -151,6 +162,12 @@ impl OrderForm {
                 Some((first, last))
             }
         };
+        // A saved image is no worse than what is seen, unless that has been chosen.
+        let status = session.status();
+        let seen = status.denoised_error.or(status.estimated_error).map_or(NOISE, |error| 100.0 * error);
+        if !frames && self.is_usual {
+            self.of_image.error = (seen.clamp(0.25, NOISE) * 100.0).floor() / 100.0;
+        }
         // Each time another one, so that nothing is replaced by a second click.
         self.file = new_file(folder, scene, self.format.extension());
         (self.is_open, self.problem) = (true, None);
@@ -196,8 +213,8 @@ impl OrderForm {
 
     /// Draws the form while it is open.
     ///
-    /// - `window`: pixels of the image in the window.
-    pub fn show(&mut self, context: &Context, window: (u32, u32)) -> Option<Wish> {
+    /// - `window`: pixels of the image in the window; `preview`: a small image of what would be saved.
+    pub fn show(&mut self, context: &Context, window: (u32, u32), preview: Option<&TextureHandle>) -> Option<Wish> {
         if !self.is_open {
             return None;
         }
@@ -211,6 +228,13 @@ impl OrderForm {
             .resizable(false)
             .show(context, |ui| {
                 ui.set_width(width);
+                let room = Vec2::new(width, FormPreview::HEIGHT);
+                let frame = |ui: &mut Ui| match preview {
+                    Some(preview) => drop(ui.image(preview)),
+                    None => drop(ui.weak("…")),
+                };
+                ui.allocate_ui_with_layout(room, egui::Layout::centered_and_justified(egui::Direction::TopDown), frame);
+                ui.add_space(4.0);
                 Grid::new("order").num_columns(2).spacing([14.0, 7.0]).show(ui, |ui| {
                     self.rows(ui, window, &mut wish);
                 });
@@ -261,7 +285,11 @@ impl OrderForm {
         });
         ui.end_row();
         ui.label("until");
-        ui.horizontal(|ui| self.ending().show(ui));
+        ui.horizontal(|ui| {
+            let before = *self.ending();
+            self.ending().show(ui);
+            self.is_usual &= *self.ending() == before;
+        });
         ui.end_row();
         ui.label("denoised");
         ui.checkbox(&mut self.denoised, "").on_hover_text("filter what noise is left");
@@ -359,12 +387,12 @@ mod tests {
         assert_eq!((form.file.clone(), form.format), (PathBuf::from("/a/room.exr"), PictureFormat::Exr));
         form.place(DialogPurpose::SaveImage, PathBuf::from("/a/room.v2"));
         assert_eq!(form.file, Path::new("/a/room.v2.exr"));
-        assert_eq!(form.order().target.error, Some(0.02));
+        assert_eq!(form.order().target.error, Some(0.01));
         form.of_image.limit = Limit::Samples;
         let order = form.order();
         assert_eq!((order.target.spp, order.target.error, order.frames), (Some(64), None, None));
         form.frames = Some((2, 9));
-        assert_eq!(form.order().target.error, Some(0.02), "frames have a limit of their own");
+        assert_eq!(form.order().target.error, Some(0.01), "frames have a limit of their own");
         form.place(DialogPurpose::SaveFrames, PathBuf::from("/b"));
         assert_eq!((form.order().path, form.order().frames), (PathBuf::from("/b"), Some(2..=9)));
     }

@@ -76,21 +76,23 @@ pub fn progress(ui: &mut egui::Ui, width: f32, share: f32) {
     ui.painter().rect_filled(part, 3.0, ui.visuals().selection.bg_fill);
 }
 
-/// Draws messages in the upper left corner; they ignore the mouse, except for those that say where something was saved.
+/// Draws messages in the upper left corner; they ignore the mouse, except for those with a button.
 /// Returns the command that was clicked.
 pub fn toasts(context: &Context, toasts: &[Toast]) -> Option<Action> {
     let mut chosen = None;
     let free = context.available_rect();
     let mut corner = free.left_top() + Vec2::splat(10.0);
     for (i, toast) in toasts.iter().enumerate() {
-        let area = egui::Area::new(egui::Id::new(("toast", i, toast.is_saved))).order(Order::Foreground);
-        let drawn = area.interactable(toast.is_saved).fixed_pos(corner).show(context, |ui| {
+        let area = egui::Area::new(egui::Id::new(("toast", i, toast.button.is_some()))).order(Order::Foreground);
+        let drawn = area.interactable(toast.button.is_some()).fixed_pos(corner).show(context, |ui| {
             ui.set_max_width((free.width() - 40.0).max(120.0));
             let color = if toast.tone == Tone::Problem { PROBLEM } else { TEXT };
             glass().show(ui, |ui| {
                 ui.label(RichText::new(&toast.text).size(TEXT_SIZE + 1.0).color(color));
-                if toast.is_saved && ui.button("Show in its folder").clicked() {
-                    chosen = Some(Action::ShowSaved);
+                if let Some((text, action)) = &toast.button
+                    && ui.button(*text).clicked()
+                {
+                    chosen = Some(action.clone());
                 }
             });
         });

@@ -1,7 +1,11 @@
 //! Short messages over the image that disappear by themselves. Times are passed in, for tests.
 
 use crate::files::printable;
+use crate::viewer::keys::Action;
 use std::time::{Duration, Instant};
+
+/// The button of what was saved.
+pub const IN_FOLDER: &str = "Show in its folder";
 
 /// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,8 +18,8 @@ pub enum Tone {
 pub struct Toast {
     pub text: String,
     pub tone: Tone,
-    /// It says where something was saved.
-    pub is_saved: bool,
+    /// What it offers: the text of a button, and what that does.
+    pub button: Option<(&'static str, Action)>,
     until: Instant,
 }
 
@@ -36,17 +40,17 @@ impl Toasts {
     const PROGRESS: Duration = Duration::from_secs(600);
 
     pub fn add(&mut self, tone: Tone, text: impl Into<String>, now: Instant) {
-        self.show(tone, text.into(), false, now);
+        self.show(tone, text.into(), None, now);
     }
 
-    /// Says that something was saved; long enough to click it.
-    pub fn add_saved(&mut self, text: String, now: Instant) {
-        self.show(Tone::News, text, true, now);
+    /// Says something with a button, long enough to click it.
+    pub fn add_offer(&mut self, text: String, button: &'static str, action: Action, now: Instant) {
+        self.show(Tone::News, text, Some((button, action)), now);
     }
 
     /// Says that something is being done, until news of the same first word say what became of it, or it [ends](Self::end).
     pub fn add_progress(&mut self, text: &str, now: Instant) {
-        self.show(Tone::News, text.to_owned(), false, now + Self::PROGRESS);
+        self.show(Tone::News, text.to_owned(), None, now + Self::PROGRESS);
     }
 
     /// Removes news of this first word.
@@ -54,12 +58,12 @@ impl Toasts {
         self.keep(|toast| toast.tone != Tone::News || !toast.text.starts_with(topic));
     }
 
-    fn show(&mut self, tone: Tone, text: String, is_saved: bool, now: Instant) {
+    fn show(&mut self, tone: Tone, text: String, button: Option<(&'static str, Action)>, now: Instant) {
         let text = printable::lines(&text);
         // Long enough to read; for a problem, to read twice.
         let reading = Duration::from_millis(1500 + 40 * text.len() as u64);
-        let until =
-            now + if tone == Tone::Problem || is_saved { 2 * reading + Duration::from_secs(3) } else { reading };
+        let until = now
+            + if tone == Tone::Problem || button.is_some() { 2 * reading + Duration::from_secs(3) } else { reading };
         // The first word is the topic: a message replaces an older one of the same topic.
         let topic = |text: &str| text.split_whitespace().next().map(str::to_owned);
         if tone == Tone::News {
@@ -67,7 +71,7 @@ impl Toasts {
         }
         self.shown.retain(|toast| toast.text != text);
         self.is_new = true;
-        self.shown.push(Toast { text, tone, is_saved, until });
+        self.shown.push(Toast { text, tone, button, until });
         if self.shown.len() > Self::MAX_SHOWN {
             self.shown.remove(0);
         }

@@ -221,10 +221,10 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     assert!(text.contains("quad(") && now < before, "a dimmer light: {before}, {now}");
     assert!(!text.contains("environment: constant(1"), "{text}");
     // An image with little noise, while the view goes on.
-    let form = (300, 380);
+    let form = (300, 455);
     open_menu(&program);
     open(&program, 1, (60, HEIGHT - 328), form);
-    click(&program, 1, (522, 380));
+    click(&program, 1, (522, 458));
     program.hold("w", 300);
     let image = desktop.folder().join("room-0001.png");
     until("the image", || image.is_file().then_some(()));
@@ -373,17 +373,17 @@ fn an_image_whose_goal_is_far_is_kept_as_it_stands() {
     title_is(&program, "room.ron");
     seen(&program);
     program.key("ctrl+e");
-    let form = (300, 380);
+    let form = (300, 455);
     until("the form", || is_dark(&program, form).then_some(()));
     std::thread::sleep(Duration::from_millis(500));
     // The goal in its row, typed over.
-    click(&program, 1, (475, 275));
+    click(&program, 1, (475, 353));
     std::thread::sleep(Duration::from_millis(500));
     program.key("ctrl+a");
     program.type_text("0.01");
     program.key("Return");
     std::thread::sleep(Duration::from_millis(300));
-    click(&program, 1, (522, 380));
+    click(&program, 1, (522, 458));
     // The button is there as soon as every pixel has a sample.
     let image = desktop.folder().join("room-0001.png");
     until("the image", || {

@@ -58,7 +58,8 @@ impl Animation {
         inputs
     }
 
-    pub(super) fn moves_camera(&self) -> bool {
+    /// Whether it moves the camera.
+    pub fn moves_camera(&self) -> bool {
         self.model.as_ref().is_some_and(ModelMotion::moves_camera) || self.has_camera_track()
     }
 

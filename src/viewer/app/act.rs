@@ -1,6 +1,7 @@
 //! Actions of keys and of the panel.
 
 use crate::console;
+use crate::frame::navigation::Rig;
 use crate::frame::{
     Command, Denoising, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
 };
@@ -11,7 +12,7 @@ use crate::viewer::keys::Action;
 use crate::viewer::panel::DroppedMaterial;
 use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
 use crate::viewer::time_line::{Ask, NOTHING_MOVES, Strip};
-use crate::viewer::toasts::Tone;
+use crate::viewer::toasts::{IN_FOLDER, Tone};
 use crate::viewer::{camera_text, file_manager, panel};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -136,6 +137,11 @@ impl App {
             }
             Action::CopyImage => self.copy_image(now),
             Action::ShowSaved => self.show_saved(now),
+            Action::ReturnTo(rig) => {
+                let Rig { view, projection, lens } = *rig;
+                let commands = [Command::SetView(view), Command::SetProjection(projection), Command::SetLens(lens)];
+                commands.into_iter().for_each(|command| self.session.send(command));
+            }
             Action::Explain => self.session.send(Command::ExplainAt { x, y }),
             Action::FocusHere => {
                 self.session.send(Command::FocusAt { x, y });
@@ -408,7 +414,7 @@ impl App {
 
     /// Says that something was saved, and where.
     pub(super) fn tell_saved(&mut self, path: PathBuf, news: String, now: Instant) {
-        self.toasts.add_saved(news, now);
+        self.toasts.add_offer(news, IN_FOLDER, Action::ShowSaved, now);
         self.last_saved = Some(path);
     }
 

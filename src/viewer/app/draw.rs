@@ -82,9 +82,17 @@ impl App {
         let greets = self.greeting && overlays && question.is_none() && !session.status().scene.is_empty();
         let menu_input = MenuInput { session, navigation, recent: self.memory.recent() };
         let (here, palette, browser) = (&mut self.here, &mut self.palette, &mut self.browser);
+        let is_moving = self.input.is_moving() || self.input.is_dragging();
         let (strip, playing) = (self.strip.take(), self.input.is_playing());
         let mut on_strip = Vec::new();
         let (form, renders, mut wish) = (&mut self.form, &self.renders, None);
+        let preview = match form.is_open() {
+            true => self.form_preview.of(presenter.egui_context(), session, form.size(), is_moving),
+            false => {
+                self.form_preview.close();
+                None
+            }
+        };
         let window_size = (session.picture().width, session.picture().height);
         let chosen_name = chosen_name.as_deref();
         let free_now = &mut self.free;
@@ -138,7 +146,7 @@ impl App {
             if greets {
                 greeted = greeting::show(context);
             }
-            wish = form.show(context, window_size);
+            wish = form.show(context, window_size, preview.as_ref());
             file = browser.show(context);
             let found = palette.show(context, || menu::all(&menu_input));
             clicked = clicked.take().or(found);

@@ -1,10 +1,11 @@
 //! State kept between runs: the bookmarks of each scene, recent files, the window's size, and its noise.
 
+use crate::frame::navigation::Rig;
 use crate::frame::{
     Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Picture, Recovery, SceneBookmarks, Session,
     SettingsStore, ViewMode, scene_name,
 };
-use crate::scene::{SceneSource, builtin_text};
+use crate::scene::{Animation, SceneSource, builtin_text};
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
 use crate::viewer::thumbnails::Thumbnails;
@@ -18,6 +19,12 @@ pub struct Memory {
     adopted: u64,
     /// As they are in the store.
     bookmarks: Bookmarks,
+    /// The view that the scene opened with, and the one that is seen now.
+    views: Option<[Rig; 2]>,
+    /// The view at which the scene was left last time, as it is in the store.
+    left: Option<Rig>,
+    /// Whether that has been offered.
+    has_offered: bool,
     recent: Vec<String>,
     thumbnails: Thumbnails,
     /// The scene has an image of this session in the list of recent ones.
@@ -35,8 +42,19 @@ impl Memory {
         let settings = store.settings().0;
         let (recent, noise) = (settings.recent, (settings.denoising, settings.denoiser));
         let thumbnails = Thumbnails::beside(store.folder());
-        let (scene, adopted, bookmarks) = (None, 0, Bookmarks::default());
-        Self { store, scene, adopted, bookmarks, recent, thumbnails, is_pictured: false, noise }
+        Self {
+            store,
+            scene: None,
+            adopted: 0,
+            bookmarks: Bookmarks::default(),
+            views: None,
+            left: None,
+            has_offered: true,
+            recent,
+            thumbnails,
+            is_pictured: false,
+            noise,
+        }
     }
 
     /// Has the image displayed with the noise that it had last; returns why it cannot be denoised by what denoised it
@@ -89,9 +107,15 @@ impl Memory {
             self.adopted = adopted;
             let source = session.world().get_resource::<CurrentScene>().map(|current| current.0.source.clone());
             if let Some(source) = source.filter(|source| self.scene.as_ref() != Some(source)) {
+                troubles.extend(self.leave());
                 troubles.extend(self.open(source, session));
             }
             return troubles;
+        }
+        // A camera on tracks is where its time says.
+        if session.world().get_resource::<Animation>().is_none_or(|animation| !animation.moves_camera()) {
+            let rig = session.status().rig;
+            self.views = Some([self.views.map_or(rig, |[first, _]| first), rig]);
         }
         let look = session.world().resource::<ViewMode>().0;
         if (look.denoising, look.filter) != self.noise {
@@ -109,12 +133,35 @@ impl Memory {
         if let Some(source) = &self.scene
             && (bookmarks != self.bookmarks || is_renamed)
         {
-            let views = (1..).zip(bookmarks.0).filter_map(|(slot, rig)| Some((slot, rig?))).collect();
-            let kept = SceneBookmarks { views, ..SceneBookmarks::default() };
-            troubles.extend(self.store.keep_bookmarks(source, &kept).err().map(String::from));
+            troubles.extend(self.keep_views(source, &bookmarks));
             self.bookmarks = bookmarks;
         }
         troubles
+    }
+
+    fn keep_views(&self, source: &SceneSource, bookmarks: &Bookmarks) -> Option<String> {
+        let views = (1..).zip(bookmarks.0).filter_map(|(slot, rig)| Some((slot, rig?))).collect();
+        let kept = SceneBookmarks { views, left: self.left, ..SceneBookmarks::default() };
+        self.store.keep_bookmarks(source, &kept).err().map(String::from)
+    }
+
+    /// Keeps the view at which the scene is left, for the next time; called when the window closes, too.
+    pub fn leave(&mut self) -> Option<String> {
+        let ([first, last], source) = (self.views.take()?, self.scene.clone()?);
+        // Who has not moved keeps what was left before.
+        let left = if last == first { self.left } else { Some(last) };
+        if std::mem::replace(&mut self.left, left) == left {
+            return None;
+        }
+        self.keep_views(&source, &self.bookmarks)
+    }
+
+    /// The view at which this scene was left last time, once after it was opened, if another one is seen now.
+    pub fn take_left(&mut self, session: &Session) -> Option<Box<Rig>> {
+        if std::mem::replace(&mut self.has_offered, true) {
+            return None;
+        }
+        self.left.filter(|left| *left != session.status().rig).map(Box::new)
     }
 
     fn open(&mut self, source: SceneSource, session: &mut Session) -> Vec<String> {
@@ -123,7 +170,8 @@ impl Memory {
         for (slot, rig) in kept.views {
             bookmarks.set(slot, rig);
         }
-        self.bookmarks = bookmarks;
+        (self.bookmarks, self.left) = (bookmarks, kept.left);
+        (self.views, self.has_offered) = (None, false);
         // A command, so that a recording of the session contains them too.
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
@@ -204,6 +252,40 @@ mod tests {
     fn opened(session: &mut Session, name: &str) {
         let scene = load(&SceneSource::Builtin(name.to_owned()), &LoadOptions::default()).unwrap();
         session.adopt(scene);
+    }
+
+    #[test]
+    fn the_view_at_which_a_scene_was_left_is_offered_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let memory = || Memory::of(SettingsStore::in_folder(folder.path()));
+        let begin = |memory: &mut Memory| {
+            let mut session = Session::new(SessionOptions::default()).unwrap();
+            opened(&mut session, "cornell");
+            for _ in 0..2 {
+                session.update(Duration::ZERO);
+                assert_eq!(memory.follow(&mut session), Vec::<String>::new());
+            }
+            session
+        };
+        let mut first = memory();
+        let mut session = begin(&mut first);
+        assert_eq!(first.take_left(&session), None, "nobody has been here");
+        session.send(Command::Orbit { yaw_deg: 10.0, pitch_deg: 3.0 });
+        session.send(Command::SetBookmark { slot: 2 });
+        session.update(Duration::ZERO);
+        first.follow(&mut session);
+        let left = session.status().rig;
+        assert_eq!(first.leave(), None);
+        // Who opens it and leaves it as it was loses nothing either.
+        for _ in 0..2 {
+            let mut next = memory();
+            let session = begin(&mut next);
+            assert_eq!(next.take_left(&session).as_deref(), Some(&left));
+            assert_eq!(next.take_left(&session), None);
+            assert_eq!(next.leave(), None);
+        }
+        let kept = memory().store.bookmarks(&SceneSource::Builtin("cornell".to_owned())).0;
+        assert_eq!((kept.left, kept.views.get(&2)), (Some(left), Some(&left)));
     }
 
     #[test]

@@ -40,6 +40,7 @@ use crate::viewer::app::options::{ViewerError, ViewerOptions, size_to_keep};
 use crate::viewer::bar::Figures;
 use crate::viewer::browser::Browser;
 use crate::viewer::dialog::Dialog;
+use crate::viewer::form_preview::FormPreview;
 use crate::viewer::grab::Grab;
 use crate::viewer::handles::Handles;
 use crate::viewer::help::Help;
@@ -99,6 +100,7 @@ struct App {
     saver: Saver,
     /// The form of what is to be rendered to a file, and what is being rendered.
     form: OrderForm,
+    form_preview: FormPreview,
     renders: Renders,
     dialog: Dialog,
     browser: Browser,
@@ -215,6 +217,7 @@ impl App {
             pending,
             session,
             form: OrderForm::default(),
+            form_preview: FormPreview::new(waker.clone()),
             renders: Renders::new(waker.clone()),
             saver: Saver::new(&options.folder, waker.clone()),
             dialog: Dialog::new(waker.clone()),

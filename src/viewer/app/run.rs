@@ -73,6 +73,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     app.session.end_record();
     app.keep_window_size();
     app.keep_panel();
+    app.keep_view();
     app.keep_thumbnail(true);
     for outcome in app.renders.finish() {
         app.report_outcome(outcome);
@@ -116,6 +117,13 @@ impl App {
         let is_image = picture.inspection == Inspection::Picture && picture.divider == 1 && self.is_rendered();
         if is_image && !status.scene.is_empty() && (status.done || status.seconds >= THUMBNAIL_SECONDS) {
             self.memory.keep_thumbnail(picture, again);
+        }
+    }
+
+    /// Stores the view at which the scene is left, at exit.
+    fn keep_view(&mut self) {
+        if let Some(trouble) = self.memory.leave() {
+            log::warn!("{trouble}");
         }
     }
 

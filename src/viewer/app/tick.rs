@@ -4,7 +4,8 @@ use crate::frame::{CurrentScene, MessageKind, Selection};
 use crate::scene::SceneSource;
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
-use crate::viewer::toasts::{Toasts, Tone};
+use crate::viewer::keys::Action;
+use crate::viewer::toasts::{IN_FOLDER, Toasts, Tone};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -31,6 +32,10 @@ impl App {
         }
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
+        }
+        if let Some(left) = self.memory.take_left(&self.session) {
+            let text = "another view was left here last time".to_owned();
+            self.toasts.add_offer(text, "Go back to it", Action::ReturnTo(left), now);
         }
         let scene = self.session.world().get_resource::<CurrentScene>();
         self.input.set_model(scene.is_some_and(|scene| matches!(scene.0.source, SceneSource::Model(_))));
@@ -59,7 +64,7 @@ impl App {
                     self.toasts.add(Tone::Problem, message.text.clone(), now);
                 }
                 MessageKind::Saved => {
-                    self.toasts.add_saved(message.text.clone(), now);
+                    self.toasts.add_offer(message.text.clone(), IN_FOLDER, Action::ShowSaved, now);
                     self.last_saved = self.session.scene_file().and_then(|path| std::path::absolute(path).ok());
                 }
             }

@@ -1,5 +1,6 @@
 //! Triggers and what they do: the types of the table.
 
+use crate::frame::navigation::Rig;
 use crate::frame::{Command, gizmo};
 use crate::render::Inspection;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey};
@@ -116,6 +117,8 @@ pub enum Action {
     CopyImage,
     /// Opens the folder of what was saved last.
     ShowSaved,
+    /// Shows this view again.
+    ReturnTo(Box<Rig>),
     /// Toggles between this inspection and the image.
     Inspect(Inspection),
     /// Explains the pixel under the mouse.
