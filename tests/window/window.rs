@@ -274,7 +274,7 @@ fn a_window_with_unsaved_changes_asks_before_it_closes() {
     // Pausing may take a while on a busy machine.
     let mut bare = middle(&program);
     until("the image to stand still", || {
-        std::thread::sleep(Duration::from_millis(500));
+        std::thread::sleep(Duration::from_millis(1500));
         let before = std::mem::replace(&mut bare, middle(&program));
         (difference(&before, &bare) < 0.5).then_some(())
     });
@@ -336,10 +336,13 @@ fn changes_that_could_not_be_saved_are_offered_at_the_next_start() {
         assert_eq!(left_behind(&desktop), 1, "{said}");
         let program = desktop.open(&["cornell", "--size", "640x360"], &[]);
         until("the box to be seen", || has_content(&program.pixels()).then_some(()));
-        std::thread::sleep(Duration::from_secs(1));
-        program.key("Return");
         let name = format!("cornell-balls-{number:04}.ron");
-        until("the scene to come back", || (program.title() == format!("firstlight — {name}")).then_some(()));
+        // The question comes some time after the scene.
+        until("the scene to come back", || {
+            program.key("Return");
+            std::thread::sleep(Duration::from_millis(700));
+            (program.title() == format!("firstlight — {name}")).then_some(())
+        });
         assert_eq!(left_behind(&desktop), 0);
         program.key("ctrl+q");
         assert!(program.ended().success());
