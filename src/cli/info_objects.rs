@@ -146,6 +146,7 @@ impl ObjectGroup<'_> {
 
     fn what(&self) -> String {
         let what = match &self.first.shape {
+            Shape::Mesh(mesh) if mesh.triangles.is_empty() => return "left out".to_owned(),
             Shape::Mesh(mesh) => {
                 let vertices = mesh.positions.len();
                 let vertices = if vertices == 1 { "1 vertex".to_owned() } else { format!("{vertices} vertices") };

@@ -162,3 +162,14 @@ fn a_replay_says_what_it_replayed_and_refuses_a_recording_of_nothing() {
     assert!(said.ends_with(expected), "{said}");
     assert!(does(path, "--replay a.rec -o a.png").err.ends_with(", replaced the existing a.png\n"));
 }
+
+#[test]
+fn info_says_which_mesh_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene =
+        "WorldBegin\nLightSource \"infinite\"\nShape \"plymesh\" \"string filename\" \"none.ply\"\nShape \"sphere\"\n";
+    std::fs::write(path.join("a.pbrt"), scene).unwrap();
+    let said = does(path, "info a.pbrt").out().to_owned();
+    assert!(said.contains("none: left out\n") && !said.contains("infinite"), "{said}");
+}
