@@ -206,6 +206,7 @@ fn what_is_not_modelled_is_told_and_what_is_no_scene_refused() {
         ("{\n \"primitives\": [}", "room.json:2:17: is not JSON: expected value"),
         ("[1]", "is no scene of Tungsten"),
         ("{\"primitives\": []}", "has no primitive that can be shown"),
+        (&format!("{{\"primitives\": [{}1]}}", "1,".repeat(1 << 20)), "has more than 1048576 primitives"),
     ] {
         std::fs::write(&path, text).unwrap();
         let error = load(&SceneSource::parse(&path).unwrap(), &LoadOptions::default()).err().unwrap().to_string();

@@ -65,6 +65,8 @@ pub(crate) struct Converter<'a> {
     /// Materials by their BSDF and what is inside.
     pub surfaces: HashMap<(*const Value, String), Option<String>>,
     pub textures: HashMap<(String, Reads), ColorValue>,
+    /// Of the images that are read as numbers: whether they have alpha, and colours.
+    pub channels: HashMap<String, [bool; 2]>,
     pub material_names: Names,
     pub texture_names: Names,
 }
@@ -94,6 +96,7 @@ impl<'a> Converter<'a> {
             domes: HashMap::new(),
             surfaces: HashMap::new(),
             textures: HashMap::new(),
+            channels: HashMap::new(),
             material_names: Names::default(),
             texture_names: Names::default(),
         }

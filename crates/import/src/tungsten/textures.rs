@@ -75,16 +75,24 @@ impl Converter<'_> {
             *encoding = if flag("gamma_correct", true) { Encoding::Auto } else { Encoding::Linear };
             let scale = settings.and_then(|it| it.number("scale")).unwrap_or(1.0).clamp(0.0, 1e6);
             *tint = Rgb(Vec3::splat(scale as f32));
-            let (folder, images) = (self.folder, self.light_images);
-            if reads == Reads::Opacity && images.has_alpha(folder, &path) {
+            let is_number = matches!(reads, Reads::Number | Reads::Opacity);
+            let [has_alpha, has_colours] = if is_number { self.channels_of(&path) } else { [false; 2] };
+            if reads == Reads::Opacity && has_alpha {
                 *channel = Some(Channel::A);
-            } else if matches!(reads, Reads::Number | Reads::Opacity) && images.has_colours(folder, &path) {
+            } else if has_colours {
                 *channel = Some(Channel::G);
                 let file = printable::name(file);
                 of.tell(format!("the mean of the channels of `{file}` is not modelled: it is the green one"));
             }
         }
         self.add_texture(file, source)
+    }
+
+    /// Whether an image has an alpha channel, and whether it is not grey; each is read once.
+    fn channels_of(&mut self, path: &str) -> [bool; 2] {
+        let (folder, images) = (self.folder, self.light_images);
+        let read = || [images.has_alpha(folder, path), images.has_colours(folder, path)];
+        *self.channels.entry(path.to_owned()).or_insert_with(read)
     }
 
     pub(crate) fn add_texture(&mut self, wanted: &str, source: TextureSource) -> ColorValue {
