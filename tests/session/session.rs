@@ -128,6 +128,8 @@ fn it_is_known_whether_edits_are_saved() {
     };
     delete(&mut driver);
     assert!(driver.session.has_unsaved_edits());
+    let says = |text: &str| driver.session.status().messages.iter().any(|message| message.text.starts_with(text));
+    assert!(says("deleted: "), "{:?}", driver.session.status().messages);
     driver.session.send(Command::Edit(Edit::Undo));
     driver.frame();
     assert!(!driver.session.has_unsaved_edits(), "what is undone is as it was");

@@ -3,10 +3,11 @@
 //! A removed entity stays and only loses its components, so that undo restores the same entity and all references to it
 //! are valid again.
 
+use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
-use crate::frame::state::resources::RenderState;
+use crate::frame::state::resources::{Clock, RenderState};
 use crate::frame::state::selection::{Selection, box_of};
 use crate::mesh::procedural;
 use crate::scene::light_of;
@@ -154,10 +155,20 @@ fn add_object(world: &mut World, new: &NewThing) -> Option<Entity> {
     })
 }
 
+/// Deletes what is selected, and says what that was: it may be behind something, or all around.
 pub fn delete(world: &mut World) {
-    for entity in std::mem::take(&mut world.resource_mut::<Selection>().0) {
+    let selected = std::mem::take(&mut world.resource_mut::<Selection>().0);
+    let Some(first) = selected.first() else { return };
+    let name = world.get::<Name>(*first).map_or("an object", |name| name.as_str()).to_owned();
+    let deleted = match selected.len() {
+        1 => format!("deleted: {name}"),
+        n => format!("deleted: {name} and {} more", n - 1),
+    };
+    for entity in selected {
         EntityState::default().put(world, entity);
     }
+    let now = world.resource::<Clock>().0;
+    world.resource_mut::<Status>().say(now, MessageKind::Note, deleted);
 }
 
 pub fn duplicate(world: &mut World) {
