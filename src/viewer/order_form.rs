@@ -7,7 +7,9 @@ use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
 use crate::viewer::saver::{file_stem, new_file};
 use crate::viewer::time_line::{NOTHING_MOVES, Strip};
-use egui::{Align2, Button, ComboBox, Context, DragValue, Grid, RichText, TextureHandle, Ui, Vec2, Window};
+use egui::{
+    Align2, Button, ComboBox, Context, DragValue, Grid, Key, Modifiers, RichText, TextureHandle, Ui, Vec2, Window,
+};
 use std::path::{Path, PathBuf};
 
 /// Sizes beside those of the scene and of the window.
@@ -126,10 +128,6 @@ impl OrderForm {
         self.is_open
     }
 
-    pub fn close(&mut self) {
-        self.is_open = false;
-    }
-
     /// Width and height of what is to be saved, pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size
@@ -219,6 +217,10 @@ impl OrderForm {
             return None;
         }
         let (mut wish, mut open) = (None, true);
+        // A value that is typed has its own Enter and Escape.
+        let is_typed = context.wants_keyboard_input();
+        let pressed = |key| !is_typed && context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+        let (is_entered, is_left) = (pressed(Key::Enter), pressed(Key::Escape));
         let title = if self.frames.is_some() { "Render frames" } else { "Save image" };
         let width = WIDTH.min(context.content_rect().width() - 40.0).max(80.0);
         Window::new(title)
@@ -247,7 +249,8 @@ impl OrderForm {
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         let name = if self.frames.is_some() { "Render" } else { "Save" };
                         let begin = Button::new(RichText::new(name).strong()).min_size(Vec2::new(86.0, 26.0));
-                        if ui.add(begin).on_hover_text("in the background; the window stays usable").clicked() {
+                        let begin = ui.add(begin).on_hover_text("in the background; the window stays usable");
+                        if begin.clicked() || is_entered {
                             let order = self.order();
                             match order.check() {
                                 Ok(()) => wish = Some(Wish::Begin(order)),
@@ -260,7 +263,7 @@ impl OrderForm {
                     });
                 });
             });
-        self.is_open &= open && !matches!(wish, Some(Wish::Begin(_)));
+        self.is_open &= open && !is_left && !matches!(wish, Some(Wish::Begin(_)));
         wish
     }
 

@@ -3,15 +3,15 @@
 use crate::frame::{Command, LeftBehind};
 use crate::viewer::overlay::style_key;
 use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
-use winit::keyboard::{Key, NamedKey};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
 
 /// A question to the user.
 #[derive(Debug)]
 pub enum Prompt {
     /// The scene of this name has unsaved edits, and another scene or closing the window is about to replace it.
     ///
-    /// - `file`: the file that saving writes.
-    Leave { title: String, file: String, then: Option<Command> },
+    /// - `file`: the file that saving writes; `renders`: an image is being rendered to a file.
+    Leave { title: String, file: String, renders: bool, then: Option<Command> },
     /// An earlier window ended with unsaved edits.
     Restore(LeftBehind),
 }
@@ -30,10 +30,17 @@ pub enum PromptAnswer {
 impl Prompt {
     fn text(&self) -> (String, String) {
         match self {
-            Self::Leave { title, file, .. } => (
-                format!("Save the changes to {title}?"),
-                format!("They will be saved to {file}. Otherwise they are lost."),
-            ),
+            Self::Leave { title, file, renders, then } => {
+                let before = if then.is_some() { "another scene opens" } else { "the window closes" };
+                let kept = match *renders && then.is_none() {
+                    true => " What is being rendered is kept as it stands.",
+                    false => "",
+                };
+                (
+                    format!("Save the changes to {title} before {before}?"),
+                    format!("They will be saved to {file}. Otherwise they are lost.{kept}"),
+                )
+            }
             Self::Restore(left) => (
                 format!("Restore the changes to {}?", left.title),
                 "firstlight ended before they were saved. They are restored to a new scene file.".to_owned(),
@@ -45,23 +52,23 @@ impl Prompt {
         match self {
             Self::Leave { .. } => [
                 ("Save", "Enter", PromptAnswer::Yes),
-                ("Don't save", "D", PromptAnswer::No),
+                ("Don't save", "Ctrl+D", PromptAnswer::No),
                 ("Cancel", "Esc", PromptAnswer::Later),
             ],
             Self::Restore(_) => [
                 ("Restore", "Enter", PromptAnswer::Yes),
-                ("Discard", "D", PromptAnswer::No),
+                ("Discard", "Ctrl+D", PromptAnswer::No),
                 ("Later", "Esc", PromptAnswer::Later),
             ],
         }
     }
 
-    /// The answer of a pressed key.
-    pub fn key(key: &Key) -> Option<PromptAnswer> {
+    /// The answer of a pressed key. What is lost is lost by no letter alone: one may be typing.
+    pub fn key(key: &Key, modifiers: ModifiersState) -> Option<PromptAnswer> {
         match key {
             Key::Named(NamedKey::Enter) => Some(PromptAnswer::Yes),
             Key::Named(NamedKey::Escape) => Some(PromptAnswer::Later),
-            Key::Character(text) if text.eq_ignore_ascii_case("d") => Some(PromptAnswer::No),
+            Key::Character(text) if text.eq_ignore_ascii_case("d") && modifiers.control_key() => Some(PromptAnswer::No),
             _ => None,
         }
     }
@@ -98,16 +105,19 @@ mod tests {
 
     #[test]
     fn every_choice_has_the_key_that_stands_beside_it() {
-        let question = Prompt::Leave { title: "gallery".to_owned(), file: "gallery-0001.ron".to_owned(), then: None };
+        let (title, file) = ("gallery".to_owned(), "gallery-0001.ron".to_owned());
+        let question = Prompt::Leave { title, file, renders: false, then: None };
+        let none = ModifiersState::empty();
         for (_, name, answer) in question.choices() {
-            let key = match name {
-                "Enter" => Key::Named(NamedKey::Enter),
-                "Esc" => Key::Named(NamedKey::Escape),
-                letter => Key::Character(letter.into()),
+            let (key, modifiers) = match name {
+                "Enter" => (Key::Named(NamedKey::Enter), none),
+                "Esc" => (Key::Named(NamedKey::Escape), none),
+                "Ctrl+D" => (Key::Character("d".into()), ModifiersState::CONTROL),
+                other => panic!("{other}"),
             };
-            assert_eq!(Prompt::key(&key), Some(answer), "{name}");
+            assert_eq!(Prompt::key(&key, modifiers), Some(answer), "{name}");
         }
-        assert_eq!(Prompt::key(&Key::Named(NamedKey::Space)), None);
-        assert_eq!(Prompt::key(&Key::Character("x".into())), None);
+        assert_eq!(Prompt::key(&Key::Named(NamedKey::Space), none), None);
+        assert_eq!(Prompt::key(&Key::Character("d".into()), none), None, "one may be typing");
     }
 }

@@ -212,7 +212,6 @@ impl App {
                 }
             }
             Action::Leave if self.input.is_captured() => self.capture_mouse(false, now),
-            Action::Leave if self.form.is_open() => self.form.close(),
             Action::Leave if self.help.open => self.help.open = false,
             Action::Leave if self.brush.is_armed() => drop(self.brush.toggle()),
             Action::Leave if self.session.world().resource::<Explaining>().story.is_some() => {
@@ -221,7 +220,7 @@ impl App {
             Action::Leave if !self.session.world().resource::<Selection>().0.is_empty() => {
                 self.session.send(Command::Edit(Edit::SelectNone));
             }
-            Action::Leave => self.leave_by_key(now),
+            Action::Leave => self.toasts.add(Tone::News, "Ctrl+Q closes the window", now),
             Action::Quit => self.leaving.wanted = true,
         }
         self.repaint_at = Some(now);

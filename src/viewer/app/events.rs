@@ -53,7 +53,8 @@ impl ApplicationHandler<Wake> for App {
         let in_menu = self.in_menu();
         let Some(presenter) = &mut self.presenter else { return };
         // Overlays get the keyboard only during text input. Tab, which the window uses itself, would give it to a button.
-        let typing = presenter.egui_context().wants_keyboard_input() || self.palette.open || self.browser.is_open();
+        let is_asked = self.palette.open || self.browser.is_open() || self.form.is_open();
+        let typing = presenter.egui_context().wants_keyboard_input() || is_asked;
         let mut response = match is_tab(&event) && !typing {
             true => egui_winit::EventResponse::default(),
             false => presenter.on_window_event(&event),
@@ -84,9 +85,9 @@ impl ApplicationHandler<Wake> for App {
                 self.input.set_modifiers(modifiers.state(), now);
             }
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
-                let pressed = event.state.is_pressed();
+                let (pressed, modifiers) = (event.state.is_pressed(), self.input.modifiers());
                 if pressed && self.leaving.question.is_some() {
-                    if let Some(answer) = Prompt::key(&event.logical_key).filter(|_| !event.repeat) {
+                    if let Some(answer) = Prompt::key(&event.logical_key, modifiers).filter(|_| !event.repeat) {
                         self.answer(answer, now, event_loop);
                     }
                     return;

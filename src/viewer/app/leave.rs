@@ -14,9 +14,6 @@ use winit::event_loop::ActiveEventLoop;
 /// Delay after the last edit before edits are stored, so that they are not stored during a drag.
 const STORE_DELAY: Duration = Duration::from_secs(2);
 
-/// Time for a second Escape.
-const ESCAPE_AGAIN: Duration = Duration::from_secs(3);
-
 impl App {
     /// Tracks edits and saving, shows pending questions, and closes the window when nothing prevents it.
     pub(super) fn follow_edits(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
@@ -43,11 +40,20 @@ impl App {
                 None => return event_loop.exit(),
             }
         }
+        self.leaving.is_warned &= !self.renders.is_empty();
         if std::mem::take(&mut self.leaving.wanted) && self.leaving.saving.is_none() {
-            if !unsaved {
+            let is_warned = self.renders.is_empty() || std::mem::replace(&mut self.leaving.is_warned, true);
+            if !unsaved && is_warned {
                 return event_loop.exit();
             }
-            self.ask_to_leave(None, now);
+            match unsaved {
+                true => self.ask_to_leave(None, now),
+                false => {
+                    let told = "an image is being rendered: close once more to keep it as it stands";
+                    self.toasts.add(Tone::News, told, now);
+                    self.repaint_at = Some(now);
+                }
+            }
         }
         let is_shown = !self.session.status().scene.is_empty();
         if self.leaving.question.is_none()
@@ -57,18 +63,6 @@ impl App {
             self.ask(Prompt::Restore(left), now);
         }
         self.keep_edits(unsaved, now);
-    }
-
-    /// Quits when Escape, with nothing left to close, is pressed twice: the samples of minutes would be gone. Unsaved
-    /// edits are asked about in any case.
-    pub(super) fn leave_by_key(&mut self, now: Instant) {
-        let is_second = self.leaving.last_escape.is_some_and(|last| now < last + ESCAPE_AGAIN);
-        if is_second || self.session.has_unsaved_edits() {
-            self.leaving.wanted = true;
-            return;
-        }
-        self.leaving.last_escape = Some(now);
-        self.toasts.add(Tone::News, "Press Esc again to quit", now);
     }
 
     /// Executes a command that may replace the scene; with unsaved edits, after the user has decided about them.
@@ -86,7 +80,8 @@ impl App {
     fn ask_to_leave(&mut self, then: Option<Command>, now: Instant) {
         let title = short_name(&self.session.status().scene);
         let file = short_name(&self.scene_path(false).to_string_lossy());
-        self.ask(Prompt::Leave { title, file, then }, now);
+        let renders = !self.renders.is_empty();
+        self.ask(Prompt::Leave { title, file, renders, then }, now);
     }
 
     fn ask(&mut self, question: Prompt, now: Instant) {

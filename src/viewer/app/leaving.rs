@@ -23,8 +23,8 @@ pub(super) struct Leaving {
     pub left_behind: VecDeque<LeftBehind>,
     /// Revision of the session when edits were last checked.
     pub seen: u64,
-    /// When Escape was pressed last with nothing left to close.
-    pub last_escape: Option<Instant>,
+    /// It has been said that an image is being rendered.
+    pub is_warned: bool,
     /// When unsaved edits are to be stored.
     pub keep_at: Option<Instant>,
     pub restored: Receiver<Result<PathBuf, String>>,
@@ -45,7 +45,7 @@ impl Leaving {
             recovery,
             left_behind,
             seen: 0,
-            last_escape: None,
+            is_warned: false,
             keep_at: None,
             restored,
             sender,

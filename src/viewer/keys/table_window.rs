@@ -33,7 +33,7 @@ pub const WINDOW: KeyGroup = KeyGroup {
             named(NamedKey::F11, Action::ToggleFullscreen),
             item("Full screen", &[Menu::Window], Action::ToggleFullscreen)
         ),
-        row!("close this list, close the explanation, deselect; twice: quit", named(NamedKey::Escape, Action::Leave)),
+        row!("close this list, close the explanation, deselect", named(NamedKey::Escape, Action::Leave)),
         row!("quit", ctrl("q", Action::Quit), item("Quit", &[Menu::Window], Action::Quit)),
     ],
 };

@@ -73,7 +73,8 @@ impl<'a> Converter<'a> {
 
     fn converted(&mut self, of: &Fields<'a>, is_there: bool, medium: &str, depth: u32) -> Option<String> {
         let absorption = self.media.get(medium).copied().flatten();
-        if !medium.is_empty() && !(of.kind().ends_with("dielectric") && absorption.is_some()) {
+        let is_shown = medium.is_empty() || of.kind().ends_with("dielectric") && absorption.is_some();
+        if !is_shown {
             let medium = printable::name(medium);
             of.tell(format!("the medium `{medium}` inside is not modelled: only glass that absorbs light is"));
         }
