@@ -213,3 +213,14 @@ fn what_is_not_modelled_is_told_and_what_is_no_scene_refused() {
         assert!(error.contains(part), "{part}: {error}");
     }
 }
+
+/// A few letters ask for hundreds of triangles, each of which is a light.
+#[test]
+fn shapes_that_emit_have_a_limit_together() {
+    let cylinder = r#"{"type": "cylinder", "emission": 1, "bsdf": {"type": "null"}}"#;
+    let (_folder, scene) = with("", &vec![cylinder; 2100].join(","));
+    let is_light = |name: &str| matches!(scene.file.materials.get(name), Some(Material::Emissive { .. }));
+    let lights = scene.file.objects.iter().filter(|object| object.material().is_some_and(is_light)).count();
+    assert_eq!((scene.file.objects.len(), lights), (2100, (1 << 20) / 512));
+    assert!(told(&scene).iter().any(|it| it.contains("it is dark")), "{:?}", told(&scene));
+}

@@ -34,6 +34,10 @@ pub(crate) fn told_of_long(name: &str) -> Option<String> {
 /// exact.
 pub(crate) const LIGHT_SHARE: f32 = 1.0 / 1024.0;
 
+/// Triangles that emit of shapes that formulas make, for all of a scene: a few letters ask for hundreds of them, and
+/// each takes 1,700 bytes.
+pub(crate) const MAX_EMITTING: usize = 1 << 20;
+
 /// A texture times a colour; `None` if it cannot have a factor.
 pub(crate) fn tinted(source: &TextureSource, factor: Vec3) -> Option<TextureSource> {
     let mut source = source.clone();

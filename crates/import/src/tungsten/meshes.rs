@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Edges above this angle stay hard where normals are computed: 0.15 π.
 const CREASE: f32 = 0.15 * std::f32::consts::PI;
 /// Triangles around an axis.
-const SEGMENTS: u32 = 256;
+const SEGMENTS: u32 = 128;
 const BYTES_OF_VERTEX: usize = 32;
 const BYTES_OF_TRIANGLE: usize = 16;
 
@@ -218,7 +218,7 @@ mod tests {
             (Geometry::Cylinder { capped: true }, 1.5 * PI, Some(0.25 * PI)),
         ] {
             let mesh = make(geometry.clone());
-            assert!((mesh.area() / area - 1.0).abs() < 2e-4, "{geometry:?}: {}", mesh.area());
+            assert!((mesh.area() / area - 1.0).abs() < 1e-3, "{geometry:?}: {}", mesh.area());
             for (t, triangle) in mesh.triangles.iter().enumerate() {
                 let normal = mesh.doubled_area_normal(t);
                 let is_outward = |&v: &u32| normal.dot(mesh.normals[v as usize].as_dvec3()) > 0.0;
@@ -226,7 +226,7 @@ mod tests {
             }
             if let Some(volume) = volume {
                 assert!(Topology::of(&mesh).is_closed(), "{geometry:?}");
-                assert!((mesh.signed_volume() / volume - 1.0).abs() < 2e-4, "{geometry:?}: {}", mesh.signed_volume());
+                assert!((mesh.signed_volume() / volume - 1.0).abs() < 1e-3, "{geometry:?}: {}", mesh.signed_volume());
             }
         }
         assert!(make(Geometry::Disk).normals.iter().all(|normal| *normal == Vec3::Y));
