@@ -205,6 +205,13 @@ impl SceneArgs {
         Ok(files)
     }
 
+    /// Files of the scene of an image or a film that an output of this path would replace; none where there is no such
+    /// output yet, or the scene is not there.
+    pub fn files_behind(image: &Path, output: &Path) -> Vec<PathBuf> {
+        let scene = Self { scene: image.as_os_str().to_owned(), ..Self::default() };
+        if output.exists() { scene.files().unwrap_or_default() } else { Vec::new() }
+    }
+
     /// The files of the command line.
     fn own_files(&self, source: &SceneSource) -> Vec<PathBuf> {
         let given = Path::new(&self.scene);

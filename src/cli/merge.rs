@@ -3,7 +3,7 @@
 //! First the metadata of all films is read: whether they belong together, and which samples are duplicate or missing.
 //! Then the films are added one by one, with memory for two, however many there are.
 
-use crate::cli::args::{OverwriteArgs, replaced};
+use crate::cli::args::{OverwriteArgs, SceneArgs, replaced};
 use crate::cli::console::{inform, print, remark};
 use crate::cli::denoising::DenoiserArg;
 use crate::cli::failure::Failure;
@@ -124,6 +124,9 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         set = group;
     }
     let first = set.films[0].clone();
+    if let Some(picture) = &args.image {
+        files.read_all(SceneArgs::files_behind(&first, picture))?;
+    }
     // A scene that cannot be opened is reported before films are added.
     let denoiser = match is_denoised {
         true => Some(FilmDenoiser::open(&first, &read_film_summary(&first)?.shot, args.denoiser, &mut files)?),

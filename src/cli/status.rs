@@ -1,5 +1,6 @@
 //! `firstlight status FOLDER`: shows the progress of a job from the files in its folder.
 
+use crate::cli::args::SceneArgs;
 use crate::cli::console::{inform, print, remark};
 use crate::cli::failure::Failure;
 use crate::cli::merge::{FilmSet, note_of};
@@ -10,6 +11,7 @@ use firstlight::cluster::coverage::in_words;
 use firstlight::cluster::job::{Job, JobRound, Rounds};
 use firstlight::cluster::part::sample_ranges;
 use firstlight::frame::{FilmFile, PictureFormat, Print, read_film_summary};
+use firstlight::scene::Files;
 use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -154,6 +156,10 @@ fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> R
         remark("warning: no part has a film yet: there is no image");
         return Ok(());
     }
+    let mut files = Files::new(Replace::AllButFilms);
+    files.read_all(SceneArgs::files_behind(&films[0], path))?;
+    files.read_all(films.iter().cloned())?;
+    files.write(path)?;
     let set = FilmSet::read(films)?;
     let FilmFile { film, shot, .. } = set.add_up(&|_, _| ())?;
     let note = note_of(&film, shot.clone(), &set.films[0], path);

@@ -77,6 +77,7 @@ fn nothing_that_a_command_reads_is_written_over() {
         "merge a.exr b.exr -o a.exr",
         "merge a.exr b.exr -o c.exr --image c.exr",
         "merge a.exr b.exr -o c.exr --image ./b.exr",
+        "merge a.exr b.exr -o c.exr --image wall.png",
         "merge a.exr b.exr -o c.exr --overwrite --image a.exr",
         "save room.ron -o ./room.ron",
         "simplify tent.obj -o sub/../tent.obj --ratio 0.5",
