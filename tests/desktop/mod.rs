@@ -126,8 +126,6 @@ impl Desktop {
         let mut command = Command::new(env!("CARGO_BIN_EXE_firstlight"));
         quiet(&mut command, &self.display, &self.folder)
             .args(arguments)
-            // So that the windows of tests that run beside one another answer.
-            .args(if arguments.contains(&"--threads") { &[][..] } else { &["--threads", "1"] })
             .envs(environment.iter().copied())
             .current_dir(self.folder())
             .stdout(create("stdout"))

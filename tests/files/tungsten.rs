@@ -4,7 +4,8 @@ use bevy_ecs::prelude::World;
 use firstlight::render::{Film, Material, advance};
 use firstlight::scene::file::{LightPart, ObjectPart, SceneFile};
 use firstlight::scene::{
-    ColorValue, EnvironmentSource, Extraction, LoadOptions, LoadedScene, Rendering, Rgb, SceneInputs, SceneSource, load,
+    ColorValue, EnvironmentSource, Extraction, LoadOptions, LoadedScene, MeshSource, Rendering, Rgb, SceneInputs,
+    SceneSource, load,
 };
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
@@ -223,4 +224,24 @@ fn shapes_that_emit_have_a_limit_together() {
     let lights = scene.file.objects.iter().filter(|object| object.material().is_some_and(is_light)).count();
     assert_eq!((scene.file.objects.len(), lights), (2100, (1 << 20) / 512));
     assert!(told(&scene).iter().any(|it| it.contains("it is dark")), "{:?}", told(&scene));
+}
+
+/// A saved scene names a mesh by its number, which is the same whether or not others may be read.
+#[test]
+fn a_mesh_has_its_number_whatever_must_not_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = include_bytes!("../../fuzz/seeds/tungsten/square.wo3");
+    std::fs::write(folder.path().join("square.wo3"), square).unwrap();
+    let number = |first: &str| {
+        let path = folder.path().join("a.json");
+        let mesh = |file: &str| format!("{{\"type\": \"mesh\", \"file\": \"{file}\"}}");
+        std::fs::write(&path, format!("{{\"primitives\": [{}, {}]}}", mesh(first), mesh("square.wo3"))).unwrap();
+        let scene = opened(&path);
+        let of_mesh = |object: &ObjectPart| match object {
+            ObjectPart::Mesh { source: MeshSource::Part { shape, .. }, .. } => Some(*shape),
+            _ => None,
+        };
+        scene.file.objects.iter().filter_map(of_mesh).next_back().expect("the square")
+    };
+    assert_eq!([number("gone.wo3"), number("../outside.wo3")], [1; 2]);
 }

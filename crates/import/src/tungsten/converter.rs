@@ -120,9 +120,11 @@ impl<'a> Converter<'a> {
         let primitives: Vec<Fields> = primitives.map(|value| Fields::of(Some(value), kind_of(value), source)).collect();
         let wanted: Vec<Option<MeshRequest>> = primitives.iter().map(|primitive| self.mesh_of(primitive)).collect();
         let mut requests: HashMap<&MeshRequest, u32> = HashMap::new();
-        for request in wanted.iter().flatten() {
-            let next = requests.len() as u32;
-            requests.entry(request).or_insert(next);
+        // By the place of the first primitive that has it, whatever must not be read.
+        for (place, request) in (0..).zip(&wanted) {
+            if let Some(request) = request {
+                requests.entry(request).or_insert(place);
+            }
         }
         let budget = self.meshes;
         let made: HashMap<&MeshRequest, Result<PrimitiveMesh, String>> = (requests.par_iter())
