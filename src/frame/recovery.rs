@@ -18,6 +18,8 @@ pub struct Recovery {
     folder: Option<PathBuf>,
     place: Option<RecoverySlot>,
     writer: Option<JoinHandle<Result<(), String>>>,
+    /// The last attempt to store has failed, such as on a full disk.
+    has_failed: bool,
 }
 
 /// The files of a window.
@@ -50,7 +52,7 @@ impl Recovery {
 
     /// Whether edits are stored.
     pub fn has_kept(&self) -> bool {
-        self.place.is_some()
+        self.place.is_some() && !self.has_failed
     }
 
     /// Replaces the stored scene, on another thread; returns the error of the previous attempt, if any.
@@ -79,7 +81,9 @@ impl Recovery {
     /// Waits until the pending write is on disk; returns its error, if any.
     pub fn wait(&mut self) -> Option<String> {
         // A panic has been printed by the thread itself.
-        self.writer.take().and_then(|writer| writer.join().ok()).and_then(Result::err)
+        let written = self.writer.take()?.join().unwrap_or(Ok(()));
+        self.has_failed = written.is_err();
+        written.err()
     }
 
     /// Removes the stored edits, because there is nothing unsaved any more.
@@ -194,6 +198,23 @@ mod tests {
         let back = load(&SceneSource::Scene(target), &LoadOptions::default()).unwrap();
         assert_eq!(back.file.objects, description("cornell-balls").file.objects);
         assert_eq!(std::fs::read_dir(folder.path().join("recovery")).unwrap().count(), 0);
+    }
+
+    /// As on a full disk: what could not be written is not said to be kept.
+    #[test]
+    fn what_could_not_be_stored_is_not_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut window = Recovery::beside(Some(folder.path()));
+        window.keep(description("cornell"), "cornell");
+        assert_eq!((window.wait(), window.has_kept()), (None, true));
+        let scene = window.place.as_ref().unwrap().scene.clone();
+        std::fs::remove_file(&scene).unwrap();
+        std::fs::create_dir_all(scene.join("in the way")).unwrap();
+        window.keep(description("cornell"), "cornell");
+        assert!(window.wait().is_some() && !window.has_kept());
+        std::fs::remove_dir_all(&scene).unwrap();
+        window.keep(description("cornell"), "cornell");
+        assert_eq!((window.wait(), window.has_kept()), (None, true));
     }
 
     #[test]

@@ -166,7 +166,12 @@ impl App {
 
     /// The message when the program is stopped from outside.
     pub(super) fn stopped_message(&self) -> String {
-        let kept = self.leaving.recovery.has_kept();
-        if kept { "stopped: unsaved changes can be restored at the next start" } else { "stopped" }.to_owned()
+        let is_unsaved = self.session.has_unsaved_edits() && !self.leaving.discarded;
+        match (is_unsaved, self.leaving.recovery.has_kept()) {
+            (true, true) => "stopped: unsaved changes can be restored at the next start",
+            (true, false) => "stopped: unsaved changes could not be kept",
+            (false, _) => "stopped",
+        }
+        .to_owned()
     }
 }
