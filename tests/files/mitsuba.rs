@@ -412,7 +412,7 @@ fn instances_share_a_mesh_and_mirrored_cameras_turn_the_scene() {
             other => panic!("{other:?}"),
         })
         .collect();
-    assert_eq!(shapes, [0, 1, 0, 1]);
+    assert_eq!(shapes, [2, 3, 2, 3]);
     let Some(matrix) = scene.file.objects[2].transform().matrix else { panic!() };
     assert_eq!((matrix[0][0], matrix[0][3]), (-1.0, -3.0));
     assert_eq!(scene.file.camera.eye, DVec3::new(0.0, 0.0, 5.0));

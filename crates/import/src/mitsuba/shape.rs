@@ -196,7 +196,8 @@ impl Converter<'_> {
             geometry,
         };
         let Some(transform) = self.placement(node, placed) else { return Ok(()) };
-        let next = self.requests.len() as u32;
+        // Also those that must not be read have a number.
+        let next = (self.n_shapes - 1) as u32;
         let may_be_body = !matches!(request.geometry, Geometry::Rectangle | Geometry::Disk | Geometry::Cylinder);
         let shape = *self.requests.entry(request).or_insert(next);
         if may_be_body && !material.two_sided && !material.has_holes {
