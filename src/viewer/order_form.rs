@@ -289,9 +289,9 @@ impl OrderForm {
         ui.end_row();
         ui.label("until");
         ui.horizontal(|ui| {
-            let before = *self.ending();
+            let before = self.of_image;
             self.ending().show(ui);
-            self.is_usual &= *self.ending() == before;
+            self.is_usual &= self.of_image == before;
         });
         ui.end_row();
         ui.label("denoised");

@@ -248,3 +248,22 @@ fn a_job_writes_through_no_link() {
         "{output:?}"
     );
 }
+
+/// A part that is rendered later would be of another scene.
+#[test]
+fn an_image_of_what_is_there_replaces_nothing_that_the_scene_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    does(path, "render cornell -o t.png --spp 1 --size 8x8");
+    std::fs::write(path.join("a.ron"), SCENE.replace("constant(1)", "image(file: \"t.png\")")).unwrap();
+    does(path, "submit slurm a.ron --parts 2 --spp 4 -o job --dry-run");
+    does(path, "work job --part 1/2");
+    let texture = path.join("job/scene/t.png");
+    let before = std::fs::read(&texture).unwrap();
+    let said = fails(path, "status job --image job/scene/t.png", 2);
+    assert!(said.contains("is also an input of this command"), "{said}");
+    assert!(std::fs::read(&texture).unwrap() == before);
+    for _ in 0..2 {
+        does(path, "status job --image so-far.png");
+    }
+}

@@ -3,7 +3,7 @@
 
 use bevy_ecs::prelude::World;
 use firstlight::scene::file::ObjectPart;
-use firstlight::scene::{LoadOptions, LoadedScene, SceneSource, load, whole_scene};
+use firstlight::scene::{LoadOptions, LoadedScene, MeshSource, SceneSource, load, whole_scene};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
@@ -287,4 +287,27 @@ fn shapes_of_mitsuba_that_emit_have_a_limit_together() {
     assert_eq!(cylinders(8).unwrap().file.objects.len(), 8);
     let error = cylinders(1025).unwrap_err();
     assert!(error.contains("more than 1048576 triangles of such shapes that emit"), "{error}");
+}
+
+/// A saved scene names a mesh by its number, which is the same whether or not others may be read.
+#[test]
+fn a_mesh_of_mitsuba_has_its_number_whatever_must_not_be_read() {
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let number = |first: &str| {
+        let shape = |file: &str| format!("<shape type=\"obj\"><string name=\"filename\" value=\"{file}\"/></shape>");
+        let scene = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><emitter type=\"constant\"/>{}{}</scene>",
+            shape(first),
+            shape("a.obj")
+        );
+        let (folder, path) =
+            folder(&[("a.xml", scene), ("a.obj", triangle.to_owned()), ("b.obj", triangle.to_owned())]);
+        std::fs::write(folder.path().join("outside.obj"), triangle).unwrap();
+        let of_mesh = |object: &ObjectPart| match object {
+            ObjectPart::Mesh { source: MeshSource::Part { shape, .. }, .. } => Some(*shape),
+            _ => None,
+        };
+        open(&path).unwrap().file.objects.iter().filter_map(of_mesh).next_back().expect("the triangle")
+    };
+    assert_eq!(["b.obj", "gone.obj", "../outside.obj"].map(number), [1; 3]);
 }

@@ -7,7 +7,7 @@ use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::words::numbers;
-use crate::model::foreign::tinted;
+use crate::model::foreign::{grey, n_lobes, tinted};
 use crate::model::ior;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
@@ -317,7 +317,7 @@ impl Converter<'_> {
         let front = self.surface(nested[0], depth + 1)?;
         let Some(&back) = nested.get(1) else { return Ok(front.map(|front| Surface { two_sided: true, ..front })) };
         let (Some(front), Some(other)) = (front, self.surface(back, depth + 1)?) else { return Ok(None) };
-        if self.n_lobes(&front.part) + self.n_lobes(&other.part) > MAX_LOBES {
+        if n_lobes(&self.file, &front.part) + n_lobes(&self.file, &other.part) > MAX_LOBES {
             self.tell(node, &format!("two sides of more than {MAX_LOBES} lobes are not modelled: both are the first"));
             return Ok(Some(Surface { two_sided: true, ..front }));
         }
@@ -436,7 +436,7 @@ impl Converter<'_> {
                 return a.or(b);
             }
         };
-        if self.n_lobes(&a.part) + self.n_lobes(&b.part) > MAX_LOBES {
+        if n_lobes(&self.file, &a.part) + n_lobes(&self.file, &b.part) > MAX_LOBES {
             self.tell(node, &format!("a blend of more than {MAX_LOBES} lobes is not modelled: it is the first part"));
             return Some(a);
         }
@@ -498,15 +498,6 @@ impl Converter<'_> {
         Ok(Some(Surface { part, ..surface }))
     }
 
-    pub(crate) fn n_lobes(&self, part: &MaterialPart) -> usize {
-        match part {
-            Material::Blend { a, b, .. } => {
-                [a, b].into_iter().filter_map(|name| self.file.materials.get(name)).map(|part| self.n_lobes(part)).sum()
-            }
-            part => part.n_lobes(),
-        }
-    }
-
     fn normal_map(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
         // Of version 0.x, it has any name.
         let Some(map) = node.child("normalmap")?.or(node.children("texture")?.first().copied()) else {
@@ -522,11 +513,6 @@ impl Converter<'_> {
         let part = self.mapped(node, surface.part, map)?;
         Ok(Some(Surface { part, ..surface }))
     }
-}
-
-/// What stands for a surface that is not modelled.
-pub(crate) fn grey() -> MaterialPart {
-    Material::Diffuse { albedo: ColorValue::grey(0.5) }
 }
 
 fn within_share(value: ScalarValue) -> ScalarValue {

@@ -5,14 +5,14 @@ use crate::error::together::MeshesTooLarge;
 use crate::mitsuba::serialized::{UnpackedBytes, read_serialized};
 use crate::model::imported::{ModelNormals, ModelOptions};
 use crate::model::mesh_budget::MeshBudget;
-use crate::model::placing::oriented;
+use crate::model::placing::{made_mesh, oriented};
 use crate::obj::load_obj_with;
 use crate::ply::load_ply_colored;
 use crate::ply::vertices::ColourSource;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_mesh::{Mesh, NormalWeight};
-use glam::{DVec3, Vec2, Vec3};
+use glam::DVec3;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -146,15 +146,6 @@ fn is_mirrored(mesh: &Mesh) -> bool {
     mesh.triangles.iter().any(|&[a, b, c]| (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)) < 0.0)
 }
 
-/// From corners with normals and texture coordinates.
-fn built(vertices: Vec<(DVec3, DVec3, [f64; 2])>, triangles: Vec<[u32; 3]>) -> Mesh {
-    let positions: Vec<DVec3> = vertices.iter().map(|vertex| vertex.0).collect();
-    let mesh = Mesh::from_f64(&positions, triangles).expect("the shape is one");
-    let normals: Vec<Vec3> = vertices.iter().map(|vertex| vertex.1.as_vec3()).collect();
-    let uvs = vertices.iter().map(|vertex| Vec2::new(vertex.2[0] as f32, vertex.2[1] as f32)).collect();
-    Mesh { normals, uvs, ..mesh }
-}
-
 /// From −1 to 1 along each axis; every side has the whole texture.
 fn cube() -> Mesh {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
@@ -178,14 +169,14 @@ fn cube() -> Mesh {
             triangles.push(if is_right { [a, b, c] } else { [a, c, b] });
         }
     }
-    built(vertices, triangles)
+    made_mesh(&vertices, triangles)
 }
 
 /// From −1 to 1 in the plane z = 0, facing +Z.
 fn rectangle() -> Mesh {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let vertex = |[u, v]: [f64; 2]| (DVec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 0.0), DVec3::Z, [u, v]);
-    built(corners.map(vertex).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+    made_mesh(&corners.map(vertex), vec![[0, 1, 2], [0, 2, 3]])
 }
 
 /// Radius 1 in the plane z = 0, facing +Z; u is the radius and v the angle.
@@ -199,7 +190,7 @@ fn disk() -> Mesh {
         vertices.push((DVec3::ZERO, DVec3::Z, [0.0, share + 0.5 / f64::from(SEGMENTS)]));
     }
     triangles.extend((0..SEGMENTS).map(|i| [2 * i + 1, 2 * i, 2 * i + 2]));
-    built(vertices, triangles)
+    made_mesh(&vertices, triangles)
 }
 
 /// Facing outwards; u is the angle and v the height.
@@ -216,13 +207,14 @@ fn cylinder() -> Mesh {
         let [a, b, c, d] = [0, 1, 2, 3].map(|k| 2 * i + k);
         triangles.extend([[a, c, d], [a, d, b]]);
     }
-    built(vertices, triangles)
+    made_mesh(&vertices, triangles)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use firstlight_mesh::Topology;
+    use glam::Vec3;
     use std::f64::consts::PI;
 
     #[test]

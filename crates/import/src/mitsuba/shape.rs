@@ -1,6 +1,6 @@
 //! Shapes as objects, with the lights that they are.
 
-use crate::mitsuba::bsdf::{by_side, exchange_own, grey, with_parts, without_own};
+use crate::mitsuba::bsdf::{by_side, exchange_own, with_parts, without_own};
 use crate::mitsuba::converter::Surface;
 use crate::mitsuba::converter::{Converter, PlacedMaterial};
 use crate::mitsuba::graph::Node;
@@ -8,7 +8,7 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
-use crate::model::foreign::{LIGHT_SHARE, MAX_EMITTING};
+use crate::model::foreign::{LIGHT_SHARE, MAX_EMITTING, MAX_OBJECTS, grey, n_lobes};
 use crate::model::placing;
 use crate::ply::has_normals;
 use firstlight_files::input_file::{FileKind, InputFile};
@@ -24,8 +24,6 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Objects of a scene; instances of instances multiply.
-const MAX_OBJECTS: usize = 1 << 20;
 /// Parts of all shapes that are placed, with those of instances: each shape asks for all of its own.
 const MAX_PARTS: usize = 1 << 24;
 /// Depth of instances.
@@ -120,7 +118,7 @@ impl Converter<'_> {
         if matches!(front, Material::Emissive { .. }) {
             return name.to_owned();
         }
-        if self.n_lobes(&front) == MAX_LOBES {
+        if n_lobes(&self.file, &front) == MAX_LOBES {
             let (scene, shown) = (self.graph.files[0].path.display(), printable::name(name));
             self.warnings.push(format!(
                 "{scene}: the black back of `{shown}`, a blend of {MAX_LOBES} lobes, is not modelled: it is like the front"
@@ -386,7 +384,7 @@ impl Converter<'_> {
 
     /// A surface of which a share is a light that is as much brighter; `None` if it cannot have one.
     fn share_of_light(&mut self, node: Node, mut part: MaterialPart, radiance: &ColorValue) -> Option<MaterialPart> {
-        if self.n_lobes(&part) >= MAX_LOBES || self.has_textured_weight(&part) {
+        if n_lobes(&self.file, &part) >= MAX_LOBES || self.has_textured_weight(&part) {
             return None;
         }
         let radiance = match radiance {

@@ -5,8 +5,10 @@ use crate::model::projection::LightImages;
 use firstlight_files::printable;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
+use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::TextureSource;
+use firstlight_format::value::ColorValue;
 use firstlight_mesh::Mesh;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -34,9 +36,27 @@ pub(crate) fn told_of_long(name: &str) -> Option<String> {
 /// exact.
 pub(crate) const LIGHT_SHARE: f32 = 1.0 / 1024.0;
 
+/// Objects of a scene: instances of instances are quickly said.
+pub(crate) const MAX_OBJECTS: usize = 1 << 20;
+
 /// Triangles that emit of shapes that formulas make, for all of a scene: a few letters ask for hundreds of them, and
 /// each takes 1,700 bytes.
 pub(crate) const MAX_EMITTING: usize = 1 << 20;
+
+/// What stands for a surface that is not modelled.
+pub(crate) fn grey() -> MaterialPart {
+    MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
+}
+
+/// Number of lobes of a material with all of its parts.
+pub(crate) fn n_lobes(file: &SceneFile, part: &MaterialPart) -> usize {
+    match part {
+        MaterialPart::Blend { a, b, .. } => {
+            [a, b].into_iter().filter_map(|name| file.materials.get(name)).map(|part| n_lobes(file, part)).sum()
+        }
+        part => part.n_lobes(),
+    }
+}
 
 /// A texture times a colour; `None` if it cannot have a factor.
 pub(crate) fn tinted(source: &TextureSource, factor: Vec3) -> Option<TextureSource> {

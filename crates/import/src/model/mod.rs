@@ -8,6 +8,7 @@ pub(crate) mod imported;
 pub(crate) mod ior;
 pub(crate) mod material;
 pub(crate) mod mesh_budget;
+pub(crate) mod named_files;
 pub(crate) mod number;
 pub mod placing;
 pub(crate) mod polygon;

@@ -3,7 +3,7 @@
 use firstlight_format::bounds;
 use firstlight_format::parts::TransformPart;
 use firstlight_mesh::Mesh;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 /// Whether an object may have this transform.
 pub(crate) fn is_placement(world: &DAffine3) -> bool {
@@ -22,6 +22,15 @@ pub(crate) fn transform(world: &DAffine3) -> TransformPart {
     let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
     let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
     TransformPart { matrix, ..TransformPart::default() }
+}
+
+/// From vertices with a position, a normal and texture coordinates each, of a shape that formulas make.
+pub(crate) fn made_mesh(vertices: &[(DVec3, DVec3, [f64; 2])], triangles: Vec<[u32; 3]>) -> Mesh {
+    let positions: Vec<DVec3> = vertices.iter().map(|vertex| vertex.0).collect();
+    let mesh = Mesh::from_f64(&positions, triangles).expect("the shape is one");
+    let normals = vertices.iter().map(|vertex| vertex.1.as_vec3()).collect();
+    let uvs = vertices.iter().map(|vertex| Vec2::new(vertex.2[0] as f32, vertex.2[1] as f32)).collect();
+    Mesh { normals, uvs, ..mesh }
 }
 
 /// The same mesh with its front where its normals point, also that of triangles whose order says otherwise; or turned

@@ -1,7 +1,8 @@
 //! Collects what directives describe: objects with their materials, lights, and meshes inside of the text.
 
-use crate::model::foreign::{ForeignOptions, cut};
+use crate::model::foreign::{ForeignOptions, MAX_OBJECTS, cut};
 use crate::model::mesh_budget::MeshBudget;
+use crate::model::named_files::NamedFiles;
 use crate::model::placing::{is_placement, transform};
 use crate::model::projection::LightImages;
 use crate::pbrt::curves::Strands;
@@ -11,7 +12,6 @@ use crate::pbrt::state::{Described, MaterialRef, State};
 use crate::pbrt::textures::{Texture, Textures};
 use firstlight_files::limits::Limits;
 use firstlight_files::printable;
-use firstlight_files::reference::References;
 use firstlight_files::relative::path_to_text;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
@@ -27,8 +27,6 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Objects that a scene may have: instances of instances are quickly said.
-pub(super) const MAX_OBJECTS: usize = 1 << 20;
 /// Shapes, with the pieces of hair, and those that are left out.
 const MAX_SHAPES: u32 = 1 << 23;
 /// Meshes that formulas make may have this fraction of the bytes of a scene: reading them and building their trees takes
@@ -72,7 +70,7 @@ pub(crate) struct Known {
 pub(crate) struct Builder<'a> {
     pub(super) path: &'a Path,
     pub(super) folder: &'a Path,
-    pub(super) references: References,
+    pub(super) named_files: NamedFiles<'a>,
     pub(super) allow_outside: bool,
     light_images: &'a LightImages,
     pub(super) meshes: &'a MeshBudget,
@@ -112,8 +110,6 @@ pub(crate) struct Builder<'a> {
     pub(super) place_of: HashMap<String, usize>,
     pub(super) lobes: HashMap<String, usize>,
     pub(super) with_textures: HashSet<String>,
-    /// The path in the scene file of each file that was named, `None` if it must not be read.
-    pub(super) resolved: HashMap<String, Option<String>>,
     /// Whether a PLY file has normals, by its path.
     pub(super) with_normals: HashMap<PathBuf, Option<bool>>,
     /// By path and whether it is turned round.
@@ -135,7 +131,7 @@ impl<'a> Builder<'a> {
         Self {
             path,
             folder,
-            references: References::of(path, allow_outside),
+            named_files: NamedFiles::of(path, allow_outside),
             allow_outside,
             light_images: &options.light_images,
             meshes: &options.meshes,
@@ -164,7 +160,6 @@ impl<'a> Builder<'a> {
             place_of: HashMap::new(),
             lobes: HashMap::new(),
             with_textures: HashSet::new(),
-            resolved: HashMap::new(),
             with_normals: HashMap::new(),
             ply: HashMap::new(),
             bytes_left: Limits::of_this_process().scene_bytes / SCENE_BYTES_PER_BYTE_MADE,
@@ -201,27 +196,14 @@ impl<'a> Builder<'a> {
 
     /// The path of a file in the scene file; `None` if it must not be read, which is told.
     pub(crate) fn file(&mut self, name: &str) -> Option<String> {
-        if let Some(known) = self.resolved.get(name) {
-            return known.clone();
-        }
-        let found = match self.references.resolve(self.folder, name) {
-            Ok(found) => {
-                let difference = found.difference(name);
-                difference.into_iter().for_each(|it| self.tell(it));
-                Some(path_to_text(&found.path))
-            }
-            Err(outside) => {
-                self.tell(outside.to_string());
-                None
-            }
-        };
-        self.resolved.insert(name.to_owned(), found.clone());
-        found
+        let (path, told) = self.named_files.find(name);
+        told.into_iter().for_each(|it| self.tell(it));
+        path
     }
 
     /// Like [`Self::file`], for a file that was named before.
     pub(super) fn named_file(&self, name: &str) -> Option<String> {
-        self.resolved.get(name).cloned().flatten()
+        self.named_files.known(name)
     }
 
     /// A shape.

@@ -444,7 +444,8 @@ impl<'a> Reader<'a> {
             return Err(cursor.wrong(at, format!("more than {MAX_INCLUDES} files are included")));
         }
         // A part that is missing costs only itself.
-        let found = self.builder.references.resolve(self.folder, file).map_err(|outside| outside.to_string());
+        let found =
+            self.builder.named_files.references.resolve(self.folder, file).map_err(|outside| outside.to_string());
         let folder = self.folder;
         let source = found.and_then(|found| self.text(&folder.join(found.path)).map_err(|error| error.to_string()));
         let source = match source {

@@ -1,7 +1,8 @@
 //! Object definitions and their instances.
 
+use crate::model::foreign::MAX_OBJECTS;
 use crate::model::foreign::cut;
-use crate::pbrt::build::{Builder, MAX_OBJECTS, TooMany};
+use crate::pbrt::build::{Builder, TooMany};
 use firstlight_files::printable;
 use glam::DAffine3;
 

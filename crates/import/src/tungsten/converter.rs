@@ -2,10 +2,10 @@
 
 use crate::model::foreign::{ForeignOptions, ForeignScene};
 use crate::model::mesh_budget::MeshBudget;
+use crate::model::named_files::NamedFiles;
 use crate::model::projection::LightImages;
 use crate::tungsten::fields::{Fields, Source};
 use crate::tungsten::meshes::MeshRequest;
-use firstlight_files::reference::References;
 use firstlight_files::relative::path_to_text;
 use firstlight_files::stamp::{Stamp, stamp};
 use firstlight_format::camera::CameraPart;
@@ -48,19 +48,17 @@ pub(crate) struct Converter<'a> {
     source: &'a Source<'a>,
     /// Of the scene: paths are relative to it.
     pub folder: &'a Path,
-    references: References,
+    named_files: NamedFiles<'a>,
     pub light_images: &'a LightImages,
     meshes: &'a MeshBudget,
     /// Of the scene in its folder.
     pub file_name: String,
     /// Names and values from the command line, which have no effect.
     pub defines: &'a [(String, String)],
-    /// The path in the scene file of each file that was named, `None` if it must not be read.
-    resolved: HashMap<String, Option<String>>,
     pub bsdfs: HashMap<&'a str, &'a Value>,
     /// Absorption of the media that do not scatter, per metre; `None` for others.
     pub media: HashMap<&'a str, Option<Vec3>>,
-    /// Orientation of the primitives, of which one may be a skydome.
+    /// Orientation of the skydomes.
     pub domes: HashMap<&'a str, DMat3>,
     /// Materials by their BSDF and what is inside.
     pub surfaces: HashMap<(*const Value, String), Option<String>>,
@@ -87,12 +85,11 @@ impl<'a> Converter<'a> {
             file: SceneFile::new(CameraPart::looking_at(DVec3::ZERO, DVec3::NEG_Z)),
             source,
             folder: path.parent().unwrap_or(Path::new("")),
-            references: References::of(path, options.allow_outside),
+            named_files: NamedFiles::of(path, options.allow_outside),
             light_images: &options.light_images,
             meshes: &options.meshes,
             file_name: path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default(),
             defines: &options.defines,
-            resolved: HashMap::new(),
             bsdfs: named(root, "bsdfs").collect(),
             media: HashMap::new(),
             domes: HashMap::new(),
@@ -114,6 +111,7 @@ impl<'a> Converter<'a> {
         self.view();
         self.describe_media();
         self.domes = named(root, "primitives")
+            .filter(|(_, value)| kind_of(value) == "skydome")
             .map(|(name, value)| (name, Fields::of(Some(value), "primitive", source).transform("transform").matrix3))
             .collect();
         let primitives = root.get("primitives").and_then(Value::as_array).into_iter().flatten();
@@ -161,21 +159,9 @@ impl<'a> Converter<'a> {
 
     /// The path of a file in the scene file; `None` if it must not be read, which is told.
     pub(crate) fn file_of(&mut self, of: &Fields, name: &str) -> Option<String> {
-        if let Some(known) = self.resolved.get(name) {
-            return known.clone();
-        }
-        let found = match self.references.resolve(self.folder, name) {
-            Ok(found) => {
-                found.difference(name).into_iter().for_each(|it| of.tell(it));
-                Some(path_to_text(&found.path))
-            }
-            Err(outside) => {
-                of.tell(outside.to_string());
-                None
-            }
-        };
-        self.resolved.insert(name.to_owned(), found.clone());
-        found
+        let (path, told) = self.named_files.find(name);
+        told.into_iter().for_each(|it| of.tell(it));
+        path
     }
 
     fn describe_media(&mut self) {

@@ -82,7 +82,7 @@ impl Converter<'_> {
         if kelvin != USUAL_TEMPERATURE {
             of.tell("a sky of another sun (`temperature`) is not modelled: it has the colours of ours");
         }
-        of.tell("a skydome is shown as our clear sky: its colours and brightness differ by up to a fifth");
+        of.tell("a skydome is shown as our clear sky: its colours and brightness differ by up to 30 %");
         let turbidity = of.number("turbidity").unwrap_or(3.0).clamp(1.0, 10.0);
         let brightness = of.number("intensity").unwrap_or(2.0).clamp(0.0, 1e6);
         let sky = EnvironmentSource::Sky {

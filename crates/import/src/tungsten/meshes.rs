@@ -6,6 +6,7 @@
 use crate::error::together::MeshesTooLarge;
 use crate::model::imported::{ModelNormals, ModelOptions, with_normals};
 use crate::model::mesh_budget::MeshBudget;
+use crate::model::placing::made_mesh;
 use crate::obj::load_obj_with;
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_mesh::{Mesh, NormalWeight};
@@ -145,21 +146,12 @@ fn parse_wo3(bytes: &[u8]) -> Result<(Mesh, Vec<Vec3>), String> {
     Ok((Mesh { uvs, slots, ..mesh }, normals))
 }
 
-/// From corners with normals and texture coordinates.
-fn built(vertices: &[(DVec3, DVec3, [f64; 2])], triangles: Vec<[u32; 3]>) -> Mesh {
-    let positions: Vec<DVec3> = vertices.iter().map(|vertex| vertex.0).collect();
-    let mesh = Mesh::from_f64(&positions, triangles).expect("the shape is one");
-    let normals = vertices.iter().map(|vertex| vertex.1.as_vec3()).collect();
-    let uvs = vertices.iter().map(|vertex| Vec2::new(vertex.2[0] as f32, vertex.2[1] as f32)).collect();
-    Mesh { normals, uvs, ..mesh }
-}
-
 /// The corners of a square, around it.
 const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
 fn quad() -> Mesh {
     let vertices = CORNERS.map(|[u, v]| (DVec3::new(u - 0.5, 0.0, v - 0.5), DVec3::Y, [u, v]));
-    built(&vertices, vec![[0, 2, 1], [0, 3, 2]])
+    made_mesh(&vertices, vec![[0, 2, 1], [0, 3, 2]])
 }
 
 /// Texture coordinates are those of the two axes that follow the axis of the side.
@@ -173,7 +165,7 @@ fn cube() -> Mesh {
         let of_side = if sign > 0.0 { [[0, 1, 2], [0, 2, 3]] } else { [[0, 2, 1], [0, 3, 2]] };
         triangles.extend(of_side.map(|triangle| triangle.map(|corner| first + corner)));
     }
-    built(&vertices, triangles)
+    made_mesh(&vertices, triangles)
 }
 
 /// A profile of radius and height, turned about Y; its edges stay hard.
@@ -198,7 +190,7 @@ fn turned(profile: &[[f64; 2]]) -> Mesh {
             triangles.extend((r > 0.0).then_some([a, d, c]));
         }
     }
-    built(&vertices, triangles)
+    made_mesh(&vertices, triangles)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ mod surfaces;
 mod textures;
 mod transforms;
 
-use crate::model::foreign::{ForeignOptions, ForeignScene};
+use crate::model::foreign::{ForeignOptions, ForeignScene, MAX_OBJECTS};
 use crate::tungsten::converter::Converter;
 use crate::tungsten::fields::Source;
 use firstlight_files::input_file::{FileKind, InputFile};
@@ -28,8 +28,6 @@ use serde_json::Value;
 use std::cell::RefCell;
 use std::path::Path;
 
-/// As many as a scene of other formats has shapes.
-const MAX_PRIMITIVES: usize = 1 << 20;
 /// A value takes up to a hundred times the memory of its text.
 const SCENE_BYTES_PER_BYTE: u64 = 16;
 
@@ -50,8 +48,8 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
     let Some(primitives) = root.get("primitives").and_then(Value::as_array) else {
         return Err(SceneError::in_file(path, "is no scene of Tungsten: it has no list of `primitives`"));
     };
-    if primitives.len() > MAX_PRIMITIVES {
-        return Err(SceneError::in_file(path, format!("has more than {MAX_PRIMITIVES} primitives")));
+    if primitives.len() > MAX_OBJECTS {
+        return Err(SceneError::in_file(path, format!("has more than {MAX_OBJECTS} primitives")));
     }
     let source = Source { path, told: RefCell::default() };
     Converter::new(&root, &source, options).convert(before)

@@ -18,7 +18,7 @@
 //!
 //! Reflections are the same on both sides, and roughness is α.
 
-use crate::model::foreign::{cut, tinted};
+use crate::model::foreign::{cut, grey, n_lobes, tinted};
 use crate::model::ior;
 use crate::tungsten::converter::{Converter, Reads};
 use crate::tungsten::fields::Fields;
@@ -203,7 +203,7 @@ impl<'a> Converter<'a> {
         let [first, second] = [first, second].map(|part| self.without_own(of, part));
         // The ratio is the share of the first.
         let part = Material::blend(ratio, second, first.clone());
-        if self.n_lobes(&part) > MAX_LOBES {
+        if n_lobes(&self.file, &part) > MAX_LOBES {
             of.tell(format!("a mixture of more than {MAX_LOBES} lobes is not modelled: it is the first part"));
             return Some(first);
         }
@@ -290,19 +290,6 @@ impl<'a> Converter<'a> {
         self.file.materials.0.insert(name.clone(), part);
         name
     }
-
-    fn n_lobes(&self, part: &MaterialPart) -> usize {
-        match part {
-            Material::Blend { a, b, .. } => {
-                [a, b].into_iter().filter_map(|name| self.file.materials.get(name)).map(|part| self.n_lobes(part)).sum()
-            }
-            part => part.n_lobes(),
-        }
-    }
-}
-
-fn grey() -> MaterialPart {
-    Material::Diffuse { albedo: ColorValue::grey(0.5) }
 }
 
 /// The same surface as one that can have holes and normals of its own.

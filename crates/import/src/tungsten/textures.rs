@@ -41,7 +41,7 @@ impl Converter<'_> {
                 match fields.kind() {
                     "bitmap" => match fields.text("file") {
                         Some(file) => self.image(of, file, Some(&fields), reads),
-                        None => grey(&fields, "a bitmap has no `file`"),
+                        None => told_grey(&fields, "a bitmap has no `file`"),
                     },
                     "constant" => ColorValue::Rgb(within(fields.vector("value").unwrap_or(DVec3::ONE), reads)),
                     "checker" => {
@@ -56,7 +56,7 @@ impl Converter<'_> {
                     }
                     other => {
                         let other = printable::name(other);
-                        grey(&fields, &format!("textures of the kind `{other}` are not modelled"))
+                        told_grey(&fields, &format!("textures of the kind `{other}` are not modelled"))
                     }
                 }
             }
@@ -102,7 +102,7 @@ impl Converter<'_> {
     }
 }
 
-fn grey(of: &Fields, why: &str) -> ColorValue {
+fn told_grey(of: &Fields, why: &str) -> ColorValue {
     of.tell(format!("{why}: grey is shown"));
     ColorValue::grey(0.5)
 }
