@@ -122,7 +122,11 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let mut files = args.overwrite.files();
     files.read(path)?;
     files.write(&args.output)?;
-    let options = ReplayOptions { threads: args.threads.map(usize::from), spp: args.spp };
+    let options = ReplayOptions {
+        threads: args.threads.map(usize::from),
+        spp: args.spp,
+        allow_outside: args.scene.how.allow_outside,
+    };
     let mut played = replay(path, options, &|| false).map_err(Failure::Failed)?;
     files.read_all(played.files())?;
     for warning in &played.warnings {

@@ -168,7 +168,7 @@ impl CommandParams<'_, '_> {
                 if let Some(rig) = self.rig()
                     && self.bookmarks.set(slot, rig)
                 {
-                    self.note(format!("view saved as bookmark {slot}"));
+                    self.note(format!("bookmark {slot} is this view"));
                 }
             }
             Command::GoToBookmark { slot } => match self.bookmarks.get(slot) {

@@ -62,6 +62,7 @@ pub struct Recorder {
     pub(super) out: Option<(File, PathBuf)>,
     pub(super) frame: u64,
     pub(super) adopted: u64,
+    /// Why it stopped before the end.
     pub(super) trouble: Option<String>,
 }
 
@@ -103,8 +104,8 @@ pub fn record(
         let line = RecordedLine::Do(recorder.frame, clock.0.as_secs_f64(), command.clone());
         recorder.write(&line);
     }
-    if let Some(trouble) = recorder.trouble.take() {
-        status.say(clock.0, MessageKind::Error, trouble);
+    if let Some(trouble) = &recorder.trouble {
+        status.say(clock.0, MessageKind::Error, trouble.clone());
     }
 }
 

@@ -9,7 +9,8 @@ use crate::frame::state::resources::{CurrentScene, FreeShare, PictureSize, Rende
 use crate::frame::{Command, Session, SessionOptions};
 use crate::render::{ErrorMetric, Film, Room, SampleAllocation};
 use crate::scene::{
-    DisplaySettings, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path, text_to_path,
+    DisplaySettings, ModelChoice, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path,
+    text_to_path,
 };
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,14 +51,15 @@ impl Session {
         Ok(())
     }
 
-    /// Ends the recording with the present sample count.
-    pub fn end_record(&mut self) {
+    /// Ends the recording with the present sample count; returns why it is not complete.
+    pub fn end_record(&mut self) -> Option<String> {
         let status = self.status();
         let spp = if status.divider == 1 { status.spp } else { 0 };
         let mut recorder = self.world_mut().resource_mut::<Recorder>();
         let line = RecordedLine::End(recorder.frame, spp);
         recorder.write(&line);
         recorder.out = None;
+        recorder.trouble.take()
     }
 }
 
@@ -82,6 +84,8 @@ pub struct ReplayOptions {
     pub threads: Option<usize>,
     /// Samples per pixel at the end, instead of those of the recording.
     pub spp: Option<u32>,
+    /// Whether the model that is opened first may read files outside of its folder, which no recording allows by itself.
+    pub allow_outside: bool,
 }
 
 /// Samples per pixel that a recording may ask for by itself.
@@ -126,7 +130,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         waker: None,
     })?;
     session.world_mut().insert_resource(FreeShare(header.free.unwrap_or(1.0)));
-    session.open(source);
+    session.open_choice(source, None, ModelChoice { allow_outside: options.allow_outside, ..ModelChoice::default() });
     let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
     let (mut end, mut last, mut commands) = (None, 0, 0);
     for line in lines {
@@ -340,6 +344,24 @@ mod tests {
         second.end_record();
         assert_eq!(read(&target, &|| false).unwrap().1.len(), 1);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+    }
+
+    /// As on a full disk: when it happens, and at the end.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_recording_that_cannot_be_written_says_so() {
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let recorder = || Recorder { out: Some((full(), PathBuf::from("a.rec"))), ..Recorder::default() };
+        let mut session = session();
+        session.world_mut().insert_resource(recorder());
+        let stopped = session.end_record().unwrap();
+        assert!(stopped.starts_with("a.rec: recording stopped: "), "{stopped}");
+        session.world_mut().insert_resource(recorder());
+        session.send(Command::Pause);
+        session.update(Duration::ZERO);
+        assert!(session.status().messages.iter().any(|message| message.text == stopped));
+        assert_eq!(session.end_record(), Some(stopped));
+        assert_eq!(session.end_record(), None);
     }
 
     /// File names of arbitrary bytes are recorded, too.

@@ -196,7 +196,7 @@ fn a_replay_has_the_mesh_that_was_deleted_and_brought_back() {
     driver.session.end_record();
     assert!(shown.means() == before.means(), "undo brings all back");
     std::fs::remove_file(folder.path().join("saved.ron")).unwrap();
-    let options = firstlight::frame::ReplayOptions { threads: Some(1), spp: None };
+    let options = firstlight::frame::ReplayOptions { threads: Some(1), spp: None, allow_outside: false };
     let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
     assert!(played.film.means() == shown.means());
     assert!(played.warnings.len() == 1 && played.warnings[0].contains("not saved again"), "{:?}", played.warnings);
@@ -231,7 +231,7 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     driver.session.end_record();
 
     for threads in [1, 3] {
-        let options = firstlight::frame::ReplayOptions { threads: Some(threads), spp: None };
+        let options = firstlight::frame::ReplayOptions { threads: Some(threads), spp: None, allow_outside: false };
         let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
         assert_eq!(played.warnings, Vec::<String>::new());
         assert_eq!((played.film.width(), played.film.height(), played.film.spp()), (33, 21, 5));

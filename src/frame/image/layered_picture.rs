@@ -15,7 +15,7 @@
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::frame::image::cryptomatte::Cryptomatte;
 use crate::frame::image::feature_layers::{FeatureLayers, channels_of};
-use crate::frame::image::picture_file::mean_channels;
+use crate::frame::image::picture_file::{free_of, mean_channels, numbered};
 use crate::render::{Film, Purpose, Room, relative_errors};
 use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_channels, exr_text};
@@ -169,13 +169,12 @@ impl LayeredPicture<'_> {
     /// # Errors
     /// As [`Self::write`], and if no number is free.
     pub fn write_new(&self, folder: &Path, stem: &str) -> Result<PathBuf, WriteError> {
-        let name = |number: u32| folder.join(format!("{stem}-{number:04}.exr"));
-        let path = name(0);
+        let mut names = numbered(folder, stem, "exr");
+        let path = free_of(&mut names)?;
         let bytes = self.bytes(&path)?;
         let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;
         out.write_all(&bytes).map_err(|error| unwritable(&path, error))?;
-        let taken = || WriteError::NoFreeName(name(u32::MAX));
-        out.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
+        out.finish_new(std::iter::once(path.clone()).chain(names))?.ok_or(WriteError::NoFreeName(path))
     }
 
     fn room(&self) -> io::Result<Room> {

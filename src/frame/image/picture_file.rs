@@ -111,6 +111,24 @@ pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), Wr
     out.finish()
 }
 
+/// The names of new images of this stem.
+pub(super) fn numbered(folder: &Path, stem: &str, extension: &str) -> impl Iterator<Item = PathBuf> {
+    (1..=u32::MAX).map(move |number| folder.join(format!("{stem}-{number:04}.{extension}")))
+}
+
+/// The first name that no file has, by which errors call the image.
+///
+/// # Errors
+/// If there is none.
+pub(super) fn free_of(names: &mut impl Iterator<Item = PathBuf>) -> Result<PathBuf, WriteError> {
+    let mut last = PathBuf::new();
+    let is_free = |path: &PathBuf| {
+        last.clone_from(path);
+        !path.exists()
+    };
+    names.find(is_free).ok_or(WriteError::NoFreeName(last))
+}
+
 impl Print<'_> {
     /// Writes the image in the format of the file name, to a temporary file that then replaces `path`.
     ///
@@ -126,10 +144,10 @@ impl Print<'_> {
     /// # Errors
     /// If no number is free, or the file cannot be written.
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
-        let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
-        let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;
-        let taken = || WriteError::NoFreeName(name(u32::MAX));
-        file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
+        let mut names = numbered(folder, stem, format.extension());
+        let first = free_of(&mut names)?;
+        let file = self.encode_beside(format, &first, Replace::AllButFilms)?;
+        file.finish_new(std::iter::once(first.clone()).chain(names))?.ok_or(WriteError::NoFreeName(first))
     }
 
     /// Encodes the image as the bytes of a file.
@@ -272,6 +290,17 @@ mod tests {
         let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
         assert_eq!(linear, (5, 3));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
+    }
+
+    /// What cannot be written has the name that it would have got.
+    #[test]
+    fn errors_of_new_pictures_name_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let (film, display) = (Film::new(5, 3), Display::default());
+        let print = Print { film: &film, display: &display, size: (10, 6), note: None, denoised: None };
+        let too_long = "x".repeat(250);
+        let told = print.write_new(folder.path(), &too_long, PictureFormat::Png).unwrap_err().to_string();
+        assert!(told.contains("x-0001.png: "), "{told}");
     }
 
     #[test]

@@ -142,7 +142,7 @@ impl Memory {
     fn keep_views(&self, source: &SceneSource, bookmarks: &Bookmarks) -> Option<String> {
         let views = (1..).zip(bookmarks.0).filter_map(|(slot, rig)| Some((slot, rig?))).collect();
         let kept = SceneBookmarks { views, left: self.left, ..SceneBookmarks::default() };
-        self.store.keep_bookmarks(source, &kept).err().map(String::from)
+        self.store.keep_bookmarks(source, &kept).err().map(|error| format!("views of this scene are not kept: {error}"))
     }
 
     /// Keeps the view at which the scene is left, for the next time; called when the window closes, too.
@@ -340,6 +340,24 @@ mod tests {
         assert_eq!((second.keep_window((700, 500)), second.navigation()), (None, Navigation::Maya));
         assert_eq!(second.store.settings().0.window, Some((700, 500)));
         assert_eq!(second.store.settings().0.recent[1..], ["cornell", "ball"]);
+    }
+
+    /// As on a full disk: a bookmark is not said to be saved.
+    #[test]
+    fn a_bookmark_that_cannot_be_kept_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("bookmarks"), "in the way").unwrap();
+        let mut memory = Memory::of(SettingsStore::in_folder(folder.path()));
+        let mut session = Session::new(SessionOptions::default()).unwrap();
+        opened(&mut session, "cornell");
+        session.update(Duration::ZERO);
+        memory.follow(&mut session);
+        session.send(Command::SetBookmark { slot: 3 });
+        session.update(Duration::ZERO);
+        let told = memory.follow(&mut session);
+        assert!(told.len() == 1 && told[0].starts_with("views of this scene are not kept: "), "{told:?}");
+        let said = &session.status().messages;
+        assert!(said.iter().any(|message| message.text == "bookmark 3 is this view"), "{said:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! From the first window to the last file: the event loop is started here, and what outlives it is stored.
 
+use crate::console;
 use crate::frame::{LatencyHistogram, Waker};
 use crate::render::Inspection;
 use crate::viewer::app::options::{ViewerError, ViewerOptions};
@@ -70,7 +71,9 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     };
     app.keep_or_forget_edits();
     // Also if the display is gone.
-    app.session.end_record();
+    if let Some(trouble) = app.session.end_record() {
+        console::remark(format_args!("error: {trouble}"));
+    }
     app.keep_window_size();
     app.keep_panel();
     app.keep_view();
