@@ -25,6 +25,7 @@ pub const LIMITS: Limits = Limits {
     picture_pixels: 1 << 18,
     scene_image_bytes: 1 << 23,
     scene_mesh_bytes: 1 << 23,
+    scene_lights: 1 << 12,
     film_pixels: 1 << 12,
     note_bytes: 1 << 18,
     recording_bytes: 1 << 18,

@@ -380,7 +380,7 @@ pub(super) fn resolve(
         scene.warnings.push(format!("{place}`{name}`: not enough memory; an environment of one colour is shown"));
         lost.insert(file);
     }
-    check_memory(&scene).map_err(|message| SceneError::in_file(&title, message))?;
+    check_memory(&scene, text.map_or(0, str::len)).map_err(|message| SceneError::in_file(&title, message))?;
     scene.leave_out_pictures(&lost);
     if let EnvironmentSource::Image { file, layout, axes, .. } = &scene.file.environment
         && (*layout != EnvironmentLayout::default() || axes.is_some())
@@ -547,6 +547,7 @@ impl LoadedScene {
         };
         let of_text = self.text_files.iter().map(|(path, _)| path.clone());
         let of_meshes = self.mesh_files().into_iter().map(|(path, _)| path.clone());
+        let of_meshes = of_meshes.chain(self.meshes.iter().flatten().flat_map(|mesh| mesh.beside.iter().cloned()));
         let of_pictures = self.picture_files.values().map(|(path, _)| path.clone());
         let mut files: Vec<PathBuf> = own.into_iter().chain(of_text).chain(of_meshes).chain(of_pictures).collect();
         files.sort();
@@ -555,7 +556,7 @@ impl LoadedScene {
     }
 
     /// The files of all meshes: those of a file with many meshes once.
-    fn mesh_files(&self) -> Vec<&(PathBuf, Stamp)> {
+    pub(super) fn mesh_files(&self) -> Vec<&(PathBuf, Stamp)> {
         let mut seen = HashSet::new();
         let lists = self.meshes.iter().flatten().filter(|mesh| seen.insert(Arc::as_ptr(&mesh.files)));
         lists.flat_map(|mesh| mesh.files.iter()).collect()

@@ -10,6 +10,7 @@ mod explain;
 mod faults;
 mod foreign;
 mod frames;
+mod lights;
 mod motion_blur;
 mod pack;
 mod parts;

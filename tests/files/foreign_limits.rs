@@ -280,15 +280,6 @@ fn spectra_are_files_of_the_scene() {
     assert_eq!(names, ["a.xml", "a.spd"]);
 }
 
-/// A few letters ask for hundreds of triangles, each of which is a light; a cylinder has 1,024.
-#[test]
-fn shapes_of_mitsuba_that_emit_have_a_limit_together() {
-    let cylinders = |n: usize| mitsuba(&"<shape type=\"cylinder\"><emitter type=\"area\"/></shape>".repeat(n));
-    assert_eq!(cylinders(8).unwrap().file.objects.len(), 8);
-    let error = cylinders(1025).unwrap_err();
-    assert!(error.contains("more than 1048576 triangles of such shapes that emit"), "{error}");
-}
-
 /// A saved scene names a mesh by its number, which is the same whether or not others may be read.
 #[test]
 fn a_mesh_of_mitsuba_has_its_number_whatever_must_not_be_read() {

@@ -102,6 +102,43 @@ fn nothing_that_a_command_reads_is_written_over() {
     }
 }
 
+/// Also those that are named and not used.
+#[test]
+fn an_image_replaces_no_image_that_a_material_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(path.join(name), text).unwrap();
+    write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    write(
+        "a.mtl",
+        "newmtl a\nKd 1 1 1\nmap_bump bump.png\nmap_Ks shine.png\nrefl sky.png\nmap_Ns -s 2 2 2 rough.png\n",
+    );
+    for input in ["bump.png", "shine.png", "sky.png", "rough.png"] {
+        image::GrayImage::new(2, 2).save(path.join(input)).unwrap();
+        let said = refused(path, &format!("render a.obj -o {input} --spp 1 --size 8x6"), 2);
+        assert!(said.contains(input) && said.contains("is also an input of this command"), "{input}: {said}");
+    }
+    does(path, "render a.obj -o other.png --spp 1 --size 8x6");
+}
+
+/// A recording may come from anywhere: it does not say by itself what may be read.
+#[test]
+fn a_replay_reads_files_outside_if_it_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("in")).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(path.join(name), text).unwrap();
+    write("in/a.obj", "mtllib ../a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nf 3 2 1\n");
+    write("a.mtl", "newmtl a\nKd 1 0 0\n");
+    let header = "(format:1,program:\"firstlight\",scene:File(\"in/a.obj\"),up:None,width:16,height:12,seed:0)";
+    write("a.rec", &format!("{header}\nOpened(1,1,\"\")\nEnd(3,1)\n"));
+    does(path, "--replay a.rec -o usual.png");
+    does(path, "--replay a.rec --allow-outside -o outside.png");
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().to_rgb8();
+    let is_red = |name: &str| pixels(name).pixels().any(|pixel| pixel.0[0] / 4 > pixel.0[1].max(8));
+    assert_eq!([is_red("usual.png"), is_red("outside.png")], [false, true]);
+}
+
 /// Of several scenes, and of all that a recording opens and edits.
 #[test]
 fn an_image_replaces_no_input_of_another_scene_or_of_a_replay() {

@@ -215,15 +215,27 @@ fn what_is_not_modelled_is_told_and_what_is_no_scene_refused() {
     }
 }
 
-/// A few letters ask for hundreds of triangles, each of which is a light.
 #[test]
-fn shapes_that_emit_have_a_limit_together() {
-    let cylinder = r#"{"type": "cylinder", "emission": 1, "bsdf": {"type": "null"}}"#;
-    let (_folder, scene) = with("", &vec![cylinder; 2100].join(","));
-    let is_light = |name: &str| matches!(scene.file.materials.get(name), Some(Material::Emissive { .. }));
-    let lights = scene.file.objects.iter().filter(|object| object.material().is_some_and(is_light)).count();
-    assert_eq!((scene.file.objects.len(), lights), (2100, (1 << 20) / 512));
-    assert!(told(&scene).iter().any(|it| it.contains("it is dark")), "{:?}", told(&scene));
+fn what_has_no_name_is_told_as_what_it_is() {
+    let (_folder, scene) = with("", r#"{"type": ""}, {"name": "", "type": "flame"}, {"type": "sphere"}"#);
+    let told = told(&scene);
+    assert!(told.iter().any(|it| it.ends_with("`primitive`: a primitive without a `type` is left out")), "{told:?}");
+    assert!(told.iter().any(|it| it.contains("`flame`: primitives of the kind `flame`")), "{told:?}");
+    assert!(!told.iter().any(|it| it.contains("``")), "{told:?}");
+}
+
+#[test]
+fn a_damaged_mesh_that_a_scene_of_ours_names_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("bad.wo3", "no mesh");
+    write("a.json", r#"{"primitives": [{"type": "mesh", "file": "bad.wo3"}, {"type": "sphere"}]}"#);
+    let mesh = r#"mesh(source: part(file: "a.json", shape: 0), material: "m")"#;
+    let materials = r#"materials: {"m": diffuse(albedo: 0.5)}"#;
+    write("a.ron", &format!("(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), {materials}, objects: [{mesh}])"));
+    let path = folder.path().join("a.ron");
+    let error = load(&SceneSource::Scene(path), &LoadOptions::default()).err().unwrap().to_string();
+    assert!(error.contains("bad.wo3: the mesh of shape 0 of this scene cannot be read"), "{error}");
 }
 
 /// A saved scene names a mesh by its number, which is the same whether or not others may be read.

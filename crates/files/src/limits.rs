@@ -22,6 +22,8 @@ pub struct Limits {
     pub scene_image_bytes: u64,
     /// Bytes of all meshes of a scene together, and of the files that are read for them.
     pub scene_mesh_bytes: u64,
+    /// Emissive triangles and spheres of a scene, besides those that its files have room for; 630 bytes each.
+    pub scene_lights: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,
     /// Bytes of the metadata in an image, with the scene that it may hold.
@@ -76,6 +78,7 @@ impl Limits {
         picture_pixels: 1 << 27,
         scene_image_bytes: 4 << 30,
         scene_mesh_bytes: 4 << 30,
+        scene_lights: 1 << 21,
         film_pixels: 1 << 26,
         note_bytes: 16 << 20,
         recording_bytes: 256 << 20,
@@ -111,6 +114,7 @@ impl Limits {
             picture_pixels: scaled(self.picture_pixels),
             scene_image_bytes: scaled(self.scene_image_bytes),
             scene_mesh_bytes: scaled(self.scene_mesh_bytes),
+            scene_lights: scaled(self.scene_lights),
             film_pixels: scaled(self.film_pixels),
             note_bytes: scaled(self.note_bytes),
             recording_bytes: scaled(self.recording_bytes),

@@ -57,6 +57,8 @@ pub struct LoadedMesh {
     pub material_warnings: Warnings,
     /// All files that were read for it, each with its stamp.
     pub files: Arc<[(PathBuf, Stamp)]>,
+    /// Images that its materials name without a use.
+    pub beside: Arc<[PathBuf]>,
 }
 
 /// Reads or generates a mesh, then simplifies and shades it.
@@ -108,7 +110,8 @@ fn load(
         let mesh = Arc::new(finish(base.mesh, source, shading, simplify, Some(CREASE))?);
         let (slots, textures, files) = (base.slots, base.textures, base.files);
         let (warnings, material_warnings) = (base.warnings, base.material_warnings);
-        return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
+        let beside = Arc::default();
+        return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files, beside });
     }
     if let MeshSource::Part { file, shape, defines } = source {
         let path = folder.join(text_to_path(file));
@@ -139,7 +142,10 @@ fn load(
 
 /// The mesh of a shape of a scene of another renderer.
 fn part_of<'a>(scene: &'a ForeignScene, path: &Path, shape: u32) -> Result<&'a Arc<Mesh>, SceneError> {
-    let none = || SceneError::in_file(path, format!("shape {shape}, counted from 0, is no mesh of this scene"));
+    let none = || match scene.part_files.get(&shape) {
+        Some((file, _)) => SceneError::in_file(file, format!("the mesh of shape {shape} of this scene cannot be read")),
+        None => SceneError::in_file(path, format!("shape {shape}, counted from 0, is no mesh of this scene")),
+    };
     scene.parts.get(&shape).ok_or_else(none)
 }
 
@@ -258,7 +264,8 @@ fn read_file(
         .collect();
     let (slots, textures) = (Vec::new(), Vec::new());
     let (warnings, material_warnings) = (imported.warnings, imported.material_warnings);
-    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files };
+    let beside = imported.materials.iter().flat_map(|material| material.beside.iter().cloned()).collect();
+    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files, beside };
     // If the file has no materials, the slots stay empty.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
         let mut converted = MtlMaterials::default();
@@ -325,6 +332,7 @@ impl LoadedMesh {
             warnings: Warnings::default(),
             material_warnings: Warnings::default(),
             files,
+            beside: Arc::default(),
         }
     }
 

@@ -100,8 +100,6 @@ pub(crate) struct Converter<'a> {
     pub surfaces: HashMap<usize, Option<Surface>>,
     /// Number of shapes so far, with those of instances.
     pub n_shapes: usize,
-    /// Triangles of shapes by formula that emit.
-    pub n_emitting: usize,
     /// Number of their parameters and nested objects.
     pub n_parts: usize,
     /// By BSDF and emitter.

@@ -39,17 +39,6 @@ impl Geometry {
             Self::Cube | Self::Disk | Self::Rectangle | Self::Cylinder => None,
         }
     }
-
-    /// Triangles, if it is made by a formula.
-    pub(crate) fn n_made(&self) -> usize {
-        match self {
-            Self::Model(..) | Self::Serialized(..) => 0,
-            Self::Cube => 12,
-            Self::Rectangle => 2,
-            Self::Disk => SEGMENTS as usize,
-            Self::Cylinder => 2 * SEGMENTS as usize,
-        }
-    }
 }
 
 /// A mesh to be made. Equal ones are made once.

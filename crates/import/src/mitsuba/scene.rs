@@ -66,7 +66,6 @@ impl<'a> Converter<'a> {
             texture_depth: 0,
             surfaces: HashMap::new(),
             n_shapes: 0,
-            n_emitting: 0,
             n_parts: 0,
             materials: HashMap::new(),
             requests: HashMap::new(),

@@ -8,7 +8,7 @@ use crate::mitsuba::meshes::{Geometry, MeshRequest};
 use crate::mitsuba::read::find_file;
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::transform::orthonormal;
-use crate::model::foreign::{LIGHT_SHARE, MAX_EMITTING, MAX_OBJECTS, grey, n_lobes};
+use crate::model::foreign::{LIGHT_SHARE, MAX_OBJECTS, grey, n_lobes};
 use crate::model::placing;
 use crate::ply::has_normals;
 use firstlight_files::input_file::{FileKind, InputFile};
@@ -173,14 +173,6 @@ impl Converter<'_> {
         material: PlacedMaterial,
     ) -> Result<(), SceneError> {
         let is_obj = matches!(geometry, Geometry::Model(ModelFormat::Obj, _));
-        if !node.children("emitter")?.is_empty() {
-            self.n_emitting += geometry.n_made();
-            if self.n_emitting > MAX_EMITTING {
-                return Err(
-                    node.error(format!("the scene has more than {MAX_EMITTING} triangles of such shapes that emit"))
-                );
-            }
-        }
         let face_normals = node.boolean_or("face_normals", false)?;
         // Mitsuba has the vertices of a file in the world: without normals, a mirrored mesh is turned inside out.
         let is_mirrored = node.transform("to_world")?.determinant() < 0.0;

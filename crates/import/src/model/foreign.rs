@@ -39,10 +39,6 @@ pub(crate) const LIGHT_SHARE: f32 = 1.0 / 1024.0;
 /// Objects of a scene: instances of instances are quickly said.
 pub(crate) const MAX_OBJECTS: usize = 1 << 20;
 
-/// Triangles that emit of shapes that formulas make, for all of a scene: a few letters ask for hundreds of them, and
-/// each takes 1,700 bytes.
-pub(crate) const MAX_EMITTING: usize = 1 << 20;
-
 /// What stands for a surface that is not modelled.
 pub(crate) fn grey() -> MaterialPart {
     MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }

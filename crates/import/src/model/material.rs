@@ -2,6 +2,7 @@
 
 use crate::model::texture_map::TextureMap;
 use glam::Vec3;
+use std::path::PathBuf;
 
 /// A material as in its file; missing values are `None`. It is interpreted elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,6 +45,8 @@ pub struct ImportedMaterial {
     pub bump_texture: Option<TextureMap>,
     /// Parameters of the PBR extension; `None` if none of them is present.
     pub pbr: Option<PbrMaterial>,
+    /// Images that are named and need not be read, which no output may replace either.
+    pub beside: Vec<PathBuf>,
 }
 
 /// The PBR extension of MTL (Clara.io 2013): `Pr`, `Pm`, `Ps`, `Pc`, `Pcr`, `aniso`, `anisor` and their maps.

@@ -69,6 +69,9 @@ const KEYWORDS: &[(&str, KeywordValue)] = &[
     ("map_Pcr", KeywordValue::UnusedMap),
 ];
 
+/// Keywords of images without a use that are other parameters to tobj.
+const UNUSED: &[&str] = &["refl", "disp", "map_disp", "decal", "map_Ps", "map_Pc", "map_Pcr"];
+
 /// Reads a library; invalid lines give warnings, and all other lines are used.
 ///
 /// - `files`: what it may refer to.
@@ -112,13 +115,31 @@ pub(crate) fn load_library(
             None
         }
     };
-    let materials = materials.iter().map(|material| imported(material, is_of_meshlab, &mut file));
-    let materials: Vec<_> = materials.collect();
-    for material in &materials {
-        let mut is_unused = |keyword: &str, is: bool| is.then(|| unused.insert(format!("`{keyword}`")));
-        is_unused("map_Bump (heights)", material.bump_texture.is_some() && material.normal_map().is_none());
-        is_unused("map_Ns", material.shininess_texture.is_some() && !material.is_of_blender());
-        is_unused("map_refl", material.reflection_texture.is_some() && !material.is_of_blender());
+    let beside = |material: &tobj::Material| -> Vec<PathBuf> {
+        let names = UNUSED.iter().filter_map(|keyword| material.unknown_param.get(*keyword));
+        let find = |name: &str| files.resolve(folder, name).ok().map(|file| folder.join(file.path));
+        names.chain(&material.specular_texture).filter_map(|text| Some(TextureMap::parse(text, find)?.path)).collect()
+    };
+    let materials = materials
+        .iter()
+        .map(|material| ImportedMaterial { beside: beside(material), ..imported(material, is_of_meshlab, &mut file) });
+    let mut materials: Vec<_> = materials.collect();
+    for material in &mut materials {
+        let is_plain = !material.is_of_blender();
+        let maps = [
+            ("map_Bump (heights)", &material.bump_texture, material.normal_map().is_none()),
+            ("map_Ns", &material.shininess_texture, is_plain),
+            ("map_refl", &material.reflection_texture, is_plain),
+        ];
+        let mut named = Vec::new();
+        for (keyword, map, is_unused) in maps {
+            let Some(map) = map else { continue };
+            named.push(map.path.clone());
+            if is_unused {
+                unused.insert(format!("`{keyword}`"));
+            }
+        }
+        material.beside.extend(named);
     }
     if !unused.is_empty() {
         warn(format!("not modelled and ignored: {}", unused.into_iter().collect::<Vec<_>>().join(", ")));
@@ -170,7 +191,7 @@ fn clean(text: &str, unused: &mut BTreeSet<String>, warn: &mut impl FnMut(String
             }
             KeywordValue::UnusedMap => {
                 unused.insert(format!("`{keyword}`"));
-                continue;
+                Ok(value.to_owned())
             }
         };
         match valid {
@@ -230,6 +251,7 @@ fn imported(
         normal_texture: map(other("norm")),
         bump_texture: map(material.normal_texture.as_deref()),
         pbr: (pbr != PbrMaterial::default()).then_some(pbr),
+        beside: Vec::new(),
     }
 }
 

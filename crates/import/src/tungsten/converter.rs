@@ -65,8 +65,6 @@ pub(crate) struct Converter<'a> {
     pub textures: HashMap<(String, Reads), ColorValue>,
     /// Of the images that are read as numbers: whether they have alpha, and colours.
     pub channels: HashMap<String, [bool; 2]>,
-    /// Triangles of shapes by formula that emit.
-    pub n_emitting: usize,
     pub material_names: Names,
     pub texture_names: Names,
 }
@@ -96,7 +94,6 @@ impl<'a> Converter<'a> {
             surfaces: HashMap::new(),
             textures: HashMap::new(),
             channels: HashMap::new(),
-            n_emitting: 0,
             material_names: Names::default(),
             texture_names: Names::default(),
         }

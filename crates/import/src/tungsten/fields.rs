@@ -28,7 +28,7 @@ impl<'a> Fields<'a> {
     pub(crate) fn of(value: Option<&'a Value>, kind: &'a str, source: &'a Source<'a>) -> Self {
         let map = value.and_then(Value::as_object);
         let name = map.and_then(|map| map.get("name")).and_then(Value::as_str).filter(|name| !name.is_empty());
-        Self { map, source, place: name.map_or(kind, cut) }
+        Self { map, source, place: name.map_or(if kind.is_empty() { "primitive" } else { kind }, cut) }
     }
 
     /// Its name, or what it is.

@@ -1,6 +1,6 @@
 //! Primitives as objects.
 
-use crate::model::foreign::{MAX_EMITTING, cut};
+use crate::model::foreign::cut;
 use crate::model::placing;
 use crate::tungsten::converter::{Converter, PrimitiveMesh};
 use crate::tungsten::fields::Fields;
@@ -62,6 +62,10 @@ impl<'a> Converter<'a> {
             "infinite_sphere" => return self.environment(of, &world),
             "infinite_sphere_cap" => return self.sun(of, &world),
             "sphere" | "mesh" | "cube" | "disk" | "quad" | "cylinder" => {}
+            "" => {
+                of.tell("a primitive without a `type` is left out");
+                return;
+            }
             other => {
                 let other = printable::name(other);
                 of.tell(format!("primitives of the kind `{other}` are not modelled: this one is left out"));
@@ -84,16 +88,7 @@ impl<'a> Converter<'a> {
             (_, Some(mesh)) => area_of(&mesh.mesh, &world),
             (_, None) => return,
         };
-        let mut light = self.radiance(of, 1.0 / (PI * area));
-        if let (true, Some(mesh)) = (light.is_some() && of.kind() != "mesh", &mesh) {
-            self.n_emitting += mesh.mesh.triangles.len();
-            if self.n_emitting > MAX_EMITTING {
-                of.tell(format!(
-                    "more than {MAX_EMITTING} triangles of such shapes that emit are not modelled: it is dark"
-                ));
-                light = None;
-            }
-        }
+        let light = self.radiance(of, 1.0 / (PI * area));
         let inside = of.text("int_medium").unwrap_or_default();
         let mut material = |bsdf: Option<&'a Value>| match &light {
             None => self.surface(of, bsdf, inside),
