@@ -10,7 +10,7 @@ use crate::cli::number::{counted, two_digits};
 use clap::Args;
 use firstlight::frame::{Aperture, DenoiseFilter, PictureLayer, f_number};
 use firstlight::printable;
-use firstlight::render::{CausticChoice, Emission, Environment, Film, caustic_choice};
+use firstlight::render::{CausticChoice, Emission, Environment, Film, caustic_choice, portal_count};
 use firstlight::scene::animation::Shutter;
 use firstlight::scene::file::{AnimationPart, TrackPart};
 use firstlight::scene::gltf::GltfFacts;
@@ -62,6 +62,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
     let can_be_seen = prepared.camera.check().is_ok() && settings.check().is_ok();
     let caustics = (prepared.features().caustics && can_be_seen)
         .then(|| caustic_choice(prepared, &settings, (film.width, film.height)));
+    let n_portals = if can_be_seen { portal_count(prepared, &settings) } else { 0 };
     let animation = world.get_resource::<Animation>().cloned();
     let list = ObjectList::of(&inputs);
     let told = SceneReport {
@@ -72,6 +73,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
         film,
         layers,
         caustics,
+        n_portals,
         animation,
     };
     match (args.json, args.materials) {
@@ -101,6 +103,8 @@ struct SceneReport<'a> {
     layers: Vec<&'static str>,
     /// How caustics are sampled, if there can be any.
     caustics: Option<CausticChoice>,
+    /// Number of openings through which the environment is sampled.
+    n_portals: usize,
     /// The animation of the scene file, if it has one.
     animation: Option<Animation>,
 }
@@ -144,6 +148,9 @@ impl SceneReport<'_> {
         }
         if let Some(caustics) = self.caustics {
             row("caustics", caustics.to_string());
+        }
+        if self.n_portals > 0 {
+            row("portals", format!("the environment is sampled through {}", counted(self.n_portals, "opening")));
         }
         if let Some(animation) = &self.animation {
             animation_rows(&scene.file.animation, animation, &mut row);
@@ -210,6 +217,7 @@ impl SceneReport<'_> {
             "not_used": self.features(false),
             "not_modelled": self.not_modelled(),
             "caustics": self.caustics.map(caustics_json),
+            "portals": self.n_portals,
             "animation": self.animation.as_ref().map(|animation| animation_json(&scene.file.animation, animation)),
             "model": scene.facts.as_ref().map(facts_json),
             "warnings": texts_of(&scene.warnings, Severity::Warning),

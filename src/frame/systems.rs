@@ -439,7 +439,7 @@ pub fn present(
     status.seconds = stats.seconds;
     (status.rays, status.elapsed) = (stats.rays, stats.elapsed);
     status.estimated_error = stats.error;
-    status.caustics = stats.caustics;
+    (status.caustics, status.n_portals) = (stats.caustics, stats.n_portals);
     (status.denoising, status.denoised_error) = (stats.denoising, stats.denoised_error);
     (status.denoised_spp, status.mixes_raw) = (stats.denoised_spp, stats.mixes_raw);
     status.denoised_by = stats.denoised_by;

@@ -11,7 +11,8 @@ use firstlight::report::{ConvergenceCurve, CurveLimits, LinearPicture, Reference
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
-/// A room with lights of every shape, one much brighter than the others, diffuse, glossy and mirroring things.
+/// A room with an opening behind the camera, lights of every shape, one much brighter than the others, diffuse, glossy and
+/// mirroring things.
 fn room() -> Prepared {
     let metal = Material::Metal {
         alpha: ScalarInput::Constant(0.2),
@@ -24,9 +25,12 @@ fn room() -> Prepared {
     scene(
         vec![
             (plane(Vec3::ZERO, Vec3::Y), 0),
-            (plane(Vec3::Z * -3.0, Vec3::Z), 0),
-            (plane(Vec3::X * -3.0, Vec3::X), 1),
-            (plane(Vec3::Y * 4.0, Vec3::NEG_Y), 0),
+            (quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::X * 6.0, Vec3::Y * 4.0), 0),
+            (quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 9.0, Vec3::Y * 4.0), 1),
+            (quad(Vec3::new(-3.0, 4.0, -3.0), Vec3::X * 6.0, Vec3::Z * 9.0), 0),
+            (quad(Vec3::new(3.0, 0.0, -3.0), Vec3::Z * 9.0, Vec3::Y * 4.0), 0),
+            (quad(Vec3::new(-3.0, 0.0, 6.0), Vec3::X * 2.0, Vec3::Y * 4.0), 0),
+            (quad(Vec3::new(1.0, 0.0, 6.0), Vec3::X * 2.0, Vec3::Y * 4.0), 0),
             (sphere(Vec3::new(-0.8, 0.7, -0.5), 0.7), 2),
             (sphere(Vec3::new(0.9, 0.5, 0.3), 0.5), 1),
             (quad(Vec3::new(-0.5, 3.5, -1.0), Vec3::X * 1.5, Vec3::Z * 1.5), 3),
@@ -34,7 +38,7 @@ fn room() -> Prepared {
             (triangle(Vec3::new(-2.0, 2.0, -2.9), Vec3::new(-1.0, 2.0, -2.9), Vec3::new(-1.5, 3.0, -2.9)), 4),
         ],
         vec![diffuse(0.6), metal, mirror, emissive(6.0), emissive(1.0)],
-        Environment::Constant(Vec3::splat(0.2)),
+        Environment::Constant(Vec3::splat(0.8)),
         camera(Vec3::new(0.5, 1.5, 5.0), Vec3::new(0.0, 1.0, 0.0), 45.0),
     )
 }
@@ -144,7 +148,7 @@ fn the_command_writes_a_page_and_a_table() {
     let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     // The column `denoiser` is empty in rows of raw images.
-    assert_eq!(rows.iter().filter(|row| row[4].is_empty()).count(), 10 * 3, "{table}");
+    assert_eq!(rows.iter().filter(|row| row[4].is_empty()).count(), 11 * 3, "{table}");
     assert_eq!(rows.iter().filter(|row| row[4] == "denoised").count(), 3, "{table}");
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
 

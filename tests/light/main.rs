@@ -20,6 +20,7 @@ mod materials;
 mod motion_blur;
 mod orthographic;
 mod phong;
+mod portals;
 mod principled;
 #[path = "../common/program.rs"]
 mod program;

@@ -25,6 +25,7 @@ const PLAIN: Techniques = Techniques {
     even_samples: false,
     solid_angle: false,
     light_selection: false,
+    portals: false,
     caustics: false,
     caustic_plan: None,
     resampling: false,

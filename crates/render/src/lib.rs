@@ -44,6 +44,7 @@ pub use driver::inspect::{
     Inspected, Inspection, Legend, SeenSurface, depths, inspect, relative_errors, scale_color, seen_surface,
     tint_sharp_zone,
 };
+pub use driver::portals::{known_portal_count, portal_count};
 pub use driver::relight::{MovingImage, Relighting, StillImage, relight};
 pub use driver::renderer::{advance, advance_region, compute_tables};
 pub use driver::report::{BadSample, PassReport};

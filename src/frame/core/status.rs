@@ -71,6 +71,8 @@ pub struct Status {
     pub estimated_error: Option<f64>,
     /// How caustics are rendered, if the scene may have any and it is known.
     pub caustics: Option<CausticChoice>,
+    /// Number of portals through which the environment is sampled.
+    pub n_portals: usize,
     /// How the image is denoised.
     pub denoising: Denoising,
     /// The filter of the denoised image, if that is displayed.

@@ -91,6 +91,8 @@ pub struct Stats {
     pub error: Option<f64>,
     /// How caustics are rendered, if the scene may have any; for the film at full resolution.
     pub caustics: Option<CausticChoice>,
+    /// Number of portals of the view; for the film at full resolution.
+    pub n_portals: usize,
     /// How the displayed image is denoised.
     pub denoising: Denoising,
     /// The filter of the denoised image, if that is displayed.

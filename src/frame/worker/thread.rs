@@ -11,7 +11,8 @@ use crate::frame::worker::shared::{
 };
 use crate::frame::worker::views::Views;
 use crate::render::{
-    Display, Film, MovingImage, Region, SampleAllocation, advance_region, explain, known_caustic_choice, seen_surface,
+    Display, Film, MovingImage, Region, SampleAllocation, advance_region, explain, known_caustic_choice,
+    known_portal_count, seen_surface,
 };
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -345,6 +346,9 @@ impl<'a> Loop<'a> {
         stats.error = error.filter(|_| divider == 1);
         if divider == 1 && job.prepared.features().caustics {
             stats.caustics = known_caustic_choice(&job.prepared, &job.settings, (film.width(), film.height()));
+        }
+        if divider == 1 {
+            stats.n_portals = known_portal_count(&job.prepared);
         }
         let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
         let can_be_seen = film.spp() > 0;

@@ -41,6 +41,7 @@ const HINTS: &[(&str, &str)] = &[
     ("error estimate", "relative noise of the samples, without denoising"),
     ("denoised", "relative error of the denoised image, and the samples it was made of"),
     ("caustics", "how light through glass and by mirrors is found"),
+    ("portals", "openings of a room through which the environment is sampled"),
     ("discarded", "samples that were no finite numbers"),
     ("input latency", "from an input to the first new pixels"),
     ("cancel latency", "until the workers drop what nobody needs any more"),

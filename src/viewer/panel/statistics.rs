@@ -27,6 +27,9 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         if let Some(caustics) = status.caustics {
             figure("caustics", caustics.to_string());
         }
+        if status.n_portals > 0 {
+            figure("portals", status.n_portals.to_string());
+        }
         figure("discarded", format!("{} non-finite samples", status.n_bad));
         if status.n_above > 0 {
             figure("", format!("{} brighter than the scene allows", status.n_above));

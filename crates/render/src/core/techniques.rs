@@ -17,6 +17,8 @@ pub struct Techniques {
     pub solid_angle: bool,
     /// Lights are selected by estimated contribution or by power; off: uniformly.
     pub light_selection: bool,
+    /// The environment is sampled through the openings of a room; off: by its brightness only, or not at all.
+    pub portals: bool,
     /// Several points on lights compete for the shadow ray of a rough metal; off: one point.
     pub resampling: bool,
     /// Paths are also traced from the lights if there are specular casters; off: from the camera only.
@@ -35,6 +37,7 @@ impl Techniques {
         even_samples: true,
         solid_angle: true,
         light_selection: true,
+        portals: true,
         resampling: true,
         caustics: true,
         caustic_plan: None,
@@ -50,7 +53,7 @@ impl Default for Techniques {
 
 impl Techniques {
     /// One technique switched off at a time, with its name.
-    pub fn ablations() -> [(&'static str, Self); 8] {
+    pub fn ablations() -> [(&'static str, Self); 9] {
         let all = Self::default();
         [
             ("light sampling", Self { light_sampling: false, ..all }),
@@ -58,6 +61,7 @@ impl Techniques {
             ("even samples (Owen-Sobol\u{2019})", Self { even_samples: false, ..all }),
             ("lights by solid angle", Self { solid_angle: false, ..all }),
             ("choice of lights by contribution", Self { light_selection: false, ..all }),
+            ("portals", Self { portals: false, ..all }),
             ("resampling of lights", Self { resampling: false, ..all }),
             ("light paths", Self { caustics: false, ..all }),
             ("Russian roulette", Self { roulette: false, ..all }),

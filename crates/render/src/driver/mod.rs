@@ -8,6 +8,7 @@ pub(crate) mod features;
 pub(crate) mod guides;
 pub(crate) mod inspect;
 pub(crate) mod moving;
+pub(crate) mod portals;
 pub(crate) mod relight;
 pub(crate) mod renderer;
 pub(crate) mod report;

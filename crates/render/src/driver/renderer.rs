@@ -58,7 +58,8 @@ pub fn advance_region<'a>(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
     let scene = scene.into();
-    let snapshot = scene.middle();
+    let with_last_portals = film.is_preview.then(|| scene.middle().with_last_portals());
+    let snapshot = with_last_portals.as_ref().unwrap_or(scene.middle());
     settings.check().unwrap_or_else(|error| panic!("{error}"));
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
     if settings.integrator == Integrator::Path {

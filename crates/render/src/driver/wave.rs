@@ -12,6 +12,7 @@ use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::survival::endless_depth;
 use crate::integrators::path::{CameraPath, PathWave};
 use crate::integrators::phong::PhongWave;
+use crate::integrators::portals::prepare_portals;
 use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
@@ -197,10 +198,11 @@ impl<'a> Pass<'a> {
         plan: CausticPlan,
         filter: Arc<FilterSampler>,
     ) -> Self {
+        prepare_portals(snapshot, settings);
         let camera_media = snapshot.camera_media();
         let caustics = CausticPass::of(snapshot, settings, size, &camera_media, plan);
         let bound = (snapshot.tables.radiance_bound)
-            .filter(|_| settings.integrator == Integrator::Path)
+            .filter(|_| settings.integrator == Integrator::Path && snapshot.portals().is_none())
             .map(|bound| bound * filter.scale() * snapshot.tables.bodies.environment_scale(&camera_media));
         let endless = endless_depth(snapshot);
         Self { snapshot, settings, caustics, plan, camera_media, filter, size, bound, endless, notes_surfaces: false }
@@ -212,6 +214,7 @@ impl<'a> Pass<'a> {
     where
         'a: 'b,
     {
+        moment.share_portals(self.snapshot);
         let mut pass = Pass::with_filter(moment, self.settings, self.size, self.plan, self.filter.clone());
         if let (Some(own), Some(caustics)) = (&self.caustics, &mut pass.caustics) {
             caustics.guide_of = own.guide_of;

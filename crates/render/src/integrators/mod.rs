@@ -5,5 +5,6 @@ pub(crate) mod common;
 pub(crate) mod features;
 pub(crate) mod path;
 pub(crate) mod phong;
+pub(crate) mod portals;
 pub(crate) mod simd;
 pub(crate) mod visible_albedo;

@@ -1,7 +1,7 @@
 //! Upper bound of the radiance of all samples of a scene, where one is known.
 //!
 //! A check of the whole integrator without cost: in a scene that is lit by its environment only, found by BSDF sampling
-//! only, with surfaces whose sample weights are at most 1, no sample is brighter than the brightest part of the
+//! only, without portals, with surfaces whose sample weights are at most 1, no sample is brighter than the brightest part of the
 //! environment. A sample that is indicates a bug, and is counted with its position like one that is not finite.
 
 use crate::core::color::luminance;

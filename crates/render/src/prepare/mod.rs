@@ -21,6 +21,7 @@ pub(crate) mod light;
 pub(crate) mod material_table;
 pub(crate) mod occluders;
 pub(crate) mod plan_cache;
+pub(crate) mod portals;
 pub(crate) mod prepared;
 mod radiance_unit;
 pub(crate) mod surface_table;

@@ -16,6 +16,7 @@ use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
 use crate::prepare::occluders::Occluders;
+use crate::prepare::portals::Portals;
 use crate::prepare::radiance_unit::radiance_unit;
 use crate::prepare::surface_table::SurfaceTable;
 use firstlight_kdtree::geometry::Ray;
@@ -24,7 +25,7 @@ use glam::Vec3;
 use std::fmt;
 use std::ops::Deref;
 use std::panic::{RefUnwindSafe, UnwindSafe};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A scene ready for rendering: a [`Snapshot`], to which it dereferences, and its tables, which are shared like its
 /// parts.
@@ -37,7 +38,12 @@ pub struct Prepared {
     pub(crate) occluders: Option<Arc<Occluders>>,
     /// `None` if nothing moves while the shutter is open.
     moments: Option<SharedMoments>,
+    /// Of this camera, once they are looked for; `None` inside if there are none that pay.
+    portals: OnceLock<FoundPortals>,
 }
+
+/// The portals of a view, if there are any that pay.
+type FoundPortals = Option<Arc<Portals>>;
 
 /// A scene that moves while the shutter is open.
 pub trait Moments: Send + Sync {
@@ -103,6 +109,8 @@ pub(crate) struct Tables {
     pub(crate) radiance_bound: Option<f32>,
     /// See [`crate::prepare::radiance_unit`].
     pub(crate) radiance_unit: f32,
+    /// Those of the last view for which they were looked for.
+    portals: Mutex<FoundPortals>,
     pub(crate) features: Features,
 }
 
@@ -133,7 +141,7 @@ impl Prepared {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, None));
         let occluders = occluders(&snapshot.geometry, &tables);
-        Self { snapshot, surfaces, tables, occluders, moments: None }
+        Self { snapshot, surfaces, tables, occluders, moments: None, portals: OnceLock::new() }
     }
 
     /// Returns the same objects with other materials and lights.
@@ -142,7 +150,7 @@ impl Prepared {
         let is_same = self.tables.cutouts.iter().map(Option::is_some).eq(tables.cutouts.iter().map(Option::is_some));
         let occluders = if is_same { self.occluders.clone() } else { occluders(&self.geometry, &tables) };
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
-        Self { snapshot, tables, surfaces: self.surfaces.clone(), occluders, moments: None }
+        Self { snapshot, tables, surfaces: self.surfaces.clone(), occluders, moments: None, portals: OnceLock::new() }
     }
 
     /// Returns the tables for another snapshot; what is the same in both, and takes long, is not computed again.
@@ -150,7 +158,7 @@ impl Prepared {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading, Some(self)));
         let occluders = occluders(&snapshot.geometry, &tables);
-        Self { snapshot, surfaces, tables, occluders, moments: None }
+        Self { snapshot, surfaces, tables, occluders, moments: None, portals: OnceLock::new() }
     }
 
     /// Returns the same scene with other trees of the same meshes: all hits are the same, and so are the tables.
@@ -158,7 +166,8 @@ impl Prepared {
         let surfaces = Arc::new(SurfaceTable::build(&geometry.tree));
         let occluders = occluders(&geometry, &self.tables);
         let snapshot = Snapshot { geometry, ..self.snapshot.clone() };
-        Self { snapshot, surfaces, tables: self.tables.clone(), occluders, moments: None }
+        let (tables, portals) = (self.tables.clone(), self.portals.clone());
+        Self { snapshot, surfaces, tables, occluders, moments: None, portals }
     }
 
     /// Whether both are the same scene but for the camera.
@@ -170,6 +179,7 @@ impl Prepared {
     pub fn with_camera(&self, camera: Camera) -> Self {
         let mut seen = self.with_moments(None);
         seen.snapshot.camera = camera;
+        seen.portals = OnceLock::new();
         seen
     }
 
@@ -182,6 +192,31 @@ impl Prepared {
     /// How it moves while the shutter is open; `None` if it stands still.
     pub fn moments(&self) -> Option<&dyn Moments> {
         self.moments.as_ref().map(|moments| &*moments.0)
+    }
+
+    /// The portals of the view, if [`Self::find_portals`] has found some.
+    #[inline]
+    pub(crate) fn portals(&self) -> Option<&Portals> {
+        self.portals.get()?.as_deref()
+    }
+
+    /// Sets the portals by `find` if they are not known.
+    pub(crate) fn find_portals(&self, find: impl FnOnce() -> Option<Portals>) {
+        self.portals.get_or_init(|| {
+            let found = find().map(Arc::new);
+            *self.tables.portals.lock().unwrap_or_else(PoisonError::into_inner) = found.clone();
+            found
+        });
+    }
+
+    /// Sets the portals to those of the same view at another moment, if they are not known.
+    pub(crate) fn share_portals(&self, other: &Self) {
+        self.portals.get_or_init(|| other.portals.get().cloned().flatten());
+    }
+
+    /// Returns the same scene for a preview, which must not be delayed: with the portals of the last view that has some.
+    pub(crate) fn with_last_portals(&self) -> Self {
+        Self { portals: OnceLock::from(self.tables.last_portals()), ..self.clone() }
     }
 
     /// Features that the scene uses.
@@ -244,6 +279,7 @@ impl Tables {
             materials: &before.shading.materials,
             contacts: &before.tables.contacts,
         });
+        let portals = before.and_then(|before| before.tables.last_portals());
         let before = before.filter(|before| is_same(&before.shading.environment, environment));
         let (ambient, environment_sampler) = match before.map(|before| &before.tables) {
             Some(tables) => (tables.ambient.clone(), tables.environment_sampler.clone()),
@@ -285,7 +321,12 @@ impl Tables {
             classic: ClassicTable::build(materials),
             casters,
             features,
+            portals: Mutex::new(portals),
         }
+    }
+
+    fn last_portals(&self) -> FoundPortals {
+        self.portals.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 

@@ -6,6 +6,7 @@ use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
 use crate::sampling::warp::{shifted, shifted_single};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
+use crate::shading::environment_sampling::{EnvironmentSampling, environment_share};
 use crate::shading::paths::Path;
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::Hit;
@@ -29,13 +30,12 @@ pub(crate) fn choose_light_point(
 ) -> Option<LightPoint> {
     let u = Vec2::from(shifted(sampler.pair(dimension + DIM_LIGHT_POINT).to_array(), candidate));
     let tables = &*scene.tables;
-    let share = environment_share(scene);
+    let share = environment_share(scene, techniques, position.into(), normal.into());
     let mut u_select = None;
     let mut select =
         || *u_select.get_or_insert_with(|| shifted_single(sampler.single(dimension + DIM_LIGHT), candidate));
     if share > 0.0 && (share >= 1.0 || select() < share) {
-        let environment = tables.environment_sampler.as_ref().expect("a share without a sampler");
-        let (wi, pdf) = environment.sample(u)?;
+        let (wi, pdf) = EnvironmentSampling::of(scene, techniques)?.sample(position, normal, u)?;
         let radiance = scene.shading.environment.radiance(wi);
         return Some((None, LightSample { target: wi, wi, pdf: pdf * share, radiance, is_far: true }));
     }
@@ -45,16 +45,6 @@ pub(crate) fn choose_light_point(
     Some(((!sample.is_far).then_some(sample.target), sample))
 }
 
-/// Probability with which light sampling selects the environment rather than the finite lights.
-#[inline]
-pub(crate) fn environment_share(scene: &Prepared) -> f32 {
-    match (&scene.tables.environment_sampler, scene.tables.lights.is_empty()) {
-        (None, _) => 0.0,
-        (Some(_), true) => 1.0,
-        (Some(_), false) => 0.5,
-    }
-}
-
 /// Radiance of the environment for a path that leaves the scene, with the MIS weight against light sampling.
 #[inline]
 pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path: &Path, dir: Vec3) -> Vec3 {
@@ -62,9 +52,11 @@ pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path:
         return Vec3::ZERO;
     }
     let radiance = scene.shading.environment.radiance(dir);
-    match &scene.tables.environment_sampler {
-        Some(sampler) if path.pdf.is_finite() => {
-            radiance * bounce_weight(techniques, path.pdf, environment_share(scene) * sampler.pdf(dir))
+    match EnvironmentSampling::of(scene, techniques) {
+        Some(sampling) if path.pdf.is_finite() => {
+            let share = sampling.share(path.position.into(), path.normal.into());
+            let other = share * sampling.pdf(path.position, path.normal, dir);
+            radiance * bounce_weight(techniques, path.pdf, other)
         }
         _ => radiance,
     }
@@ -86,7 +78,8 @@ pub(crate) fn emitter_weight(
     match lights.light_of(hit.object, hit.prim, vertex.front) {
         Some(id) => {
             let pdf = lights.pdf(techniques, id, path.position, path.normal, -vertex.wo, hit.t);
-            bounce_weight(techniques, path.pdf, (1.0 - environment_share(scene)) * pdf)
+            let share = environment_share(scene, techniques, path.position.into(), path.normal.into());
+            bounce_weight(techniques, path.pdf, (1.0 - share) * pdf)
         }
         None => 1.0,
     }

@@ -10,6 +10,7 @@ pub(crate) mod dimensions;
 pub(crate) mod disney;
 pub(crate) mod disney_at;
 pub(crate) mod disney_layers;
+pub(crate) mod environment_sampling;
 pub(crate) mod ggx;
 pub(crate) mod glass_loss;
 pub(crate) mod guided;

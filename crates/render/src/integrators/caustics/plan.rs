@@ -24,6 +24,7 @@ use crate::integrators::caustics::trace::LightWave;
 use crate::integrators::common::caustics_pass::{CausticPass, casters_of};
 use crate::integrators::common::work::Work;
 use crate::integrators::path::{CameraPath, PathWave};
+use crate::integrators::portals::prepare_portals;
 use crate::prepare::plan_cache::PlanKey;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
@@ -150,6 +151,7 @@ impl Pilot {
             simd: RenderSettings::default().simd,
             ..*settings
         };
+        prepare_portals(scene, settings);
         let camera_media = scene.camera_media();
         let pass = CausticPass::of(scene, settings, size, &camera_media, CausticPlan::UNKNOWN)?;
         if !prepare_guide(&pass, stop) {

@@ -14,6 +14,7 @@ use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{
     DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension, resampling_dimension, shadow_roulette_dimension,
 };
+use crate::shading::environment_sampling::samples_lights;
 use crate::shading::guided::Guided;
 use crate::shading::lights::{LightPoint, choose_light_point, light_weight};
 use crate::shading::paths::Path;
@@ -391,7 +392,7 @@ fn light_points(
 ) -> [[Option<LightPoint>; LANES]; CANDIDATES as usize] {
     let techniques = &settings.techniques;
     let mut places = [None; LANES];
-    if scene.tables.features.light_sampling && techniques.light_sampling {
+    if samples_lights(scene, techniques) {
         for (place, surface) in places.iter_mut().zip(surfaces) {
             let normal = surface.lit_side();
             *place = normal.map(|normal| (surface.vertex.position, normal, surface.path.sampler));

@@ -2,7 +2,8 @@
 
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::simd::shade::KindHits;
-use crate::shading::lights::{bounce_weight, environment_share};
+use crate::shading::environment_sampling::environment_share;
+use crate::shading::lights::bounce_weight;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
@@ -46,7 +47,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits) {
             let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
             let mut other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
-            other = other * (1.0 - environment_share(scene));
+            other = other * (other.all(1.0) - environment_share(scene, techniques, from[0], from[1]));
             if tables.materials.two_sided {
                 other = with_two_sided(other, &group, &indices, known);
             }
@@ -80,7 +81,8 @@ fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANE
         {
             let (dir, distance) = (paths.rays.get(i).dir, hits.t[i]);
             let pdf = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);
-            pdfs[lane] = (1.0 - environment_share(scene)) * pdf;
+            let share = environment_share(scene, techniques, path.position.into(), path.normal.into());
+            pdfs[lane] = (1.0 - share) * pdf;
         }
     }
     Float::load(pdf.s, &pdfs)

@@ -2,7 +2,8 @@
 
 use crate::core::techniques::Techniques;
 use crate::prepare::prepared::Prepared;
-use crate::shading::lights::{bounce_weight, environment_share};
+use crate::shading::environment_sampling::EnvironmentSampling;
+use crate::shading::lights::bounce_weight;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
@@ -39,6 +40,7 @@ fn misses<S: Simd>(
     if !scene.tables.features.environment {
         return;
     }
+    let sampling = EnvironmentSampling::of(scene, techniques);
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);
         let LaneGroup { indices, mask } = chunk;
@@ -50,9 +52,10 @@ fn misses<S: Simd>(
             z: Float::gather(&rays.dir_z, index),
         };
         let mut arriving = scene.shading.environment.radiance_lanes(mask, dir);
-        if let Some(sampler) = &scene.tables.environment_sampler {
+        if let Some(sampling) = sampling {
             let pdf = Float::gather(&paths.pdf, index);
-            let other = sampler.pdf_lanes(dir) * environment_share(scene);
+            let (position, normal) = (Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index));
+            let other = sampling.pdf_lanes(position, normal, dir) * sampling.share(position, normal);
             let weight = bounce_weight(techniques, pdf, other);
             // All others could only have been found so.
             arriving = arriving * select(pdf.lt(pdf.all(f32::INFINITY)), weight, pdf.all(1.0));

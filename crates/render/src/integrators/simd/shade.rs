@@ -11,6 +11,7 @@ use crate::prepare::layer_table::{LAYERED, LAYERED_RICHLY};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;
+use crate::shading::environment_sampling::samples_lights;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
@@ -81,7 +82,7 @@ pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
 fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
     let KindHits { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
     let KindHits { next, shadows, shadow_thresholds, sets, radiance, is_last, .. } = group;
-    let features = &scene.tables.features;
+    let (features, samples_lights) = (&scene.tables.features, samples_lights(scene, techniques));
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);
         let LaneGroup { indices, mask } = chunk;
@@ -113,7 +114,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
             }
             _ => HintLanes::NONE,
         };
-        if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
+        if KIND != MIRROR && KIND != GLASS && samples_lights {
             let lit = mask & surface.non_specular;
             if lit != 0 {
                 let (mask, place, surface, hints, media, sampler) = (lit, &place, &surface, &hints, &media, &sampler);

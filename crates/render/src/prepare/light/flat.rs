@@ -60,6 +60,25 @@ pub(crate) struct FlatPoint<R: Real> {
     pub uv: [R; 2],
 }
 
+impl QuadLight<f32> {
+    /// The same quad in all lanes.
+    #[inline(always)]
+    pub fn in_all<R: Real>(&self, like: R) -> QuadLight<R> {
+        let Self { corner, units: [u, v], lengths, normal, area, lift, is_rectangle } = *self;
+        let zero = like.all(0.0);
+        // No closures, which would not be compiled for the instruction set.
+        QuadLight {
+            corner: Vector3::in_all(like, corner.into()),
+            units: [Vector3::in_all(like, u.into()), Vector3::in_all(like, v.into())],
+            lengths: [like.all(lengths[0]), like.all(lengths[1])],
+            normal: Vector3::in_all(like, normal.into()),
+            area: like.all(area),
+            lift: like.all(lift),
+            is_rectangle: if is_rectangle { zero.is_zero() } else { zero.is_positive() },
+        }
+    }
+}
+
 impl<R: Elementary> QuadLight<R> {
     /// Samples a point of the front: uniformly over the solid angle for rectangles where that is stable and `by_angle`,
     /// otherwise over the area.

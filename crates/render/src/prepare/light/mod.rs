@@ -10,7 +10,7 @@ pub(crate) mod flat;
 mod mean_light;
 mod objects;
 mod sample_simd;
-mod selection;
+pub(crate) mod selection;
 pub(crate) mod shape;
 mod tree;
 mod tree_build;

@@ -162,7 +162,7 @@ impl LightTable {
         }
         let (mut own, mut sum) = (one.all(0.0), one.all(0.0));
         for (i, bounds) in (0..).zip(self.selection.bounds()) {
-            let estimate = bounds.estimate_lanes(position, Some(normal));
+            let estimate = bounds.estimate_at(position, Some(normal));
             own = select(id.equals(i), estimate, own);
             sum += estimate;
         }
@@ -196,7 +196,7 @@ impl LightTable {
         let mut estimates = [Float::splat(s, 0.0); LANES];
         let mut sum = Float::splat(s, 0.0);
         for (estimate, bounds) in estimates.iter_mut().zip(self.selection.bounds()) {
-            *estimate = bounds.estimate_lanes(position, normal);
+            *estimate = bounds.estimate_at(position, normal);
             sum += *estimate;
         }
         let mut rest = *u * sum;

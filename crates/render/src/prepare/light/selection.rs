@@ -8,7 +8,7 @@ use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
 use crate::prepare::light::tree_simd::LightTreeArrays;
 use crate::sampling::AliasTable;
-use firstlight_simd::{Float, Real, Simd, Vector, Vector3, select};
+use firstlight_simd::{Real, Truth, Vector3, select};
 use glam::Vec3;
 
 /// Maximum number of lights whose contributions are estimated individually; more would cost more than they gain.
@@ -118,6 +118,21 @@ impl LightSelection {
         }
     }
 
+    /// Estimate of the irradiance that a few lights together can cause; `None` for many lights.
+    ///
+    /// - `normal`: unit, of the side that is lit; zero if both sides are.
+    #[inline(always)]
+    pub fn estimate<R: Real>(&self, position: Vector3<R>, normal: Vector3<R>) -> Option<R> {
+        if self.bounds.is_empty() {
+            return None;
+        }
+        let mut sum = position.x.all(0.0);
+        for bounds in &self.bounds {
+            sum += bounds.estimate_on(position, normal);
+        }
+        Some(sum)
+    }
+
     /// Bounds of a few lights.
     #[inline]
     pub fn bounds(&self) -> &[LightBounds] {
@@ -143,7 +158,7 @@ impl LightSelection {
 }
 
 impl LightBounds {
-    fn new(light: &Light) -> Self {
+    pub fn new(light: &Light) -> Self {
         let mut cone = None;
         let (center, radius, normal, projected) = match light.shape {
             LightShape::Sphere { center, radius } => (center, radius, Vec3::ZERO, 0.25 * light.shape.area()),
@@ -172,12 +187,22 @@ impl LightBounds {
         self.estimate(offset.length_squared(), offset / offset.length(), side)
     }
 
-    /// Like the scalar estimate, for sixteen points.
+    /// Like the scalar estimate, for one or sixteen points.
     #[inline(always)]
-    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Option<Vector<S>>) -> Float<S> {
-        let offset = Vector::in_all(position.x, self.center) - position;
+    pub fn estimate_at<R: Real>(&self, position: Vector3<R>, normal: Option<Vector3<R>>) -> R {
+        let offset = Vector3::in_all(position.x, self.center) - position;
         let distance2 = offset.length_squared();
         self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), normal)
+    }
+
+    /// The same on the side of `normal`, or on both sides where it is zero.
+    #[inline(always)]
+    pub fn estimate_on<R: Real>(&self, position: Vector3<R>, normal: Vector3<R>) -> R {
+        let (of_side, both_sides) = (self.estimate_at(position, Some(normal)), normal.is_zero());
+        if !both_sides.any() {
+            return of_side;
+        }
+        select(both_sides, self.estimate_at(position, None), of_side)
     }
 
     /// Estimates the irradiance that the light can cause, never zero if it can cause any.
@@ -189,7 +214,10 @@ impl LightBounds {
         let (r2, one, distance) = (self.radius * self.radius, distance2.all(1.0), distance2.sqrt());
         let sin_u = one.all(self.radius) / distance;
         let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
-        let receiver = normal.map_or(one, |normal| largest_cosine(wi.dot(normal), cos_u, sin_u));
+        let receiver = match normal {
+            Some(normal) => largest_cosine(wi.dot(normal), cos_u, sin_u),
+            None => one,
+        };
         let mut estimate = receiver * self.intensity;
         if self.normal != Vec3::ZERO {
             estimate = estimate * largest_cosine(-wi.dot(Vector3::in_all(one, self.normal)), cos_u, sin_u);

@@ -8,7 +8,8 @@ use crate::prepare::prepared::Prepared;
 use crate::sampling::warp::{shifted, shifted_single};
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
-use crate::shading::lights::{LightPoint, environment_share};
+use crate::shading::environment_sampling::EnvironmentSampling;
+use crate::shading::lights::LightPoint;
 use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{
     Bits, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector,
@@ -57,15 +58,20 @@ fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
     let zero = u[0].all(0.0);
     let nowhere = Vector::all(zero);
     let mut points = FoundLights { found: 0, infinite: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere };
-    let share = environment_share(scene);
+    let environment = EnvironmentSampling::of(scene, techniques);
     let mut u_select = u[0];
-    if tables.lights.selects_apart() || share > 0.0 {
+    if tables.lights.selects_apart() || environment.is_some() {
         u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
     }
-    let mut outside = 0;
-    if share > 0.0 {
-        outside = mask & u_select.lt(zero.all(share));
-        u_select = ((u_select - share) / (1.0 - share)).at_least(0.0).at_most(1.0f32.next_down());
+    let (mut outside, mut share) = (0, zero);
+    if let Some(environment) = environment {
+        let side = match normal {
+            Some(normal) => normal,
+            None => nowhere,
+        };
+        share = environment.share(position, side);
+        outside = mask & u_select.lt(share);
+        u_select = ((u_select - share) / (zero.all(1.0) - share)).at_least(0.0).at_most(1.0f32.next_down());
     }
     let inside = mask & !outside;
     let textures = &scene.shading.textures;
@@ -73,12 +79,12 @@ fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
         && let Some(lights) = tables.lights.sample_lanes(textures, techniques, inside, (position, normal), u_select, u)
     {
         let LightLanes { found, target, wi, pdf, radiance, is_far, .. } = lights;
-        points = FoundLights { found, infinite: is_far, target, wi, pdf: pdf * (1.0 - share), radiance };
+        points = FoundLights { found, infinite: is_far, target, wi, pdf: pdf * (zero.all(1.0) - share), radiance };
     }
-    if let Some(environment) = &tables.environment_sampler
-        && outside != 0
+    if outside != 0
+        && let Some(environment) = environment
     {
-        let (found, wi, pdf) = environment.sample_lanes(u);
+        let (found, wi, pdf) = environment.sample_lanes(outside, position, normal, u);
         let radiance = scene.shading.environment.radiance_lanes(outside, wi);
         points = FoundLights {
             found: points.found | found & outside,
