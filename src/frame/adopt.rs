@@ -106,12 +106,18 @@ pub fn adopt_moment(world: &mut World, mut scene: LoadedScene, now: Duration) {
 
 /// Shows another time of an animation whose scene is in the world. That is no change of the scene, though it can be undone.
 pub(super) fn set_moment(world: &mut World, seconds: f64) {
-    if world.get_resource::<Moment>().copied().unwrap_or_default().0 == seconds {
+    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    if shown == seconds {
         return;
     }
     // Edits of this frame count.
     History::content(world);
-    let was_saved = !world.resource::<History>().is_unsaved();
+    let mut was_saved = !world.resource::<History>().is_unsaved();
+    if !was_saved {
+        // What tracks take back is not there to be saved.
+        crate::scene::show_moment(world, shown);
+        was_saved = History::is_clean_as_it_is(world);
+    }
     crate::scene::show_moment(world, seconds);
     let content = History::content(world);
     if was_saved {

@@ -197,6 +197,37 @@ fn with_an_open_shutter_what_has_got_a_key_is_blurred_as_in_the_saved_file() {
 }
 
 #[test]
+fn a_change_that_tracks_would_take_back_is_told_at_once_and_nothing_is_unsaved_when_it_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let tracks = "animation: (tracks: [object(name: \"ball\", property: translate, \
+                  keys: [(0, (0, 0.5, 0)), (2, (2, 0.5, 0))])])";
+    let text = STILL.trim_end().trim_end_matches(')').to_owned() + tracks + ")";
+    let mut driver = Driver::open(folder.path(), "s.ron", &text);
+    let id = driver.id;
+    let told = |driver: &Driver| driver.said(MessageKind::Note).matches("Set key (Ctrl+K) keeps").count();
+    driver.go_to(1.0);
+    // Its size has no track.
+    let radius = |value: f64| Edit::Set { id, property: Property::SphereRadius, value: DVec3::splat(value) };
+    driver.edit([Edit::Select { id, add: false }, radius(0.4), radius(0.5)]);
+    assert_eq!(told(&driver), 0);
+    driver.edit([Edit::Begin, Edit::Move { by: DVec3::Y }]);
+    assert_eq!(told(&driver), 1, "{}", driver.said(MessageKind::Note));
+    driver.edit([Edit::Move { by: 2.0 * DVec3::Y }, Edit::End]);
+    assert!(told(&driver) == 1 && driver.session.has_unsaved_edits(), "a file can hold it");
+    driver.go_to(2.0);
+    assert_eq!(driver.ball(), DVec3::new(2.0, 0.5, 0.0));
+    assert!(!driver.session.has_unsaved_edits());
+    driver.edit([Edit::Undo]);
+    assert_eq!(driver.ball(), DVec3::new(1.0, 2.5, 0.0), "one step back, it is there again");
+    driver.edit([KEY]);
+    assert_eq!(driver.tracks(), [("translate", vec![0.0, 1.0, 2.0], Interpolation::Linear)]);
+    // What stays is unsaved.
+    driver.edit([Edit::Undo, Edit::Undo, radius(0.4), Edit::Move { by: DVec3::Y }]);
+    driver.go_to(2.0);
+    assert!(driver.session.has_unsaved_edits());
+}
+
+#[test]
 fn keys_that_no_file_could_hold_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open(folder.path(), "s.ron", STILL);

@@ -2,7 +2,7 @@
 
 use crate::driver::{Drive, Driver};
 use crate::program::{Outcome, does, program};
-use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
+use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Property, Session, SessionOptions, Target};
 use firstlight::scene::{
     ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
 };
@@ -454,10 +454,11 @@ fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
     std::fs::write(&path, MOVING.replace("(2, (2, 0, 0))", "(2, (6, 0, 0))")).unwrap();
     driver.run_until(|session| session.status().messages.iter().any(|told| told.text.contains("reloaded")));
     assert_eq!(shown(&mut driver), (0.5, 0.0, 35.0));
-    // An edit has to be saved, at whatever moment.
+    // An edit has to be saved, at whatever moment: no track takes it back.
     let id = SceneInputs::of(driver.session.world_mut()).objects[0].entity.to_bits();
-    driver.session.send(Command::Edit(Edit::Select { id, add: false }));
-    driver.session.send(Command::Edit(Edit::Move { by: DVec3::Y }));
+    let (property, value) = (Property::SphereRadius, DVec3::splat(0.75));
+    let larger = Command::Edit(Edit::Set { id, property, value });
+    driver.session.send(larger.clone());
     driver.frame();
     assert!(driver.session.has_unsaved_edits());
     driver.session.send(Command::SetMoment { seconds: Some(1.0) });
@@ -468,8 +469,7 @@ fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
     driver.session.send(Command::Edit(Edit::Undo));
     driver.frame();
     assert!(!driver.session.has_unsaved_edits());
-    driver.session.send(Command::Edit(Edit::Select { id, add: false }));
-    driver.session.send(Command::Edit(Edit::Move { by: DVec3::Y }));
+    driver.session.send(larger);
     driver.session.send(Command::SetMoment { seconds: Some(1e300) });
     driver.frame();
     assert!(driver.session.has_unsaved_edits());

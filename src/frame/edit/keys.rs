@@ -9,7 +9,7 @@ use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, CurrentScene};
 use crate::frame::state::selection::Selection;
 use crate::scene::animation::{
-    Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, set_keys,
+    Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, off_their_tracks, set_keys,
 };
 use crate::scene::{Animation, Description, LoadedScene, Moment, SceneInputs};
 use bevy_ecs::name::Name;
@@ -32,6 +32,16 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     let text = format!("keys at {} s: {}{single}", number(seconds), named(world, &channels));
     say(world, text);
     Ok(())
+}
+
+/// Tells that a change is not kept at other times, unless a key keeps it.
+///
+/// - `known`: what was [off its tracks](off_their_tracks) before, of which that has been told.
+pub fn tell_what_needs_keys(world: &mut World, known: &[Entity]) {
+    let new = off_their_tracks(world).into_iter().find(|entity| !known.contains(entity));
+    let Some(entity) = new else { return };
+    let name = world.get::<Name>(entity).map_or("this".to_owned(), |name| format!("`{name}`"));
+    say(world, format!("{name} changes by its animation: Set key (Ctrl+K) keeps what you have changed at this frame"));
 }
 
 /// Deletes the keys at the current time: of the selection, or of everything if nothing is selected.

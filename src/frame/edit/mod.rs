@@ -42,7 +42,7 @@ use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, PictureSize, RenderState};
 use crate::frame::state::selection::{Selection, pick};
 use crate::render::MaterialKind;
-use crate::scene::animation::Interpolation;
+use crate::scene::animation::{Interpolation, off_their_tracks};
 use crate::scene::{MaterialSlots, MeshShading, TextureSource, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
@@ -206,7 +206,10 @@ pub struct EditQueue(pub Vec<Edit>);
 ///
 /// Reads [`EditQueue`]; writes entities, [`Selection`], [`History`], [`Status`].
 pub fn edit_scene(world: &mut World) {
-    for edit in std::mem::take(&mut world.resource_mut::<EditQueue>().0) {
+    let edits = std::mem::take(&mut world.resource_mut::<EditQueue>().0);
+    let known = if edits.is_empty() { Vec::new() } else { off_their_tracks(world) };
+    let is_any = !edits.is_empty();
+    for edit in edits {
         // With nothing to do it on, an edit does no harm.
         let kind = match edit {
             Edit::Undo | Edit::Redo | Edit::SelectUsers { .. } | Edit::Dress { .. } => MessageKind::Note,
@@ -216,6 +219,9 @@ pub fn edit_scene(world: &mut World) {
             let now = world.resource::<Clock>().0;
             world.resource_mut::<Status>().say(now, kind, problem);
         }
+    }
+    if is_any {
+        keys::tell_what_needs_keys(world, &known);
     }
     // Removed entities are deselected.
     let gone: Vec<Entity> =

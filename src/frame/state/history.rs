@@ -87,6 +87,13 @@ pub(crate) struct Content {
     animation: AnimationKeys,
 }
 
+impl Content {
+    fn is_same(&self, other: &Self) -> bool {
+        let same_entities = Arc::ptr_eq(&self.entities, &other.entities) || self.entities == other.entities;
+        same_entities && self.environment == other.environment && self.animation.is_same_content(&other.animation)
+    }
+}
+
 /// The steps that can be undone and redone, and whether the scene has unsaved changes.
 #[derive(Resource, Default)]
 pub struct History {
@@ -162,10 +169,19 @@ impl History {
 
     fn compare(&mut self) {
         let Some(now) = &self.now else { return };
-        let clean = self.clean.get_or_insert_with(|| now.content());
-        let same = Arc::ptr_eq(&now.entities, &clean.entities) || now.entities == clean.entities;
-        let same_keys = now.animation.is_same_content(&clean.animation);
-        self.unsaved = !same || now.environment != clean.environment || !same_keys;
+        let now = now.content();
+        self.unsaved = !now.is_same(self.clean.get_or_insert_with(|| now.clone()));
+    }
+
+    /// Whether the world is as it was opened or saved last, without recording how it is.
+    pub(crate) fn is_clean_as_it_is(world: &mut World) -> bool {
+        let Some(clean) = world.resource::<Self>().clean.clone() else { return true };
+        let now = Content {
+            entities: read_entities(world, &clean.entities),
+            environment: world.get_resource::<SceneEnvironment>().cloned(),
+            animation: AnimationKeys::of(world, &clean.animation),
+        };
+        now.is_same(&clean)
     }
 
     /// The inputs of an image as they were when the time of the animation was set, or its last keys; what was added since

@@ -6,7 +6,7 @@ use crate::format::placement::Placement;
 use crate::format::property::CameraProperty;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::animation::model::ModelMotion;
-use crate::scene::animation::{Animation, Channel};
+use crate::scene::animation::{Animation, Channel, Track};
 use crate::scene::world::components::put;
 use crate::scene::world::components::{Shape, SurfaceMaterial};
 use crate::scene::world::inputs::{CameraInput, SceneInputs};
@@ -156,6 +156,34 @@ fn keep_changes(world: &mut World) {
         let mut animation = world.resource_mut::<Animation>();
         animation.camera = rest_camera(&animation, shown, &view, &projection, &lens);
     }
+}
+
+/// Objects, lights and materials that are not as their tracks have them at the current time: another time loses that.
+pub fn off_their_tracks(world: &World) -> Vec<Entity> {
+    let seconds = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    let tracks = world.get_resource::<Animation>().map_or(&[][..], |animation| &animation.tracks);
+    let differs = |track: &Track| match track.channel {
+        Channel::Camera(_) => None,
+        Channel::Object(entity, property) => {
+            let placement = world.get::<Shape>(entity).and(world.get::<Placement>(entity))?;
+            (property.set(*placement, track.at(seconds)) != *placement).then_some(entity)
+        }
+        Channel::Light(entity, property) => {
+            let now = (light_of(world, entity)?, *world.get::<Placement>(entity)?);
+            let (mut light, mut placement) = now;
+            property.set(&mut light, &mut placement, track.at(seconds));
+            ((light, placement) != now).then_some(entity)
+        }
+        Channel::Material(entity, property) => {
+            let now = world.get::<SurfaceMaterial>(entity)?;
+            let mut then = now.clone();
+            property.set(&mut then.0, track.at(seconds));
+            (then != *now).then_some(entity)
+        }
+    };
+    let mut found: Vec<Entity> = tracks.iter().filter_map(differs).collect();
+    found.dedup();
+    found
 }
 
 /// Whether the animation moves the camera, and it is where that has it at the present time.
