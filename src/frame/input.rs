@@ -1,7 +1,6 @@
 //! Executes commands: they become changes of components and resources.
 
 use crate::format::bounds::MOST_STOPS;
-use crate::frame::Command;
 use crate::frame::core::rig::{Rig, Turning};
 use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::edit::EditQueue;
@@ -19,11 +18,12 @@ use crate::frame::state::resources::{
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
+use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Commands for the next frame, in order.
 #[derive(Resource, Default)]
@@ -308,7 +308,8 @@ impl CommandParams<'_, '_> {
 
     fn toggle_focus_lock(&mut self) {
         let Some(rig) = self.rig() else { return };
-        self.focus.target = match (self.focus.target, self.focus.last) {
+        let selected = self.selected_point(&rig);
+        self.focus.target = match (self.focus.target, selected.or(self.focus.last)) {
             (FocusTarget::Camera, Some((entity, point))) => self.stuck_to(entity, point),
             (FocusTarget::Camera, None) => {
                 FocusTarget::Point(rig.view.eye + rig.view.forward * rig.lens.focus_distance)
@@ -321,6 +322,24 @@ impl CommandParams<'_, '_> {
             FocusTarget::Object(..) => "focus locked to the object".to_owned(),
             FocusTarget::Cursor(_) => "focus follows the mouse".to_owned(),
         });
+    }
+
+    /// What is in focus of the active object: the point that was focused on last, else what is seen in its middle, else
+    /// that; `None` without an object, or for one without an end.
+    fn selected_point(&mut self, rig: &Rig) -> Option<(Entity, DVec3)> {
+        let active = self.selection.active()?;
+        if let Some(last) = self.focus.last.filter(|(entity, _)| *entity == active) {
+            return Some(last);
+        }
+        let RenderState { inputs, extents, .. } = &mut *self.shown;
+        let object = inputs.objects.iter().find(|object| object.entity == active)?;
+        let corners = extents.corners_of(object).into_iter().map(|corner| (corner, corner));
+        let (min, max) = corners.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))?;
+        let middle = 0.5 * (min + max);
+        let place = Projector::new(rig, DVec2::new(self.size.aspect(), 1.0)).place(middle);
+        let seen = place.and_then(|place| self.pick(place.x / self.size.aspect(), place.y));
+        let point = seen.filter(|picked| picked.entity == active).map_or(middle, |picked| picked.point);
+        Some((active, point))
     }
 
     /// Converts a point of an object to a focus target.

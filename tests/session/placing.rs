@@ -2,7 +2,7 @@
 
 use crate::driver::{Drive, Driver};
 use firstlight::format::property::SkyProperty;
-use firstlight::frame::{Command, Edit, NewThing, Projector, Property, SessionOptions, Target};
+use firstlight::frame::{Command, Edit, Focus, FocusTarget, NewThing, Projector, Property, SessionOptions, Target};
 use firstlight::render::Environment;
 use firstlight::scene::{
     ColorParam, DirectionalLight, EnvironmentSource, GRADIENT, Material, MaterialSlots, Placement, PointLight, Rgb,
@@ -119,12 +119,71 @@ fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
                 assert!((at - subject).length() < (eye - subject).length(), "{thing:?} of {size}: {at}");
                 let middle = driver.session.box_of(entity).expect("its box").middle();
                 let seen = place(&driver, middle).expect("in front of the camera");
-                assert!(seen.cmpge(DVec2::ZERO).all() && seen.cmple(DVec2::new(480.0, 320.0)).all(), "{seen}");
+                let is_above = thing == NewThing::AreaLight && seen.y < 0.0;
+                assert!(
+                    is_above || seen.cmpge(DVec2::ZERO).all() && seen.cmple(DVec2::new(480.0, 320.0)).all(),
+                    "{seen}"
+                );
                 let irradiance = irradiance(&driver, &thing, subject);
                 assert!((4.0..8.0).contains(&irradiance), "{thing:?} of {size}, chosen {chosen}: {irradiance}");
             }
         }
     }
+}
+
+/// Its dark back would be a board before the scene.
+#[test]
+fn a_new_area_light_shows_its_front_however_far_the_camera_is_and_hides_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for (factor, pitch_deg) in [(1.0, 0.0), (1.0, -70.0), (4.0, -30.0), (8.0, 20.0)] {
+        let mut driver = model(folder.path(), 1.0);
+        let object = driver.named("model");
+        let subject = driver.session.box_of(object).expect("its box").middle();
+        driver.select("model");
+        driver.session.send(Command::Dolly { factor });
+        driver.session.send(Command::Orbit { yaw_deg: 0.0, pitch_deg: -pitch_deg });
+        driver.settle();
+        driver.edit([Edit::Add(NewThing::AreaLight)]);
+        let (shape, at): (Shape, Placement) = (driver.get("area light"), driver.get("area light"));
+        let Shape::Quad { edge_u, edge_v } = shape else { panic!("{shape:?}") };
+        let center = at.translation + 0.5 * (edge_u + edge_v);
+        let eye = driver.session.status().rig.view.eye;
+        assert!(edge_u.cross(edge_v).dot(eye - center) > 0.0, "{factor} {pitch_deg}: its back, from {eye}");
+        // The way from the camera to what is lit is free.
+        let seen = place(&driver, subject).expect("in view");
+        assert_eq!(driver.session.entity_at(seen.x / 480.0, seen.y / 320.0), Some(object), "{factor} {pitch_deg}");
+    }
+}
+
+#[test]
+fn focus_tracks_the_selected_object_where_it_is_seen_or_else_the_last_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let (object, ground) = (driver.named("model"), driver.named("ground"));
+    let target = |driver: &mut Driver| {
+        driver.session.send(Command::ToggleFocusLock);
+        driver.frame();
+        let target = driver.session.world().resource::<Focus>().target;
+        driver.session.send(Command::ToggleFocusLock);
+        driver.frame();
+        target
+    };
+    driver.session.send(Command::FocusAt { x: 0.5, y: 0.95 });
+    driver.frame();
+    assert!(matches!(target(&mut driver), FocusTarget::Object(entity, _) if entity == ground));
+    driver.select("model");
+    let at: Placement = driver.get("model");
+    let FocusTarget::Object(entity, local) = target(&mut driver) else { panic!("no object") };
+    assert_eq!(entity, object);
+    let (point, eye) = (at.affine().transform_point3(local), driver.session.status().rig.view.eye);
+    let middle = driver.session.box_of(object).expect("its box").middle();
+    assert!((point - eye).length() < (middle - eye).length(), "its surface: {point}, {middle}");
+    // Where it was clicked is better known than its middle.
+    driver.session.send(Command::FocusAt { x: 0.52, y: 0.55 });
+    driver.frame();
+    let last = driver.session.world().resource::<Focus>().last.expect("it was focused on");
+    let FocusTarget::Object(entity, local) = target(&mut driver) else { panic!("no object") };
+    assert!((last.0, entity) == (object, object) && at.affine().transform_point3(local).distance(last.1) < 1e-9);
 }
 
 #[test]

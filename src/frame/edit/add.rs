@@ -29,7 +29,7 @@ pub enum NewThing {
     Sphere,
     /// A horizontal, infinite plane.
     Plane,
-    /// An emissive square beside what is selected or seen, facing it.
+    /// An emissive square above what is selected or seen, facing it; the camera sees its front.
     AreaLight,
     /// A point light beside it.
     PointLight,
@@ -83,7 +83,7 @@ fn add_light(world: &mut World, new: &NewThing) -> Option<Entity> {
     if !matches!(new, AreaLight | Point | Spot | Parallel) {
         return None;
     }
-    let spot = spot::find_for_light(world);
+    let spot = spot::find_for_light(world, matches!(new, AreaLight));
     let (way, distance) = (spot.way(), spot.way().length());
     let direction = way.try_normalize().unwrap_or(DVec3::NEG_Y);
     let irradiance = NEW_IRRADIANCE / f64::from(world.resource::<DisplaySettings>().0.exposure_stops).exp2();

@@ -10,7 +10,7 @@ use crate::frame::state::selection::{Selection, box_of, pick};
 use crate::geometry::Ray;
 use crate::scene::{Extraction, Shape, View};
 use bevy_ecs::prelude::{Entity, World};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
 /// A position for an object, with free space for a cube of side `2 * size` above it.
@@ -74,9 +74,15 @@ impl LightSpot {
 
 /// Finds a position for a light: beside and above the selected objects, or else what is in the middle of the image, and
 /// in view with them. The way to it from the camera is free of walls and ceilings.
-pub fn find_for_light(world: &mut World) -> LightSpot {
-    /// To the right, up, and to the camera, relative to the size of what is lit: an area light shows its front.
-    const OFFSET: [f64; 3] = [1.0, 0.5, 0.2];
+///
+/// - `shows_front`: it is as far from the camera as what it lights, in whatever direction that is seen. So an emissive
+///   square that faces it shows the camera its front, from the side, and its dark back hides nothing.
+pub fn find_for_light(world: &mut World, shows_front: bool) -> LightSpot {
+    /// To the right, up, and to the camera, relative to the size of what is lit.
+    const OFFSET: DVec3 = DVec3::new(1.0, 0.5, 0.2);
+    /// Of a square: from above where there is room, else from a side.
+    const ASIDE: [DVec3; 4] =
+        [DVec3::new(0.6, 1.2, 0.0), DVec3::new(-0.6, 1.2, 0.0), DVec3::new(1.2, 0.6, 0.0), DVec3::new(-1.2, 0.6, 0.0)];
     /// Part of the way to an obstacle.
     const SHORT_OF: f64 = 0.8;
     let shown = world.resource::<RenderState>();
@@ -90,13 +96,31 @@ pub fn find_for_light(world: &mut World) -> LightSpot {
     });
     // Level, whatever the camera does.
     let right = DVec3::new(view.right().x, 0.0, view.right().z).try_normalize().unwrap_or(DVec3::X);
-    let axes = [right, DVec3::Y, right.cross(DVec3::Y)];
-    let place = subject + radius * (0..3).map(|i| OFFSET[i] * axes[i]).sum::<DVec3>();
-    let (way, away) = (place - view.eye, (place - view.eye).length());
+    let level = DMat3::from_cols(right, DVec3::Y, right.cross(DVec3::Y));
+    let (axes, offsets) = match (view.eye - subject).try_normalize().filter(|_| shows_front) {
+        Some(back) => {
+            let right = view.up.cross(back).try_normalize().unwrap_or(right);
+            (DMat3::from_cols(right, back.cross(right), back), &ASIDE[..])
+        }
+        None => (level, &[OFFSET][..]),
+    };
     let scene = world.resource::<RenderState>().extraction.as_ref();
-    let free = scene.and_then(|scene| distance(scene, view.eye, way / away));
-    let share = free.map_or(1.0, |free| (SHORT_OF * free / away).min(1.0));
-    LightSpot { place: view.eye + share * way, subject, radius }
+    // How much of the way to a place is free.
+    let free_share = |place: DVec3| {
+        let (way, away) = (place - view.eye, (place - view.eye).length());
+        let free = scene.and_then(|scene| distance(scene, view.eye, way / away));
+        match free {
+            // Beside what it lights, the ground may be close behind it.
+            Some(free) if !(shows_front && free > away + 0.5 * radius) => (SHORT_OF * free / away).min(1.0),
+            _ => 1.0,
+        }
+    };
+    let places = offsets.iter().map(|offset| subject + radius * (axes * *offset));
+    let (place, share) = places
+        .map(|place| (place, free_share(place)))
+        .reduce(|best, other| if other.1 > best.1 { other } else { best })
+        .unwrap_or((subject, 1.0));
+    LightSpot { place: view.eye + share * (place - view.eye), subject, radius }
 }
 
 /// Centre and radius of a ball around the boxes of objects; `None` without any that has an end.

@@ -177,7 +177,7 @@ pub const LENS: KeyGroup = KeyGroup {
             item("Focus here", &[Menu::Here], Action::FocusHere)
         ),
         row!(
-            "focus follows the point focused on last, or keeps its distance",
+            "focus follows what is selected, else the point focused on last; or keeps its distance",
             shifted(Typed::Text("l"), false, Action::Send(Command::ToggleFocusLock)),
             send_item("Focus stays on its point", &[Menu::Lens], Command::ToggleFocusLock)
         ),

@@ -173,7 +173,10 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 let [x, y] = around.place;
                 for (i, (label, hint)) in [
                     ("off", "keep the focus distance"),
-                    ("object", "follow the point focused on last, when it or the camera moves (L)"),
+                    (
+                        "object",
+                        "follow the selected object, else the point focused on last, when it or the camera moves (L)",
+                    ),
                     ("mouse", "follow what is under the mouse (Shift+L)"),
                 ]
                 .into_iter()
