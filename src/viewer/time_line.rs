@@ -114,6 +114,12 @@ impl Strip {
     }
 }
 
+/// The frame that is shown at a time between two of them: seconds times a rate may be a little less than its number.
+fn whole_frame(frame: f64) -> f64 {
+    let nearest = frame.round();
+    if (frame - nearest).abs() < 1e-6 { nearest } else { frame.floor() }
+}
+
 /// Draws the strip.
 pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
     let mut asked = Vec::new();
@@ -126,7 +132,7 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
             if ui.button(sign).on_hover_text(hint).clicked() {
                 asked.push(Ask::Act(Action::TogglePlay));
             }
-            let shown = strip.frame.map_or("–".to_owned(), |frame| format!("{:.0}", frame.floor()));
+            let shown = strip.frame.map_or("–".to_owned(), |frame| whole_frame(frame).to_string());
             let last = strip.n.saturating_sub(1);
             // As wide as the last one, so that the track does not move.
             let width = 18.0 + 15.0 * last.to_string().len() as f32;
@@ -147,7 +153,9 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 draw_track(ui.painter(), rect, strip);
                 let about = track.on_hover_text("drag: another frame; yellow marks are keys");
                 let frame_at = |place: Pos2| strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));
-                if let Some(place) = about.interact_pointer_pos().filter(|_| about.is_pointer_button_down_on()) {
+                // A button that is released in the frame in which it was pressed was never seen down.
+                let is_meant = about.is_pointer_button_down_on() || about.clicked();
+                if let Some(place) = about.interact_pointer_pos().filter(|_| is_meant) {
                     let frame = frame_at(place);
                     if strip.frame != Some(frame) {
                         asked.push(Ask::Send(strip.moment(frame)));
@@ -241,6 +249,9 @@ mod tests {
         );
         assert_eq!(strip.place_of(30.0), 0.5);
         assert_eq!(strip.moment(12.0), Command::SetMoment { seconds: Some(0.5) });
+        // At 30 a second, some whole frames are a little earlier than their number.
+        assert!((0..1000).all(|i| whole_frame(f64::from(i) / 29.97 * 29.97) == f64::from(i)));
+        assert_eq!(whole_frame(15.7), 15.0);
     }
 
     #[test]
@@ -256,6 +267,34 @@ mod tests {
         assert_eq!(range(strip.with_end(PlayEnd::Last, 5.0)), Some([5.0 / 24.0, 0.25]));
         strip.plays = [0, 23];
         assert_eq!(range(strip.with_end(PlayEnd::Last, 48.0)), None);
+    }
+
+    /// Shows the strip, with a press and a release within a frame.
+    fn click(context: &Context, strip: &Strip, at: Pos2) -> Vec<f64> {
+        let button = |pressed| egui::Event::PointerButton {
+            pos: at,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        };
+        let mut frames = Vec::new();
+        for events in [vec![], vec![egui::Event::PointerMoved(at), button(true), button(false)], vec![]] {
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, egui::vec2(800.0, 100.0)));
+            let input = egui::RawInput { events, screen_rect, ..egui::RawInput::default() };
+            let _ = context.run(input, |context| {
+                frames.extend(show(context, strip, false).into_iter().filter_map(|ask| match ask {
+                    Ask::Send(Command::SetMoment { seconds }) => seconds.map(|seconds| (seconds * strip.fps).round()),
+                    _ => None,
+                }));
+            });
+        }
+        frames
+    }
+
+    #[test]
+    fn a_click_within_one_frame_goes_to_its_frame() {
+        let frames = click(&Context::default(), &strip(61), Pos2::new(400.0, 80.0));
+        assert!(matches!(frames[..], [frame] if (10.0..50.0).contains(&frame)), "{frames:?}");
     }
 
     #[test]

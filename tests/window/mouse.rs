@@ -274,6 +274,15 @@ fn a_material_is_dropped_on_an_object_and_the_panel_keeps_clicks_from_what_is_be
     program.key("Delete");
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(program.title(), "firstlight — room.ron", "the floor is not selected");
+    // Neither is what the panel takes from the image once the mouse is back there.
+    let place = (256, 300);
+    program.point_at(760, 560);
+    std::thread::sleep(Duration::from_millis(500));
+    program.drag(3, place, (0, 0));
+    let frame = (place.0 + 4, place.1 + 30);
+    until("the menu of the image", || is_dark(&program, frame).then_some(()));
+    program.key("Escape");
+    until("the menu to close", || (!is_dark(&program, frame)).then_some(()));
     // The image has moved aside: the middle of the ball is that of what the panel leaves free.
     let (row, ball) = ((585, 263), (256, 200));
     program.drag(1, row, (ball.0 - row.0, ball.1 - row.1));

@@ -47,8 +47,14 @@ impl ApplicationHandler<Wake> for App {
             return;
         }
         let was_over_widgets = self.over_widgets;
-        if let WindowEvent::CursorMoved { position, .. } = &event {
-            self.over_widgets = self.has_widget_at([position.x, position.y]);
+        // Overlays know where the mouse was when they were drawn, which may be before it jumped here.
+        let at_mouse = match &event {
+            WindowEvent::CursorMoved { position, .. } => Some([position.x, position.y]),
+            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => Some(self.input.cursor_place()),
+            _ => None,
+        };
+        if let Some(place) = at_mouse {
+            self.over_widgets = self.has_widget_at(place);
         }
         let in_menu = self.in_menu();
         let Some(presenter) = &mut self.presenter else { return };
@@ -59,11 +65,9 @@ impl ApplicationHandler<Wake> for App {
             true => egui_winit::EventResponse::default(),
             false => presenter.on_window_event(&event),
         };
-        let is_at_mouse = matches!(
-            event,
-            WindowEvent::CursorMoved { .. } | WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. }
-        );
-        response.consumed |= self.over_widgets && is_at_mouse;
+        if at_mouse.is_some() {
+            response.consumed = self.over_widgets || presenter.egui_context().is_using_pointer();
+        }
         if response.repaint && (was_over_widgets || self.has_widgets()) && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }

@@ -182,6 +182,8 @@ impl Input {
     pub fn toggle_play(&mut self, now: Instant) {
         self.count(now);
         self.play = if self.play.is_some() { None } else { Some(now) };
+        // It stops where it was last shown, at a whole frame.
+        self.sum.play = 0.0;
     }
 
     pub fn is_playing(&self) -> bool {

@@ -253,6 +253,16 @@ fn a_focus_that_follows_goes_where_the_mouse_goes() {
 }
 
 #[test]
+fn an_animation_stops_where_it_was_shown() {
+    let (mut input, start) = (Input::new(800, 400, Navigation::Firstlight), Instant::now());
+    input.toggle_play(start);
+    let later = start + Duration::from_millis(100);
+    assert!(matches!(input.take(later)[..], [Command::AdvanceMoment { seconds }] if (seconds - 0.1).abs() < 1e-9));
+    input.toggle_play(later + Duration::from_millis(30));
+    assert_eq!(input.take(later + Duration::from_millis(60)), [], "the whole frame that it stops at stays");
+}
+
+#[test]
 fn a_drag_with_ctrl_orbits_and_a_click_with_ctrl_adds_to_the_selection() {
     for navigation in Navigation::ALL {
         let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());

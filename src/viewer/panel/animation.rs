@@ -42,7 +42,7 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
                 asked.action = Some(Action::TogglePlay);
             }
             if let Some(animation) = animation.filter(|animation| animation.moves()) {
-                let frame = format!("frame {:.1} of {}", at * fps, animation.n_frames());
+                let frame = format!("frame {:.1} / {}", at * fps, animation.n_frames().saturating_sub(1));
                 ui.weak(frame).on_hover_text("as numbered by render --frames");
             }
         });
