@@ -132,7 +132,8 @@ fn property_row(
                 _ => None,
             };
             labelled(ui, &mut |ui| {
-                ui.horizontal(|ui| {
+                // The strength of a light and its textures are in a line below.
+                ui.horizontal_wrapped(|ui| {
                     match paint {
                         ColorParam::Rgb(rgb) => {
                             if let Some(value) = color(ui, *rgb, unit) {
@@ -213,6 +214,33 @@ mod tests {
     use super::*;
     use crate::render;
     use glam::Vec3;
+
+    /// What is wider than the panel makes all of its rows wider, and cuts them.
+    #[test]
+    fn the_rows_of_an_area_light_are_no_wider_than_the_panel() {
+        use crate::frame::{NewThing, Selection, SessionOptions};
+        use crate::scene::{LoadOptions, SceneSource, load};
+        let mut session = Session::new(SessionOptions { width: 8, height: 8, ..SessionOptions::default() }).unwrap();
+        session.adopt(load(&SceneSource::Builtin("ball".to_owned()), &LoadOptions::default()).unwrap());
+        session.update(std::time::Duration::ZERO);
+        session.send(frame::Command::Edit(Edit::Add(NewThing::AreaLight)));
+        session.update(std::time::Duration::ZERO);
+        let active = session.world().resource::<Selection>().active().unwrap();
+        let object = session.inputs().objects.iter().find(|object| object.entity == active).unwrap();
+        let context = egui::Context::default();
+        let mut width = 0.0;
+        for _ in 0..3 {
+            let _ = context.run(egui::RawInput::default(), |context| {
+                egui::Window::new("w").show(context, |ui| {
+                    // That of the panel, its margins, its scroll bar and the indent of a section less.
+                    ui.set_max_width(248.0);
+                    of_object(ui, &session, &session.inventory(), object, &mut Asked::default());
+                    width = ui.min_rect().width();
+                });
+            });
+        }
+        assert!(width <= 248.0, "{width}");
+    }
 
     #[test]
     fn every_property_that_can_be_set_has_a_row_with_its_label() {
