@@ -162,7 +162,7 @@ impl OrderForm {
         };
         // A saved image is no worse than what is seen, unless that has been chosen.
         let status = session.status();
-        let seen = status.denoised_error.or(status.estimated_error).map_or(NOISE, |error| 100.0 * error);
+        let seen = status.known_denoised_error().or(status.estimated_error).map_or(NOISE, |error| 100.0 * error);
         if !frames && self.is_usual {
             self.of_image.error = (seen.clamp(0.25, NOISE) * 100.0).floor() / 100.0;
         }

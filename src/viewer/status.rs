@@ -8,6 +8,8 @@ const MIN_SECONDS: f64 = 0.5;
 
 /// Seconds for which somebody may wait.
 const PATIENCE: f64 = 1800.0;
+/// In place of a figure.
+const NOT_KNOWN: &str = "not known yet";
 /// Errors on the way to a target that is farther away.
 const MILESTONES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 
@@ -28,7 +30,8 @@ pub fn line(status: &Status, target: Target) -> String {
     };
     let place = if status.region.is_some() { " in the region" } else { "" };
     let raw = status.estimated_error.map(percent);
-    let denoised = status.denoised_error.map(percent).filter(|_| status.denoising != Denoising::Raw);
+    let error = |_| status.known_denoised_error().map_or(NOT_KNOWN.to_owned(), percent);
+    let denoised = status.denoised_error.map(error).filter(|_| status.denoising != Denoising::Raw);
     let by = match status.denoised_by {
         DenoiseFilter::Own => String::new(),
         filter => format!(" by {}", filter.label()),
@@ -188,6 +191,12 @@ mod tests {
         assert_eq!(line(&status), "noise 0.40 %, denoised by Open Image Denoise, about 30 s to go");
         (status.denoised_by, status.denoising) = (DenoiseFilter::Own, Denoising::Split);
         assert_eq!(line(&status), "noise 1.0 % | denoised: 0.40 %, about 30 s to go");
+        // Two halves of the samples may lack the same light, such as that of rare, bright paths.
+        status.estimated_error = Some(1.4);
+        assert_eq!(line(&status), "noise over 100 % | denoised: not known yet");
+        status.denoising = Denoising::Denoised;
+        assert_eq!(line(&status), "noise not known yet, denoised");
+        (status.estimated_error, status.denoising) = (Some(0.01), Denoising::Split);
         // A denoised image that is there but not shown does not matter.
         status.denoising = Denoising::Raw;
         let region = Region { start: UVec2::ZERO, end: UVec2::splat(32) };

@@ -144,6 +144,12 @@ impl Status {
         self.camera_mrays + self.bounce_mrays + self.shadow_mrays
     }
 
+    /// Relative error of the denoised image, if it is displayed and can be told: it is estimated from two halves of the
+    /// samples, and as long as these have an error over 100 %, both may lack the same light.
+    pub fn known_denoised_error(&self) -> Option<f64> {
+        self.denoised_error.filter(|_| self.estimated_error.is_none_or(|error| error <= 1.0))
+    }
+
     /// Withdraws the last errors of a scene file, by their texts.
     pub(crate) fn withdraw(&mut self, texts: Vec<String>) {
         self.withdrawn = texts;

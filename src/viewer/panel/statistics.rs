@@ -20,9 +20,10 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));
         figure("", format!("{shadow:.2} shadow"));
         figure("error estimate", status.estimated_error.map_or("–".to_owned(), percent));
-        if let Some(denoised) = status.denoised_error {
+        if status.denoised_error.is_some() {
+            let denoised = status.known_denoised_error().map_or("not known yet,".to_owned(), percent);
             let mixed = if status.mixes_raw { ", mixed with raw" } else { "" };
-            figure("denoised", format!("{} of {} spp{mixed}", percent(denoised), status.denoised_spp));
+            figure("denoised", format!("{denoised} of {} spp{mixed}", status.denoised_spp));
         }
         if let Some(caustics) = status.caustics {
             figure("caustics", caustics.to_string());
