@@ -266,6 +266,7 @@ impl Work {
     ) -> Result<Option<String>, String> {
         let Some(frames) = order.frames.clone() else { return Ok(None) };
         let (n, first, fps) = (frames.end() - frames.start() + 1, *frames.start(), reel.fps());
+        let is_new = !order.path.exists();
         std::fs::create_dir_all(&order.path).map_err(|error| format!("{}: {error}", order.path.display()))?;
         let mut reel = reel.open()?;
         let is_ended = || self.cancelled.load(Ordering::Relaxed) || self.ending.load(Ordering::Relaxed);
@@ -289,7 +290,12 @@ impl Work {
             }
         }
         let folder = order.path.display();
+        if saved == 0 && is_new {
+            // What others have put there meanwhile stays, and so does the folder.
+            let _ = std::fs::remove_dir(&order.path);
+        }
         Ok(Some(match saved {
+            0 => format!("saved none of {n} frames"),
             1 if n == 1 => format!("saved 1 frame in {folder}{short}"),
             saved if saved == n => format!("saved {n} frames in {folder}{short}"),
             saved => format!("saved {saved} of {n} frames in {folder}{short}"),
@@ -362,8 +368,9 @@ mod tests {
         // A window that closes ends it.
         let reel = Reel::of(&mut session).unwrap();
         let long = Order { frames: Some(0..=100_000), path: folder.path().join("long"), ..order };
-        renders.begin(long, Source::Frames(Box::new(reel), settings), "c".to_owned(), 1).unwrap();
+        renders.begin(long.clone(), Source::Frames(Box::new(reel), settings), "c".to_owned(), 1).unwrap();
         let outcome = renders.finish().pop().unwrap().unwrap().1;
         assert!(outcome.contains("of 100001 frames"), "{outcome}");
+        assert_eq!(long.path.exists(), !outcome.starts_with("saved none"), "no empty folder stays");
     }
 }
