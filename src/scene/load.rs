@@ -120,8 +120,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.text_files = read.files.to_vec();
             let bounds = scene.look_at_middle();
             if !scene.has_light() {
-                model =
-                    Some(Model { bounds, side: DVec3::ONE, emits: false, has_camera: true, aspect: options.aspect() });
+                model = Some(Model { bounds, side: DVec3::ONE, emits: false, has_camera: true });
             }
             scene
         }
@@ -136,7 +135,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.facts = Some(made.facts);
             scene.motion = made.motion.map(Arc::new);
             let (bounds, has_camera) = (made.framing.bounds(), made.has_camera);
-            model = Some(Model { bounds, side: DVec3::ONE, emits: made.emits, has_camera, aspect: options.aspect() });
+            model = Some(Model { bounds, side: DVec3::ONE, emits: made.emits, has_camera });
             scene
         }
         SceneSource::Model(path) => {
@@ -149,7 +148,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let (file, framing, side) = default_scene::around(&mesh, &mesh_source, options.up, options.aspect());
             let emits = mesh.slots.iter().any(|(_, part)| emits(part));
             let bounds = framing.bounds();
-            model = Some(Model { bounds, side, emits, has_camera: false, aspect: options.aspect() });
+            model = Some(Model { bounds, side, emits, has_camera: false });
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();

@@ -3,13 +3,18 @@
 //!
 //! What the file brings is measured, not guessed: a small image is rendered in its light alone, and divided by the albedo
 //! of what it shows. That is how bright a white surface would be there, so dark models are not taken for unlit ones. The
-//! result is a function of model and camera.
+//! result is a function of the model, and of the camera of its file if it has one: not of the size of an image.
 
 use crate::files::warnings::Warning;
 use crate::format::bounds::MOST_STOPS;
+use crate::format::camera::CameraPart;
 use crate::format::material_textures::emits;
 use crate::format::parts::{DisplayPart, LightPart, MaterialPart, ObjectPart};
+use crate::format::placement::Placement;
 use crate::format::sources::EnvironmentSource;
+use crate::import::framing::Framing;
+use crate::import::meshes::LoadedMesh;
+use crate::import::model::placing::corners_of;
 use crate::render::{Film, RenderSettings, Techniques, advance, gather_features};
 use crate::scene::default_scene;
 use crate::scene::default_scene::{is_inner, is_key_light};
@@ -32,9 +37,11 @@ pub(super) struct Model {
     pub emits: bool,
     /// Whether the camera is that of the file: then the file is a scene, which stands on a ground of its own.
     pub has_camera: bool,
-    /// Width over height of the image.
-    pub aspect: f64,
 }
+
+/// Width over height of the image in which light is measured, whatever the size of the image that is rendered: an image
+/// opens again at another size, and must have the same light.
+const ASPECT: f64 = 16.0 / 9.0;
 
 /// The light on the surfaces that the camera sees: radiance of a white surface in their place, W·m⁻²·sr⁻¹, 1 being the
 /// white of the display; ascending, not empty.
@@ -111,6 +118,20 @@ impl Model {
         let is_one_sided = |part: &MaterialPart| matches!(part, MaterialPart::Principled { two_sided: false, .. });
         self.brings_light(scene) || self.has_camera || scene.file.materials.iter().any(|(_, part)| is_one_sided(part))
     }
+
+    /// The camera by which light is measured: that of the file, or one that frames the model for [`ASPECT`].
+    fn measuring_camera(&self, scene: &LoadedScene) -> CameraPart {
+        if self.has_camera || !self.is_measured(scene) {
+            return scene.file.camera.clone();
+        }
+        let mut framing = Framing::new(self.side, ASPECT);
+        for (object, mesh) in scene.file.objects.iter().zip(&scene.meshes) {
+            if let Some(LoadedMesh { mesh, .. }) = mesh {
+                framing.add(mesh, corners_of(mesh), &Placement::from_part(object.transform()).affine());
+            }
+        }
+        framing.camera()
+    }
 }
 
 /// Adds to a scene what was added to the same model in its stored pose.
@@ -133,11 +154,18 @@ pub(super) fn light_as_in(scene: &mut LoadedScene, stored: &LoadedScene) {
 /// Adds what the scene of a model lacks: environment, key light and ground, and sets the exposure of physical lights.
 /// An environment that was chosen stays as it is.
 pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
+    let camera = model.measuring_camera(scene);
+    let camera = std::mem::replace(&mut scene.file.camera, camera);
+    light_as_measured(scene, model);
+    scene.file.camera = camera;
+}
+
+fn light_as_measured(scene: &mut LoadedScene, model: &Model) {
     let has_lights = !scene.file.lights.is_empty();
     let brings_light = model.brings_light(scene);
     let own = if brings_light {
         let chosen = std::mem::replace(&mut scene.file.environment, EnvironmentSource::Black);
-        let own = measure(scene, model.aspect);
+        let own = measure(scene);
         scene.file.environment = chosen;
         own
     } else {
@@ -166,9 +194,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
     if !model.is_measured(scene) {
         return;
     }
-    let Some(mut light) =
-        own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene, model.aspect))
-    else {
+    let Some(mut light) = own.filter(|_| is_enough && scene.environment.is_none()).or_else(|| measure(scene)) else {
         if model.has_camera && !sees_anything(&extraction(scene)) {
             scene.warnings.push(format!("{title}: the camera of the file sees nothing of it: choose another view"));
         }
@@ -178,7 +204,7 @@ pub(super) fn light_model(scene: &mut LoadedScene, model: &Model) {
     if !is_enough && light.mean(0.0) < ModelLight::SHADED {
         let place = middle_of_room(&extraction(scene));
         let added = place.map(|place| default_scene::light_inside(&mut scene.file, &place));
-        match added.and_then(|()| measure(scene, model.aspect)).filter(|inside| inside.reached() > light.reached()) {
+        match added.and_then(|()| measure(scene)).filter(|inside| inside.reached() > light.reached()) {
             Some(inside) => {
                 light = inside;
                 let text = format!("{title}: hardly any light gets into it: a light is added inside");
@@ -218,7 +244,7 @@ fn extraction(scene: &LoadedScene) -> Extraction {
 }
 
 /// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
-fn measure(scene: &LoadedScene, aspect: f64) -> Option<ModelLight> {
+fn measure(scene: &LoadedScene) -> Option<ModelLight> {
     /// Pixels of the image.
     const PIXELS: f64 = 1024.0;
     const SAMPLES: u32 = 4;
@@ -233,7 +259,7 @@ fn measure(scene: &LoadedScene, aspect: f64) -> Option<ModelLight> {
     // Unlit materials too. The key light is behind the camera.
     let has_emission = materials.any(|(name, part)| emits(part) && !is_key_light(name));
     let scene = extraction(scene).prepared;
-    let width = (PIXELS * aspect).sqrt().clamp(8.0, PIXELS / 8.0).round();
+    let width = (PIXELS * ASPECT).sqrt().clamp(8.0, PIXELS / 8.0).round();
     let size = UVec2::new(width as u32, (PIXELS / width).round() as u32);
     let settings = |max_depth| {
         let techniques = Techniques { caustics: false, ..Techniques::ALL };

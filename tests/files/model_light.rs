@@ -173,6 +173,26 @@ fn lights_are_exposed_for_their_level() {
     assert!(generated(&away).is_some() && says(&away, "too weak or does not reach"), "{:?}", away.warnings);
 }
 
+/// An image that is taller than wide opens again as it was, and so does one that is saved from a window.
+#[test]
+fn the_light_does_not_depend_on_the_size_of_the_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let glow = json!({ "emissiveFactor": [1, 1, 1] });
+    let one_sided = json!({ "doubleSided": false });
+    for (i, bytes) in [with_part(&glow, 0.5), with_part(&glow, 3.0), with_part(&one_sided, 1.0)].iter().enumerate() {
+        let path = folder.path().join(format!("{i}.glb"));
+        std::fs::write(&path, bytes).unwrap();
+        let with = |aspect| {
+            let scene = load(&SceneSource::Model(path.clone()), &LoadOptions { aspect, ..LoadOptions::default() });
+            let file = scene.unwrap().file;
+            format!("{:?} {:?} {:?} {:?}", file.environment, file.display, file.materials, file.lights)
+        };
+        for aspect in [0.5, 1.0, 3.0] {
+            assert_eq!(with(Some(aspect)), with(None), "model {i} at {aspect}");
+        }
+    }
+}
+
 #[test]
 fn an_environment_of_choice_keeps_the_ground() {
     let folder = tempfile::tempdir().unwrap();
