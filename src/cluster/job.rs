@@ -283,13 +283,16 @@ impl Rounds {
     /// Reads the rounds in `folder`.
     ///
     /// # Errors
-    /// When there are none.
+    /// When there are none, or their numbers are not what a merge writes.
     pub fn read(folder: &Path) -> Result<Self, JobError> {
         let path = folder.join(ROUNDS);
         let rounds: Self = read(path.clone())?;
-        let is_right = |round: &JobRound| round.samples.0 < round.samples.1;
+        let is_right = |round: &JobRound| {
+            round.samples.0 < round.samples.1 && round.error.is_none_or(|error| error >= 0.0 && error.is_finite())
+        };
         if rounds.0.is_empty() || !rounds.0.iter().all(is_right) {
-            return Err(JobError::Content { path, reason: "has no rounds, or one without samples".to_owned() });
+            let reason = "has no rounds, or one without samples or with an error that is none".to_owned();
+            return Err(JobError::Content { path, reason });
         }
         Ok(rounds)
     }
@@ -383,6 +386,9 @@ mod tests {
         );
         rounds.0[0].merged = true;
         assert_eq!(rounds.open(), None);
+        rounds.0[0].error = Some(-1.0);
+        rounds.write(folder.path()).unwrap();
+        assert!(Rounds::read(folder.path()).is_err());
         std::fs::write(folder.path().join("rounds.json"), "[]").unwrap();
         assert!(Rounds::read(folder.path()).is_err());
     }
