@@ -5,7 +5,7 @@ use crate::core::techniques::Techniques;
 use crate::prepare::light::LightTable;
 use crate::prepare::portals::Portals;
 use crate::prepare::prepared::Prepared;
-use firstlight_simd::{Float, Mask, Real, Simd, Vector, Vector3, select, select_vector};
+use firstlight_simd::{Float, Kernel, Mask, Real, Simd, Vector, Vector3, select, select_vector};
 use glam::{Vec2, Vec3};
 
 /// Share of directions through portals where the brightness is sampled as well.
@@ -127,13 +127,16 @@ impl<'a> EnvironmentSampling<'a> {
         let through = mask & u[0].lt(zero.all(share));
         let (of_portals, of_image) = (u[0] / share, (u[0] - share) / (1.0 - share).max(f32::MIN_POSITIVE));
         u[0] = select(through, of_portals, of_image).at_least(0.0).at_most(1.0f32.next_down());
-        let (mut found, mut wi, mut pdf) = portals.sample(through, position, normal, u);
+        let (mut found, mut wi, known) = zero.s.call(PortalSample { portals, mask: through, position, normal, u });
         if let Some(image) = self.image {
             let (seen, dir, _) = image.sample_lanes(u);
             wi = select_vector(through, wi, dir);
             found |= mask & seen & !through;
-            pdf = self.pdf_lanes(position, normal, wi);
         }
+        let pdf = match (known, self.image) {
+            (Some(pdf), None) => pdf,
+            _ => self.pdf_lanes(position, normal, wi),
+        };
         (found & pdf.is_positive(), wi, pdf)
     }
 
@@ -146,9 +149,44 @@ impl<'a> EnvironmentSampling<'a> {
             pdf = image.pdf_lanes(wi) * by_brightness;
         }
         match self.portals {
-            Some(portals) => pdf + portals.pdf(position, normal, wi) * through,
+            Some(portals) => pdf + wi.x.s.call(PortalPdf { portals, position, normal, wi }) * through,
             None => pdf,
         }
+    }
+}
+
+/// Arguments of [`Portals::sample`], whose code is shared by all that sample lights.
+struct PortalSample<'a, S: Simd> {
+    portals: &'a Portals,
+    mask: Mask,
+    position: Vector<S>,
+    normal: Vector<S>,
+    u: [Float<S>; 2],
+}
+
+impl<S: Simd> Kernel<S> for PortalSample<'_, S> {
+    type Output = (Mask, Vector<S>, Option<Float<S>>);
+
+    #[inline(always)]
+    fn run(self, _: S) -> Self::Output {
+        self.portals.sample(self.mask, self.position, self.normal, self.u)
+    }
+}
+
+/// Arguments of [`Portals::pdf`], likewise.
+struct PortalPdf<'a, S: Simd> {
+    portals: &'a Portals,
+    position: Vector<S>,
+    normal: Vector<S>,
+    wi: Vector<S>,
+}
+
+impl<S: Simd> Kernel<S> for PortalPdf<'_, S> {
+    type Output = Float<S>;
+
+    #[inline(always)]
+    fn run(self, _: S) -> Float<S> {
+        self.portals.pdf(self.position, self.normal, self.wi)
     }
 }
 
