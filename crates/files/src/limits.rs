@@ -22,7 +22,7 @@ pub struct Limits {
     pub scene_image_bytes: u64,
     /// Bytes of all meshes of a scene together, and of the files that are read for them.
     pub scene_mesh_bytes: u64,
-    /// Emissive triangles and spheres of a scene, besides those that its files have room for; 630 bytes each.
+    /// Emissive triangles and spheres of a scene, besides those that its files have room for; 700 bytes each.
     pub scene_lights: u64,
     /// Pixels of a film that is read; reading takes up to 700 bytes of memory per pixel.
     pub film_pixels: u64,

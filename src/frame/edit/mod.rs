@@ -207,8 +207,7 @@ pub struct EditQueue(pub Vec<Edit>);
 /// Reads [`EditQueue`]; writes entities, [`Selection`], [`History`], [`Status`].
 pub fn edit_scene(world: &mut World) {
     let edits = std::mem::take(&mut world.resource_mut::<EditQueue>().0);
-    let known = if edits.is_empty() { Vec::new() } else { off_their_tracks(world) };
-    let is_any = !edits.is_empty();
+    let known = (!edits.is_empty()).then(|| off_their_tracks(world));
     for edit in edits {
         // With nothing to do it on, an edit does no harm.
         let kind = match edit {
@@ -220,7 +219,7 @@ pub fn edit_scene(world: &mut World) {
             world.resource_mut::<Status>().say(now, kind, problem);
         }
     }
-    if is_any {
+    if let Some(known) = known {
         keys::tell_what_needs_keys(world, &known);
     }
     // Removed entities are deselected.

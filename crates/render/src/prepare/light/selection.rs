@@ -150,7 +150,7 @@ impl LightSelection {
         let mut estimates = [0.0; MAX_ESTIMATED];
         let mut sum = 0.0;
         for (estimate, bounds) in estimates.iter_mut().zip(&self.bounds) {
-            *estimate = bounds.estimate_one(position, normal);
+            *estimate = bounds.estimate_on(position.into(), normal.into());
             sum += *estimate;
         }
         (estimates, sum)
@@ -180,14 +180,7 @@ impl LightBounds {
         Self { center, radius, normal, intensity: light.mean_radiance * projected, cone }
     }
 
-    #[inline]
-    fn estimate_one(&self, position: Vec3, normal: Vec3) -> f32 {
-        let offset = Vector3::from(self.center - position);
-        let side = (normal != Vec3::ZERO).then(|| normal.into());
-        self.estimate(offset.length_squared(), offset / offset.length(), side)
-    }
-
-    /// Like the scalar estimate, for one or sixteen points.
+    /// Estimates the irradiance on the side of `normal`, if there is one, at one or sixteen points.
     #[inline(always)]
     pub fn estimate_at<R: Real>(&self, position: Vector3<R>, normal: Option<Vector3<R>>) -> R {
         let offset = Vector3::in_all(position.x, self.center) - position;
