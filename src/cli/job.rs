@@ -261,14 +261,19 @@ impl RenderJob {
         let Some((FilmFile { film, shot, .. }, path)) = kept else {
             return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
         };
-        let ours = ImageMetadata::from_note(&self.note(&film, path)).map_err(|error| Failure::Failed(error.into()))?;
-        match ours.differs_from(&shot) {
+        match self.differs_from(&film, &shot, path)? {
             None => Ok(film),
             Some(what) => Err(Failure::Failed(format!(
                 "{}: the film was rendered with a different {what}; resume it as it was begun, or choose a new --film",
                 path.display()
             ))),
         }
+    }
+
+    /// Why samples for `film`, in the file `path`, cannot be combined with those of `shot`, if so.
+    pub fn differs_from(&self, film: &Film, shot: &ImageMetadata, path: &Path) -> Result<Option<&str>, Failure> {
+        let ours = ImageMetadata::from_note(&self.note(film, path)).map_err(|error| Failure::Failed(error.into()))?;
+        Ok(ours.differs_from(shot))
     }
 
     /// When to stop rendering.

@@ -29,7 +29,9 @@ use std::time::{Duration, Instant};
 const NUMBER: &str = "{part}";
 
 /// Renders the part given by `args`.
-pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
+///
+/// - `merged`: the film of earlier rounds, which the part is added to.
+pub fn run(args: &RenderArgs, merged: Option<&Path>, stop: &Stop) -> Result<(), Failure> {
     stop.is_of_part();
     // Uniform allocation: only a fixed number of samples can be divided in advance.
     let args = &RenderArgs { uniform: args.part_by() != PartBy::Frames || args.uniform, ..args.clone() };
@@ -41,7 +43,7 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         .map_err(|error| Failure::Retry(format!("error: cannot start worker threads: {error}")))?;
     pool.install(|| match args.part_by() {
         PartBy::Frames => frames(args, part, stop),
-        PartBy::Samples | PartBy::Tiles => film(args, part, stop),
+        PartBy::Samples | PartBy::Tiles => film(args, part, merged, stop),
     })
 }
 
@@ -62,7 +64,7 @@ fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
 }
 
 /// Renders a part of the samples or of the tiles of an image.
-fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
+fn film(args: &RenderArgs, part: Part, merged: Option<&Path>, stop: &Stop) -> Result<(), Failure> {
     if args.is_sequence() {
         return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
     }
@@ -91,6 +93,14 @@ fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
     };
     let args = &RenderArgs { samples: Some(samples.clone()), ..args.clone() };
     let (film, kept) = film_so_far(args, &job, &path).map_err(Failure::of_part)?;
+    // A film that cannot be read is told by the merge.
+    if let Some((merged, summary)) = merged.and_then(|path| Some((path, read_film_summary(path).ok()?)))
+        && let Some(what) = job.differs_from(&film, &summary.shot, merged)?
+    {
+        let merged = merged.display();
+        let message = format!("{merged}: the rounds before were rendered with a different {what}: submit a new job");
+        return Err(Failure::Failed(message).of_part());
+    }
     let region = match args.part_by() {
         PartBy::Tiles => Some(region(&film, part, &job)?),
         _ => None,

@@ -55,7 +55,7 @@ impl Command {
 /// Renders each scene in turn.
 pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
     if let Some(job) = command.part()? {
-        return part::run(&job, stop);
+        return part::run(&job, None, stop);
     }
     let jobs = command.jobs()?;
     // An error in the last argument should be reported before the others are rendered.

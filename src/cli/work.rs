@@ -130,7 +130,7 @@ impl WorkOrder {
         moved.map_err(|error| Failure::Retry(format!("error: {}: {error}", self.folder.display())))?;
         let command = Command::parse(&words).map_err(|failure| failure.of_part())?;
         match command.part()? {
-            Some(args) => part::run(&args, stop),
+            Some(args) => part::run(&args, (number > 1).then_some(Path::new(ALL[0])), stop),
             None => unreachable!("the words have --part"),
         }
     }

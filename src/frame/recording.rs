@@ -10,7 +10,7 @@ use crate::frame::command::Command;
 use crate::frame::core::status::MessageKind;
 use crate::frame::input::CommandQueue;
 use crate::frame::state::resources::{Clock, CurrentScene, SceneGeneration};
-use crate::scene::{FileKind, InputFile, ReadError, WriteError, check_film_size};
+use crate::scene::{FileKind, InputFile, ModelChoice, ReadError, WriteError, check_film_size};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -27,6 +27,12 @@ pub(super) struct RecordingHeader {
     /// Program name and version.
     pub(super) program: String,
     pub(super) scene: SceneWord,
+    /// An image in place of the scene's own environment, by its path relative to the recording.
+    #[serde(default)]
+    pub(super) environment: Option<String>,
+    /// What of the model is opened.
+    #[serde(default)]
+    pub(super) choice: ModelChoice,
     /// Up axis, `y` or `z`, if given.
     #[serde(default)]
     pub(super) up: Option<char>,

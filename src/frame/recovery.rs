@@ -114,13 +114,20 @@ impl Recovery {
         Err(format!("{}: unsaved edits cannot be backed up: the folder holds too many backups", folder.display()))
     }
 
-    /// Edits of windows that no longer run, the oldest first.
+    /// Edits of windows that no longer run, the oldest first. What such windows left without a scene, as on a full
+    /// disk, is removed.
     pub fn left_behind(&self) -> Vec<LeftBehind> {
         let Some(entries) = self.folder.as_ref().and_then(|folder| std::fs::read_dir(folder).ok()) else {
             return Vec::new();
         };
-        let mut scenes: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        scenes.retain(|path| path.extension().is_some_and(|extension| extension == SCENE));
+        let is = |path: &Path, wanted: &str| path.extension().is_some_and(|extension| extension == wanted);
+        let paths = entries.flatten().map(|entry| entry.path());
+        let (mut scenes, others): (Vec<PathBuf>, Vec<PathBuf>) = paths.partition(|path| is(path, SCENE));
+        for path in others.iter().filter(|path| is(path, LOCK) && !path.with_extension(SCENE).exists()) {
+            if let Ok(Some(_lock)) = lock(path) {
+                remove(path);
+            }
+        }
         scenes.sort_by_key(|path| (path.metadata().and_then(|data| data.modified()).ok(), path.clone()));
         let left = |scene: PathBuf| {
             let lock = lock(&scene).ok()??;
@@ -213,8 +220,15 @@ mod tests {
         window.keep(description("cornell"), "cornell");
         assert!(window.wait().is_some() && !window.has_kept());
         std::fs::remove_dir_all(&scene).unwrap();
+        // Nothing is offered, and what is left goes with the window.
+        let (next, files) = (Recovery::beside(Some(folder.path())), scene.parent().unwrap());
+        assert!(next.left_behind().is_empty() && std::fs::read_dir(files).unwrap().count() > 0);
         window.keep(description("cornell"), "cornell");
         assert_eq!((window.wait(), window.has_kept()), (None, true));
+        std::fs::remove_file(&scene).unwrap();
+        drop(window);
+        assert!(next.left_behind().is_empty());
+        assert_eq!(std::fs::read_dir(files).unwrap().count(), 0);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
 use crate::frame::core::offline::{Target, render_offline_until};
 use crate::frame::core::status::MessageKind;
+use crate::frame::input::ModelUp;
 use crate::frame::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::resources::{CurrentScene, FreeShare, PictureSize, RenderState, SceneGeneration, StopAt};
@@ -17,11 +18,18 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 impl Session {
-    /// Starts recording; must be called before the first frame, with the scene that is opened first.
+    /// Starts recording; must be called before the first frame, with the scene that is opened first and what
+    /// [`Session::open_choice`] is called with.
     ///
     /// # Errors
     /// If the file cannot be created.
-    pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), WriteError> {
+    pub fn record(
+        &mut self,
+        path: &Path,
+        source: &SceneSource,
+        environment: Option<&Path>,
+        choice: &ModelChoice,
+    ) -> Result<(), WriteError> {
         check_recordable(path)?;
         let mut out = WholeFile::claim(path, Replace::AllButFilms)?;
         let folder = folder_of(path);
@@ -37,7 +45,9 @@ impl Session {
             format: FORMAT,
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
-            up: up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' }),
+            environment: environment.map(|image| relative_path(&folder, image)),
+            choice: choice.clone(),
+            up: self.world().resource::<ModelUp>().0.map(|up| if up == UpAxis::Y { 'y' } else { 'z' }),
             width,
             height,
             seed: self.world().resource::<Rendering>().0.seed,
@@ -130,7 +140,8 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         waker: None,
     })?;
     session.world_mut().insert_resource(FreeShare(header.free.unwrap_or(1.0)));
-    session.open_choice(source, None, ModelChoice { allow_outside: options.allow_outside, ..ModelChoice::default() });
+    let environment = header.environment.map(|image| folder_of(path).join(text_to_path(&image)));
+    session.open_choice(source, environment, ModelChoice { allow_outside: options.allow_outside, ..header.choice });
     let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
     let (mut end, mut last, mut commands) = (None, 0, 0);
     for line in lines {
@@ -318,19 +329,19 @@ mod tests {
         let mut first = session();
         assert!(
             first
-                .record(&scene, &source, None)
+                .record(&scene, &source, None, &ModelChoice::DEFAULT)
                 .unwrap_err()
                 .to_string()
                 .contains("s.ron: exists and is not a recording")
         );
         assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
         // While it is being written, no other process may write it.
-        first.record(&target, &source, None).unwrap();
+        first.record(&target, &source, None, &ModelChoice::DEFAULT).unwrap();
         let begun = std::fs::read_to_string(&target).unwrap();
         assert!(begun.lines().count() == 1 && begun.contains("File(\"s.ron\")"), "{begun}");
         assert!(
             session()
-                .record(&target, &source, None)
+                .record(&target, &source, None, &ModelChoice::DEFAULT)
                 .unwrap_err()
                 .to_string()
                 .contains("is being written by another process")
@@ -340,7 +351,7 @@ mod tests {
         first.end_record();
         assert_eq!(read(&target, &|| false).unwrap().1.len(), 2, "a command and the end");
         let mut second = session();
-        second.record(&target, &source, None).unwrap();
+        second.record(&target, &source, None, &ModelChoice::DEFAULT).unwrap();
         second.end_record();
         assert_eq!(read(&target, &|| false).unwrap().1.len(), 1);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");

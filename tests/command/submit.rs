@@ -267,3 +267,25 @@ fn an_image_of_what_is_there_replaces_nothing_that_the_scene_reads() {
         does(path, "status job --image so-far.png");
     }
 }
+
+/// Samples of two scenes are not added up, and no time is spent on those of the second.
+#[test]
+fn a_later_round_renders_no_other_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let ball = "materials: { \"m\": diffuse(albedo: 0.5) }, objects: [sphere(center: (0, 0, 0), radius: 1, material: \"m\")], film:";
+    std::fs::write(path.join("a.ron"), SCENE.replace("film:", ball)).unwrap();
+    does(path, "submit slurm a.ron --size 8x8 --parts 1 --spp 4 --error 1e-9 -o job --dry-run");
+    does(path, "work job --part 1/1");
+    let said = does(path, "work job --merge");
+    assert!(said.contains("round 2"), "{said}");
+    let scene = path.join("job/scene/a.ron");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    let changed = text.replace("constant(1)", "constant(2)");
+    assert!(changed != text);
+    std::fs::write(&scene, changed).unwrap();
+    let said = fails(path, "work job --part 1/1", 2);
+    assert!(said.contains("all.exr: the rounds before were rendered with a different scene"), "{said}");
+    std::fs::write(&scene, text).unwrap();
+    does(path, "work job --part 1/1");
+}

@@ -174,6 +174,23 @@ pub struct Program<'a> {
     window: String,
 }
 
+impl Drop for Program<'_> {
+    /// A test that fails says what the program was doing.
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            return;
+        }
+        let process = self.child.0.id();
+        let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default().trim_end().to_owned();
+        eprintln!("window {}, keyboard {:?}", self.window, self.desktop.tool("xdotool", &["getwindowfocus"]));
+        for task in std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten() {
+            let [stat, waits] = ["stat", "wchan"].map(|name| read(&task.path().join(name)));
+            eprintln!("{}, {waits}", stat.split_whitespace().take(15).collect::<Vec<_>>().join(" "));
+        }
+        eprintln!("{}", self.errors());
+    }
+}
+
 impl Program<'_> {
     pub fn focus(&self) {
         until("the window to take the keyboard", || {

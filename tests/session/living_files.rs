@@ -4,7 +4,7 @@ use crate::driver::{Drive, Driver};
 use crate::program::{Outcome, does, program};
 use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Property, Session, SessionOptions, Target};
 use firstlight::scene::{
-    ColorParam, LoadOptions, Material, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
+    ColorParam, LoadOptions, Material, ModelChoice, Moment, SceneInputs, SceneSource, Shape, SurfaceMaterial, load,
 };
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -183,7 +183,7 @@ fn a_replay_has_the_mesh_that_was_deleted_and_brought_back() {
     let recording = folder.path().join("session.rec");
     let source = SceneSource::Builtin("gallery".to_owned());
     let mut driver = Driver::open(source.clone(), 2, 1);
-    driver.session.record(&recording, &source, None).unwrap();
+    driver.session.record(&recording, &source, None, &ModelChoice::DEFAULT).unwrap();
     driver.settle();
     let before = driver.session.film_snapshot().unwrap();
     for command in [Command::Edit(Edit::SelectAll), Command::Edit(Edit::Delete), Command::Edit(Edit::Undo)] {
@@ -203,6 +203,42 @@ fn a_replay_has_the_mesh_that_was_deleted_and_brought_back() {
     assert!(!folder.path().join("saved.ron").exists());
 }
 
+/// The image of the sky that a session began with, and the parameters of its scene.
+#[test]
+fn a_replay_opens_what_the_recording_was_begun_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = r#"<scene version="3.0.0"><default name="shade" value="0.1"/>
+        <sensor type="perspective"><transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/>
+        </transform></sensor><shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="$shade"/></bsdf>
+        </shape><emitter type="constant"/></scene>"#;
+    std::fs::write(path.join("ball.xml"), scene).unwrap();
+    image::RgbImage::from_fn(8, 4, |x, y| image::Rgb([30 * x as u8, 60 * y as u8, 90]))
+        .save(path.join("sky.png"))
+        .unwrap();
+    std::fs::create_dir(path.join("elsewhere")).unwrap();
+    let recording = path.join("elsewhere/session.rec");
+    let (source, sky) = (SceneSource::Foreign(path.join("ball.xml")), path.join("sky.png"));
+    let choice = ModelChoice { defines: vec![("shade".to_owned(), "0.8".to_owned())], ..ModelChoice::default() };
+    let options = SessionOptions {
+        width: 24,
+        height: 16,
+        target: Target { spp: Some(4), ..Target::default() },
+        ..SessionOptions::default()
+    };
+    let mut session = Session::new(options).unwrap();
+    session.record(&recording, &source, Some(&sky), &choice).unwrap();
+    session.open_choice(source, Some(sky), choice);
+    let mut driver = Driver { session, start: std::time::Instant::now() };
+    driver.settle();
+    let shown = driver.session.film_snapshot().unwrap();
+    driver.session.end_record();
+    let options = firstlight::frame::ReplayOptions::default();
+    let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
+    assert_eq!(played.warnings, Vec::<String>::new());
+    assert!(played.film.means() == shown.means());
+}
+
 /// A session that does a bit of everything, and another one that plays it.
 #[test]
 fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
@@ -211,7 +247,10 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     let source = write_room(path);
     let recording = path.join("session.rec");
     let mut driver = Driver::open(SceneSource::Builtin("dof-balls".to_owned()), 2, 5);
-    driver.session.record(&recording, &SceneSource::Builtin("dof-balls".to_owned()), None).unwrap();
+    driver
+        .session
+        .record(&recording, &SceneSource::Builtin("dof-balls".to_owned()), None, &ModelChoice::DEFAULT)
+        .unwrap();
     driver.settle();
     let send = |driver: &mut Driver, commands: Vec<Command>| {
         for command in commands {

@@ -200,7 +200,8 @@ impl App {
             session.world_mut().insert_resource(FreeShare(f64::from(1.0 - panel::width(window) / window)));
         }
         if let Some(path) = &options.record {
-            session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
+            let recorded = session.record(path, &options.source, options.environment.as_deref(), &options.choice);
+            recorded.map_err(|error| ViewerError::Session(error.into()))?;
         }
         session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
         let trouble = memory.begin(&mut session);
