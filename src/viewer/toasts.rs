@@ -60,10 +60,14 @@ impl Toasts {
 
     fn show(&mut self, tone: Tone, text: String, button: Option<(&'static str, Action)>, now: Instant) {
         let text = printable::lines(&text);
-        // Long enough to read; for a problem, to read twice.
+        // Long enough to read; for a problem, to read twice; for an offer, to make up one's mind and reach it.
         let reading = Duration::from_millis(1500 + 40 * text.len() as u64);
-        let until = now
-            + if tone == Tone::Problem || button.is_some() { 2 * reading + Duration::from_secs(3) } else { reading };
+        let shown = match (&button, tone) {
+            (Some(_), _) => 2 * reading + Duration::from_secs(10),
+            (None, Tone::Problem) => 2 * reading + Duration::from_secs(3),
+            (None, _) => reading,
+        };
+        let until = now + shown;
         // The first word is the topic: a message replaces an older one of the same topic.
         let topic = |text: &str| text.split_whitespace().next().map(str::to_owned);
         if tone == Tone::News {

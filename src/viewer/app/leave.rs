@@ -1,6 +1,7 @@
 //! Unsaved edits: stored in the settings folder some seconds after they are made, confirmed when the window closes, and
 //! offered at the next start if the window could not ask.
 
+use crate::files::printable;
 use crate::frame::Command;
 use crate::viewer::app::App;
 use crate::viewer::app::tick::short_name;
@@ -79,7 +80,8 @@ impl App {
 
     fn ask_to_leave(&mut self, then: Option<Command>, now: Instant) {
         let title = short_name(&self.session.status().scene);
-        let file = short_name(&self.scene_path(false).to_string_lossy());
+        let path = self.scene_path(false);
+        let file = printable::line(&std::path::absolute(&path).unwrap_or(path).to_string_lossy()).into_owned();
         let renders = !self.renders.is_empty();
         self.ask(Prompt::Leave { title, file, renders, then }, now);
     }
