@@ -77,7 +77,7 @@ pub enum Command {
     Level,
     /// Switch between turning about the vertical, which keeps the horizon, and turning freely about the image axes.
     ToggleTurntable,
-    /// Restore the camera at the time when the scene was opened.
+    /// Return to the view with which the scene was opened; focus and aperture stay.
     Home,
     /// Keep the direction, move the camera so that the selection just fits into the image, or else the whole scene
     /// except for distant outliers, and focus on the centre.

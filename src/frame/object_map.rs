@@ -13,6 +13,9 @@ use std::collections::HashSet;
 /// No object.
 const NONE: u32 = u32::MAX;
 
+/// Distance of what counts as in front, relative to that of what it hides: surfaces that meet are at about the same.
+const NEARER: f32 = 0.995;
+
 /// What a map is made of; shares the snapshot.
 pub struct ObjectMapSource {
     scene: Prepared,
@@ -23,8 +26,9 @@ pub struct ObjectMapSource {
 #[derive(Clone, Debug)]
 pub struct ObjectMap {
     size: UVec2,
-    /// Row by row from the top: indices of `entities`.
+    /// Row by row from the top: indices of `entities`, and distances in metres.
     objects: Vec<u32>,
+    distances: Vec<f32>,
     entities: Vec<Entity>,
 }
 
@@ -48,7 +52,8 @@ impl ObjectMapSource {
     pub fn trace(self, size: UVec2, stop: &dyn Fn() -> bool) -> Option<ObjectMap> {
         let Self { scene, entities } = self;
         let (mut rays, mut hits) = (RayBatch::default(), HitBatch::default());
-        let mut objects = Vec::with_capacity(size.x as usize * size.y as usize);
+        let n = size.x as usize * size.y as usize;
+        let (mut objects, mut distances) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for y in 0..size.y {
             if stop() {
                 return None;
@@ -59,9 +64,12 @@ impl ObjectMapSource {
                 rays.push(&scene.camera.middle_ray(place, size.as_vec2()));
             }
             scene.geometry.tree.closest_hits(&rays, RayClass::Coherent, &mut hits);
-            objects.extend((0..rays.len()).map(|i| hits.get(i).map_or(NONE, |hit| hit.object)));
+            for hit in (0..rays.len()).map(|i| hits.get(i)) {
+                objects.push(hit.map_or(NONE, |hit| hit.object));
+                distances.push(hit.map_or(f32::INFINITY, |hit| hit.t));
+            }
         }
-        Some(ObjectMap { size, objects, entities })
+        Some(ObjectMap { size, objects, distances, entities })
     }
 }
 
@@ -78,7 +86,8 @@ impl ObjectMap {
         self.entities.get(object as usize).copied()
     }
 
-    /// The line around all pixels that show one of these; `None` if no pixel does.
+    /// The line around all pixels that show one of these; `None` if no pixel does. Where something stands in front, there
+    /// is none: around all that stands on a floor, it would say that all of that is meant.
     ///
     /// - `radius`: half of its width, pixels; its rim is a pixel wide on either side.
     pub fn outline(&self, of: &HashSet<Entity>, radius: f32) -> Option<Outline> {
@@ -95,10 +104,12 @@ impl ObjectMap {
                 let place = UVec2::new(x as u32, y as u32);
                 (min, max) = (min.min(place), max.max(place));
                 // At the edge of the image there is no line: the object goes on.
-                let differs = (x > 0 && !is_in(x - 1, y))
-                    || (x + 1 < width && !is_in(x + 1, y))
-                    || (y > 0 && !is_in(x, y - 1))
-                    || (y + 1 < height && !is_in(x, y + 1));
+                let nearest = NEARER * self.distances[y * width + x];
+                let ends = |x: usize, y: usize| !is_in(x, y) && self.distances[y * width + x] >= nearest;
+                let differs = (x > 0 && ends(x - 1, y))
+                    || (x + 1 < width && ends(x + 1, y))
+                    || (y > 0 && ends(x, y - 1))
+                    || (y + 1 < height && ends(x, y + 1));
                 if differs {
                     border.push(place);
                 }
@@ -138,7 +149,8 @@ mod tests {
         let entities = [world.spawn_empty().id(), world.spawn_empty().id()];
         let objects = rows.iter().flat_map(|row| row.chars()).map(|c| c.to_digit(10).unwrap_or(NONE)).collect();
         let size = UVec2::new(rows[0].len() as u32, rows.len() as u32);
-        (ObjectMap { size, objects, entities: entities.to_vec() }, entities)
+        let distances = vec![1.0; (size.x * size.y) as usize];
+        (ObjectMap { size, objects, distances, entities: entities.to_vec() }, entities)
     }
 
     #[test]
@@ -163,6 +175,20 @@ mod tests {
         assert!(line(2, 1)[1] > 0.4, "the rim is beside the line");
         assert_eq!([line(0, 5), line(2, 5)], [[0.0; 2]; 2], "not inside, nor at the edge of the image");
         assert_eq!(map.outline(&HashSet::from([b]), 0.5), None);
+    }
+
+    #[test]
+    fn there_is_no_line_around_what_stands_in_front() {
+        let rows = [".........", "000000000", "000111000", "000111000", "000000000"];
+        let (mut map, [floor, ball]) = map(&rows);
+        for (distance, object) in map.distances.iter_mut().zip(&map.objects) {
+            *distance = if *object == 1 { 0.9 } else { 1.0 };
+        }
+        let lines = |of: Entity| {
+            let outline = map.outline(&HashSet::from([of]), 0.5).unwrap();
+            outline.pixels.iter().filter(|[line, _]| *line == 1.0).count()
+        };
+        assert_eq!([lines(floor), lines(ball)], [9, 6], "the horizon alone, and all of what is in front");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::frame::command::Command;
 use crate::frame::core::rig::Rig;
 use crate::frame::navigation::{
-    Surroundings, dolly, fly, focus_at, level, orbit_above, pan, roll, scale_aperture, scale_focus, set_aperture,
+    Surroundings, dolly_above, fly, focus_at, level, orbit_above, pan, roll, scale_aperture, scale_focus, set_aperture,
     stride, toggle_depth_of_field, turn, zoom,
 };
 use glam::DVec3;
@@ -29,11 +29,12 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
         Command::Dolly { factor } if projection.orthographic_height.is_some() => {
             Some(Rig { projection: zoom(&projection, factor), ..*rig })
         }
-        Command::Dolly { factor } => with_view(dolly(&view, factor)),
+        Command::Dolly { factor } => with_view(dolly_above(&view, factor, around.turning, around.ground)),
         Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
         Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
         Command::Level => with_view(level(&view)),
-        Command::Home => Some(around.home),
+        // What is in focus, and how much, is no matter of where one stands.
+        Command::Home => Some(Rig { lens, ..around.home }),
         Command::SetView(view) => with_view(view),
         Command::SetProjection(projection) => Some(Rig { projection, ..*rig }),
         Command::SetLens(lens) => with_lens(lens),
@@ -77,7 +78,7 @@ mod tests {
             go(Command::Turn { yaw_deg: 90.0, pitch_deg: 0.0 }).view,
             turn(&rig.view, FRAC_PI_2, 0.0, Turning::Turntable)
         );
-        assert_eq!(go(Command::Home), around.home);
+        assert_eq!(go(Command::Home), Rig { lens: rig.lens, ..around.home });
         let flown = go(Command::Fly { right: 0.0, up: 0.0, forward: 2.0 }).view;
         assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0, None)).abs() < 1e-14);
         assert_eq!(go(Command::ScaleFocus { factor: 2.0 }).view, rig.view);

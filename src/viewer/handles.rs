@@ -1,7 +1,7 @@
 //! Overlays of the selection: its bounds and its handles, and dragging them.
 
 use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
-use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
+use crate::frame::{Command, Edit, OwnBox, Projector, SceneBounds, Selection, Session};
 use crate::scene::{Placement, light_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
@@ -22,6 +22,8 @@ const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
 pub struct Handles {
     /// Of the selection, in its order, and whether something without a size is to be marked.
     boxes: Vec<(Entity, OwnBox, bool)>,
+    /// What of it a drag moves; not floors and walls, on which a drag is meant for the view.
+    bodies: Vec<Entity>,
     gizmo: Option<(Gizmo, Projector)>,
     projector: Option<Projector>,
     hovered: Option<Handle>,
@@ -47,11 +49,16 @@ impl Handles {
     /// - `size`: of the part of the window that the panel leaves free, points.
     pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, projector: Projector, size: DVec2) {
         self.boxes.clear();
+        self.bodies.clear();
+        let radius = session.world().resource::<SceneBounds>().extent.radius;
         let selected = session.world().resource::<Selection>().0.clone();
         for &entity in &selected {
             if let Some(own) = session.box_of(entity) {
                 // The reference point of a plane is anywhere.
                 let is_point = light_of(session.world(), entity).is_some();
+                if is_point || !own.is_backdrop(radius) {
+                    self.bodies.push(entity);
+                }
                 self.boxes.push((entity, own, is_point));
             }
         }
@@ -86,6 +93,11 @@ impl Handles {
         let handle = gizmo.handle_at(mouse, &projector);
         self.grabbed = handle.map(|handle| Grabbed { gizmo, handle, from: mouse, now: None });
         handle.is_some()
+    }
+
+    /// Whether a drag that begins on this moves it, if it is selected.
+    pub fn is_body(&self, entity: Entity) -> bool {
+        self.bodies.contains(&entity)
     }
 
     /// Handles a mouse press on a selected object itself, which moves it once the mouse moves.

@@ -10,8 +10,8 @@ const MIN_SECONDS: f64 = 0.5;
 const PATIENCE: f64 = 1800.0;
 /// In place of a figure.
 const NOT_KNOWN: &str = "not known yet";
-/// Errors on the way to a target that is farther away.
-const MILESTONES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+/// Error of an image that most people are content with: the goal that is told first.
+const CLEAN: f64 = 0.01;
 
 /// What is on the image, how good it is, and how long it will take: one noise, that of what is shown.
 pub fn line(status: &Status, target: Target) -> String {
@@ -47,18 +47,19 @@ pub fn line(status: &Status, target: Target) -> String {
         (None, None) => "first samples".to_owned(),
     };
     let denoising = if status.awaits_denoised { ", denoising …" } else { "" };
-    let time = time_to_go(status, target).filter(|_| state.is_empty()).and_then(|seconds| {
-        if seconds <= PATIENCE {
-            // Beside the noise of a denoised image, the goal of its samples would be another figure.
-            let to = target.error.filter(|_| denoised.is_none()).map_or("go".to_owned(), percent);
-            return Some(format!(", {} to {to}", about(seconds)));
+    // Beside the noise of a denoised image, the goal of its samples would be another figure.
+    let time = match status.estimated_error.filter(|error| denoised.is_none() && *error > CLEAN) {
+        // The last bit takes longest, and few wait for it.
+        Some(error) if target.error.is_some_and(|goal| goal < CLEAN) => {
+            let seconds = seconds_to(status.seconds, error, CLEAN);
+            Some(seconds).filter(|_| status.seconds >= MIN_SECONDS).map(|seconds| (seconds, percent(CLEAN)))
         }
-        // A goal that is days away says little: the next one on the way there, which stays until it is reached.
-        let error = status.estimated_error.filter(|_| denoised.is_none())?;
-        let end = target.error.unwrap_or_default();
-        let goal = MILESTONES.iter().rfind(|goal| (end..error).contains(*goal))?;
-        Some(format!(", {} to {}", about(seconds_to(status.seconds, error, *goal)), percent(*goal)))
-    });
+        _ => time_to_go(status, target)
+            .map(|seconds| (seconds, target.error.filter(|_| denoised.is_none()).map_or("go".to_owned(), percent))),
+    };
+    // Hours frighten, and an estimate of hours is a guess.
+    let time = time.filter(|(seconds, _)| state.is_empty() && *seconds <= PATIENCE);
+    let time = time.map(|(seconds, to)| format!(", {} to {to}", about(seconds)));
     let loading = loading.map(|loading| loading + "   ").unwrap_or_default();
     format!("{loading}{state}{noise}{denoising}{}", time.unwrap_or_default())
 }
@@ -221,11 +222,13 @@ mod tests {
         assert_eq!(target(Some(300), Some(60.0), Some(0.01)), Some(10.0));
         assert_eq!(target(None, None, None), None);
         assert_eq!(target(None, None, Some(0.05)), None, "reached");
-        let far = Status { spp: 1, seconds: 10.0, estimated_error: Some(0.5), ..Status::default() };
         let target = Target { error: Some(0.005), ..Target::default() };
-        assert_eq!(line(&far, target), "noise 50 %, about 55 s to 20 %", "the target is a day away");
-        let later = Status { spp: 5, seconds: 50.0, estimated_error: Some(0.22), ..far.clone() };
-        assert_eq!(line(&later, target), "noise 22 %, about 10 s to 20 %", "the goal stays");
+        let near = Status { spp: 9, seconds: 10.0, estimated_error: Some(0.05), ..Status::default() };
+        assert_eq!(line(&near, target), "noise 5.0 %, about 4 min to 1.0 %", "what most are content with");
+        let clean = Status { estimated_error: Some(0.009), ..near.clone() };
+        assert_eq!(line(&clean, target), "noise 0.90 %, about 20 s to 0.50 %");
+        let far = Status { estimated_error: Some(0.5), ..near };
+        assert_eq!(line(&far, target), "noise 50 %", "hours away");
         let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
         assert_eq!(line(&denoised, target), "noise 5.0 %, denoised");
         assert_eq!([0.2, 43.0, 200.0].map(about), ["about 1 s", "about 45 s", "about 3 min"]);

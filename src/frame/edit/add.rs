@@ -3,11 +3,10 @@
 //! A removed entity stays and only loses its components, so that undo restores the same entity and all references to it
 //! are valid again.
 
-use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
-use crate::frame::state::resources::{Clock, RenderState};
+use crate::frame::state::resources::RenderState;
 use crate::frame::state::selection::{Selection, box_of};
 use crate::mesh::procedural;
 use crate::scene::light_of;
@@ -167,8 +166,7 @@ pub fn delete(world: &mut World) {
     for entity in selected {
         EntityState::default().put(world, entity);
     }
-    let now = world.resource::<Clock>().0;
-    world.resource_mut::<Status>().say(now, MessageKind::Note, deleted);
+    crate::frame::edit::keys::say(world, deleted);
 }
 
 pub fn duplicate(world: &mut World) {

@@ -188,7 +188,8 @@ fn number(seconds: f64) -> String {
     ((seconds * 1e3).round() / 1e3).to_string()
 }
 
-fn say(world: &mut World, text: String) {
+/// Notes what has been done.
+pub(super) fn say(world: &mut World, text: String) {
     let now = world.resource::<Clock>().0;
     world.resource_mut::<Status>().say(now, MessageKind::Note, text);
 }

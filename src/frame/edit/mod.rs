@@ -265,11 +265,17 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
         Edit::Undo => {
-            crate::frame::edit::remesh::take_back(world)
-                .or_else(|| History::step_back(world))
-                .ok_or("nothing to undo")?;
+            if crate::frame::edit::remesh::take_back(world).is_none() {
+                History::step_back(world).ok_or("nothing to undo")?;
+                let label = world.resource::<History>().redo_label().map(|label| format!("undone: {label}"));
+                label.into_iter().for_each(|text| keys::say(world, text));
+            }
         }
-        Edit::Redo => History::step_on(world).ok_or("nothing to redo")?,
+        Edit::Redo => {
+            History::step_on(world).ok_or("nothing to redo")?;
+            let label = world.resource::<History>().undo_label().map(|label| format!("done again: {label}"));
+            label.into_iter().for_each(|text| keys::say(world, text));
+        }
         Edit::Delete => add::delete(world),
         Edit::Duplicate => add::duplicate(world),
         Edit::Add(new) => add::add(world, &new),

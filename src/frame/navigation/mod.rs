@@ -10,7 +10,9 @@ mod lens;
 mod moves;
 
 pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
-pub use moves::{VERTICAL, dolly, fly, frame_points, frame_rig, level, orbit, orbit_above, pan, roll, turn, zoom};
+pub use moves::{
+    VERTICAL, dolly_above, fly, frame_points, frame_rig, level, orbit, orbit_above, pan, roll, turn, zoom,
+};
 
 pub use crate::frame::core::rig::{Rig, Turning};
 

@@ -36,25 +36,29 @@ pub fn orbit(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
 ///
 /// - `ground`: height of a horizontal plane, metres.
 pub fn orbit_above(view: &View, yaw: f64, pitch: f64, turning: Turning, ground: Option<f64>) -> View {
-    /// Height that remains, relative to the distance to the pivot: the ground still looks like one.
-    const CLEARANCE: f64 = 1.0 / 64.0;
-    /// Halvings of the angle.
-    const STEPS: u32 = 32;
     let whole = orbit(view, yaw, pitch, turning);
     let Some(ground) = ground.filter(|ground| view.eye.y > *ground) else { return whole };
     let least = (ground + CLEARANCE * view.pivot_distance).min(view.eye.y);
     if whole.eye.y >= least {
         return whole;
     }
-    let part = |share: f64| orbit(view, yaw, share * pitch, turning);
-    let (mut possible, mut too_much) = (0.0, 1.0);
-    for _ in 0..STEPS {
-        let middle = 0.5 * (possible + too_much);
-        *if part(middle).eye.y >= least { &mut possible } else { &mut too_much } = middle;
-    }
+    let part = |pitch: f64| orbit(view, yaw, pitch, turning);
+    let (possible, _) = divided(pitch, |pitch| part(pitch).eye.y >= least);
     let stopped = part(possible);
     // A view that leans may lose height by its yaw alone.
     if stopped.eye.y > ground { stopped } else { *view }
+}
+
+/// Height that remains above the ground, relative to the distance to the pivot: the ground still looks like one.
+const CLEARANCE: f64 = 1.0 / 64.0;
+
+/// Where a condition changes between 0 and `end`: the nearest angles at which it holds and no longer holds.
+fn divided(end: f64, holds: impl Fn(f64) -> bool) -> (f64, f64) {
+    const HALVINGS: u32 = 32;
+    (0..HALVINGS).fold((0.0, end), |(start, end), _| {
+        let middle = 0.5 * (start + end);
+        if holds(middle) { (middle, end) } else { (start, middle) }
+    })
 }
 
 /// Moves along the view's axes: x right, y up, z forward, metres.
@@ -75,6 +79,24 @@ pub fn dolly(view: &View, factor: f64) -> View {
         return *view;
     }
     finite_or(view, View { eye: view.pivot() - view.forward * pivot_distance, pivot_distance, ..*view })
+}
+
+/// Like [`dolly`], but a camera above `ground` stays above it: where it would sink below, it rises about the pivot.
+///
+/// - `ground`: height of a horizontal plane, metres.
+pub fn dolly_above(view: &View, factor: f64, turning: Turning, ground: Option<f64>) -> View {
+    let whole = dolly(view, factor);
+    let Some(ground) = ground.filter(|ground| view.eye.y > *ground) else { return whole };
+    let least = ground + CLEARANCE * whole.pivot_distance;
+    // What is lower already may come nearer as it is.
+    let least = if factor > 1.0 { least } else { least.min(view.eye.y) };
+    if whole.eye.y >= least {
+        return whole;
+    }
+    let risen = |angle: f64| orbit(&whole, 0.0, angle, turning);
+    let (_, enough) = divided(FRAC_PI_2, |angle| risen(angle).eye.y < least);
+    let risen = risen(enough);
+    if risen.eye.y > ground { risen } else { *view }
 }
 
 /// Multiplies the visible height at a given distance, within the limits of `VFOV_RANGE_DEG`.
@@ -337,6 +359,31 @@ mod tests {
         assert_eq!(orbit_above(&start(), 0.0, -1.2, Turning::Turntable, None), below);
         let on = orbit(&below, 0.1, 0.2, Turning::Turntable);
         assert_eq!(orbit_above(&below, 0.1, 0.2, Turning::Turntable, Some(ground)), on);
+    }
+
+    #[test]
+    fn going_back_stays_above_the_ground() {
+        let ground = -0.75;
+        // Looks up from near the ground.
+        let low = View::look_at(DVec3::new(0.0, -0.7, 3.0), DVec3::new(0.5, 0.25, -0.5), DVec3::Y).unwrap();
+        for turning in [Turning::Turntable, Turning::Free] {
+            let mut view = low;
+            for n in 1..=60 {
+                view = dolly_above(&view, 1.1, turning, Some(ground));
+                let distance = low.pivot_distance * 1.1_f64.powi(n);
+                assert!(view.eye.y > ground && close(view.pivot(), low.pivot(), 1e-9 * distance), "{view:?}");
+                assert!((view.pivot_distance / distance - 1.0).abs() < 1e-9, "it goes as far");
+            }
+            assert!(view.eye.y - ground > 0.01 * view.pivot_distance);
+            let mut state = 5;
+            let mut view = roll(&low, 0.8);
+            for _ in 0..1000 {
+                view = dolly_above(&view, wander(&mut state).exp(), turning, Some(ground));
+                assert!(view.eye.y > ground, "{view:?}");
+            }
+        }
+        assert_eq!(dolly_above(&low, 3.0, Turning::Turntable, None), dolly(&low, 3.0));
+        assert_eq!(dolly_above(&low, 0.5, Turning::Turntable, Some(ground)), dolly(&low, 0.5));
     }
 
     #[test]

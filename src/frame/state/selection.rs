@@ -111,6 +111,19 @@ impl OwnBox {
     pub fn middle(&self) -> DVec3 {
         self.world_from_box.transform_point3(0.5 * (self.min + self.max))
     }
+
+    /// Whether what is inside is a floor, a wall or an infinite plane: flat, and as large as the scene.
+    ///
+    /// - `radius`: of the scene, metres.
+    pub fn is_backdrop(&self, radius: f64) -> bool {
+        /// Thickness of what is flat, relative to its length.
+        const FLAT: f64 = 0.02;
+        let sides: [f64; 3] =
+            std::array::from_fn(|a| (self.max[a] - self.min[a]) * self.world_from_box.matrix3.col(a).length());
+        let (thin, long) = sides.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &x| (low.min(x), high.max(x)));
+        // An infinite one has a box without a size.
+        long == 0.0 || thin <= FLAT * long && long >= radius
+    }
 }
 
 /// The box around an object or a light as it is rendered; for infinite ones, its reference point.

@@ -185,7 +185,8 @@ impl App {
             }
             Action::PlayAll => self.session.send(Command::SetPlayRange { seconds: None }),
             Action::ToggleSpin => self.input.toggle_spin(now),
-            Action::ToggleDrag => self.toggle_drag(now),
+            Action::PlayOrDrag if Strip::of(&self.session).is_some() => self.toggle_play(now),
+            Action::PlayOrDrag | Action::ToggleDrag => self.toggle_drag(now),
             Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),
             Action::FocusFollows => {
                 let follows = self.session.world().resource::<Focus>().target;

@@ -109,7 +109,7 @@ impl App {
                 }
                 let image = context.content_rect().translate(egui::vec2(-aside, 0.0));
                 outlines.draw(context, image);
-                let is_over_body = outlines.hovered().is_some_and(|entity| selected.contains(&entity));
+                let is_over_body = outlines.hovered().is_some_and(|entity| handles.is_body(entity));
                 if let Some(cursor) = handles.cursor(is_over_body) {
                     context.set_cursor_icon(cursor);
                 }

@@ -160,7 +160,7 @@ impl ApplicationHandler<Wake> for App {
             }
             WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
                 let is_plain = self.input.modifiers().is_empty() && !self.input.is_captured();
-                if button == MouseButton::Left && state.is_pressed() && is_plain && self.is_selected_at_mouse() {
+                if button == MouseButton::Left && state.is_pressed() && is_plain && self.is_body_at_mouse() {
                     self.handles.press_body(self.mouse());
                 }
                 if self.input.button(button, state.is_pressed(), now) {
@@ -220,11 +220,11 @@ impl ApplicationHandler<Wake> for App {
 }
 
 impl App {
-    /// Whether what is under the mouse is selected.
-    fn is_selected_at_mouse(&self) -> bool {
+    /// Whether what is under the mouse is selected, and a drag moves it.
+    fn is_body_at_mouse(&self) -> bool {
         let [x, y] = self.input.place();
-        let selected = &self.session.world().resource::<Selection>().0;
-        !selected.is_empty() && self.session.entity_at(x, y).is_some_and(|entity| selected.contains(&entity))
+        let is_selected = !self.session.world().resource::<Selection>().0.is_empty();
+        is_selected && self.session.entity_at(x, y).is_some_and(|entity| self.handles.is_body(entity))
     }
 
     /// Outlines what is under the mouse; returns whether that is news.

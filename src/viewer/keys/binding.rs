@@ -142,6 +142,8 @@ pub enum Action {
     PlayAll,
     /// Starts or stops the turntable.
     ToggleSpin,
+    /// Plays or pauses what moves; without that, as the next one.
+    PlayOrDrag,
     /// Toggles whether a drag looks around or orbits the pivot.
     ToggleDrag,
     /// Captures the mouse, so that it moves the view without a button, or releases it.

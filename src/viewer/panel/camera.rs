@@ -8,7 +8,7 @@ use crate::frame::{
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::keys::Action;
 use crate::viewer::panel::state::{Around, Asked};
-use crate::viewer::panel::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
+use crate::viewer::panel::widgets::{length, number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use crate::viewer::status::metres;
 use egui::Ui;
 
@@ -53,7 +53,7 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             }),
         };
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
-        row_with_hint(ui, "drag", "left mouse drag (Space)", |ui| {
+        row_with_hint(ui, "drag", "what a drag with the left button does", |ui| {
             ui.horizontal(|ui| {
                 for (label, orbits) in [("look around", false), ("orbit", true)] {
                     let is_chosen = around.orbits == orbits;
@@ -201,27 +201,19 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             return;
         }
         row(ui, "aperture", |ui| {
-            let stop = match Aperture::of(lens.radius, &rig.projection) {
-                Aperture::FNumber(stop) => stop,
-                Aperture::Diameter(diameter) => {
-                    let mut new = diameter;
-                    let drag = egui::DragValue::new(&mut new).suffix(" m wide").speed(0.01 * diameter);
-                    let drag = drag.range(0.0..=1e9).max_decimals(f_number_decimals(diameter) + 1);
-                    let hint =
-                        "diameter of the lens; an f-number if that is between 0.5 and 128 on a sensor 24 mm high";
-                    if ui.add(drag.update_while_editing(false)).on_hover_text(hint).changed() {
-                        asked.send(Command::SetAperture { radius: 0.5 * new });
-                    }
-                    return;
+            ui.horizontal(|ui| {
+                let diameter = 2.0 * lens.radius;
+                if let Some(diameter) = length(ui, diameter, proportional(diameter), "diameter of the lens") {
+                    asked.send(Command::SetAperture { radius: 0.5 * diameter });
                 }
-            };
-            let hint = format!("f-number for a sensor 24 mm high; diameter of the lens {}", metres(2.0 * lens.radius));
-            let mut new = stop;
-            let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6);
-            let drag = drag.max_decimals(f_number_decimals(stop));
-            if ui.add(drag.update_while_editing(false)).on_hover_text(hint).changed() {
-                asked.send(Command::SetAperture { radius: radius_of_f_stop(new, &rig.projection) });
-            }
+                let Aperture::FNumber(stop) = Aperture::of(lens.radius, &rig.projection) else { return };
+                let mut new = stop;
+                let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6);
+                let drag = drag.max_decimals(f_number_decimals(stop)).update_while_editing(false);
+                if ui.add(drag).on_hover_text("f-number, for a sensor 24 mm high").changed() {
+                    asked.send(Command::SetAperture { radius: radius_of_f_stop(new, &rig.projection) });
+                }
+            })
         });
         row(ui, "blades", |ui| {
             ui.horizontal(|ui| {

@@ -113,11 +113,9 @@ fn one_color(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: 
 
 fn color_row(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: Property, unit: Option<&str>) {
     row(ui, name, |ui| {
-        ui.horizontal(|ui| {
-            if let Some(value) = color(ui, value, unit) {
-                set_sky(asked, property, value);
-            }
-        })
+        if let Some(value) = color(ui, value, unit) {
+            set_sky(asked, property, value);
+        }
     });
 }
 

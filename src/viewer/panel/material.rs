@@ -132,8 +132,7 @@ fn property_row(
                 _ => None,
             };
             labelled(ui, &mut |ui| {
-                // The strength of a light and its textures are in a line below.
-                ui.horizontal_wrapped(|ui| {
+                let contents = |ui: &mut Ui| {
                     match paint {
                         ColorParam::Rgb(rgb) => {
                             if let Some(value) = color(ui, *rgb, unit) {
@@ -145,7 +144,12 @@ fn property_row(
                     if let Some(session) = texture_of {
                         texture::menu(ui, session, id, frame::Property::Material(name), paint, asked);
                     }
-                });
+                };
+                // The strength of a light, and its textures, have lines of their own.
+                match unit {
+                    Some(_) => ui.vertical(contents),
+                    None => ui.horizontal_wrapped(contents),
+                };
             });
         }
         Param::Rgb(rgb) => labelled(ui, &mut |ui| {

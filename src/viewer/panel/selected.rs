@@ -95,7 +95,7 @@ pub fn property_row(
                 number(ui, value.x, 0.005 * value.x.abs(), least..=most, info.unit).map(DVec3::splat)
             }
             Quantity::Factors => vector(ui, value, 0.005),
-            Quantity::Color => ui.horizontal_wrapped(|ui| color(ui, value.as_vec3(), Some(info.unit))).inner,
+            Quantity::Color => color(ui, value.as_vec3(), Some(info.unit)),
             Quantity::Number => {
                 let speed = if info.unit == "°" { 0.2 } else { proportional(value.x) };
                 number(ui, value.x, speed, least..=most, info.unit).map(DVec3::splat)

@@ -53,7 +53,7 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
     match &mut new {
         TextureSource::Checker { a, b, squares, offset, rotate } => {
             row(ui, "colours", |ui| {
-                ui.horizontal(|ui| {
+                ui.vertical(|ui| {
                     for paint in [a, b] {
                         if let Some(value) = color(ui, paint.0, None) {
                             *paint = Rgb(value.as_vec3());

@@ -8,6 +8,7 @@ use crate::frame::{Edit, Selection};
 use crate::viewer::panel::hints::hint_of;
 use crate::viewer::panel::list::Listed;
 use crate::viewer::panel::state::Asked;
+use crate::viewer::status;
 use egui::{Color32, RichText, Ui};
 use glam::{DVec3, Vec3};
 
@@ -62,13 +63,54 @@ pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
 pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
     // Clamped by the field, a number outside of the range would be an edit that nobody made.
     let mut new = value.clamp(*range.start(), *range.end());
-    let drag = egui::DragValue::new(&mut new)
+    let mut drag = egui::DragValue::new(&mut new)
         .speed(speed)
         .range(range)
         .suffix(suffix)
         .max_decimals(decimals(value))
         .update_while_editing(false);
+    if suffix.trim() == "m" {
+        drag = drag.custom_parser(|text| of_length(text, 1.0));
+    }
     ui.add(drag).changed().then_some(new)
+}
+
+/// A length in the unit that suits it; any unit can be typed, and a number without one has that of the field.
+pub fn length(ui: &mut Ui, metres: f64, speed: f64, hint: &str) -> Option<f64> {
+    let mut new = metres;
+    let shown = status::metres(metres);
+    let unit = shown.split_once(' ').and_then(|(_, unit)| factor_of(unit)).unwrap_or(1.0);
+    let drag = egui::DragValue::new(&mut new)
+        .speed(speed)
+        .range(0.0..=1e9)
+        .custom_formatter(|metres, _| status::metres(metres))
+        .custom_parser(|text| of_length(text, unit))
+        .update_while_editing(false);
+    ui.add(drag).on_hover_text(hint).changed().then_some(new)
+}
+
+/// Metres of a typed length.
+///
+/// - `unit`: of a number without one, metres.
+fn of_length(text: &str, unit: f64) -> Option<f64> {
+    let text = text.trim();
+    // Not by the first letter, which may be that of an exponent.
+    let end = text.trim_end_matches(|c: char| c.is_alphabetic()).len();
+    let (number, word) = text.split_at(end);
+    let factor = if word.is_empty() { unit } else { factor_of(word)? };
+    number.trim().parse::<f64>().ok().map(|number| number * factor)
+}
+
+/// Metres of a unit of length.
+fn factor_of(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "µm" | "um" => 1e-6,
+        "mm" => 1e-3,
+        "cm" => 1e-2,
+        "m" => 1.0,
+        "km" => 1e3,
+        _ => return None,
+    })
 }
 
 /// Decimals with which a number is shown: four digits say more than anybody sees, and all rows are equally wide.
@@ -121,10 +163,10 @@ pub const RADIANCE: &str = "W/m²sr";
 
 /// A linear colour.
 ///
-/// - `unit`: of one that may be brighter than white, which is edited as a hue and a strength. There is no room for it
-///   beside both: it is in the hint.
+/// - `unit`: of one that may be brighter than white, which is edited as a hue and a strength, one below the other: there
+///   is no room for both. The unit is in the hint.
 pub fn color(ui: &mut Ui, value: Vec3, unit: Option<&str>) -> Option<DVec3> {
-    color_with(ui, value, unit, true)
+    ui.vertical(|ui| color_with(ui, value, unit, true)).inner
 }
 
 /// Like [`color`], where there is no room for its code.
@@ -137,8 +179,14 @@ fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> O
     // Black has no hue: it becomes white when its strength is raised.
     let hue = if strength > 0.0 { value / strength } else { Vec3::ONE };
     let mut rgb = hue.to_array();
-    let picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
-    let new_hue = if has_code { picked.or(hex_field(ui, hue)) } else { picked };
+    let mut pick = |ui: &mut Ui| {
+        let is_picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed();
+        is_picked.then(|| Vec3::from(rgb).as_dvec3())
+    };
+    let new_hue = match has_code {
+        true => ui.horizontal(|ui| pick(ui).or(hex_field(ui, hue))).inner,
+        false => pick(ui),
+    };
     let new_strength = unit.and_then(|unit| strength_drag(ui, f64::from(strength), unit));
     if new_hue.is_none() && new_strength.is_none() {
         return None;
@@ -227,6 +275,14 @@ mod tests {
         }
         assert_eq!(of_hex("fff"), Some(DVec3::ONE));
         assert_eq!([of_hex("#12345"), of_hex("red"), of_hex(""), of_hex("#11223344")], [None; 4]);
+    }
+
+    #[test]
+    fn lengths_are_typed_in_any_unit() {
+        let centimetres = ["5", "5cm", " 5 cm ", "50 mm", "0.05 m", "5e-2m", "0.00005 km"];
+        assert!(centimetres.iter().all(|text| (of_length(text, 0.01).unwrap() / 0.05 - 1.0).abs() < 1e-12));
+        assert_eq!(of_length("5", 1.0), Some(5.0));
+        assert_eq!(["", "cm", "5 inches", "f/2", "1 2 m"].map(|text| of_length(text, 1.0)), [None; 5]);
     }
 
     #[test]
