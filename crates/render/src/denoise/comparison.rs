@@ -4,6 +4,10 @@
 //! them: so what exceeds the variance, with fireflies and without, counts as bias as far as its mean over a neighbourhood
 //! is far above the deviation that such a mean has. Else grains of noise would remain wherever it is large at random:
 //! without samples that show a bias, blur is better.
+//!
+//! A pixel that has a bright sample in both halves at random looks like detail: its variance is small, and its difference
+//! large. By how much pixels scatter at random follows from the variances around. For significance no pixel counts for
+//! much more than that: what only one of them shows is noise.
 
 use crate::denoise::blur::{Pooled, RADIUS, n_averaged};
 use crate::denoise::input::DenoiseInput;
@@ -16,6 +20,10 @@ const SIGNIFICANCE: f32 = 3.0;
 
 /// Mean square of what the squared difference exceeds the variance by, over that of the variance, for normal noise.
 const SQUARE_OF_EXCESS: f32 = 4.0 / 3.0;
+/// What the excess of one pixel counts for significance, at most: multiples of the root mean square of the variances
+/// around, but at least this square of a level.
+const LARGEST_EXCESS: f32 = 4.0;
+const LEAST_LIMIT: f32 = 0.2;
 /// Level of pixels that show an emitter in part: their own value less this multiple of the step.
 const EMITTER_STEPS: f32 = 0.5;
 
@@ -41,9 +49,18 @@ impl Comparison {
         let weight: Vec<Vec3> = each(n, stop, |i| one_over_level(input, noise, filtered, i))?;
         let pooled = Pooled::of(input, &noise.at_emitters, stop)?;
         let narrow = |of: &(dyn Fn(usize) -> f32 + Sync)| pooled.narrow(of, stop);
-        let beyond = |off: Vec3, variance: Vec3, i: usize| weight[i].dot(off * off - variance + filtered.covariance[i]);
-        let of_all = narrow(&|i| beyond(filtered.color[i] - input.color[i], noise.variance[i], i))?;
-        let of_usual = narrow(&|i| beyond(filtered.color[i] - input.color[i] + noise.excess[i], noise.usual(i), i))?;
+        let excess_of =
+            |off: Vec3, variance: Vec3, i: usize| weight[i].dot(off * off - variance + filtered.covariance[i]);
+        let squares_around = pooled.wide(&|i| weight[i].dot(noise.variance[i]).powi(2), stop)?;
+        let scatter = each(n, stop, |i| squares_around[i].max(0.0).sqrt())?;
+        let off = |i: usize| filtered.color[i] - input.color[i];
+        let own_of_all = each(n, stop, |i| excess_of(off(i), noise.variance[i], i))?;
+        let own_of_usual = each(n, stop, |i| excess_of(off(i) + noise.excess[i], noise.usual(i), i))?;
+        let of_all = narrow(&|i| own_of_all[i])?;
+        let of_usual = narrow(&|i| own_of_usual[i])?;
+        let limit = |own: f32, i: usize| own.min((LARGEST_EXCESS * scatter[i]).max(LEAST_LIMIT));
+        let limited_of_all = narrow(&|i| limit(own_of_all[i], i))?;
+        let limited_of_usual = narrow(&|i| limit(own_of_usual[i], i))?;
         let squares = pooled.mean(&|i| weight[i].dot(noise.usual(i)).powi(2), stop)?;
         let variance = pooled.wide(&|i| weight[i].dot(noise.variance[i]), stop)?;
         let bias = each(n, stop, |i| {
@@ -51,7 +68,8 @@ impl Comparison {
             // Both squared difference and variance have one degree of freedom per channel.
             let square = SQUARE_OF_EXCESS * squares[i].max(0.0);
             let deviation = SIGNIFICANCE * (square / n_averaged(RADIUS)).sqrt();
-            let ratio = excess / deviation.hypot(VARIANCE_UNCERTAINTY * variance[i]).max(1e-30);
+            let limited = limited_of_all[i].min(limited_of_usual[i]).max(0.0);
+            let ratio = limited / deviation.hypot(VARIANCE_UNCERTAINTY * variance[i]).max(1e-30);
             excess - excess / (1.0 + ratio.powi(4))
         })?;
         Some(Self {
