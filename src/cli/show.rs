@@ -28,7 +28,7 @@ pub struct ShowArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = between::<u32>(0, u32::MAX))]
     seed: Option<u32>,
     /// Record the session to a file, for --replay.
-    #[arg(long, value_name = "FILE", conflicts_with = "env")]
+    #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay a recording without a window and render its final image.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["record", "scene", "size", "seed", "env"])]

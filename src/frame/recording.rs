@@ -22,6 +22,7 @@ pub(super) const FORMAT: u32 = 1;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct RecordingHeader {
     pub(super) format: u32,
     /// Program name and version.
@@ -140,7 +141,10 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
     let is_bearable = |line: &&[u8]| line.len() <= LONGEST_LINE;
     let (_, first) = lines.next().ok_or_else(no_recording)?;
     let first = Some(first).filter(is_bearable).and_then(|line| str::from_utf8(line).ok()).ok_or_else(no_recording)?;
-    let header: RecordingHeader = ron::from_str(first).map_err(|_| no_recording())?;
+    let header: RecordingHeader = ron::from_str(first).map_err(|error| match first.starts_with("(format:") {
+        true => failed(format!("the first line cannot be parsed: {error}")),
+        false => no_recording(),
+    })?;
     if header.format > FORMAT {
         return Err(failed(format!(
             "was written by {}, in a format that this version does not support",

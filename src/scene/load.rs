@@ -466,12 +466,23 @@ impl LoadedScene {
 
     /// Selects the chosen camera; warns about choices that only glTF models support.
     fn choose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
+        let title = self.source.title();
+        // Only an image of it comes here.
+        let is_gltf = self.source.path().is_some_and(|path| ModelFormat::of(path) == Some(ModelFormat::Gltf));
+        if choice.variant.is_some() && is_gltf {
+            let problem = format!("the image shows the model as it was; open {title} for its variants");
+            return Err(SceneError::in_file(title, problem));
+        }
         if choice.variant.is_some() {
-            self.warnings.push(format!("{}: only glTF models have variants", self.source.title()));
+            self.warnings.push(format!("{title}: only glTF models have variants"));
         }
         match choice.at {
+            Some(_) if self.file.animation.tracks.is_empty() && is_gltf => {
+                let problem = format!("the image shows one moment of the model; open {title} for others");
+                return Err(SceneError::in_file(title, problem));
+            }
             Some(at) if self.file.animation.tracks.is_empty() => {
-                let (title, at) = (self.source.title(), bounds::number(at));
+                let at = bounds::number(at);
                 self.warnings.push(format!("{title} has no animation: {at} s shows what any moment does"));
             }
             Some(at) => {

@@ -224,3 +224,16 @@ fn a_scene_of_an_archive_is_saved_with_its_files() {
     assert_eq!(std::fs::read(path.join("other-files/m.obj")).unwrap(), b"mine");
     assert!(!path.join("saved-files-2").exists());
 }
+
+/// What an image shows of a model is settled.
+#[test]
+fn an_image_of_a_model_has_no_other_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("m.gltf"), moving_model(FLIGHT)).unwrap();
+    does(path, &format!("render m.gltf {SMALL} --at 0.5 -o a.png"));
+    for (option, what) in [("--at 1", "moment"), ("--variant red", "variants")] {
+        let said = fails(path, &format!("render a.png {SMALL} {option} -o b.png"), 1);
+        assert!(said.contains("open m.gltf for") && said.contains(what), "{said}");
+    }
+}

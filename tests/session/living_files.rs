@@ -237,6 +237,15 @@ fn a_replay_opens_what_the_recording_was_begun_with() {
     let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
     assert_eq!(played.warnings, Vec::<String>::new());
     assert!(played.film.means() == shown.means());
+    let text = std::fs::read_to_string(&recording).unwrap();
+    let unknown = text.replacen("choice:(", "choice:(allow_outside:true,", 1);
+    assert!(unknown != text);
+    std::fs::write(&recording, unknown).unwrap();
+    let refused = firstlight::frame::replay(&recording, options, &|| false).map(|_| ()).unwrap_err();
+    assert!(
+        refused.contains("session.rec: the first line cannot be parsed: ") && refused.contains("allow_outside"),
+        "{refused}"
+    );
 }
 
 /// A session that does a bit of everything, and another one that plays it.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which camera, time and material variant of a glTF file to open, and which files it may read.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(default, deny_unknown_fields)]
 pub struct ModelChoice {
     /// Name of the camera to use; `None`: the first one.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -28,15 +28,18 @@ impl PrimitiveTrees {
     ///
     /// - `boxes`: bounds of all shapes.
     pub fn build(shapes: &[Shape], boxes: &[Aabb]) -> (Self, Vec<u32>) {
-        let of_kind = |is_kind: fn(&Shape) -> bool| -> Vec<u32> {
-            (0u32..).zip(shapes).filter(|(_, shape)| is_kind(shape)).map(|(object, _)| object).collect()
-        };
-        let mut simple = of_kind(|shape| matches!(shape, Shape::Plane { .. }));
-        let mut kinds = [
-            of_kind(|shape| matches!(shape, Shape::Sphere { .. })),
-            of_kind(|shape| matches!(shape, Shape::Quad { .. })),
-            of_kind(|shape| matches!(shape, Shape::Triangle { .. })),
-        ];
+        let [mut simple, mut spheres, mut quads, mut triangles] = [const { Vec::new() }; 4];
+        for (object, shape) in (0u32..).zip(shapes) {
+            match shape {
+                Shape::Plane { .. } => simple.push(object),
+                Shape::Sphere { .. } => spheres.push(object),
+                Shape::Quad { .. } => quads.push(object),
+                Shape::Triangle { .. } => triangles.push(object),
+                // They have trees of their own.
+                Shape::Mesh { .. } | Shape::Spheres { .. } => {}
+            }
+        }
+        let mut kinds = [spheres, quads, triangles];
         kinds.sort_by_key(Vec::len);
         let mut trees = Self::default();
         let mut n_simple = 0;

@@ -5,7 +5,7 @@ use crate::format::bounds::check_size;
 use crate::frame::edit::property::Property;
 use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
-use crate::scene::animation::{LightProperty, ObjectProperty};
+use crate::scene::animation::{ObjectProperty, Quantity};
 use crate::scene::{ColorParam, LightKind, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial};
 use crate::scene::{light_of, put_light};
 use bevy_ecs::prelude::{Entity, World};
@@ -46,7 +46,7 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         Property::Light(property) => {
             let mut light = light_of(world, entity).ok_or_else(wrong)?;
             let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
-            if property == LightProperty::Direction && value == DVec3::ZERO {
+            if property.info().quantity == Quantity::Direction && value == DVec3::ZERO {
                 return Err("a direction must have a length".to_owned());
             }
             let [least, most] = property.info().range;

@@ -11,7 +11,8 @@ const GRAMMAR: [(&str, &[&str]); 13] = [
     ("crates/format/src/camera.rs", &[]),
     ("crates/format/src/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
     ("crates/format/src/key.rs", &["Interpolation"]),
-    ("crates/format/src/property.rs", &["CameraProperty", "ObjectProperty", "LightProperty"]),
+    // Rows of tables.
+    ("crates/format/src/property.rs", &["-"]),
     ("crates/format/src/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
     ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
@@ -27,6 +28,13 @@ fn grammar_words() -> BTreeSet<String> {
     for (path, types) in GRAMMAR {
         let mut is_type = false;
         for line in read(path).text.lines() {
+            // A row of a table: `Name = "word": …`.
+            if !line.trim_start().starts_with("//")
+                && let Some((word, after)) = line.split_once(" = \"").and_then(|(_, rest)| rest.split_once('"'))
+                && after.starts_with(": ")
+            {
+                words.insert(word.to_owned());
+            }
             if let Some(name) = line.strip_prefix("pub struct ").or_else(|| line.strip_prefix("pub enum ")) {
                 let name: String = name.chars().take_while(|c| c.is_alphanumeric()).collect();
                 is_type = types.is_empty() || types.contains(&name.as_str());

@@ -254,7 +254,9 @@ impl Writer<'_> {
                 self.xml.rgb("irradiance", light.irradiance);
                 self.xml.close();
             }
-            _ => self.tell(name, "a light without a direction is left out"),
+            (LightKind::Spot(_) | LightKind::Directional(_), None) => {
+                self.tell(name, "a light without a direction is left out");
+            }
         }
         Ok(())
     }

@@ -229,7 +229,9 @@ impl Writer<'_> {
                 let list = list.points("from", &[DVec3::ZERO]).points("to", &[direction]);
                 self.text.directive("LightSource", &["distant"], list);
             }
-            _ => self.tell(name, "a light without a direction is left out"),
+            (LightKind::Spot(_) | LightKind::Directional(_), None) => {
+                self.tell(name, "a light without a direction is left out");
+            }
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept
 use crate::integrators::caustics::lens_connections::LensConnections;
 use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::common::caustics_weight::etendue_gain;
-use crate::integrators::simd::shade::{knows, scatters};
+use crate::integrators::simd::shade::scatters;
 use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;
 use crate::prepare::surface_table::SurfaceTable;
@@ -19,9 +19,7 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
-use crate::shading::simd::lanes::{
-    DIFFUSE, DISNEY, GLASS, METAL, MIRROR, PLASTIC, TRANSLUCENT, lanes_of, transmittance,
-};
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, PLASTIC, lanes_of, transmittance};
 use crate::shading::simd::scatter::{LobeLanes, eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
@@ -50,8 +48,8 @@ pub(crate) struct LightHits<'a> {
 
 /// Whether [`scatter`] handles a hit on a material of this kind.
 pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
-    let is_here = kind <= COATED && kind != TRANSLUCENT && kind != DISNEY;
-    knows(kind) && is_here && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
+    let is_here = [DIFFUSE, MIRROR, GLASS, METAL, PLASTIC, COATED].contains(&kind);
+    is_here && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
 }
 
 /// Connects the vertices to the lens, and continues the paths.
@@ -62,7 +60,8 @@ pub(crate) fn scatter(set: InstructionSet, kind: usize, group: LightHits) {
         GLASS => dispatch!(set, scatter_kind::<_, GLASS>(group: LightHits)),
         METAL => dispatch!(set, scatter_kind::<_, METAL>(group: LightHits)),
         PLASTIC => dispatch!(set, scatter_kind::<_, PLASTIC>(group: LightHits)),
-        _ => dispatch!(set, scatter_kind::<_, COATED>(group: LightHits)),
+        COATED => dispatch!(set, scatter_kind::<_, COATED>(group: LightHits)),
+        _ => unreachable!("kind {kind} is not known here"),
     }
 }
 
