@@ -210,8 +210,11 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The process ends after this: freeing a large scene would only take time.
     let mut job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
-        let samples = counted(shot.spp as usize, "sample");
-        let message = format!("the image was saved in the middle of a pass; the new one has {samples} in every pixel");
+        let (was, samples) = match shot.spp {
+            0 => ("has pixels without a sample", "a sample".to_owned()),
+            spp => ("was saved in the middle of a pass", counted(spp as usize, "sample")),
+        };
+        let message = format!("the image {was}; the new one has {samples} in every pixel");
         progress.suspend(|| remark(format_args!("warning: {message}")));
     }
     let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());

@@ -8,12 +8,13 @@ use crate::frame::navigation;
 use crate::frame::saving::SavedAs;
 use crate::frame::scene_bounds::SceneBounds;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{CurrentScene, PlayRange, RenderState, SceneGeneration};
+use crate::frame::state::resources::{Clock, CurrentScene, PlayRange, RenderState, SceneGeneration};
 use crate::frame::views::ViewTrail;
 use crate::scene::{
     Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
     camera_follows,
 };
+use bevy_ecs::name::Name;
 use bevy_ecs::prelude::World;
 use std::sync::Arc;
 use std::time::Duration;
@@ -112,6 +113,7 @@ pub(super) fn set_moment(world: &mut World, seconds: f64) {
     }
     // Edits of this frame count.
     History::content(world);
+    let taken_back = crate::scene::animation::off_their_tracks(world);
     let mut was_saved = !world.resource::<History>().is_unsaved();
     if !was_saved {
         // What tracks take back is not there to be saved.
@@ -122,5 +124,11 @@ pub(super) fn set_moment(world: &mut World, seconds: f64) {
     let content = History::content(world);
     if was_saved {
         world.resource_mut::<History>().mark_clean(content);
+    }
+    if let Some(entity) = taken_back.first() {
+        let name = world.get::<Name>(*entity).map_or("it".to_owned(), |name| format!("`{name}`"));
+        let text = format!("{name} follows its keys again: Ctrl+Z brings your change back, Set key (Ctrl+K) keeps it");
+        let now = world.resource::<Clock>().0;
+        world.resource_mut::<Status>().say(now, MessageKind::Note, text);
     }
 }

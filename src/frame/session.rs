@@ -5,7 +5,7 @@ use crate::frame::adopt::adopt;
 use crate::frame::core::latency::LatencyHistogram;
 use crate::frame::core::offline::Target;
 use crate::frame::core::rig::{Rig, Turning};
-use crate::frame::core::status::{Picture, Status};
+use crate::frame::core::status::{MessageKind, Picture, Status};
 use crate::frame::edit::{EditQueue, edit_scene};
 use crate::frame::focus::{Focus, hold_focus};
 use crate::frame::image::feature_layers::FeatureNames;
@@ -355,6 +355,17 @@ impl Session {
     /// Increases when anything but the camera is changed.
     pub fn revision(&self) -> u64 {
         self.world.resource::<RenderState>().revision()
+    }
+
+    /// Whether something that changes in time has been changed without a key: another time takes that back.
+    pub fn needs_keys(&self) -> bool {
+        !crate::scene::animation::off_their_tracks(&self.world).is_empty()
+    }
+
+    /// Adds to the messages that a file has been saved.
+    pub fn log_saved(&mut self, text: String) {
+        let now = self.world.resource::<Clock>().0;
+        self.world.resource_mut::<Status>().say(now, MessageKind::Saved, text);
     }
 
     /// The box around an object or a light, along its own axes.

@@ -54,6 +54,10 @@ impl Browser {
 
     /// Draws the browser; returns the file that was chosen.
     pub fn show(&mut self, context: &Context) -> Option<(DialogPurpose, PathBuf)> {
+        // At once, also from the field of the name.
+        if context.input(|input| input.key_pressed(egui::Key::Escape)) {
+            self.open = None;
+        }
         let (purpose, dialog) = self.open.as_mut()?;
         dialog.update(context);
         let chosen = dialog.take_picked().map(|path| (*purpose, path));
@@ -72,6 +76,25 @@ fn is_one(path: &Path, extensions: &[String]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn escape_closes_it_at_once() {
+        let (context, folder) = (Context::default(), tempfile::tempdir().unwrap());
+        let mut browser = Browser::default();
+        browser.open(DialogPurpose::SaveScene, folder.path(), "a.ron", egui::vec2(800.0, 600.0));
+        let frame = |browser: &mut Browser, events| {
+            let input = egui::RawInput { events, ..egui::RawInput::default() };
+            let _ = context.run(input, |context| assert_eq!(browser.show(context), None));
+        };
+        for _ in 0..3 {
+            frame(&mut browser, Vec::new());
+        }
+        assert!(browser.is_open());
+        let key = egui::Key::Escape;
+        let (modifiers, physical_key) = (egui::Modifiers::NONE, None);
+        frame(&mut browser, vec![egui::Event::Key { key, physical_key, pressed: true, repeat: false, modifiers }]);
+        assert!(!browser.is_open());
+    }
 
     #[test]
     fn files_of_any_case_are_shown_and_others_are_not() {

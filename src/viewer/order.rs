@@ -9,7 +9,7 @@ use crate::frame::{
 use crate::render::{DenoiseSource, Film, GuideGatherer, Prepared, RenderSettings, guide_samples};
 use crate::scene::whole_file::Replace;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
-use crate::viewer::status::percent;
+use crate::viewer::status::{percent, samples};
 use crate::viewer::trend::{Outlook, Trend};
 use glam::{UVec2, Vec3};
 use std::cell::RefCell;
@@ -66,7 +66,7 @@ impl Finished {
     pub fn describe(&self, size: (u32, u32)) -> String {
         let noise = self.error.map(|error| format!(", noise {}", percent(error))).unwrap_or_default();
         let short = if self.is_complete { "" } else { ", ended early" };
-        format!("{} × {}{noise}, {} samples per pixel{short}", size.0, size.1, self.spp)
+        format!("{} × {}{noise}, {}{short}", size.0, size.1, samples(self.spp))
     }
 }
 
@@ -159,11 +159,11 @@ impl Order {
         let Target { spp, seconds, error } = self.target;
         let asked = [
             error.map(|error| format!("noise {}", percent(error))),
-            spp.map(|spp| format!("{spp} samples per pixel")),
+            spp.map(samples),
             seconds.map(|seconds| format!("{seconds} s")),
         ];
         let asked: Vec<String> = asked.into_iter().flatten().collect();
-        format!("at {noise}, {} samples per pixel; asked for: {}", finished.spp, asked.join(" or "))
+        format!("at {noise}, {}; asked for: {}", samples(finished.spp), asked.join(" or "))
     }
 
     /// - `trend`: of the error of the denoised image.

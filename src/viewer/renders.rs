@@ -7,7 +7,7 @@ use crate::frame::{Reel, Waker};
 use crate::render::{RenderSettings, worker_threads};
 use crate::viewer::order::{Advance, Order, Subject};
 use crate::viewer::overlay::{self, GLASS, TEXT_SIZE};
-use crate::viewer::status::percent;
+use crate::viewer::status::{percent, samples};
 use egui::{Align2, Area, Button, Context, CornerRadius, Frame, Label, Margin, Order as Layer, Rect, RichText, Ui};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -197,7 +197,7 @@ impl Told {
             (Some(error), _) if self.frame.is_none() || self.is_flat => {
                 parts.push(format!("noise {}", percent(error)));
             }
-            (_, spp) if spp > 0 && self.frame.is_none() => parts.push(format!("{spp} samples per pixel")),
+            (_, spp) if spp > 0 && self.frame.is_none() => parts.push(samples(spp)),
             (_, 0) if parts.is_empty() => parts.push("preparing".to_owned()),
             _ => {}
         }

@@ -144,6 +144,12 @@ pub fn percent(share: f64) -> String {
     }
 }
 
+/// Such as `64 samples per pixel`.
+pub fn samples(spp: u32) -> String {
+    let s = if spp == 1 { "" } else { "s" };
+    format!("{spp} sample{s} per pixel")
+}
+
 /// Formats a length with a suitable unit.
 pub fn metres(m: f64) -> String {
     match m {

@@ -214,7 +214,10 @@ fn a_change_that_tracks_would_take_back_is_told_at_once_and_nothing_is_unsaved_w
     assert_eq!(told(&driver), 1, "{}", driver.said(MessageKind::Note));
     driver.edit([Edit::Move { by: 2.0 * DVec3::Y }, Edit::End]);
     assert!(told(&driver) == 1 && driver.session.has_unsaved_edits(), "a file can hold it");
+    assert!(driver.session.needs_keys());
     driver.go_to(2.0);
+    assert!(driver.said(MessageKind::Note).contains("`ball` follows its keys again: Ctrl+Z brings your change back"));
+    assert!(!driver.session.needs_keys());
     assert_eq!(driver.ball(), DVec3::new(2.0, 0.5, 0.0));
     assert!(!driver.session.has_unsaved_edits());
     driver.edit([Edit::Undo]);

@@ -414,6 +414,8 @@ impl App {
 
     /// Says that something was saved, and where.
     pub(super) fn tell_saved(&mut self, path: PathBuf, news: String, now: Instant) {
+        // Whoever was elsewhere meanwhile finds it in the list of messages.
+        self.session.log_saved(news.clone());
         self.toasts.add_offer(news, IN_FOLDER, Action::ShowSaved, now);
         self.last_saved = Some(path);
     }

@@ -27,6 +27,9 @@ impl App {
             true => &["right click: what to do with it"],
             false => &["click: select", "drop a file: open"],
         };
+        if self.session.needs_keys() {
+            right.push("Set key (Ctrl+K) keeps this change".to_owned());
+        }
         right.extend(hints.iter().map(|hint| (*hint).to_owned()));
         Figures { left: status::line(status, world.resource::<StopAt>().0), right }
     }

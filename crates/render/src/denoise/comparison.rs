@@ -20,6 +20,9 @@ const SIGNIFICANCE: f32 = 3.0;
 
 /// Mean square of what the squared difference exceeds the variance by, over that of the variance, for normal noise.
 const SQUARE_OF_EXCESS: f32 = 4.0 / 3.0;
+/// How much of what samples that are spread evenly gain may not be there, relative to the variance: it is known for the
+/// whole image only, and little where few samples are bright.
+const UNCERTAIN_GAIN: f32 = 0.5;
 /// What the excess of one pixel counts for significance, at most: multiples of the root mean square of the variances
 /// around, but at least this square of a level.
 const LARGEST_EXCESS: f32 = 4.0;
@@ -63,13 +66,14 @@ impl Comparison {
         let limited_of_usual = narrow(&|i| limit(own_of_usual[i], i))?;
         let squares = pooled.mean(&|i| weight[i].dot(noise.usual(i)).powi(2), stop)?;
         let variance = pooled.wide(&|i| weight[i].dot(noise.variance[i]), stop)?;
+        let uncertainty = VARIANCE_UNCERTAINTY.max(UNCERTAIN_GAIN * (noise.independent - 1.0));
         let bias = each(n, stop, |i| {
             let excess = of_all[i].min(of_usual[i]).max(0.0);
             // Both squared difference and variance have one degree of freedom per channel.
             let square = SQUARE_OF_EXCESS * squares[i].max(0.0);
             let deviation = SIGNIFICANCE * (square / n_averaged(RADIUS)).sqrt();
             let limited = limited_of_all[i].min(limited_of_usual[i]).max(0.0);
-            let ratio = limited / deviation.hypot(VARIANCE_UNCERTAINTY * variance[i]).max(1e-30);
+            let ratio = limited / deviation.hypot(uncertainty * variance[i]).max(1e-30);
             excess - excess / (1.0 + ratio.powi(4))
         })?;
         Some(Self {
