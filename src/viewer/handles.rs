@@ -325,6 +325,20 @@ mod tests {
     }
 
     #[test]
+    fn floors_and_walls_are_for_the_view() {
+        let own = |size: DVec3, scale: f64| OwnBox {
+            min: DVec3::ZERO,
+            max: size,
+            world_from_box: DAffine3::from_scale(DVec3::splat(scale)),
+        };
+        let backdrop = |size, scale| own(size, scale).is_backdrop(5.0);
+        assert!(backdrop(DVec3::new(10.0, 0.0, 8.0), 1.0) && backdrop(DVec3::new(1.0, 0.005, 0.8), 10.0));
+        assert!(backdrop(DVec3::ZERO, 1.0), "an infinite plane");
+        assert!(!backdrop(DVec3::new(2.0, 0.0, 1.0), 1.0), "a picture on a wall");
+        assert!(!backdrop(DVec3::splat(10.0), 1.0), "a model that was opened alone");
+    }
+
+    #[test]
     fn what_is_beside_the_picture_or_behind_the_eye_is_not_seen() {
         let view = View::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y).unwrap();
         let (rig, size) = (Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));

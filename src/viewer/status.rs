@@ -72,8 +72,7 @@ fn seconds_to(seconds: f64, error: f64, goal: f64) -> f64 {
 /// Seconds until the target is reached.
 fn time_to_go(status: &Status, target: Target) -> Option<f64> {
     let seconds = Some(status.seconds).filter(|seconds| *seconds >= MIN_SECONDS)?;
-    let by_error =
-        target.error.zip(status.estimated_error).map(|(goal, error)| seconds * ((error / goal).powi(2) - 1.0));
+    let by_error = target.error.zip(status.estimated_error).map(|(goal, error)| seconds_to(seconds, error, goal));
     let by_samples = target.spp.map(|goal| seconds * (f64::from(goal) / f64::from(status.spp.max(1)) - 1.0));
     let by_time = target.seconds.map(|goal| goal - seconds);
     let soonest = [by_error, by_samples, by_time].into_iter().flatten().min_by(f64::total_cmp)?;

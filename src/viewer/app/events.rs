@@ -12,7 +12,7 @@ use std::time::Instant;
 use winit::application::ApplicationHandler;
 use winit::event::{DeviceEvent, DeviceId, MouseButton, MouseScrollDelta, StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
-use winit::keyboard::{Key, NamedKey};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
 use winit::window::WindowId;
 
 /// Touchpad pixels per wheel notch.
@@ -162,6 +162,12 @@ impl ApplicationHandler<Wake> for App {
                 let is_plain = self.input.modifiers().is_empty() && !self.input.is_captured();
                 if button == MouseButton::Left && state.is_pressed() && is_plain && self.is_body_at_mouse() {
                     self.handles.press_body(self.mouse());
+                }
+                let is_shift = self.input.modifiers() == ModifiersState::SHIFT && !self.input.is_captured();
+                let is_selected = !self.session.world().resource::<Selection>().0.is_empty();
+                if button == MouseButton::Left && state.is_pressed() && is_shift && is_selected {
+                    // Elsewhere that is how one selects several.
+                    self.toasts.add(Tone::News, "focused here; Ctrl+click adds to the selection", now);
                 }
                 if self.input.button(button, state.is_pressed(), now) {
                     self.open_menu_here();

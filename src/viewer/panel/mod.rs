@@ -98,11 +98,6 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             state.open = open_now;
         });
     });
-    // What is new has a size, a material, a brightness.
-    if asked.commands[before..].iter().any(|command| matches!(command, Command::Edit(Edit::Add(_)))) {
-        let [_, _, _, _, _, _, _, selected, ..] = SECTIONS;
-        state.section = Some(selected);
-    }
     // All edits between pressing and releasing a mouse button are one undo step, also if a colour picker or a menu
     // extends beyond the panel.
     let is_over = context.pointer_latest_pos().is_some_and(|place| {
