@@ -81,7 +81,8 @@ pub fn dolly(view: &View, factor: f64) -> View {
     finite_or(view, View { eye: view.pivot() - view.forward * pivot_distance, pivot_distance, ..*view })
 }
 
-/// Like [`dolly`], but a camera above `ground` stays above it: where it would sink below, it rises about the pivot.
+/// Multiplies the distance to the pivot, which stays where it is. A camera above `ground` stays above it: where it would
+/// sink below, it rises about the pivot.
 ///
 /// - `ground`: height of a horizontal plane, metres.
 pub fn dolly_above(view: &View, factor: f64, turning: Turning, ground: Option<f64>) -> View {
