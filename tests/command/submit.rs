@@ -273,7 +273,8 @@ fn an_image_of_what_is_there_replaces_nothing_that_the_scene_reads() {
 fn a_later_round_renders_no_other_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let ball = "materials: { \"m\": diffuse(albedo: 0.5) }, objects: [sphere(center: (0, 0, 0), radius: 1, material: \"m\")], film:";
+    let ball = "materials: { \"m\": diffuse(albedo: 0.5) }, \
+                objects: [sphere(center: (0, 0, 0), radius: 1, material: \"m\")], film:";
     std::fs::write(path.join("a.ron"), SCENE.replace("film:", ball)).unwrap();
     does(path, "submit slurm a.ron --size 8x8 --parts 1 --spp 4 --error 1e-9 -o job --dry-run");
     does(path, "work job --part 1/1");

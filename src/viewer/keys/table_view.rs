@@ -33,11 +33,8 @@ pub const FLY: KeyGroup = KeyGroup {
         row!("change the flying speed", Trigger::Mouse("Ctrl+wheel"), Trigger::Mouse("wheel while flying")),
         row!("look around; about a model that was opened alone, orbit", Trigger::Mouse("Drag")),
         row!(
-            "play or pause what moves; where nothing does, switch the drag",
-            named(NamedKey::Space, Action::PlayOrDrag)
-        ),
-        row!(
-            "switch the drag between look around and orbit",
+            "play or pause what moves; where nothing does, switch the drag between look around and orbit",
+            named(NamedKey::Space, Action::PlayOrDrag),
             item("Drag: look around or orbit", &[Menu::View], Action::ToggleDrag)
         ),
         row!(

@@ -5,14 +5,12 @@ use super::page::{expect_none, files, read};
 use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
-const GRAMMAR: [(&str, &[&str]); 13] = [
+const GRAMMAR: [(&str, &[&str]); 12] = [
     ("crates/format/src/parts.rs", &[]),
     ("crates/format/src/scene_file.rs", &[]),
     ("crates/format/src/camera.rs", &[]),
     ("crates/format/src/animation.rs", &["AnimationPart", "EditedPart", "TrackPart"]),
     ("crates/format/src/key.rs", &["Interpolation"]),
-    // Rows of tables.
-    ("crates/format/src/property.rs", &["-"]),
     ("crates/format/src/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
     ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
@@ -22,19 +20,20 @@ const GRAMMAR: [(&str, &[&str]); 13] = [
     ("crates/render/src/film/develop/curve.rs", &["ToneCurve"]),
 ];
 
+/// A table of properties, whose rows are `Name = "word": …`.
+const TABLE: &str = "crates/format/src/property.rs";
+
 /// Names that a scene file may have.
 fn grammar_words() -> BTreeSet<String> {
-    let mut words = BTreeSet::new();
+    let row = |line: &str| {
+        let (word, after) = line.split_once(" = \"")?.1.split_once('"')?;
+        (after.starts_with(": ") && !line.trim_start().starts_with("//")).then(|| word.to_owned())
+    };
+    let mut words: BTreeSet<String> = read(TABLE).text.lines().filter_map(row).collect();
+    assert!(words.contains("image_width") && words.contains("focus_distance"), "{words:?}");
     for (path, types) in GRAMMAR {
         let mut is_type = false;
         for line in read(path).text.lines() {
-            // A row of a table: `Name = "word": …`.
-            if !line.trim_start().starts_with("//")
-                && let Some((word, after)) = line.split_once(" = \"").and_then(|(_, rest)| rest.split_once('"'))
-                && after.starts_with(": ")
-            {
-                words.insert(word.to_owned());
-            }
             if let Some(name) = line.strip_prefix("pub struct ").or_else(|| line.strip_prefix("pub enum ")) {
                 let name: String = name.chars().take_while(|c| c.is_alphanumeric()).collect();
                 is_type = types.is_empty() || types.contains(&name.as_str());

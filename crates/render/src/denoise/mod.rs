@@ -171,6 +171,24 @@ mod tests {
         }
     }
 
+    /// As when each half of its samples has a bright one: the pixel looks like detail, and those around it do not.
+    #[test]
+    fn what_one_pixel_shows_alone_gives_no_grains_to_its_neighbours() {
+        let scene = Scene::of(|_, _| (0.6, Vec3::ONE));
+        let mut rendered = scene.render(16, 0.4);
+        let bright: Vec<usize> = (0..5).flat_map(|y| (0..7).map(move |x| (7 + 12 * y) * WIDTH + 9 + 12 * x)).collect();
+        bright.iter().for_each(|&i| rendered.color[i] *= 2.5);
+        let found = scene.denoise(&rendered, true);
+        // How much of the noise of those around is left.
+        let off = |colors: &[Vec3], i: usize| colors[i] - scene.truth[i];
+        let around = |&i: &usize| [i - WIDTH, i + WIDTH, i - 2, i - 1, i + 1, i + 2];
+        let neighbours: Vec<usize> = bright.iter().flat_map(around).collect();
+        let sum = |of: &dyn Fn(usize) -> f32| neighbours.iter().map(|&i| f64::from(of(i))).sum::<f64>();
+        let raw = sum(&|i| off(&rendered.color, i).length_squared());
+        let left = sum(&|i| off(&rendered.color, i).dot(off(&found.color, i)));
+        assert!(left < 0.25 * raw, "{left} of {raw}");
+    }
+
     #[test]
     fn the_edge_of_a_shadow_stays_where_it_is() {
         let scene = shadow();
