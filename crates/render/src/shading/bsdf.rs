@@ -212,7 +212,7 @@ mod tests {
     use crate::sampling::Sampler;
     use crate::shading::disney::tests::{opaque, sheet, solid};
     use crate::shading::metal::Tint;
-    use crate::shading::surface::blend::{Blend, Part};
+    use crate::shading::surface::blend::Blend;
 
     fn metal(alpha: f32, compensate: bool) -> Lobe<'static> {
         let tint = Tint { color: Vec3::ONE.into(), schlick: false, index: None };
@@ -295,11 +295,16 @@ mod tests {
         (10..).zip(disneys).for_each(|(case, disney)| same_mean(case, &Lobe::Disney(disney)));
         let leaf = leaf(Vec3::new(0.1, 0.4, 0.1), Vec3::new(0.3, 0.5, 0.05));
         same_mean(6, &leaf);
-        let waxed = [(Part::Lobe(leaf), 0.8), (Part::Lobe(metal(0.3, false)), 0.2)];
-        same_mean(7, &Blend::new(&waxed, Vec::new()));
-        let coat = coat.map(|(lobe, weight)| (Part::Lobe(lobe), weight));
-        same_mean(2, &Blend::new(&coat, Vec::new()));
-        same_mean(3, &Blend::new(&coat[..1], Vec::new()));
+        same_mean(7, &blend(&[(leaf, 0.8), (metal(0.3, false), 0.2)]));
+        same_mean(2, &blend(&coat));
+        same_mean(3, &blend(&coat[..1]));
+    }
+
+    fn blend<'a>(parts: &[(Lobe<'a>, f32)]) -> Blend<'a> {
+        let mut blend = Blend::default();
+        parts.iter().for_each(|&(lobe, weight)| blend.push(lobe, weight));
+        blend.finish(None);
+        blend
     }
 
     fn same_mean(case: u32, bsdf: &impl Scatter) {

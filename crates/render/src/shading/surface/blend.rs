@@ -1,25 +1,24 @@
 //! Blends: weighted sums of BSDFs.
 
-use crate::core::material::MAX_LOBES;
 use crate::shading::bsdf::Lobe;
 use crate::shading::interface::Interface;
 use crate::shading::principled::layers::Principled;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use crate::shading::tangent::NormalShadowing;
 use glam::{Vec2, Vec3};
+use smallvec::SmallVec;
 
 /// A blend; the weights of its parts sum to at most 1.
-#[derive(Clone, Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Blend<'a> {
-    parts: [WeightedPart<'a>; MAX_LOBES],
-    n: usize,
+    /// At most [`MAX_LOBES`](crate::core::material::MAX_LOBES), but few in most blends, so that moving one is cheap.
+    parts: SmallVec<[WeightedPart<'a>; 3]>,
     layers: Vec<Principled>,
     shadowing: Option<NormalShadowing>,
 }
 
-/// A part of a blend.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Part<'a> {
+enum Part<'a> {
     Lobe(Lobe<'a>),
     /// A layered surface, by its index in the blend's `layers`.
     Layers(u8),
@@ -34,43 +33,34 @@ struct WeightedPart<'a> {
 }
 
 impl<'a> Blend<'a> {
-    /// Creates a blend from parts and their weights; at least one, at most [`MAX_LOBES`].
-    ///
-    /// - `layers`: the surfaces that [`Part::Layers`] refers to.
-    pub fn new(parts: &[(Part<'a>, f32)], layers: Vec<Principled>) -> Self {
-        let nothing = WeightedPart { part: parts[0].0, weight: 0.0, pmf: 0.0 };
-        let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers, shadowing: None };
-        // Sampled in proportion to their reflected light; uniformly if all are black.
-        let strength = |(part, weight): &(Part, f32)| {
-            weight
-                * match part {
-                    Part::Lobe(lobe) => lobe.albedo_estimate(),
-                    Part::Layers(k) => blend.layers[usize::from(*k)].albedo_estimate(),
-                }
-        };
-        let sum: f32 = parts.iter().map(strength).sum();
-        let pmfs: [f32; MAX_LOBES] = std::array::from_fn(|k| match parts.get(k) {
-            Some(part) if sum > 0.0 => strength(part) / sum,
-            _ => 1.0 / parts.len() as f32,
-        });
-        for ((slot, &(part, weight)), pmf) in blend.parts.iter_mut().zip(parts).zip(pmfs) {
-            *slot = WeightedPart { part, weight, pmf };
-        }
-        blend
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
     }
 
-    /// With the shadowing of a mapped normal.
-    pub fn shadowed(self, shadowing: Option<NormalShadowing>) -> Self {
-        Self { shadowing, ..self }
+    pub fn push(&mut self, lobe: Lobe<'a>, weight: f32) {
+        self.parts.push(WeightedPart { part: Part::Lobe(lobe), weight, pmf: weight * lobe.albedo_estimate() });
+    }
+
+    pub fn push_layers(&mut self, layers: Principled, weight: f32) {
+        let part = Part::Layers(self.layers.len() as u8);
+        self.parts.push(WeightedPart { part, weight, pmf: weight * layers.albedo_estimate() });
+        self.layers.push(layers);
+    }
+
+    /// Must be called when all parts are there.
+    ///
+    /// - `shadowing`: that of a mapped normal.
+    pub fn finish(&mut self, shadowing: Option<NormalShadowing>) {
+        self.shadowing = shadowing;
+        // Sampled in proportion to their reflected light; uniformly if all are black.
+        let sum: f32 = self.parts.iter().map(|p| p.pmf).sum();
+        let uniform = 1.0 / self.parts.len() as f32;
+        self.parts.iter_mut().for_each(|p| p.pmf = if sum > 0.0 { p.pmf / sum } else { uniform });
     }
 
     /// Factor of light from `wi`.
     fn lit_share(&self, wi: Vec3) -> f32 {
         self.shadowing.map_or(1.0, |shadowing| shadowing.share(wi))
-    }
-
-    fn parts(&self) -> &[WeightedPart<'a>] {
-        &self.parts[..self.n]
     }
 }
 
@@ -111,12 +101,12 @@ impl Part<'_> {
 
 impl Scatter for Blend<'_> {
     fn has_non_specular(&self) -> bool {
-        self.parts().iter().any(|p| p.part.has_non_specular(&self.layers))
+        self.parts.iter().any(|p| p.part.has_non_specular(&self.layers))
     }
 
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let mut sum = (Vec3::ZERO, 0.0);
-        for p in self.parts().iter().filter(|p| p.part.has_non_specular(&self.layers)) {
+        for p in self.parts.iter().filter(|p| p.part.has_non_specular(&self.layers)) {
             let leads_elsewhere = p.part.through(&self.layers).is_some() && !p.part.is_thin();
             if leads_elsewhere && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
                 continue;
@@ -130,12 +120,12 @@ impl Scatter for Blend<'_> {
     }
 
     fn through(&self) -> Option<Interface> {
-        self.parts().iter().find(|p| p.part.is_thin()).and_then(|p| p.part.through(&self.layers))
+        self.parts.iter().find(|p| p.part.is_thin()).and_then(|p| p.part.through(&self.layers))
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         let mut rest = u_lobe();
-        let parts = self.parts();
+        let parts = &self.parts;
         let chosen = parts
             .iter()
             .position(|p| {

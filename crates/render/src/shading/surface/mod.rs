@@ -2,7 +2,7 @@
 
 pub(crate) mod blend;
 
-use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId};
+use crate::core::material::{Fresnel, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::coat::Coat;
@@ -12,10 +12,9 @@ use crate::shading::metal::{Metal, Tint};
 use crate::shading::microfacets::Microfacets;
 use crate::shading::plastic::Plastic;
 use crate::shading::principled::at::principled_at;
-use crate::shading::principled::layers::Principled;
 use crate::shading::rough_glass;
 use crate::shading::sides::Sides;
-use crate::shading::surface::blend::{Blend, Part};
+use crate::shading::surface::blend::Blend;
 use crate::shading::tangent::NormalShadowing;
 use crate::shading::translucent::Translucent;
 use crate::shading::vertex::Vertex;
@@ -30,35 +29,13 @@ pub(crate) fn blend_at<'a>(
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
 ) -> Option<Blend<'a>> {
-    let mut parts = BlendParts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
-    collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
-    (parts.n > 0).then(|| {
-        let shadowing = vertex.turns_over.then(|| NormalShadowing::new(vertex.normal, vertex.interpolated_seen()));
-        Blend::new(&parts.parts[..parts.n], parts.layers).shadowed(shadowing)
-    })
-}
-
-/// The parts of a blend so far, with their weights.
-struct BlendParts<'a> {
-    parts: [(Part<'a>, f32); MAX_LOBES],
-    n: usize,
-    layers: Vec<Principled>,
-}
-
-impl<'a> BlendParts<'a> {
-    fn push(&mut self, lobe: Lobe<'a>, weight: f32) {
-        self.push_part(Part::Lobe(lobe), weight);
+    let mut blend = Blend::default();
+    collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut blend);
+    if blend.is_empty() {
+        return None;
     }
-
-    fn push_layers(&mut self, layers: Principled, weight: f32) {
-        self.push_part(Part::Layers(self.layers.len() as u8), weight);
-        self.layers.push(layers);
-    }
-
-    fn push_part(&mut self, part: Part<'a>, weight: f32) {
-        self.parts[self.n] = (part, weight);
-        self.n += 1;
-    }
+    blend.finish(vertex.turns_over.then(|| NormalShadowing::new(vertex.normal, vertex.interpolated_seen())));
+    Some(blend)
 }
 
 /// - `n_leaves`: number of transparent parts so far, of any weight: counted like in [`crate::prepare::bodies::Bodies`].
@@ -69,7 +46,7 @@ fn collect<'a>(
     sides: &mut Option<&mut Sides>,
     n_leaves: &mut u32,
     weight: f32,
-    parts: &mut BlendParts<'a>,
+    blend: &mut Blend<'a>,
 ) {
     let material = &scene.shading.materials[id as usize];
     let leaf = *n_leaves;
@@ -77,44 +54,44 @@ fn collect<'a>(
     match material {
         Material::Blend { weight: share, a, b, by_side, .. } => {
             let share = vertex.share_of_second(scene, *share, *by_side);
-            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), parts);
-            collect(scene, *b, vertex, sides, n_leaves, weight * share, parts);
+            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), blend);
+            collect(scene, *b, vertex, sides, n_leaves, weight * share, blend);
         }
         _ if weight == 0.0 => {}
         Material::Phong { diffuse, specular, transparency, .. } => {
             let specular = specular.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
             let opaque = weight * (1.0 - transparency);
             if opaque * (1.0 - specular) > 0.0 {
-                parts.push(
+                blend.push(
                     Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.texture_point) },
                     opaque * (1.0 - specular),
                 );
             }
             if opaque * specular > 0.0 {
-                parts.push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
+                blend.push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
             }
             if *transparency > 0.0 {
-                parts.push(clear_lobe(scene, sides, leaf), weight * transparency);
+                blend.push(clear_lobe(scene, sides, leaf), weight * transparency);
             }
         }
         Material::Principled { .. } => {
             if let Some(layers) = principled_at(scene, id, vertex, sides, leaf, false) {
-                parts.push_layers(layers, weight);
+                blend.push_layers(layers, weight);
             }
         }
         Material::Disney { .. } => {
             if let Some(disney) = disney_at(scene, id, vertex, sides, leaf) {
-                parts.push(Lobe::Disney(disney), weight);
+                blend.push(Lobe::Disney(disney), weight);
             }
         }
-        Material::Glass { .. } => parts.push(clear_lobe(scene, sides, leaf), weight),
+        Material::Glass { .. } => blend.push(clear_lobe(scene, sides, leaf), weight),
         Material::RoughGlass { alpha, compensate, beckmann, .. } => {
             let alpha = alpha.eval(scene, vertex.texture_point);
-            parts.push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, *beckmann, *compensate), weight);
+            blend.push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, *beckmann, *compensate), weight);
         }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, sides.as_deref_mut()) {
-                parts.push(lobe, weight);
+                blend.push(lobe, weight);
             }
         }
     }
