@@ -6,6 +6,7 @@ use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Sess
 use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
+use crate::viewer::submenu::{part, scrolled};
 use crate::viewer::thumbnails::Thumbnails;
 use crate::viewer::time_line::NOTHING_MOVES;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
@@ -26,8 +27,6 @@ const PARTS: [(&str, Menu); 6] = [
     ("Image", Menu::Image),
     ("Inspect", Menu::Inspect),
 ];
-/// Height of the longest menu, points; windows below it scroll.
-const TALL: f32 = 526.0;
 /// Width of the sphere of a material, points.
 const SPHERE: f32 = 20.0;
 
@@ -62,25 +61,6 @@ pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
         }
     });
     chosen
-}
-
-/// A line of a menu that is a menu itself.
-fn part(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
-    ui.menu_button(title, |ui| scrolled(ui, contents));
-}
-
-/// The lines of a menu; scrolls what is taller than the window.
-fn scrolled(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
-    // A menu is as wide as when it was open last: a longer name makes it wider, and is not broken.
-    ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
-    let height = ui.ctx().content_rect().height();
-    if height >= TALL {
-        return contents(ui);
-    }
-    ui.set_min_width(190.0);
-    // With a bar that is there before one scrolls: else nothing says that there is more.
-    ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
-    egui::ScrollArea::vertical().max_height((height - 20.0).max(40.0)).show(ui, contents);
 }
 
 fn built_in_mesh(ui: &mut Ui) -> Option<Action> {
@@ -232,39 +212,4 @@ pub fn all(input: &MenuInput) -> Vec<(String, String, String, Action)> {
         (format!("Material: {name}"), "give it to the selection".to_owned(), String::new(), dress(name))
     });
     lines.chain(materials).chain(scenes).chain(files).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A list that was looked at while it was empty has remembered a width that its names do not fit into.
-    #[test]
-    fn a_menu_that_has_grown_breaks_no_line() {
-        for height in [900.0, 300.0] {
-            let context = Context::default();
-            let screen = egui::Rect::from_min_size(Pos2::ZERO, egui::vec2(800.0, height));
-            let heights = |names: &[&str]| {
-                let mut heights = Vec::new();
-                for _ in 0..3 {
-                    heights.clear();
-                    let _ =
-                        context.run(egui::RawInput { screen_rect: Some(screen), ..Default::default() }, |context| {
-                            egui::Area::new(Id::new("menu")).show(context, |ui| {
-                                scrolled(ui, |ui| {
-                                    for name in names {
-                                        let button = Button::new(*name).shortcut_text("in a folder");
-                                        heights.push(ui.add(button).rect.height());
-                                    }
-                                });
-                            });
-                        });
-                }
-                heights
-            };
-            let empty = heights(&["none"]);
-            let long = "a scene whose name is longer than everything else.ron";
-            assert_eq!(heights(&["none", long]), [empty[0]; 2], "in a window of height {height}");
-        }
-    }
 }

@@ -59,6 +59,7 @@ mod renders;
 mod saver;
 mod status;
 mod story;
+mod submenu;
 mod thumbnails;
 mod time_line;
 mod toasts;

@@ -49,6 +49,8 @@ pub struct Advance {
     pub error: Option<f64>,
     /// The error has all but stopped to fall: the goal may be out of reach.
     pub is_flat: bool,
+    /// The samples are done, and the image is being denoised.
+    pub is_sampled: bool,
 }
 
 /// A finished image.
@@ -132,6 +134,8 @@ impl Order {
         let is_complete = !stop();
         let mut denoised = denoised.filter(|(spp, _)| *spp == film.spp()).map(|(_, found)| found);
         if let Some(filter) = self.denoiser.filter(|_| denoised.is_none() && film.spp() > 0) {
+            let error = film.error_estimate().map(|error| error.relative);
+            tell(Advance { share: 1.0, spp: film.spp(), error, is_flat: false, is_sampled: true });
             denoised = denoise(filter, scene, settings, &film, &mut guides, cancelled);
         }
         if film.spp() == 0 || cancelled() {
@@ -181,7 +185,7 @@ impl Order {
             Some(Outlook::Flat) | None => 0.0,
         };
         let share = by_spp.max(by_time).max(by_error).min(1.0);
-        Advance { share, spp: now.spp, error, is_flat: outlook == Some(Outlook::Flat) }
+        Advance { share, spp: now.spp, error, is_flat: outlook == Some(Outlook::Flat), is_sampled: false }
     }
 }
 
@@ -245,6 +249,12 @@ mod tests {
         let denoised = order.render_unless(&|| false, &subject, &|| false, |_| ()).unwrap().unwrap();
         assert!(denoised.error.unwrap() <= 0.2 && denoised.spp < raw.spp, "{denoised:?}");
         assert_eq!(ImageMetadata::read(&order.path).unwrap().denoised.as_deref(), Some("own"));
+        // Denoising that follows the samples is told.
+        let (mut told, target) = (Vec::new(), Target { spp: Some(2), ..Target::default() });
+        let order = Order { target, ..order };
+        order.render_unless(&|| false, &subject, &|| false, |now| told.push((now.spp, now.is_sampled))).unwrap();
+        assert_eq!(told.last(), Some(&(2, true)));
+        assert!(told[..told.len() - 1].iter().all(|(_, is_sampled)| !is_sampled), "{told:?}");
     }
 
     #[test]

@@ -217,8 +217,8 @@ impl OrderForm {
             return None;
         }
         let (mut wish, mut open) = (None, true);
-        // A value that is typed has its own Enter and Escape.
-        let is_typed = context.wants_keyboard_input();
+        // A value that is typed and a list of sizes have their own Enter and Escape.
+        let is_typed = context.wants_keyboard_input() || egui::Popup::is_any_open(context);
         let pressed = |key| !is_typed && context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let (is_entered, is_left) = (pressed(Key::Enter), pressed(Key::Escape));
         let title = if self.frames.is_some() { "Render frames" } else { "Save image" };
@@ -279,7 +279,7 @@ impl OrderForm {
                 "" => as_text(*size),
                 name => name.to_owned(),
             });
-            ComboBox::from_id_salt("size").selected_text(used).width(96.0).show_ui(ui, |ui| {
+            ComboBox::from_id_salt("size").selected_text(used).width(130.0).show_ui(ui, |ui| {
                 for (name, size) in sizes {
                     let colon = if name.is_empty() { "" } else { ": " };
                     ui.selectable_value(&mut self.size, size, format!("{name}{colon}{}", as_text(size)));
@@ -344,7 +344,7 @@ fn as_text((width, height): (u32, u32)) -> String {
 /// The sizes to choose from, each once, and whose it is.
 fn sizes(scene: (u32, u32), window: (u32, u32)) -> Vec<(String, (u32, u32))> {
     let named = match scene == window {
-        true => vec![("scene, window", scene)],
+        true => vec![("scene and window", scene)],
         false => vec![("scene", scene), ("window", window)],
     };
     let others = SIZES.into_iter().filter(|size| *size != scene && *size != window).map(|size| ("", size));

@@ -1,8 +1,10 @@
 //! Questions before something is lost: a small modal dialog, answered by mouse or by key.
 
+use crate::files::printable;
 use crate::frame::{Command, LeftBehind};
 use crate::viewer::overlay::style_key;
 use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
+use std::path::Path;
 use winit::keyboard::{Key, ModifiersState, NamedKey};
 
 /// A question to the user.
@@ -27,11 +29,19 @@ pub enum PromptAnswer {
     Later,
 }
 
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
 impl Prompt {
     fn text(&self) -> (String, String) {
         match self {
             Self::Leave { title, file, renders, then } => {
-                let before = if then.is_some() { "another scene opens" } else { "the window closes" };
+                let before = match then {
+                    Some(Command::Open { path }) => format!("{} opens", printable::name(&file_name(path))),
+                    Some(_) => "another scene opens".to_owned(),
+                    None => "the window closes".to_owned(),
+                };
                 let kept = match *renders && then.is_none() {
                     true => " What is being rendered is kept as it stands.",
                     false => "",
@@ -102,6 +112,18 @@ impl Prompt {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_question_names_what_is_about_to_open() {
+        let question = |then| {
+            let (title, file) = ("gallery".to_owned(), "gallery-0001.ron".to_owned());
+            Prompt::Leave { title, file, renders: false, then }.text().0
+        };
+        let open = |path: &str| Some(Command::Open { path: path.into() });
+        assert_eq!(question(open("cornell")), "Save the changes to gallery before cornell opens?");
+        assert_eq!(question(open("some/folder/a.glb")), "Save the changes to gallery before a.glb opens?");
+        assert_eq!(question(None), "Save the changes to gallery before the window closes?");
+    }
 
     #[test]
     fn every_choice_has_the_key_that_stands_beside_it() {

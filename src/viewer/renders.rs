@@ -62,6 +62,8 @@ struct Told {
     spp: u32,
     error: Option<f64>,
     is_flat: bool,
+    /// When the samples were done, if the image is being denoised.
+    sampled_at: Option<Instant>,
     /// The frame, counted from 1, and their number.
     frame: Option<(u32, u32)>,
 }
@@ -165,6 +167,9 @@ impl Running {
             true => "saving what there is".to_owned(),
             false => told.line(self.goal, self.since.elapsed().as_secs_f64()),
         };
+        if told.sampled_at.is_some() {
+            ui.ctx().request_repaint_after(Duration::from_secs(1));
+        }
         let text = ui.label(RichText::new(text).size(TEXT_SIZE - 1.0));
         if told.is_flat {
             text.on_hover_text("four times the samples took less than a third of the noise away");
@@ -174,9 +179,13 @@ impl Running {
                 None => ("write the image with the noise that it has now", "stop; nothing of it is saved"),
                 Some(_) => ("write this frame with the noise that it has now, and stop", "stop; whole frames stay"),
             };
-            // Before every pixel has a sample there is nothing.
+            // Before every pixel has a sample there is nothing, and after the last one all is kept.
             let button = Button::new("Keep what there is");
-            if ui.add_enabled(told.spp > 0 && !is_kept, button).on_hover_text(keep).clicked() {
+            if ui
+                .add_enabled(told.spp > 0 && told.sampled_at.is_none() && !is_kept, button)
+                .on_hover_text(keep)
+                .clicked()
+            {
                 self.kept.store(true, Ordering::Relaxed);
             }
             if ui.button("Cancel").on_hover_text(cancel).clicked() {
@@ -203,7 +212,9 @@ impl Told {
         }
         let to = goal.filter(|_| self.frame.is_none()).map_or("go".to_owned(), percent);
         // What follows the samples takes its own time.
-        if self.share >= 1.0 {
+        if let Some(since) = self.sampled_at {
+            parts.push(format!("denoising for {}", crate::viewer::status::seconds(since.elapsed().as_secs_f64())));
+        } else if self.share >= 1.0 {
             parts.push("finishing".to_owned());
         } else if let Some(goal) = goal.filter(|_| self.is_flat) {
             parts.push(format!("{} may be out of reach", percent(goal)));
@@ -236,8 +247,8 @@ impl Work {
 
     /// - `share`: of all frames; `frame`: the one of `now`, and their number.
     fn tell(&self, now: Advance, share: f64, frame: Option<(u32, u32)>) {
-        let Advance { spp, error, is_flat, .. } = now;
-        let told = Told { share, spp, error, is_flat, frame };
+        let Advance { spp, error, is_flat, is_sampled, .. } = now;
+        let told = Told { share, spp, error, is_flat, sampled_at: is_sampled.then(Instant::now), frame };
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = told;
         (self.waker)();
     }
@@ -315,6 +326,9 @@ mod tests {
         assert_eq!(Told { frame: Some((3, 60)), ..told }.line(Some(0.02), 20.0), "frame 3 of 60, about 60 s to go");
         assert_eq!(Told { error: None, share: 0.0, ..told }.line(None, 20.0), "16 samples per pixel");
         assert_eq!(Told { error: None, share: 1.0, ..told }.line(None, 20.0), "16 samples per pixel, finishing");
+        let sampled_at = Instant::now().checked_sub(Duration::from_secs(3));
+        let denoised = Told { error: None, share: 1.0, sampled_at, ..told };
+        assert_eq!(denoised.line(None, 20.0), "16 samples per pixel, denoising for 3.0 s");
         assert_eq!(Told::default().line(None, 0.1), "preparing");
     }
 

@@ -184,3 +184,42 @@ impl Drop for Worker {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::core::denoising::Denoising;
+    use crate::frame::worker::shared::{Job, Orders, Stats, ViewOptions};
+    use crate::render::Display;
+    use crate::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
+
+    /// What is displayed does not become noisy again where only rays get faster.
+    #[test]
+    fn the_denoised_image_stays_with_better_trees() {
+        let loaded = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        loaded.spawn(&mut world);
+        let prepared = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees).prepared;
+        let settings = world.resource::<Rendering>().0;
+        let target = Target { spp: Some(8), ..Target::default() };
+        let worker = Worker::start(1, false, target, None).unwrap();
+        let next = |is_awaited: &dyn Fn(&Stats) -> bool| {
+            let mut picture = Picture::default();
+            for _ in 0..5000 {
+                if worker.take(&mut picture) && is_awaited(&worker.stats()) {
+                    return worker.stats();
+                }
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            panic!("no image came: {:?}", worker.stats());
+        };
+        worker.set_look(ViewOptions { denoising: Denoising::Denoised, ..ViewOptions::default() });
+        let job = Job { generation: 1, prepared: prepared.clone(), settings, width: 48, height: 36 };
+        worker.order(Orders { job: Some(job), ..Orders::default() });
+        let before = next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
+        worker.set_prepared(1, prepared);
+        worker.set_display(Display { exposure_stops: 1.0, ..Display::default() });
+        let after = next(&|_| true);
+        assert_eq!((after.denoised_error, after.denoised_spp), (before.denoised_error, 8));
+    }
+}

@@ -186,8 +186,8 @@ impl<'a> Loop<'a> {
             && generation == job.generation
         {
             job.prepared = prepared;
-            // The number of visited nodes per ray has changed.
-            self.views = Views::default();
+            // The number of visited nodes per ray has changed, and nothing of the image.
+            self.views.inspected = None;
             self.redraw |= !self.look.inspection.is_of_film();
         }
         // The position belongs to another image.

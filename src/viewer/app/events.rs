@@ -176,7 +176,8 @@ impl ApplicationHandler<Wake> for App {
                 // The selection is an overlay and does not change the image.
                 self.repaint_at = Some(now);
             }
-            WindowEvent::MouseWheel { delta, .. } if !response.consumed => {
+            // Beside a menu, somebody wants to scroll that.
+            WindowEvent::MouseWheel { delta, .. } if !response.consumed && !in_menu => {
                 // Shift turns a vertical wheel into a horizontal one on some systems.
                 let notches = match delta {
                     MouseScrollDelta::LineDelta(x, y) => f64::from(x + y),
