@@ -7,7 +7,7 @@
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
 //! - `FIRSTLIGHT_EMBREE`: a libembree4 shared object to compare with (see `scripts/compare_embree.sh`).
-//! - `--rooms`: rooms of many meshes, in separate trees and in one; `FIRSTLIGHT_ROOMS` adds scene files.
+//! - `--rooms`: rooms of many meshes, in separate trees, in one, and in Embree; `FIRSTLIGHT_ROOMS` adds scene files.
 //! - `--isa avx2`: uses AVX2 where there is AVX-512, and Embree does too.
 //! - `FIRSTLIGHT_EMBREE_ROBUST`: if set, Embree builds its scenes with the robust flag.
 //!
@@ -80,11 +80,7 @@ fn main() {
         crowd::run(options.rounds);
         return;
     }
-    if only_rooms {
-        rooms::run(&options.filter, options.rounds, options.size);
-        return;
-    }
-    if only_small || options.filter.is_empty() {
+    if only_small || options.filter.is_empty() && !only_rooms {
         small::run(options.rounds);
     }
     if only_small {
@@ -95,6 +91,13 @@ fn main() {
     #[cfg(unix)]
     if embree.is_some() {
         println!("figures in ns a ray (x: how many times faster than Embree, one ray at a time)");
+    }
+    if only_rooms {
+        #[cfg(unix)]
+        rooms::run(&options.filter, options.rounds, options.size, embree.as_ref());
+        #[cfg(not(unix))]
+        rooms::run(&options.filter, options.rounds, options.size);
+        return;
     }
     let all = rayon::ThreadPoolBuilder::new().build().expect("threads");
     let mut totals: Vec<Total> = Vec::new();

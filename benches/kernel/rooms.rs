@@ -1,6 +1,8 @@
 //! Rooms of many meshes that stand still: each in a tree of its own, and all in one.
 
 use crate::clock::{cpu_seconds, median};
+#[cfg(unix)]
+use crate::embree::Embree;
 use crate::meshes::Mesh;
 use crate::rays::{self, Random, RaySet};
 use firstlight::kdtree::{BuildPreset, HitBatch, HitSpace, MeshTree, SceneTree, Shape};
@@ -63,7 +65,23 @@ fn loaded(path: &std::path::Path) -> Room {
     Room { name, shapes, eye: vec3(0.5, 0.1, 0.5) }
 }
 
-pub fn run(filter: &str, rounds: usize, size: u32) {
+/// All triangles of a room as one mesh.
+#[cfg(unix)]
+fn merged_mesh(shapes: &[Shape]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for shape in shapes {
+        let Shape::Mesh { tree, world_from_object, .. } = shape else { continue };
+        for prim in 0..tree.n_triangles() as u32 {
+            let first = positions.len() as u32;
+            positions.extend(tree.vertices(prim).map(|vertex| world_from_object.transform_point3(vertex)));
+            triangles.push([first, first + 1, first + 2]);
+        }
+    }
+    (positions, triangles)
+}
+
+/// - `embree`: traces the same rays through the same triangles, as one mesh.
+pub fn run(filter: &str, rounds: usize, size: u32, #[cfg(unix)] embree: Option<&Embree>) {
     println!("rooms, ns a ray (closest, any): each mesh in its own tree, all in one, and how many times faster");
     for Room { name, shapes, eye } in rooms(filter) {
         let in_space = |wanted: HitSpace| {
@@ -83,24 +101,49 @@ pub fn run(filter: &str, rounds: usize, size: u32) {
         let triangles: usize =
             shapes.iter().map(|shape| if let Shape::Mesh { tree, .. } = shape { tree.n_triangles() } else { 0 }).sum();
         println!("{name}: {} meshes, {triangles} triangles, one tree in {build:.2} s", shapes.len());
+        #[cfg(unix)]
+        let rival = embree.map(|embree| {
+            let (positions, triangles) = merged_mesh(&shapes);
+            let start = cpu_seconds();
+            let scene = embree.scene(&positions, &triangles);
+            println!("    built by Embree in {:.2} s", cpu_seconds() - start);
+            scene
+        });
         let seen = Mesh { name: name.clone(), positions: Vec::new(), triangles: Vec::new(), eye };
         let mut gains = Vec::new();
         for set in rays::classes(&merged, &seen, size) {
             let mut times: [Vec<f64>; 4] = Default::default();
+            #[cfg(unix)]
+            let mut ratios: [Vec<f64>; 2] = Default::default();
+            #[cfg(unix)]
+            let prepared = rival.as_ref().map(|rival| rival.prepare(&set));
             for _ in 0..rounds {
                 for (scene, to) in [(&separate, 0), (&merged, 2)] {
                     let [closest, any] = seconds(scene, &set);
                     times[to].push(closest);
                     times[to + 1].push(any);
                 }
+                #[cfg(unix)]
+                if let (Some(rival), Some(prepared)) = (&rival, &prepared) {
+                    let theirs = [rival.trace(prepared), rival.trace_any(prepared)];
+                    for (k, theirs) in theirs.into_iter().enumerate() {
+                        ratios[k].push(1e9 * theirs / set.len() as f64 / times[2 + k].last().expect("just pushed"));
+                    }
+                }
             }
             let [closest, any, one_closest, one_any] = times.map(|mut times| median(&mut times));
-            println!(
+            print!(
                 "    {:9} {closest:7.1} {any:7.1}   {one_closest:7.1} {one_any:7.1}   x{:.2} x{:.2}",
                 set.name,
                 closest / one_closest,
                 any / one_any
             );
+            #[cfg(unix)]
+            if rival.is_some() {
+                let [closest, any] = ratios.map(|mut ratios| median(&mut ratios));
+                print!("   Embree x{closest:.2} x{any:.2}");
+            }
+            println!();
             gains.push([closest / one_closest, any / one_any]);
         }
         let mean = |k: usize| (gains.iter().map(|gain| gain[k].ln()).sum::<f64>() / gains.len() as f64).exp();
