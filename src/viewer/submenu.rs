@@ -22,10 +22,16 @@ pub fn part(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
         since = now;
     }
     ui.data_mut(|data| data.insert_temp(id, (distance, since)));
+    if before.is_none() || open_item(ui).is_some() || ui.will_parent_close() {
+        return;
+    }
     // The toolkit closes it as soon as the pointer stops on another line, which every late image makes it do.
-    if before.is_some() && open_item(ui).is_none() && now - since < PATIENCE && !ui.will_parent_close() {
+    if now - since < PATIENCE {
         MenuState::from_ui(ui, |state, _| state.open_item = before);
         ui.ctx().request_repaint_after(Duration::from_secs_f64(PATIENCE));
+    } else {
+        // The line under the pointer opens with the next image, and the pointer may rest.
+        ui.ctx().request_repaint();
     }
 }
 

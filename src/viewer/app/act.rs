@@ -112,7 +112,13 @@ impl App {
         let [x, y] = place;
         self.needs_tick = true;
         match action {
-            Action::Send(command) => self.open(command, now),
+            Action::Send(command) => {
+                let wants_selection = matches!(command, Command::Edit(Edit::Delete | Edit::Duplicate));
+                if wants_selection && self.session.world().resource::<Selection>().0.is_empty() {
+                    self.toasts.add(Tone::News, "nothing is selected: click an object", now);
+                }
+                self.open(command, now);
+            }
             Action::TogglePause => {
                 let paused = self.session.status().paused;
                 self.session.send(if paused { Command::Resume } else { Command::Pause });

@@ -98,7 +98,10 @@ impl ApplicationHandler<Wake> for App {
                 }
                 // Escape and F1 leave the list of keys even during text input.
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
-                if pressed && (typing || in_menu && is_for_menu(&event.logical_key)) && !(leaves && self.help.open) {
+                if pressed
+                    && (typing || in_menu && is_for_menu(&event.logical_key, modifiers))
+                    && !(leaves && self.help.open)
+                {
                     return;
                 }
                 if pressed {
@@ -270,9 +273,10 @@ fn is_tab(event: &WindowEvent) -> bool {
     matches!(event, WindowEvent::KeyboardInput { event, .. } if event.logical_key == Key::Named(NamedKey::Tab))
 }
 
-/// Whether an open menu takes a key: those that move in it, choose, and close it.
-fn is_for_menu(key: &Key) -> bool {
+/// Whether an open menu takes a key: those that move in it, choose, and close it, and letters, which are meant for one
+/// of its lines.
+fn is_for_menu(key: &Key, modifiers: ModifiersState) -> bool {
     use NamedKey::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Escape, Space, Tab};
-    let Key::Named(key) = key else { return false };
+    let Key::Named(key) = key else { return !modifiers.control_key() && !modifiers.alt_key() };
     [ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Escape, Space, Tab].contains(key)
 }

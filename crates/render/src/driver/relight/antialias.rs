@@ -113,12 +113,16 @@ impl Antialiased {
         shades.par_extend(rays.colors.par_iter().map(|color| compressed(*color, rays.exposure).extend(0.0)));
         spreads.resize(shades.len(), Spread::default());
         let (shades, n_columns) = (&*shades, rays.past.size().x as usize);
-        spreads.par_chunks_exact_mut(n_columns).enumerate().for_each(|(y, to)| {
-            if !stop() {
-                let set = rays.set;
-                dispatch!(set, spread_row(shades: &[Vec4], rays: &Rays, before: Option<&Camera>, y: usize, to: &mut [Spread]));
-            }
+        let rows = spreads.par_chunks_exact_mut(n_columns).enumerate();
+        let done = rows.map(|(y, to)| {
+            let set = rays.set;
+            dispatch!(set, spread_row(shades: &[Vec4], rays: &Rays, before: Option<&Camera>, y: usize, to: &mut [Spread]));
+            !stop()
         });
+        // Rows without their spread would tell of places in images that are not there.
+        if !done.all(|done| done) {
+            return None;
+        }
         let n = size.x as usize * size.y as usize;
         present.list.resize(n, Vec4::ZERO);
         colors.resize(n, Vec3::ZERO);
@@ -391,6 +395,19 @@ mod tests {
             errors.push(error(&found, &camera));
         }
         assert!(errors[15] < 0.7 * errors[0], "{errors:?}");
+    }
+
+    /// As when the camera moves on while the first image of a view is being mixed.
+    #[test]
+    fn an_image_that_is_stopped_at_once_is_none() {
+        let (camera, past) = (moved_camera(0.0), Past::of_depth(RAYS, Vec2::splat(0.5), 2.0, 0.0));
+        let colors = vec![Vec3::ONE; (RAYS.x * RAYS.y) as usize];
+        let set = InstructionSet::detect();
+        let rays = Rays { colors: &colors, past: &past, camera: &camera, set, exposure: 1.0, weight: 1.0, most: 1.0 };
+        let mut image = Antialiased::default();
+        image.start();
+        assert!(image.mix(&rays, SIZE, &|| true).is_none());
+        assert!(image.mix(&rays, SIZE, &|| false).is_some());
     }
 
     #[test]
