@@ -75,6 +75,14 @@ impl App {
                 Ask::Act(action) => self.act(action),
                 Ask::Send(command) => {
                     self.reaction.asked(now);
+                    match command {
+                        Command::SetPlayRange { seconds: Some(_) } => {
+                            let news = "plays and renders this part until another scene opens; no file keeps it";
+                            self.toasts.add(Tone::News, news, now);
+                        }
+                        Command::SetPlayRange { seconds: None } => self.toasts.end("plays"),
+                        _ => {}
+                    }
                     self.session.send(command);
                 }
             }
