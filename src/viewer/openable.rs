@@ -54,15 +54,18 @@ pub fn recent(ui: &mut Ui, session: &Session, recent: Recent) -> Option<Command>
 
 /// The name of a recent file, and the folder that tells it from others of that name.
 fn parts(name: &str) -> (String, String) {
-    let path = Path::new(name);
-    let short = path.file_name().map_or(name.into(), |file| file.to_string_lossy()).into_owned();
-    let folder = path.parent().and_then(Path::file_name).map(|folder| folder.to_string_lossy());
+    let folder = Path::new(name).parent().and_then(Path::file_name).map(|folder| folder.to_string_lossy());
     let folder = match folder {
         Some(folder) => format!("in {}", printable::name(&folder)),
         None if builtin_text(name).is_some() => "built in".to_owned(),
         None => String::new(),
     };
-    (short, folder)
+    (short_name(name), folder)
+}
+
+/// The name of a scene without its folder.
+pub fn short_name(scene: &str) -> String {
+    Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy()).into_owned()
 }
 
 #[cfg(test)]

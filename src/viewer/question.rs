@@ -2,9 +2,9 @@
 
 use crate::files::printable;
 use crate::frame::{Command, LeftBehind};
+use crate::viewer::openable::short_name;
 use crate::viewer::overlay::style_key;
 use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
-use std::path::Path;
 use winit::keyboard::{Key, ModifiersState, NamedKey};
 
 /// A question to the user.
@@ -29,16 +29,14 @@ pub enum PromptAnswer {
     Later,
 }
 
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
 impl Prompt {
     fn text(&self) -> (String, String) {
         match self {
             Self::Leave { title, file, renders, then } => {
                 let before = match then {
-                    Some(Command::Open { path }) => format!("{} opens", printable::name(&file_name(path))),
+                    Some(Command::Open { path }) => {
+                        format!("{} opens", printable::name(&short_name(&path.to_string_lossy())))
+                    }
                     Some(_) => "another scene opens".to_owned(),
                     None => "the window closes".to_owned(),
                 };

@@ -216,10 +216,11 @@ mod tests {
         worker.set_look(ViewOptions { denoising: Denoising::Denoised, ..ViewOptions::default() });
         let job = Job { generation: 1, prepared: prepared.clone(), settings, width: 48, height: 36 };
         worker.order(Orders { job: Some(job), ..Orders::default() });
-        let before = next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
+        next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
         worker.set_prepared(1, prepared);
         worker.set_display(Display { exposure_stops: 1.0, ..Display::default() });
         let after = next(&|_| true);
-        assert_eq!((after.denoised_error, after.denoised_spp), (before.denoised_error, 8));
+        // With better guides, the same samples may have been denoised once more meanwhile.
+        assert_eq!((after.denoised_error.is_some(), after.denoised_spp), (true, 8));
     }
 }

@@ -9,7 +9,7 @@ use crate::render::{Inspection, Integrator};
 use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
-use crate::viewer::panel::DroppedMaterial;
+use crate::viewer::panel::{DroppedMaterial, NOTHING_SELECTED};
 use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
 use crate::viewer::time_line::{Ask, NOTHING_MOVES, Strip};
 use crate::viewer::toasts::{IN_FOLDER, Tone};
@@ -123,7 +123,7 @@ impl App {
             Action::Send(command) => {
                 let wants_selection = matches!(command, Command::Edit(Edit::Delete | Edit::Duplicate));
                 if wants_selection && self.session.world().resource::<Selection>().0.is_empty() {
-                    self.toasts.add(Tone::News, "nothing is selected: click an object", now);
+                    self.toasts.add(Tone::News, NOTHING_SELECTED, now);
                 }
                 self.open(command, now);
             }

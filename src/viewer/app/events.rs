@@ -280,3 +280,17 @@ fn is_for_menu(key: &Key, modifiers: ModifiersState) -> bool {
     let Key::Named(key) = key else { return !modifiers.control_key() && !modifiers.alt_key() };
     [ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Escape, Space, Tab].contains(key)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_menu_takes_letters_and_leaves_shortcuts() {
+        let (none, letter) = (ModifiersState::empty(), Key::Character("m".into()));
+        assert!(is_for_menu(&letter, none) && is_for_menu(&letter, ModifiersState::SHIFT));
+        assert!(!is_for_menu(&letter, ModifiersState::CONTROL) && !is_for_menu(&letter, ModifiersState::ALT));
+        assert!(is_for_menu(&Key::Named(NamedKey::Escape), none));
+        assert!(!is_for_menu(&Key::Named(NamedKey::F1), none));
+    }
+}

@@ -4,7 +4,7 @@
 use crate::files::printable;
 use crate::frame::Command;
 use crate::viewer::app::App;
-use crate::viewer::app::tick::short_name;
+use crate::viewer::openable::short_name;
 use crate::viewer::question::{Prompt, PromptAnswer};
 use crate::viewer::saver::new_file;
 use crate::viewer::toasts::Tone;

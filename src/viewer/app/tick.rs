@@ -5,8 +5,8 @@ use crate::scene::SceneSource;
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::keys::Action;
+use crate::viewer::openable::short_name;
 use crate::viewer::toasts::{IN_FOLDER, Toasts, Tone};
-use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -183,9 +183,4 @@ pub(super) fn title(scene: &str, unsaved: bool) -> String {
     } else {
         format!("firstlight — {mark}{}", crate::files::printable::name(&name))
     }
-}
-
-/// Returns the name of a scene without its folder.
-pub(super) fn short_name(scene: &str) -> String {
-    Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy()).into_owned()
 }

@@ -39,6 +39,7 @@ mod texture;
 mod widgets;
 
 pub use sections::SECTIONS;
+pub use selected::NOTHING_SELECTED;
 pub use state::{Around, Asked, DroppedMaterial, PanelState};
 
 use crate::frame::{Command, Edit, Session};

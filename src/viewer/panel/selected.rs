@@ -10,10 +10,13 @@ use crate::viewer::panel::widgets::{color, name_field, number, proportional, row
 use egui::Ui;
 use glam::DVec3;
 
+/// What to do about an empty selection.
+pub const NOTHING_SELECTED: &str = "nothing selected: click an object";
+
 pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
     let selection = session.world().resource::<Selection>();
     let Some(active) = selection.active() else {
-        ui.weak("nothing selected: click an object");
+        ui.weak(NOTHING_SELECTED);
         return;
     };
     let inputs = session.inputs();
