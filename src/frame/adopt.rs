@@ -127,7 +127,8 @@ pub(super) fn set_moment(world: &mut World, seconds: f64) {
     }
     if let Some(entity) = taken_back.first() {
         let name = world.get::<Name>(*entity).map_or("it".to_owned(), |name| format!("`{name}`"));
-        let text = format!("{name} follows its keys again: Ctrl+Z brings your change back, Set key (Ctrl+K) keeps it");
+        let text =
+            format!("{name} follows its animation again: Ctrl+Z brings your change back, Set key (Ctrl+K) keeps it");
         let now = world.resource::<Clock>().0;
         world.resource_mut::<Status>().say(now, MessageKind::Note, text);
     }

@@ -13,8 +13,7 @@ use std::sync::Arc;
 /// What frames are made of: the scene as it is now. Taken at once, and opened on another thread.
 pub struct Reel {
     current: Arc<LoadedScene>,
-    /// `None` for a glTF model, whose file says how it moves.
-    description: Option<Description>,
+    description: Description,
     trees: Trees,
     rendering: Rendering,
     display: DisplaySettings,
@@ -34,11 +33,11 @@ impl Reel {
     pub fn of(session: &mut Session) -> Option<Self> {
         let world = session.world();
         let animation = world.get_resource::<Animation>().filter(|animation| animation.moves())?;
-        let (is_model, fps) = (animation.has_model(), animation.fps);
+        let fps = animation.fps;
         let current = world.get_resource::<CurrentScene>()?.0.clone();
         let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
         let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
-        let description = (!is_model).then(|| session.describe());
+        let description = session.describe();
         Some(Self { current, description, trees, rendering, display, rig, fps })
     }
 
@@ -54,13 +53,8 @@ impl Reel {
     pub fn open(self) -> Result<OpenReel, String> {
         let Self { current, description, trees, rendering, display, rig, .. } = self;
         let mut world = World::new();
-        match description {
-            Some(description) => {
-                let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
-                scene.spawn(&mut world);
-            }
-            None => current.spawn(&mut world),
-        }
+        let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
+        scene.spawn(&mut world);
         world.insert_resource(rendering);
         world.insert_resource(display);
         // Where no track moves the camera, it stays where it was flown to.

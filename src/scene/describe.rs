@@ -79,9 +79,10 @@ impl Description {
         let animation_part = animation.as_ref().map_or_else(Default::default, |animation| {
             moved.part((animation, at), (world, &inputs), &writer.names, &mut writer.losses)
         });
-        let is_blurred = |it: &Animation| it.model.is_some() && it.open_shutter(at).is_some();
-        if animation.as_ref().is_some_and(is_blurred) {
-            let loss = "the motion blur of the glTF model is left out: a scene file shows one moment of its animation";
+        let has_unshown = |it: &LoadedScene| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
+        if animation.is_none() && loaded.is_some_and(has_unshown) {
+            let loss =
+                "the scene keeps the stored pose of the model, not its animation: show a moment of it to keep both";
             writer.losses.push(loss.to_owned());
         }
         let environment = writer.environment(&inputs.environment);

@@ -1,6 +1,7 @@
 //! A hash that tells whether two loaded scenes have the same contents.
 
 use crate::files::hash::Fingerprint;
+use crate::format::animation::AnimationPart;
 use crate::format::camera::CameraPart;
 use crate::format::parts::{DisplayPart, FilmPart, ObjectPart};
 use crate::format::scene_file::SceneFile;
@@ -92,6 +93,10 @@ impl SceneContent {
         let is_exposed = file.animation.shutter.is_some() || file.animation.shutter_seconds.is_some();
         let model = animation.filter(|_| is_exposed).and_then(|animation| animation.model.as_ref());
         let motion = model.map(|model| model.motion.clone());
+        // What a glTF file moves counts by its animations, and only where they are seen.
+        if file.animation.model.take().is_some() && file.animation.tracks.is_empty() && !is_exposed {
+            file.animation = AnimationPart::default();
+        }
         let CameraPart { look_at, forward, .. } = file.camera;
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
         if animation.is_some_and(Animation::has_camera_track) {

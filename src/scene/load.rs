@@ -5,7 +5,7 @@ use crate::files::printable;
 use crate::files::relative::{absolute, path_to_text, relative_path, text_to_path};
 use crate::files::stamp::Stamp;
 use crate::files::warnings::Warnings;
-use crate::format::animation::TrackPart;
+use crate::format::animation::{AnimationPart, TrackPart};
 use crate::format::bounds;
 use crate::format::bounds::{check_moment, check_shutter_share};
 use crate::format::choice::ModelChoice;
@@ -19,6 +19,7 @@ use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentLayout, EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::import::documents::Documents;
 use crate::import::environment_image::equirectangular;
+use crate::import::gltf_motion::GltfMotion;
 use crate::import::gltf_scene;
 use crate::import::meshes::{LoadedMesh, load_mesh};
 use crate::import::sky::clear_sky;
@@ -205,7 +206,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
     let shot = ImageMetadata::read(path).map_err(failed)?;
     let source = shot.source(path).map_err(failed)?;
     let options = LoadOptions { up: options.up.or(shot.up()), ..*options };
-    let (mut scene, moves) = match (&shot.text, source) {
+    let mut scene = match (&shot.text, source) {
         (Some(text), source) => {
             let start = Instant::now();
             // Its paths are relative to the folder of the scene.
@@ -215,31 +216,24 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                 SceneSource::Builtin(_) => PathBuf::new(),
                 file => file.path().and_then(Path::parent).map(Path::to_path_buf).unwrap_or_default(),
             };
-            let (mut scene, moves) = {
-                let documents = Documents::new(options.choice());
-                let file = SceneFile::parse(text, path)?;
-                let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
-                match source {
-                    source if scene.has_read(&source, &documents) => scene.source = source,
-                    source => scene.warnings.push(format!(
-                        "{}: {} is not its scene: what is saved in the image is shown",
-                        path.display(),
-                        source.title()
-                    )),
-                }
-                let moves = scene.move_as_model(shot.model_camera(), &documents)?;
-                (scene, moves)
-            };
+            let documents = Documents::new(options.choice());
+            let file = SceneFile::parse(text, path)?;
+            let mut scene = resolve(&own, file, Some(text), folder, &options, &documents)?;
+            match source {
+                source if scene.has_read(&source, &documents) => scene.source = source,
+                source => scene.warnings.push(format!(
+                    "{}: {} is not its scene: what is saved in the image is shown",
+                    path.display(),
+                    source.title()
+                )),
+            }
             scene.load_seconds = start.elapsed().as_secs_f64();
-            let start = Instant::now();
-            scene.build_trees(&options)?;
-            scene.build_seconds = start.elapsed().as_secs_f64();
-            (scene, moves)
+            scene
         }
-        (None, Some(source)) => (load(&source, &options)?, true),
+        (None, Some(source)) => load(&source, &options)?,
         (None, None) => return Err(SceneError::in_file(path, "its metadata names no scene")),
     };
-    if moves && scene.content_fingerprint().to_string() != shot.fingerprint {
+    if scene.content_fingerprint().to_string() != shot.fingerprint {
         let what = match &scene.source {
             SceneSource::Picture(_) => "a file of its scene".to_owned(),
             source => source.title(),
@@ -251,6 +245,9 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
         scene.choose(options.choice())?;
     }
     scene.expose(options.choice())?;
+    let start = Instant::now();
+    scene.build_trees(&options)?;
+    scene.build_seconds += start.elapsed().as_secs_f64();
     if scene.choice.camera.is_none() {
         scene.choice.camera = shot.model_camera().map(str::to_owned);
     }
@@ -396,6 +393,7 @@ pub(super) fn resolve(
     let mut of_materials = Warnings::default();
     scene.meshes_with_own_materials().for_each(|mesh| of_materials.append(&mesh.material_warnings));
     scene.warnings.append(&of_materials);
+    scene.find_motion(documents);
     if problems.is_empty() { Ok(scene) } else { Err(SceneError::of(problems, untold, Some(&title))) }
 }
 
@@ -415,36 +413,20 @@ impl LoadedScene {
         }
     }
 
-    /// Moves a glTF model from an image with motion blur as its file does; false, and a warning, if it has other objects.
-    ///
-    /// - `camera`: name of the camera of the model that the image was opened with.
-    fn move_as_model(&mut self, camera: Option<&str>, documents: &Documents) -> Result<bool, SceneError> {
-        let animation = &self.file.animation;
-        let is_exposed = animation.shutter.is_some() || animation.shutter_seconds.is_some();
-        let SceneSource::Model(path) = &self.source else { return Ok(true) };
-        if !is_exposed || !animation.tracks.is_empty() || ModelFormat::of(path) != Some(ModelFormat::Gltf) {
-            return Ok(true);
-        }
-        let meshes = |file: &SceneFile| -> Vec<MeshSource> {
-            let sources = file.objects.iter().filter_map(|object| match object {
-                ObjectPart::Mesh { source, .. } => Some(source.clone()),
-                _ => None,
-            });
-            sources.filter(|source| matches!(source, MeshSource::Gltf { .. })).collect()
+    /// Finds what a glTF file moves.
+    fn find_motion(&mut self, documents: &Documents) {
+        let Some(part) = &self.file.animation.model else { return };
+        let by_name: HashMap<&str, usize> =
+            self.file.objects.iter().enumerate().filter_map(|(i, object)| Some((object.name()?, i))).collect();
+        let mesh = |(name, _): &(String, usize)| {
+            let loaded = self.meshes.get(*by_name.get(name.as_str())?)?.as_ref()?;
+            Some(&*loaded.mesh)
         };
-        let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
-        let choice = ModelChoice { at: Some(animation.at), camera: camera.map(str::to_owned), ..self.choice.clone() };
-        let wish = gltf_scene::Wish { file: &file, choice: &choice, aspect: 1.0 };
-        let made = gltf_scene::generate(documents, path, &wish)?;
-        let is_same = meshes(&made.file) == meshes(&self.file) && made.file.lights.len() <= self.file.lights.len();
-        if is_same {
-            self.choice.at = choice.at;
-            self.motion = made.motion.map(Arc::new);
-        } else {
-            let title = self.source.title();
-            self.warnings.push(format!("{title}: the image has edited objects, and is shown without motion blur"));
+        let path = self.folder.join(text_to_path(&part.file));
+        match GltfMotion::of_part(documents, &path, part, part.objects.iter().map(mesh)) {
+            Ok(motion) => self.motion = Some(Arc::new(motion)),
+            Err(problem) => self.warnings.push(format!("{problem}; its animation is left out")),
         }
-        Ok(is_same)
     }
 
     /// Sets the chosen exposure time; warns if nothing can move.
@@ -476,12 +458,13 @@ impl LoadedScene {
         if choice.variant.is_some() {
             self.warnings.push(format!("{title}: only glTF models have variants"));
         }
+        let moves = !self.file.animation.tracks.is_empty() || self.motion.is_some();
         match choice.at {
-            Some(_) if self.file.animation.tracks.is_empty() && is_gltf => {
-                let problem = format!("the image shows one moment of the model; open {title} for others");
+            Some(_) if !moves && is_gltf => {
+                let problem = format!("the image shows the stored pose of the model; open {title} for moments");
                 return Err(SceneError::in_file(title, problem));
             }
-            Some(at) if self.file.animation.tracks.is_empty() => {
+            Some(at) if !moves => {
                 let at = bounds::number(at);
                 self.warnings.push(format!("{title} has no animation: {at} s shows what any moment does"));
             }
@@ -489,8 +472,9 @@ impl LoadedScene {
                 let wrong = |bad| SceneError::in_file(self.source.title(), bad);
                 check_moment("--at", at).map_err(wrong)?;
                 let of_tracks = self.file.animation.tracks.iter().filter_map(|track| track.keys().last());
+                let of_model = self.motion.as_ref().map_or(0.0, |motion| motion.length);
                 let end =
-                    self.file.animation.duration.unwrap_or_else(|| of_tracks.map(|key| key.0).fold(0.0, f64::max));
+                    self.file.animation.duration.unwrap_or_else(|| of_tracks.map(|key| key.0).fold(of_model, f64::max));
                 if let Some(ignored) = gltf_scene::beyond_animation(at.max(0.0), Some(end)) {
                     self.warnings.push(format!("{}: {ignored}", self.source.title()));
                 }
@@ -508,7 +492,8 @@ impl LoadedScene {
         let tracks = &mut self.file.animation.tracks;
         let n_tracks = tracks.len();
         tracks.retain(|track| !matches!(track, TrackPart::Camera { .. }));
-        if tracks.len() < n_tracks {
+        let of_model = self.file.animation.model.as_mut().and_then(|model| model.camera.take());
+        if tracks.len() < n_tracks || of_model.is_some() {
             let title = self.source.title();
             self.warnings.push(format!("{title}: camera `{wanted}` stands still: the tracks move `camera`"));
         }
@@ -582,7 +567,13 @@ impl LoadedScene {
         if let Some(known) = options.known {
             self.trees = known.trees.clone();
         }
+        // Skins and morph targets of another moment than that of the file.
+        let deformed = match (&self.motion, &self.file.animation) {
+            (Some(motion), AnimationPart { model: Some(_), at, .. }) => motion.meshes_at(*at),
+            _ => Default::default(),
+        };
         let shapes = (self.meshes.iter().flatten().map(|mesh| Shape::Mesh(mesh.mesh.clone())))
+            .chain(deformed.iter().map(|(_, mesh)| Shape::Mesh(mesh.clone())))
             .chain(self.balls.iter().flatten().map(|balls| Shape::Spheres(balls.clone())));
         let shapes: Vec<Shape> = shapes.collect();
         for shape in shapes {

@@ -15,9 +15,8 @@ use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSetting
 use crate::scene::animation::Animation;
 use crate::scene::animation::edited::Edited;
 use crate::scene::animation::edited::shown_camera;
-use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::moment::{Moment, show_first};
-use crate::scene::animation::written::{Entities, of_part};
+use crate::scene::animation::written::{Entities, model_of, of_part};
 use crate::scene::loaded::LoadedScene;
 use crate::scene::world::components::{
     ColorParam, DisplaySettings, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam, SceneEnvironment,
@@ -172,11 +171,10 @@ impl LoadedScene {
     /// Adds the animation of the file and sets the time that the file specifies.
     fn animate(&self, world: &mut World, entities: &Entities) {
         let part = &self.file.animation;
-        if let Some(motion) = &self.motion {
-            let (objects, lights) = (entities.meshes.clone(), entities.all_lights.clone());
-            let model = ModelMotion { motion: motion.clone(), objects, lights, holds_camera: false };
-            let animation = of_part(part, &self.file.camera, entities);
-            world.insert_resource(Animation { model: Some(model), ..animation });
+        let model = self.motion.as_ref().map(|motion| model_of(motion, part.model.as_ref(), entities));
+        let animation = Animation { model, ..of_part(part, &self.file.camera, entities) };
+        if part.model.is_none() && animation.has_model() {
+            world.insert_resource(animation);
             // It is loaded at this moment.
             world.insert_resource(Moment(self.choice.at.unwrap_or_default()));
             return;
@@ -187,7 +185,6 @@ impl LoadedScene {
             return;
         }
         let edited = Edited::of_part(&part.edited, entities);
-        let animation = of_part(part, &self.file.camera, entities);
         let shown = animation.without(&edited);
         show_first(world, animation, &shown, part.at);
     }

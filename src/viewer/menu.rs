@@ -3,7 +3,8 @@
 //! Their lines are those of the table of [`keys`](crate::viewer::keys), scenes and recent files aside.
 
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
-use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, library};
+use crate::render::Integrator;
+use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, Rendering, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::submenu::{part, scrolled};
@@ -85,11 +86,20 @@ fn dress(name: &str) -> Action {
 }
 
 fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
-    let key = shortcut(input.navigation, &item.action).unwrap_or_default();
+    let key = shortcut(input.navigation, &item.action).or_else(|| match item.action {
+        // Where keys grab at once, handles have none.
+        Action::Gizmo(Some(change)) => shortcut(input.navigation, &Action::Grab(change)),
+        _ => None,
+    });
+    let key = key.unwrap_or_default();
     let button = Button::new(name_of(input.session, item)).shortcut_text(RichText::new(key).weak());
     let line = ui.add_enabled(is_possible(input.session, &item.action), button);
     let effect = effect_of(&item.action);
-    let why_not = if is_about_frames(&item.action) { NOTHING_MOVES } else { effect };
+    let why_not = match &item.action {
+        action if is_about_frames(action) => NOTHING_MOVES,
+        Action::Explain => "Phong follows no light paths: choose the integrator path",
+        _ => effect,
+    };
     let is_clicked = line.on_hover_text(effect).on_disabled_hover_text(why_not).clicked();
     is_clicked.then(|| item.action.clone())
 }
@@ -136,6 +146,7 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
             !session.world().resource::<Selection>().0.is_empty()
         }
+        Action::Explain => session.world().resource::<Rendering>().0.integrator != Integrator::Phong,
         action if is_about_frames(action) => session.world().get_resource::<Animation>().is_some_and(Animation::moves),
         _ => true,
     }
@@ -191,6 +202,14 @@ impl HereMenu {
             self.at = None;
         }
         chosen.map(|action| (action, place))
+    }
+}
+
+/// A command of the menu of the image: what it adds goes to its place.
+pub fn at(action: Action, [x, y]: [f64; 2]) -> Action {
+    match action {
+        Action::Send(Command::Edit(Edit::Add(thing))) => Action::Send(Command::Edit(Edit::AddAt { thing, x, y })),
+        other => other,
     }
 }
 

@@ -139,11 +139,11 @@ impl Renders {
         self.receiver.try_iter().collect()
     }
 
-    /// Draws the progress at the lower right of `free`, each with buttons that end it.
+    /// Draws the progress at the lower right of `free`, each with buttons that end it; dialogs lie above.
     pub fn show(&self, context: &Context, free: Rect) {
         let mut corner = free.right_bottom() - egui::vec2(10.0, 8.0);
         for (i, running) in self.running.iter().enumerate() {
-            let area = Area::new(egui::Id::new(("render", i))).order(Layer::Foreground);
+            let area = Area::new(egui::Id::new(("render", i))).order(Layer::Middle);
             let shown = area.fixed_pos(corner).pivot(Align2::RIGHT_BOTTOM).show(context, |ui| {
                 let frame = Frame::NONE.fill(GLASS).corner_radius(CornerRadius::same(4));
                 frame.inner_margin(Margin::symmetric(9, 6)).show(ui, |ui| {

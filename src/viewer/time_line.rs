@@ -62,7 +62,7 @@ impl Strip {
         // A glTF model in its stored pose.
         let length = world.get_resource::<CurrentScene>()?.0.facts.as_ref()?.animation_length?;
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
-        let n = (length * fps - 1e-6).ceil().max(1.0) as u32;
+        let n = Animation::frames_to_key(length, fps);
         Some(Self { fps, n, frame: None, plays: plays(fps, n), keys: Vec::new() })
     }
 

@@ -150,7 +150,7 @@ fn still_times_are_known() {
     assert!(animation.is_moving_during(0.0..=0.1) && !animation.is_moving_during(4.0..=9.0));
     assert_eq!(animation.open_shutter(1.0), Some(0.975..=1.025));
     assert_eq!(animation.open_shutter(5.0), None);
-    assert_eq!((animation.length(), animation.n_frames()), (4.0, 40));
+    assert_eq!((animation.length(), animation.n_frames()), (4.0, 41));
 }
 
 #[test]

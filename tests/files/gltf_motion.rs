@@ -2,7 +2,9 @@
 
 use super::gltf::{keep, meshes, open};
 use super::gltf_writer::animated;
-use firstlight::scene::{Animation, ModelChoice, SceneInputs, Shape, save_scene, show_moment};
+use firstlight::scene::{
+    Animation, Extraction, LoadOptions, ModelChoice, SceneInputs, SceneSource, Shape, load, save_scene, show_moment,
+};
 use glam::DVec3;
 use serde_json::json;
 
@@ -110,11 +112,30 @@ fn a_scene_goes_through_its_animations_without_being_read_again() {
             assert_eq!((a.placement, &mesh.positions, &mesh.normals), (b.placement, &other.positions, &other.normals));
         }
         assert_eq!(n_meshes, 4);
-        // A scene file that is saved of it shows this moment.
+        // A scene file that is saved of it shows this moment, and goes through the others as well.
         let part = firstlight::scene::Description::of(&mut world, Some(&scene));
         let expected = firstlight::scene::Description::of(&mut direct, Some(&loaded));
         assert_eq!(part.file.objects, expected.file.objects);
-        assert_eq!(part.file.animation, Default::default());
+        assert_eq!(part.file.animation, expected.file.animation);
+        let path = kept.0.path().join("saved.ron");
+        save_scene(&mut world, Some(&scene), &path).unwrap();
+        let saved = load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let mut again = bevy_ecs::world::World::new();
+        saved.spawn(&mut again);
+        for later in [seconds, 1.25] {
+            show_moment(&mut again, later);
+            let (mut direct, _) = at(later);
+            let (here, there) = (SceneInputs::of(&mut again), SceneInputs::of(&mut direct));
+            let eye = |inputs: &SceneInputs| inputs.camera.map(|it| (it.view.eye, it.view.forward, it.view.up));
+            assert_eq!((lights(&here), eye(&here)), (lights(&there), eye(&there)), "{seconds} {later}");
+            for (a, b) in here.objects.iter().zip(&there.objects) {
+                let of = |shape: &Shape| match shape {
+                    Shape::Mesh(mesh) => Some(mesh.positions.clone()),
+                    _ => None,
+                };
+                assert_eq!((&a.name, a.placement, of(&a.shape)), (&b.name, b.placement, of(&b.shape)), "{later}");
+            }
+        }
         // Without touching a world, all but the vertices.
         let (mut base, _) = at(0.0);
         let inputs = SceneInputs::of(&mut base);
@@ -123,7 +144,7 @@ fn a_scene_goes_through_its_animations_without_being_read_again() {
         assert!(then.objects.iter().zip(&there.objects).all(|(a, b)| a.placement == b.placement));
     }
     let animation = world.resource::<Animation>();
-    assert_eq!((animation.length(), animation.n_frames()), (2.0, 48));
+    assert_eq!((animation.length(), animation.n_frames()), (2.0, 49));
     assert!(animation.is_moving_during(1.0..=1.1) && !animation.is_moving_during(2.0..=3.0));
     // The stored pose is no moment.
     let stored = open(&kept.1, &ModelChoice::default()).unwrap();
@@ -132,22 +153,61 @@ fn a_scene_goes_through_its_animations_without_being_read_again() {
     assert!(world.get_resource::<Animation>().is_none());
 }
 
-/// Of motion blur a scene file keeps nothing: that is told, where there is any.
+/// A saved scene has its shutter and the same motion blur; the stored pose is at no moment, and that is told.
 #[test]
-fn motion_blur_that_is_not_saved_is_told() {
+fn a_saved_scene_moves_as_its_model() {
     let kept = keep("a.glb", &animated().glb());
-    for (at, shutter, is_told) in
-        [(1.0, Some(1.0), true), (1.0, None, false), (1.0, Some(0.0), false), (9.0, Some(1.0), false)]
-    {
-        let scene = open(&kept.1, &ModelChoice { at: Some(at), shutter, ..ModelChoice::default() }).unwrap();
+    for (at, shutter) in [(Some(1.0), Some(1.0)), (Some(1.0), None), (None, None)] {
+        let scene = open(&kept.1, &ModelChoice { at, shutter, ..ModelChoice::default() }).unwrap();
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
-        let saved = save_scene(&mut world, Some(&scene), &kept.0.path().join("b.ron")).unwrap();
+        let path = kept.0.path().join("b.ron");
+        let saved = save_scene(&mut world, Some(&scene), &path).unwrap();
         let notes = saved.notes.join("; ");
-        assert_eq!(
-            notes.contains("the motion blur of the glTF model is left out"),
-            is_told,
-            "{at} {shutter:?}: {notes}"
-        );
+        assert_eq!(notes.contains("keeps the stored pose of the model, not its animation"), at.is_none(), "{notes}");
+        let again = load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap();
+        assert!(again.warnings.is_empty(), "{:?}", again.warnings);
+        assert_eq!(again.content_fingerprint(), scene.content_fingerprint(), "{at:?} {shutter:?}");
+        again.spawn(&mut world);
+        let animation = world.get_resource::<Animation>();
+        assert_eq!(animation.map(Animation::length), at.map(|_| 2.0));
+        assert_eq!(animation.and_then(|it| it.open_shutter(1.0)).is_some(), shutter.is_some());
+    }
+    // Skins and morph targets of another moment have their trees.
+    let path = kept.0.path().join("b.ron");
+    let scene = open(&kept.1, &ModelChoice { at: Some(1.0), ..ModelChoice::default() }).unwrap();
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    save_scene(&mut world, Some(&scene), &path).unwrap();
+    let choice = ModelChoice { at: Some(0.25), ..ModelChoice::default() };
+    let options = LoadOptions { choice: Some(&choice), ..LoadOptions::default() };
+    let moved = load(&SceneSource::Scene(path.clone()), &options).unwrap();
+    moved.spawn(&mut world);
+    let extraction = Extraction::new(&SceneInputs::of(&mut world), &moved.trees);
+    assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
+    // Without its file, or with one that places less, it stands still.
+    let path = kept.0.path().join("b.ron");
+    let scene = open(&kept.1, &ModelChoice { at: Some(1.0), ..ModelChoice::default() }).unwrap();
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    let text = save_scene(&mut world, Some(&scene), &path).unwrap().text;
+    for (from, to, told) in [
+        ("model: (\n            file: \"a.glb\"", "model: (\n            file: \"b.glb\"", "b.glb"),
+        ("(\"morphed\", 0)", "(\"morphed\", 7)", "fewer objects"),
+    ] {
+        let changed = text.replace(from, to);
+        assert_ne!(changed, text, "{text}");
+        std::fs::write(&path, changed).unwrap();
+        let again = load(&SceneSource::Scene(path.clone()), &LoadOptions::default()).unwrap();
+        let warnings = again.warnings.join("; ");
+        assert!(warnings.contains(told) && warnings.contains("its animation is left out"), "{warnings}");
+    }
+    for (from, to, told) in [
+        ("(\"morphed\", 0)", "(\"nobody\", 0)", "there is no object `nobody`"),
+        ("(\"morphed\", 0)", "(\"skinned\", 0)", "object `skinned` is listed twice"),
+    ] {
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        let error = load(&SceneSource::Scene(path.clone()), &LoadOptions::default()).err().unwrap().to_string();
+        assert!(error.contains(told), "{error}");
     }
 }

@@ -216,7 +216,9 @@ fn a_change_that_tracks_would_take_back_is_told_at_once_and_nothing_is_unsaved_w
     assert!(told(&driver) == 1 && driver.session.has_unsaved_edits(), "a file can hold it");
     assert!(driver.session.needs_keys());
     driver.go_to(2.0);
-    assert!(driver.said(MessageKind::Note).contains("`ball` follows its keys again: Ctrl+Z brings your change back"));
+    assert!(
+        driver.said(MessageKind::Note).contains("`ball` follows its animation again: Ctrl+Z brings your change back")
+    );
     assert!(!driver.session.needs_keys());
     assert_eq!(driver.ball(), DVec3::new(2.0, 0.5, 0.0));
     assert!(!driver.session.has_unsaved_edits());
@@ -240,11 +242,57 @@ fn keys_that_no_file_could_hold_are_refused() {
     let said = driver.said(MessageKind::Warning);
     assert!(said.contains("`direction` is opposite to the key before"), "{said}");
     assert!(driver.animation().is_none());
-    // A model moves by itself.
+    // The stored pose of a model is at no time.
     let mut driver = Driver::open(folder.path(), "m.gltf", &super::living_files::moving_triangle());
     driver.edit([KEY]);
     let said = driver.said(MessageKind::Warning);
-    assert!(said.contains("animations of its own") && driver.animation().is_none(), "{said}");
+    assert!(said.contains("the stored pose of the model has no time") && driver.animation().is_none(), "{said}");
+}
+
+#[test]
+fn keys_take_the_place_of_what_a_model_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open(folder.path(), "m.gltf", &super::living_files::moving_triangle());
+    driver.go_to(1.0);
+    driver.run_until(|session| session.world().get_resource::<Animation>().is_some());
+    driver.settle();
+    let mover = |driver: &mut Driver| {
+        let inputs = driver.inputs();
+        let found = inputs.objects.iter().find(|object| object.name.as_deref() == Some("mover")).unwrap();
+        (found.entity.to_bits(), found.placement.translation)
+    };
+    let (id, there) = mover(&mut driver);
+    assert_eq!(there.x, 0.5);
+    // Without a key, another time takes the change back, which is told twice.
+    driver.edit([Edit::Select { id, add: false }, Edit::Move { by: 3.0 * DVec3::Y }]);
+    assert!(driver.session.needs_keys());
+    assert!(driver.said(MessageKind::Note).contains("`mover` changes by its animation: Set key"));
+    driver.go_to(0.5);
+    assert!(driver.said(MessageKind::Note).contains("`mover` follows its animation again"));
+    assert_eq!(mover(&mut driver).1, DVec3::new(0.25, 0.0, 0.0));
+    driver.go_to(1.0);
+    driver.edit([Edit::Move { by: 3.0 * DVec3::Y }, KEY]);
+    assert!(!driver.session.needs_keys(), "{}", driver.said(MessageKind::Warning));
+    assert_eq!(driver.tracks(), [("translate", vec![0.0, 1.0], Interpolation::Linear)]);
+    driver.go_to(0.5);
+    let half = DVec3::new(0.25, 1.5, 0.0);
+    assert_eq!(mover(&mut driver).1, half);
+    // The camera of the file, the model and the keys are saved, and without the keys it moves as before.
+    let path = folder.path().join("saved.ron");
+    driver.save(&path);
+    let scene = load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap();
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    let place = |world: &mut bevy_ecs::world::World| {
+        let inputs = SceneInputs::of(world);
+        inputs.objects.iter().find(|object| object.name.as_deref() == Some("mover")).unwrap().placement.translation
+    };
+    assert_eq!(place(&mut world), half);
+    let mut animation = world.resource::<Animation>().clone();
+    animation.tracks.clear();
+    world.insert_resource(animation);
+    firstlight::scene::show_moment(&mut world, 2.0);
+    assert_eq!(place(&mut world), DVec3::X);
 }
 
 #[test]

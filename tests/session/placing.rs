@@ -131,6 +131,24 @@ fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
     }
 }
 
+#[test]
+fn what_is_added_at_a_place_of_the_image_stands_there() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [0.01, 1.0, 300.0] {
+        for (x, y) in [(0.15, 0.8), (0.85, 0.75), (0.5, 0.5)] {
+            let mut driver = model(folder.path(), size);
+            driver.edit([Edit::AddAt { thing: NewThing::Sphere, x, y }]);
+            let (shape, at): (Shape, Placement) = (driver.get("ball"), driver.get("ball"));
+            let Shape::Sphere { radius } = shape else { panic!("{shape:?}") };
+            let foot = place(&driver, at.translation - radius * DVec3::Y).expect("in front of the camera");
+            let wanted = DVec2::new(480.0 * x, 320.0 * y);
+            // In the middle is the model, before which it stands; beside it may be little room.
+            let is_there = if x == 0.5 { (foot - wanted).x.abs() < 24.0 } else { foot.distance(wanted) < 16.0 };
+            assert!(is_there, "{size}: {foot} for {wanted}");
+        }
+    }
+}
+
 /// Its dark back would be a board before the scene.
 #[test]
 fn a_new_area_light_shows_its_front_however_far_the_camera_is_and_hides_nothing() {

@@ -31,6 +31,9 @@ pub struct AnimationPart {
     /// One per animated property.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackPart>,
+    /// What moves as a glTF file says; a track of the same property takes its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelMotionPart>,
     /// What is not as its tracks say at `at`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub edited: EditedPart,
@@ -45,9 +48,27 @@ impl Default for AnimationPart {
             shutter: None,
             shutter_seconds: None,
             tracks: Vec::new(),
+            model: None,
             edited: EditedPart::default(),
         }
     }
+}
+
+/// What the animations of a glTF file move.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelMotionPart {
+    /// Path of the file, relative to the scene file.
+    pub file: String,
+    /// Unique names of objects, each with the number of its mesh among those that the file places, from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<(String, usize)>,
+    /// Unique names of lights, each with the number of its light among those that the file places, from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lights: Vec<(String, usize)>,
+    /// Number of the camera of the file that the camera of the scene follows, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<usize>,
 }
 
 /// What is shown as it is stated, not as its tracks say, until another time is shown. It stands still during the exposure.

@@ -46,16 +46,39 @@ impl Check<'_> {
             return self.wrong("animation/tracks", format!("there are {keys} keys: use at most {MOST_KEYS}"));
         }
         self.tracks();
+        self.model();
         self.edited();
     }
 
-    /// What was edited has a track, which the edit overrides.
+    /// What a glTF file moves is there, each once.
+    fn model(&mut self) {
+        let file = self.file;
+        let Some(model) = &file.animation.model else { return };
+        let objects = by_name(file.objects.iter().map(ObjectPart::name));
+        let lights = by_name(file.lights.iter().map(|light| light.name()));
+        for (what, list, known) in [("object", &model.objects, &objects), ("light", &model.lights, &lights)] {
+            let mut seen = HashSet::new();
+            for (i, (name, _)) in list.iter().enumerate() {
+                let path = format!("animation/model/{what}s/{i}");
+                if !seen.insert(name) {
+                    self.wrong(&path, format!("{what} `{name}` is listed twice"));
+                } else {
+                    self.named(&path, what, name, known);
+                }
+            }
+        }
+    }
+
+    /// What was edited has a track, or moves with a glTF file, which the edit overrides.
     fn edited(&mut self) {
         let tracks = &self.file.animation.tracks;
         let edited = &self.file.animation.edited;
+        let model = self.file.animation.model.as_ref();
         if let Some(camera) = &edited.camera {
             let path = "animation/edited/camera";
-            if !tracks.iter().any(|track| matches!(track, TrackPart::Camera { .. })) {
+            let is_moved = tracks.iter().any(|track| matches!(track, TrackPart::Camera { .. }))
+                || model.is_some_and(|model| model.camera.is_some());
+            if !is_moved {
                 self.wrong(path, "the camera has no track: this one belongs into `camera` of the scene");
             }
             self.camera(path, camera);
@@ -79,7 +102,13 @@ impl Check<'_> {
             ("material", &edited.materials, of_material),
         ];
         for (what, names, name_of) in kinds {
-            let known: HashSet<&str> = tracks.iter().filter_map(name_of).collect();
+            let of_model = match (what, model) {
+                ("object", Some(model)) => &model.objects[..],
+                ("light", Some(model)) => &model.lights[..],
+                _ => &[],
+            };
+            let of_model = of_model.iter().map(|(name, _)| name.as_str());
+            let known: HashSet<&str> = tracks.iter().filter_map(name_of).chain(of_model).collect();
             for (i, name) in names.iter().enumerate().filter(|(_, name)| !known.contains(name.as_str())) {
                 let message = format!("{what} `{name}` has no track");
                 self.misnamed(&format!("animation/edited/{what}s/{i}"), message, name, known.iter().copied());

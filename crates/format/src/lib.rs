@@ -37,7 +37,7 @@ pub mod view;
 
 pub use crate::bounds::check_film_size;
 pub use crate::value::Named;
-pub use animation::{AnimationPart, EditedPart, TrackPart};
+pub use animation::{AnimationPart, EditedPart, ModelMotionPart, TrackPart};
 pub use camera::CameraPart;
 pub use locate::locate;
 pub use parts::{

@@ -36,4 +36,7 @@ pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
     if let EnvironmentSource::Image { file, .. } = &mut file.environment {
         change(file);
     }
+    if let Some(model) = &mut file.animation.model {
+        change(&mut model.file);
+    }
 }

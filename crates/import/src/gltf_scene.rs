@@ -9,7 +9,7 @@ use crate::framing::Framing;
 use crate::gltf::assembly::PlacedLight;
 use crate::gltf::facts::GltfFacts;
 use crate::gltf::mesh::BuiltMesh;
-use crate::gltf_motion::GltfMotion;
+use crate::gltf_motion::{Animated, GltfMotion, LastMoment};
 use crate::gltf_parts::{camera_of, extend, light_of};
 use crate::model::placing::corners_of;
 use crate::model::placing::{is_placement, transform};
@@ -180,13 +180,16 @@ impl Maker<'_> {
         let motion = match facts.animation_length.filter(|_| choice.at.is_some()) {
             None => None,
             Some(length) => {
-                let moved = document.moved_nodes();
-                let (objects, boxes) = shown.into_iter().unzip();
+                let (objects, boxes): (Vec<usize>, _) = shown.into_iter().unzip();
                 let is_seen = |(i, light): (usize, &PlacedLight)| (light.light.intensity != Vec3::ZERO).then_some(i);
-                let lights = assembly.lights.iter().enumerate().filter_map(is_seen).collect();
+                let lights: Vec<usize> = assembly.lights.iter().enumerate().filter_map(is_seen).collect();
                 let camera = chosen.and_then(|chosen| cameras.iter().position(|(_, part)| std::ptr::eq(part, chosen)));
+                let moved = document.moved_nodes();
                 let camera = camera.filter(|&camera| moved[assembly.cameras[camera].node as usize]);
-                Some(GltfMotion { opened: self.opened.clone(), objects, boxes, lights, camera, moved, length })
+                let animated = Animated::of(document, &assembly, &objects, &lights);
+                let (file, opened) = (self.wish.file.to_owned(), self.opened.clone());
+                let last = LastMoment::default();
+                Some(GltfMotion { file, opened, objects, boxes, lights, camera, animated, length, last })
             }
         };
         let has_camera = chosen.is_some();

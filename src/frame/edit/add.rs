@@ -60,10 +60,11 @@ pub fn is_thing(world: &World, entity: Entity) -> bool {
     world.get::<Shape>(entity).is_some() || light_of(world, entity).is_some()
 }
 
-pub fn add(world: &mut World, new: &NewThing) {
-    let entity = match add_light(world, new) {
+/// - `at`: position in the image, see [`Edit::AddAt`](crate::frame::Edit::AddAt).
+pub fn add(world: &mut World, new: &NewThing, at: [f64; 2]) {
+    let entity = match add_light(world, new, at) {
         Some(light) => light,
-        None => match add_object(world, new) {
+        None => match add_object(world, new, at) {
             Some(object) => object,
             // It comes later.
             None => return,
@@ -77,12 +78,12 @@ pub fn add(world: &mut World, new: &NewThing) {
 const NEW_IRRADIANCE: f64 = 2.0 * PI;
 
 /// Adds a light, as bright as its distance needs; `None` for everything else.
-fn add_light(world: &mut World, new: &NewThing) -> Option<Entity> {
+fn add_light(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity> {
     use NewThing::{AreaLight, DirectionalLight as Parallel, PointLight as Point, SpotLight as Spot};
     if !matches!(new, AreaLight | Point | Spot | Parallel) {
         return None;
     }
-    let spot = spot::find_for_light(world, matches!(new, AreaLight));
+    let spot = spot::find_for_light(world, matches!(new, AreaLight), at);
     let (way, distance) = (spot.way(), spot.way().length());
     let direction = way.try_normalize().unwrap_or(DVec3::NEG_Y);
     let irradiance = NEW_IRRADIANCE / f64::from(world.resource::<DisplaySettings>().0.exposure_stops).exp2();
@@ -116,8 +117,8 @@ fn add_light(world: &mut World, new: &NewThing) -> Option<Entity> {
 }
 
 /// Adds an object; `None` for one that is loaded in the background.
-fn add_object(world: &mut World, new: &NewThing) -> Option<Entity> {
-    let Spot { foot: place, size } = spot::find(world);
+fn add_object(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity> {
+    let Spot { foot: place, size } = spot::find(world, at);
     let up = DVec3::Y * size;
     Some(match new {
         NewThing::Sphere => {
@@ -198,7 +199,7 @@ fn step_aside(world: &mut World, selected: &[Entity]) -> DVec3 {
     let along = corners.map(|corner| corner.dot(axis));
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     // What has no width, such as a plane or a point of light, is moved as far as a new object is wide.
-    axis * if high > low { GAP * (high - low) } else { 2.0 * spot::find(world).size }
+    axis * if high > low { GAP * (high - low) } else { 2.0 * spot::find(world, spot::MIDDLE).size }
 }
 
 /// Gives `object` its own copy of its first material; plain grey if it has none.

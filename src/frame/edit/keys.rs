@@ -20,6 +20,7 @@ use std::sync::Arc;
 ///
 /// - `camera`: of the camera only; otherwise of what has been changed, of the selection, or else of the camera.
 pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
+    check_pose(world)?;
     let (before, written) = before(world);
     let selected = world.resource::<Selection>().0.clone();
     let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
@@ -81,10 +82,8 @@ pub fn interpolate(world: &mut World, how: Interpolation) -> Result<(), String> 
 
 /// Sets the shutter, the duration or the frames per second; they are limited to what a scene file may have.
 pub fn set_property(world: &mut World, property: Property, value: f64) -> Result<(), String> {
+    check_pose(world)?;
     let (before, written) = before(world);
-    if is_of_model(world) && world.get_resource::<Animation>().is_none() {
-        return Err("the stored pose of the model has no time: show its animation first".to_owned());
-    }
     let mut animation = animation_or_new(world, &before, written.as_ref());
     match property {
         Property::Shutter => animation.shutter = Shutter::Share(value.clamp(0.0, 1.0)),
@@ -115,20 +114,21 @@ fn current(world: &World) -> Option<Arc<LoadedScene>> {
     world.get_resource::<CurrentScene>().map(|current| current.0.clone())
 }
 
-/// Whether the open scene is a model with animations of its own.
-fn is_of_model(world: &World) -> bool {
-    current(world).is_some_and(|it| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some()))
+/// The stored pose of a model that has animations is at no time.
+fn check_pose(world: &World) -> Result<(), String> {
+    let is_animated = |it: Arc<LoadedScene>| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
+    match world.get_resource::<Animation>() {
+        None if current(world).is_some_and(is_animated) => {
+            Err("the stored pose of the model has no time: show its animation first".to_owned())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Changes the animation, and takes the change back if a scene file could not hold the result.
 fn checked<T>(world: &mut World, change: impl FnOnce(&mut World) -> Result<T, String>) -> Result<T, String> {
     let old = world.get_resource::<Animation>().cloned();
-    let has_tracks = |world: &World| world.get_resource::<Animation>().is_some_and(|it| !it.tracks.is_empty());
     let done = change(world).and_then(|done| {
-        if is_of_model(world) && has_tracks(world) {
-            let advice = "save the scene (Ctrl+Shift+S) and open that to set keys";
-            return Err(format!("the model has animations of its own: {advice}"));
-        }
         let description = Description::of(world, current(world).as_deref());
         match description.file.check() {
             Err(error) => {

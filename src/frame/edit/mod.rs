@@ -95,8 +95,17 @@ pub enum Edit {
     Delete,
     /// Copy the selection, and select the copies.
     Duplicate,
-    /// Add an object or a light, and select it.
+    /// Add an object or a light in the middle of the image, and select it.
     Add(NewThing),
+    /// The same at a position in the image, 0..1 from the upper left corner; a light goes beside what is selected.
+    AddAt {
+        /// What is added.
+        thing: NewThing,
+        /// Fraction of the width.
+        x: f64,
+        /// Fraction of the height.
+        y: f64,
+    },
     /// Move the selection, metres in world space.
     Move {
         /// Translation in world space.
@@ -278,7 +287,8 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         }
         Edit::Delete => add::delete(world),
         Edit::Duplicate => add::duplicate(world),
-        Edit::Add(new) => add::add(world, &new),
+        Edit::Add(new) => add::add(world, &new, spot::MIDDLE),
+        Edit::AddAt { thing, x, y } => add::add(world, &thing, [x, y]),
         Edit::Move { by } => place::displace(world, |_| place::Change::Move(by)),
         Edit::Turn { axis, angle_deg } => {
             let axis =

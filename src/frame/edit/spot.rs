@@ -1,8 +1,8 @@
-//! Positions of new things. Objects go on the surface in the centre of the image, of a size that suits its distance, and
-//! without overlap; lights go beside what they are to light.
+//! Positions of new things. Objects go on the surface at a place of the image, usually its middle, of a size that suits
+//! its distance, and without overlap; lights go beside what they are to light.
 //!
-//! The space in front of the camera is free up to the first visible surface. So positions are tried along the view
-//! axis, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
+//! The space in front of the camera is free up to the first visible surface. So positions are tried along the line of
+//! sight, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
 use crate::frame::state::resources::{PictureSize, RenderState};
@@ -32,11 +32,18 @@ const RAYS: u32 = 128;
 /// Relative distance below which something is an obstacle; touching is allowed.
 const TOUCH: f64 = 0.97;
 
-/// Finds a position; if nothing is free, it is the surface in the centre of the image.
-pub fn find(world: &World) -> Spot {
+/// The middle of the image.
+pub const MIDDLE: [f64; 2] = [0.5; 2];
+
+/// Finds a position; if nothing is free, it is the surface at `at` in the image, 0..1 from its upper left corner.
+pub fn find(world: &World, at: [f64; 2]) -> Spot {
     let shown = world.resource::<RenderState>();
-    let view = shown.inputs.camera.map_or_else(View::default, |camera| camera.view);
-    let (place, distance, _) = seen(world, &view);
+    let (view, projection) = shown.inputs.camera.map(|camera| (camera.view, camera.projection)).unwrap_or_default();
+    let (place, _) = seen(world, &view, at);
+    let (distance, forward) = match projection.orthographic_height {
+        None => ((place - view.eye).length(), (place - view.eye).normalize_or(view.forward)),
+        Some(_) => ((place - view.eye).dot(view.forward), view.forward),
+    };
     let Some(scene) = &shown.extraction else { return Spot { foot: place, size: SHARE * distance } };
     let mut share = SHARE;
     for _ in 0..SHRINKS {
@@ -46,7 +53,7 @@ pub fn find(world: &World) -> Spot {
         for depth in depths {
             // Closer objects look larger, so they are made smaller.
             let size = share * depth;
-            if let Some(foot) = stand(scene, &view, place - view.forward * (distance - depth), size) {
+            if let Some(foot) = stand(scene, &view, place - forward * (distance - depth), size) {
                 return Spot { foot, size };
             }
         }
@@ -77,7 +84,7 @@ impl LightSpot {
 ///
 /// - `shows_front`: it is as far from the camera as what it lights, in whatever direction that is seen. So an emissive
 ///   square that faces it shows the camera its front, from the side, and its dark back hides nothing.
-pub fn find_for_light(world: &mut World, shows_front: bool) -> LightSpot {
+pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> LightSpot {
     /// To the right, up, and to the camera, relative to the size of what is lit.
     const OFFSET: DVec3 = DVec3::new(1.0, 0.5, 0.2);
     /// Of a square: from above where there is room, else from a side.
@@ -89,7 +96,8 @@ pub fn find_for_light(world: &mut World, shows_front: bool) -> LightSpot {
     let (view, projection) = shown.inputs.camera.map(|camera| (camera.view, camera.projection)).unwrap_or_default();
     let chosen = world.resource::<Selection>().0.clone();
     let (subject, radius) = ball_around(world, &chosen).unwrap_or_else(|| {
-        let (place, depth, object) = seen(world, &view);
+        let (place, object) = seen(world, &view, at);
+        let depth = (place - view.eye).dot(view.forward);
         // A wall or the ground is lit where it is seen.
         let near = object.and_then(|object| ball_around(world, &[object])).filter(|(_, radius)| *radius < 0.5 * depth);
         near.unwrap_or((place, 0.6 * projection.half_height(depth)))
@@ -134,14 +142,17 @@ fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
     (min != max).then_some((0.5 * (min + max), 0.5 * (max - min).length()))
 }
 
-/// The point in the middle of the image, its depth and its object: the pivot where nothing near is seen.
-fn seen(world: &World, view: &View) -> (DVec3, f64, Option<Entity>) {
-    let pivot = (view.pivot(), view.pivot_distance, None);
+/// The point at a place of the image and its object: a point as far as the pivot where nothing near is seen.
+fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>) {
+    let aspect = world.resource::<PictureSize>().aspect();
+    let projection = world.resource::<RenderState>().inputs.camera.map(|camera| camera.projection).unwrap_or_default();
+    let up = projection.half_height(view.pivot_distance);
+    let aside = 2.0 * up * (aspect * (x - 0.5) * view.right() + (0.5 - y) * view.up);
+    let pivot = (view.pivot() + aside, None);
     let Some(scene) = &world.resource::<RenderState>().extraction else { return pivot };
-    let hit = pick(scene, 0.5, 0.5, world.resource::<PictureSize>().aspect());
     // A surface far behind the pivot is a wall, or the ground near the horizon.
-    let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
-    hit.map_or(pivot, |hit| (hit.point, hit.depth, Some(hit.entity)))
+    let hit = pick(scene, x, y, aspect).filter(|hit| hit.depth < 4.0 * view.pivot_distance);
+    hit.map_or(pivot, |hit| (hit.point, Some(hit.entity)))
 }
 
 /// Returns the position of an object after dropping it from here, if there is space for it.

@@ -307,7 +307,7 @@ pub fn explain_pixel(
     }
     let (Some(place), Some(extraction)) = (explaining.wanted.take(), &shown.extraction) else { return };
     if shown.integrator() != Integrator::Path {
-        status.say(clock.0, MessageKind::Note, "not available with the Phong integrator");
+        status.say(clock.0, MessageKind::Note, "Phong follows no light paths to explain: choose the integrator `path`");
         return;
     }
     let generation = shown.generation();

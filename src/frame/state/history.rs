@@ -11,7 +11,7 @@ use crate::frame::core::rig::Rig;
 use crate::frame::state::selection::Selection;
 use crate::scene::world::entity_state::{EntityState, SceneChanges, put};
 use crate::scene::{
-    Animation, CameraInput, Lens, Moment, Ordinal, Placement, Projection, SceneEnvironment, SceneInputs, Shape,
+    Animation, CameraInput, Lens, Linear, Moment, Ordinal, Placement, Projection, SceneEnvironment, SceneInputs, Shape,
     SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::prelude::{DetectChanges, Entity, Local, Mut, Or, Res, ResMut, Resource, With, World};
@@ -432,6 +432,17 @@ fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     (label.to_owned(), goes_on.then(|| label.to_owned()))
 }
 
+/// What was done to a placement.
+fn verb(before: Option<Placement>, after: Option<Placement>) -> &'static str {
+    let linear = |placement: Option<Placement>| placement.unwrap_or_default().linear;
+    match (linear(before), linear(after)) {
+        (before, after) if before == after => "move",
+        (Linear::Turned { scale: before, .. }, Linear::Turned { scale: after, .. }) if before != after => "scale",
+        (_, Linear::Matrix(_)) => "transform",
+        _ => "turn",
+    }
+}
+
 fn what_changed_in_entities(
     old: &BTreeMap<Entity, Arc<EntityState>>,
     new: &BTreeMap<Entity, Arc<EntityState>>,
@@ -456,7 +467,7 @@ fn what_changed_in_entities(
                     merge = Some(format!("mesh {entity}"));
                     format!("mesh of {label}")
                 } else if a.placement != b.placement {
-                    format!("move {label}")
+                    format!("{} {label}", verb(a.placement, b.placement))
                 } else if a.material != b.material {
                     format!("material {label}")
                 } else if a.slots != b.slots {

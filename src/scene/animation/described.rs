@@ -4,6 +4,7 @@ use crate::format::animation::{AnimationPart, EditedPart};
 use crate::format::camera::camera_part;
 use crate::format::names::Names;
 use crate::format::placement::{Linear, Placement};
+use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::written::to_part;
 use crate::scene::animation::{Animation, Channel};
 use crate::scene::world::components::SurfaceMaterial;
@@ -23,6 +24,12 @@ pub(in crate::scene) struct Moved {
 impl Moved {
     pub(in crate::scene) fn of(animation: Option<&Animation>, inputs: &SceneInputs) -> Self {
         let (mut objects, mut lights, mut materials) = (HashSet::new(), HashSet::new(), HashSet::new());
+        let by_model: HashSet<Entity> =
+            animation.iter().filter_map(|it| it.model.as_ref()).flat_map(ModelMotion::moved).collect();
+        if !by_model.is_empty() {
+            objects.extend(inputs.objects.iter().map(|object| object.entity).filter(|it| by_model.contains(it)));
+            lights.extend(inputs.lights.iter().map(|light| light.entity).filter(|it| by_model.contains(it)));
+        }
         for track in animation.iter().flat_map(|it| &it.tracks) {
             match track.channel {
                 Channel::Camera(_) => continue,
@@ -87,7 +94,7 @@ impl Moved {
         let edited = self.edited_part(animation, at, (world, inputs), materials);
         let objects = inputs.objects.iter().map(|object| (object.entity, object)).collect();
         let lights = inputs.lights.iter().map(|light| (light.entity, light)).collect();
-        let part = to_part(animation, at, |channel| {
+        let named = |channel: Channel| {
             let name = match channel {
                 Channel::Camera(_) => return None,
                 Channel::Object(entity, _) | Channel::Light(entity, _) => self.names.get(&entity)?.clone(),
@@ -102,8 +109,9 @@ impl Moved {
                 }
                 _ => Some(name),
             }
-        });
-        AnimationPart { edited, ..part }
+        };
+        let model = animation.model.as_ref().and_then(|model| model.to_part(|entity| self.names.get(&entity).cloned()));
+        AnimationPart { edited, ..to_part(animation, at, named, model) }
     }
 
     /// What differs from its tracks.
@@ -130,7 +138,7 @@ impl Moved {
             .collect();
         of_materials.sort();
         of_materials.dedup();
-        let seen = inputs.camera.as_ref().filter(|_| edited.camera && animation.has_camera_track());
+        let seen = inputs.camera.as_ref().filter(|_| edited.camera && animation.moves_camera());
         EditedPart {
             camera: seen.map(|seen| camera_part(&seen.view, &seen.projection, &seen.lens, None)),
             objects: named(&mut inputs.objects.iter().map(|object| object.entity)),

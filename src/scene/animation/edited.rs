@@ -84,7 +84,11 @@ pub(in crate::scene) fn shown_camera(file: &SceneFile) -> CameraPart {
 pub(in crate::scene) fn show_camera(file: &mut SceneFile, shown: CameraPart) {
     let animation = animation_of_camera(file);
     file.animation.edited.camera = None;
-    if !animation.has_camera_track() {
+    let by_model = file.animation.model.as_ref().is_some_and(|model| model.camera.is_some());
+    if by_model {
+        // Where the file has it is not known here.
+        file.animation.edited.camera = Some(shown);
+    } else if !animation.has_camera_track() {
         file.camera = shown;
     } else if camera(&animation.camera_at(file.animation.at)) != camera(&shown) {
         file.animation.edited.camera = Some(shown);

@@ -99,7 +99,7 @@ pub fn set_keys(
     let expected = animation.inputs_at(before, seconds);
     let mut new = Vec::new();
     if let KeysOf::Changes(selected) = of {
-        new = changes(&animation, &expected, &now);
+        new = changes(&animation, [&animation.inputs_at(before, 0.0), &expected], &now);
         if new.is_empty() {
             new = transforms(&animation, &now, selected);
         }
@@ -161,31 +161,37 @@ pub fn animation_or_new(world: &World, before: &SceneInputs, written: Option<&Ca
 }
 
 /// What differs from what is expected.
-fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> Vec<NewKey> {
+///
+/// - `then`: what is expected at 0 s and now.
+fn changes(animation: &Animation, then: [&SceneInputs; 2], now: &SceneInputs) -> Vec<NewKey> {
+    let [first, expected] = then;
     let mut new = Vec::new();
-    let mut compare = |channel: Channel, before: Option<DVec3>, value: Option<DVec3>| {
+    let mut compare = |channel: Channel, [first, before]: [Option<DVec3>; 2], value: Option<DVec3>| {
         if let Some(value) = value.filter(|value| before != Some(*value)) {
-            let before = before.filter(|_| animation.track(channel).is_none());
+            let before = first.filter(|_| animation.track(channel).is_none());
             new.push(NewKey { channel, before, value });
         }
     };
-    let objects: HashMap<_, _> = expected.objects.iter().map(|old| (old.entity, old)).collect();
+    let objects: HashMap<_, _> =
+        first.objects.iter().zip(&expected.objects).map(|(first, old)| (old.entity, [first, old])).collect();
     for object in &now.objects {
         let Some(old) = objects.get(&object.entity) else { continue };
-        if old.placement == object.placement {
+        if old[1].placement == object.placement {
             continue;
         }
         for &property in ObjectProperty::ALL {
             let channel = Channel::Object(object.entity, property);
-            compare(channel, property.get(&old.placement), property.get(&object.placement));
+            compare(channel, old.map(|old| property.get(&old.placement)), property.get(&object.placement));
         }
     }
-    let lights: HashMap<_, _> = expected.lights.iter().map(|old| (old.entity, old)).collect();
+    let lights: HashMap<_, _> =
+        first.lights.iter().zip(&expected.lights).map(|(first, old)| (old.entity, [first, old])).collect();
     for light in &now.lights {
         let Some(old) = lights.get(&light.entity) else { continue };
         for &property in LightProperty::ALL {
             let channel = Channel::Light(light.entity, property);
-            compare(channel, property.get(&old.light, &old.placement), property.get(&light.light, &light.placement));
+            let old = old.map(|old| property.get(&old.light, &old.placement));
+            compare(channel, old, property.get(&light.light, &light.placement));
         }
     }
     let materials: HashMap<_, _> = expected.materials.iter().map(|old| (old.entity, old)).collect();
@@ -196,7 +202,8 @@ fn changes(animation: &Animation, expected: &SceneInputs, now: &SceneInputs) -> 
         }
         for property in MaterialProperty::animatable(&material.material) {
             let channel = Channel::Material(material.entity, property);
-            compare(channel, material_value(property, &old.material), material_value(property, &material.material));
+            let old = material_value(property, &old.material);
+            compare(channel, [old, old], material_value(property, &material.material));
         }
     }
     new

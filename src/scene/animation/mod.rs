@@ -138,10 +138,18 @@ impl Animation {
         self.duration.unwrap_or_else(|| ends.fold(model, f64::max))
     }
 
-    /// Number of frames; at least 1.
+    /// Number of frames, at least 1: those before the end of the duration, or those up to the last key with its own.
     pub fn n_frames(&self) -> u32 {
-        // Tolerance for rounding of a whole number of frames.
-        (self.length() * self.fps - 1e-6).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
+        match self.duration {
+            // Tolerance for rounding of a whole number of frames.
+            Some(duration) => (duration * self.fps - 1e-6).ceil().clamp(1.0, f64::from(u32::MAX)) as u32,
+            None => Self::frames_to_key(self.length(), self.fps),
+        }
+    }
+
+    /// Number of frames from 0 s to that of a key at this time, seconds.
+    pub fn frames_to_key(last: f64, fps: f64) -> u32 {
+        (last * fps + 1e-6).floor().clamp(0.0, f64::from(u32::MAX - 1)) as u32 + 1
     }
 
     /// The exposure interval of an image at this time, seconds; `None` if its length is 0 or nothing moves in it.

@@ -1,6 +1,9 @@
 //! The animations of a glTF file on the entities of the scene that was made from it.
 
+use crate::format::animation::ModelMotionPart;
 use crate::format::camera::CameraPart;
+use crate::format::light::LightKind;
+use crate::format::placement::Placement;
 use crate::format::sources::{MeshSource, Seconds};
 use crate::import::gltf_motion::GltfMotion;
 use crate::scene::world::components::put;
@@ -34,6 +37,33 @@ impl PartialEq for ModelMotion {
 }
 
 impl ModelMotion {
+    /// The objects and lights that move.
+    pub(super) fn moved(&self) -> impl Iterator<Item = Entity> {
+        let animated = &self.motion.animated;
+        let objects = self.objects.iter().zip(&animated.objects);
+        let lights = self.lights.iter().zip(&animated.lights);
+        objects.chain(lights).filter(|(_, moves)| **moves).map(|(entity, _)| *entity)
+    }
+
+    /// As in a scene file; `None` if nothing that moves is left.
+    ///
+    /// - `name`: of an object or light; `None` if it no longer exists.
+    pub(super) fn to_part(&self, name: impl Fn(Entity) -> Option<String>) -> Option<ModelMotionPart> {
+        let list = |entities: &[Entity], numbers: &[usize], moves: &[bool]| -> Vec<(String, usize)> {
+            let all = entities.iter().zip(numbers).zip(moves).filter(|(_, moves)| **moves);
+            all.filter_map(|((entity, number), _)| Some((name(*entity)?, *number))).collect()
+        };
+        let GltfMotion { file, objects, lights, camera, animated, .. } = &*self.motion;
+        let part = ModelMotionPart {
+            file: file.clone(),
+            objects: list(&self.objects, objects, &animated.objects),
+            lights: list(&self.lights, lights, &animated.lights),
+            camera: camera.filter(|_| !self.holds_camera),
+        };
+        let is_left = !part.objects.is_empty() || !part.lights.is_empty() || part.camera.is_some();
+        is_left.then_some(part)
+    }
+
     /// Seconds to the end of the last animation.
     pub(super) fn length(&self) -> f64 {
         self.motion.length
@@ -59,7 +89,8 @@ impl ModelMotion {
 
     /// `part` where the camera of the file is at a time; the lens stays.
     pub(super) fn camera_at(&self, part: CameraPart, seconds: f64) -> CameraPart {
-        let Some(camera) = self.motion.at(seconds).and_then(|moment| moment.camera) else { return part };
+        let Some(moment) = self.motion.at(seconds) else { return part };
+        let Some(camera) = moment.camera.clone() else { return part };
         CameraPart {
             eye: camera.eye,
             look_at: camera.look_at,
@@ -72,19 +103,26 @@ impl ModelMotion {
         }
     }
 
+    /// Where the objects and lights are at a time.
+    #[expect(clippy::type_complexity, reason = "two lists of what an entity becomes")]
+    pub(super) fn at(&self, seconds: f64) -> (Vec<(Entity, Placement)>, Vec<(Entity, (LightKind, Placement))>) {
+        let Some(moment) = self.motion.at(seconds) else { return Default::default() };
+        let object = |(i, placement): &(usize, Placement)| Some((*self.objects.get(*i)?, *placement));
+        let light =
+            |(i, kind, placement): &(usize, LightKind, Placement)| Some((*self.lights.get(*i)?, (*kind, *placement)));
+        (moment.objects.iter().filter_map(object).collect(), moment.lights.iter().filter_map(light).collect())
+    }
+
     /// Moves nodes; meshes of skins and morph targets keep their shape.
     pub(super) fn set_inputs(&self, inputs: &mut SceneInputs, seconds: f64) {
-        let Some(moment) = self.motion.at(seconds) else { return };
-        let objects: HashMap<Entity, _> =
-            moment.objects.iter().filter_map(|(i, placement)| Some((*self.objects.get(*i)?, placement))).collect();
+        let (objects, lights) = self.at(seconds);
+        let (objects, lights): (HashMap<_, _>, HashMap<_, _>) =
+            (objects.into_iter().collect(), lights.into_iter().collect());
         for object in &mut inputs.objects {
             if let Some(placement) = objects.get(&object.entity) {
-                object.placement = **placement;
+                object.placement = *placement;
             }
         }
-        let lights =
-            moment.lights.iter().filter_map(|(i, kind, placement)| Some((*self.lights.get(*i)?, (*kind, *placement))));
-        let lights: HashMap<Entity, _> = lights.collect();
         for light in &mut inputs.lights {
             if let Some(&(kind, placement)) = lights.get(&light.entity) {
                 (light.light, light.placement) = (kind, placement);
@@ -94,21 +132,21 @@ impl ModelMotion {
 
     /// Moves nodes, and makes the meshes of skins and morph targets again.
     pub(super) fn set_world(&self, world: &mut World, seconds: f64) {
-        let Some(moment) = self.motion.at(seconds) else { return };
-        for (i, placement) in moment.objects {
-            if let Some(&entity) = self.objects.get(i) {
+        let (objects, lights) = self.at(seconds);
+        for (entity, placement) in objects {
+            // A deleted entity may be restored by undo.
+            if world.get::<Shape>(entity).is_some() {
                 put(world, entity, placement);
             }
         }
-        for (i, light, placement) in moment.lights {
-            let Some(&entity) = self.lights.get(i) else { continue };
+        for (entity, (light, placement)) in lights {
             if light_of(world, entity).is_some() {
                 put_light(world, entity, light);
                 put(world, entity, placement);
             }
         }
-        for (i, mesh) in self.motion.meshes_at(seconds) {
-            let Some(&entity) = self.objects.get(i) else { continue };
+        for (i, mesh) in self.motion.meshes_at(seconds).iter() {
+            let Some(&entity) = self.objects.get(*i) else { continue };
             // A simplified mesh, or one that is shaded in another way, is not that of the file.
             let origin =
                 world.get::<MeshOrigin>(entity).filter(|it| it.simplify.is_none() && it.shading == Default::default());
@@ -119,7 +157,7 @@ impl ModelMotion {
                 let source =
                     MeshSource::Gltf { file: file.clone(), mesh: *index, node: *node, at: Some(Seconds(seconds)) };
                 let origin = MeshOrigin { source, ..origin.clone() };
-                put(world, entity, Shape::Mesh(mesh));
+                put(world, entity, Shape::Mesh(mesh.clone()));
                 put(world, entity, origin);
             }
         }

@@ -6,7 +6,7 @@ use crate::format::placement::Placement;
 use crate::format::property::CameraProperty;
 use crate::format::view::{Lens, Projection, View};
 use crate::scene::animation::model::ModelMotion;
-use crate::scene::animation::{Animation, Channel, Track};
+use crate::scene::animation::{Animation, Channel};
 use crate::scene::world::components::put;
 use crate::scene::world::components::{Shape, SurfaceMaterial};
 use crate::scene::world::inputs::{CameraInput, SceneInputs};
@@ -158,30 +158,55 @@ fn keep_changes(world: &mut World) {
     }
 }
 
-/// Objects, lights and materials that are not as their tracks have them at the current time: another time loses that.
+/// Objects, lights and materials that are not as the animation has them at the current time: another time loses that.
 pub fn off_their_tracks(world: &World) -> Vec<Entity> {
     let seconds = world.get_resource::<Moment>().copied().unwrap_or_default().0;
-    let tracks = world.get_resource::<Animation>().map_or(&[][..], |animation| &animation.tracks);
-    let differs = |track: &Track| match track.channel {
-        Channel::Camera(_) => None,
-        Channel::Object(entity, property) => {
-            let placement = world.get::<Shape>(entity).and(world.get::<Placement>(entity))?;
-            (property.set(*placement, track.at(seconds)) != *placement).then_some(entity)
-        }
-        Channel::Light(entity, property) => {
-            let now = (light_of(world, entity)?, *world.get::<Placement>(entity)?);
-            let (mut light, mut placement) = now;
-            property.set(&mut light, &mut placement, track.at(seconds));
-            ((light, placement) != now).then_some(entity)
-        }
-        Channel::Material(entity, property) => {
-            let now = world.get::<SurfaceMaterial>(entity)?;
-            let mut then = now.clone();
-            property.set(&mut then.0, track.at(seconds));
-            (then != *now).then_some(entity)
+    let Some(animation) = world.get_resource::<Animation>() else { return Vec::new() };
+    let mut found = Vec::new();
+    let mut see = |entity: Entity, differs: bool| {
+        if differs {
+            found.push(entity);
         }
     };
-    let mut found: Vec<Entity> = tracks.iter().filter_map(differs).collect();
+    let place = |entity: Entity| world.get::<Shape>(entity).and(world.get::<Placement>(entity)).copied();
+    let lit = |entity: Entity| Some((light_of(world, entity)?, *world.get::<Placement>(entity)?));
+    // What tracks and a model move together is compared as a whole.
+    let (mut objects, mut lights) = match &animation.model {
+        Some(model) => model.at(seconds),
+        None => Default::default(),
+    };
+    for track in &animation.tracks {
+        let value = track.at(seconds);
+        match track.channel {
+            Channel::Camera(_) => {}
+            Channel::Object(entity, property) => {
+                let Some(now) = place(entity) else { continue };
+                match objects.iter_mut().find(|(it, _)| *it == entity) {
+                    Some((_, then)) => *then = property.set(*then, value),
+                    None => see(entity, property.set(now, value) != now),
+                }
+            }
+            Channel::Light(entity, property) => {
+                let Some(now) = lit(entity) else { continue };
+                match lights.iter_mut().find(|(it, _)| *it == entity) {
+                    Some((_, (light, placement))) => drop(property.set(light, placement, value)),
+                    None => {
+                        let (mut light, mut placement) = now;
+                        property.set(&mut light, &mut placement, value);
+                        see(entity, (light, placement) != now);
+                    }
+                }
+            }
+            Channel::Material(entity, property) => {
+                let Some(now) = world.get::<SurfaceMaterial>(entity) else { continue };
+                let mut then = now.clone();
+                property.set(&mut then.0, value);
+                see(entity, then != *now);
+            }
+        }
+    }
+    objects.iter().for_each(|&(entity, then)| see(entity, place(entity).is_some_and(|now| now != then)));
+    lights.iter().for_each(|&(entity, then)| see(entity, lit(entity).is_some_and(|now| now != then)));
     found.dedup();
     found
 }

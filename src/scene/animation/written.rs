@@ -1,12 +1,15 @@
 //! Conversion between the section `animation` of a scene file, which uses names, and the tracks of a world, which use
 //! entities.
 
-use crate::format::animation::{AnimationPart, TrackPart};
+use crate::format::animation::{AnimationPart, ModelMotionPart, TrackPart};
 use crate::format::camera::CameraPart;
 use crate::format::key::Curve;
+use crate::import::gltf_motion::GltfMotion;
+use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::{Animation, Channel, Shutter, Track};
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// The entities of a scene by name. If several have the same name, it refers to the last one.
 #[derive(Default)]
@@ -45,19 +48,35 @@ pub(in crate::scene) fn of_part(part: &AnimationPart, camera: &CameraPart, entit
     }
 }
 
+/// Which entities the animations of a glTF file move in a scene.
+pub(in crate::scene) fn model_of(
+    motion: &Arc<GltfMotion>,
+    part: Option<&ModelMotionPart>,
+    entities: &Entities,
+) -> ModelMotion {
+    let named = |known: &HashMap<&str, Entity>, list: &[(String, usize)]| -> Vec<Entity> {
+        list.iter().map(|(name, _)| known.get(name.as_str()).copied().unwrap_or(Entity::PLACEHOLDER)).collect()
+    };
+    let (objects, lights) = match part {
+        Some(part) => (named(&entities.objects, &part.objects), named(&entities.lights, &part.lights)),
+        // Of the scene that was made of the file.
+        None => (entities.meshes.clone(), entities.all_lights.clone()),
+    };
+    let holds_camera = part.is_some_and(|part| part.camera.is_none());
+    ModelMotion { motion: motion.clone(), objects, lights, holds_camera }
+}
+
 /// The animation as in a scene file.
 ///
 /// - `at`: the current time, seconds.
 /// - `name`: of the object, light or material of a channel; `None` if it no longer exists.
+/// - `model`: what a glTF file moves.
 pub(in crate::scene) fn to_part(
     animation: &Animation,
     at: f64,
     mut name: impl FnMut(Channel) -> Option<String>,
+    model: Option<ModelMotionPart>,
 ) -> AnimationPart {
-    // What a glTF file moves cannot be written: a scene that is made from it shows a moment.
-    if animation.tracks.is_empty() && animation.model.is_some() && animation.shutter == Shutter::default() {
-        return AnimationPart::default();
-    }
     let (shutter, shutter_seconds) = match animation.shutter {
         Shutter::Share(share) => ((share != 0.0).then_some(share), None),
         Shutter::Seconds(seconds) => (None, Some(seconds)),
@@ -81,6 +100,7 @@ pub(in crate::scene) fn to_part(
         shutter,
         shutter_seconds,
         tracks,
+        model,
         ..AnimationPart::default()
     }
 }

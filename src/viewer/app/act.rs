@@ -309,7 +309,7 @@ impl App {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
         // A file name alone is in the folder in which the program runs.
         let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or_else(|| self.options.folder.clone());
+        let folder = folder.or_else(|| self.memory.last_folder()).unwrap_or_else(|| self.options.folder.clone());
         match self.dialog.ask(purpose, &folder) {
             Ok(true) => {}
             Ok(false) => {

@@ -201,7 +201,7 @@ impl App {
             self.act(action);
         }
         if let Some((action, place)) = clicked_here {
-            self.act_at(action, place);
+            self.act_at(menu::at(action, place), place);
         }
         if let Some(answer) = answer {
             self.leaving.answer = Some(answer);

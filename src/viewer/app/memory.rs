@@ -5,10 +5,11 @@ use crate::frame::{
     Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Picture, Recovery, SceneBookmarks, Session,
     SettingsStore, ViewMode, scene_name,
 };
-use crate::scene::{Animation, SceneSource, builtin_text};
+use crate::scene::{Animation, SceneSource, builtin_text, text_to_path};
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
 use crate::viewer::thumbnails::Thumbnails;
+use std::path::PathBuf;
 
 /// The settings store, and its content as far as it is known here.
 pub struct Memory {
@@ -81,6 +82,12 @@ impl Memory {
     /// Recently opened scenes, the latest first: built-in names and paths.
     pub fn recent(&self) -> Recent<'_> {
         Recent { names: &self.recent, thumbnails: &self.thumbnails }
+    }
+
+    /// Folder of the file that was opened last.
+    pub fn last_folder(&self) -> Option<PathBuf> {
+        let mut folders = self.recent.iter().filter_map(|name| Some(text_to_path(name).parent()?.to_path_buf()));
+        folders.find(|folder| folder.is_absolute() && folder.is_dir())
     }
 
     /// Keeps an image of the open scene for the list of recent ones; it shows that scene.
@@ -318,6 +325,7 @@ mod tests {
         follow(&mut session, &mut second);
         assert_eq!(*session.world().resource::<Bookmarks>(), kept);
         assert_eq!(second.recent, ["cornell", "ball"]);
+        assert_eq!(second.last_folder(), None);
         // A saved scene takes its bookmarks along, and is among the recent ones.
         let path = folder.path().join("room.ron");
         session.send(Command::SaveScene { path: path.clone() });
@@ -330,6 +338,7 @@ mod tests {
         }
         follow(&mut session, &mut second);
         assert!(second.recent[0].ends_with("room.ron") && second.recent.len() == 3, "{:?}", second.recent);
+        assert_eq!(second.last_folder().as_deref(), Some(folder.path()));
         let mut session = Session::new(SessionOptions::default()).unwrap();
         let mut third = memory();
         session.adopt(load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap());
