@@ -131,7 +131,7 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     }
     let WantedMoment { at, advance } = std::mem::take(&mut *world.resource_mut::<WantedMoment>());
     let animation = world.get_resource::<Animation>();
-    let is_model = current.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
+    let is_model = current.model_length().is_some();
     // A scene has time before it has an animation, so that keys can be set.
     if !is_model || animation.is_some_and(Animation::moves) {
         let length = animation.map_or(0.0, Animation::length);

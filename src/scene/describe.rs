@@ -79,8 +79,7 @@ impl Description {
         let animation_part = animation.as_ref().map_or_else(Default::default, |animation| {
             moved.part((animation, at), (world, &inputs), &writer.names, &mut writer.losses)
         });
-        let has_unshown = |it: &LoadedScene| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
-        if animation.is_none() && loaded.is_some_and(has_unshown) {
+        if animation.is_none() && loaded.is_some_and(|it| it.model_length().is_some()) {
             let loss =
                 "the scene keeps the stored pose of the model, not its animation: show a moment of it to keep both";
             writer.losses.push(loss.to_owned());

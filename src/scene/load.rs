@@ -437,9 +437,9 @@ impl LoadedScene {
         if !animation.tracks.is_empty() || self.motion.is_some() {
             (animation.shutter, animation.shutter_seconds) = (Some(share), None);
         } else if share > 0.0 {
-            let reason = match &self.facts {
-                Some(facts) if facts.animation_length.is_some() => "shows its stored pose without --at",
-                _ => "has no animation",
+            let reason = match self.model_length() {
+                Some(_) => "shows its stored pose without --at",
+                None => "has no animation",
             };
             self.warnings.push(format!("{} {reason}: the shutter has no effect", self.source.title()));
         }
@@ -495,7 +495,7 @@ impl LoadedScene {
         let of_model = self.file.animation.model.as_mut().and_then(|model| model.camera.take());
         if tracks.len() < n_tracks || of_model.is_some() {
             let title = self.source.title();
-            self.warnings.push(format!("{title}: camera `{wanted}` stands still: the tracks move `camera`"));
+            self.warnings.push(format!("{title}: camera `{wanted}` stands still: the animation moves `camera`"));
         }
         self.file.animation.edited.camera = None;
         Ok(())
@@ -550,11 +550,12 @@ impl LoadedScene {
         files
     }
 
-    /// The files of all meshes: those of a file with many meshes once.
+    /// The files of all meshes, and of what moves them: those of a file with many meshes once.
     pub(super) fn mesh_files(&self) -> Vec<&(PathBuf, Stamp)> {
         let mut seen = HashSet::new();
-        let lists = self.meshes.iter().flatten().filter(|mesh| seen.insert(Arc::as_ptr(&mesh.files)));
-        lists.flat_map(|mesh| mesh.files.iter()).collect()
+        let of_motion = self.motion.as_ref().map(|motion| &motion.opened.files);
+        let lists = self.meshes.iter().flatten().map(|mesh| &mesh.files).chain(of_motion);
+        lists.filter(|files| seen.insert(Arc::as_ptr(files))).flat_map(|files| files.iter()).collect()
     }
 
     /// The mesh of a model, if its files have not changed.

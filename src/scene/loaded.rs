@@ -61,6 +61,11 @@ pub struct LoadedScene {
 }
 
 impl LoadedScene {
+    /// Length of the animations of a glTF file that was opened by itself, seconds.
+    pub fn model_length(&self) -> Option<f64> {
+        self.facts.as_ref()?.animation_length
+    }
+
     pub(super) fn empty(source: &SceneSource, file: SceneFile, folder: PathBuf) -> Self {
         Self {
             source: source.clone(),

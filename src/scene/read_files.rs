@@ -49,6 +49,14 @@ impl LoadedScene {
             let of_mesh = of_mesh.into_iter().flat_map(|files| files.iter()).map(|(path, _)| path.as_path());
             found[first].files.extend(of_mesh.chain(of_textures).map(Path::to_path_buf));
         }
+        // Its objects may have other meshes.
+        if let (Some(motion), Some(model)) = (&self.motion, &self.file.animation.model)
+            && !known.contains_key(&model.file)
+        {
+            known.insert(model.file.clone(), found.len());
+            let files = motion.opened.files.iter().map(|(path, _)| path.clone()).collect();
+            found.push(ReadFiles { name: model.file.clone(), files });
+        }
         let of_textures = self.file.textures.iter().filter_map(|(_, texture)| match texture {
             TextureSource::Image { file, .. } => Some(file),
             _ => None,

@@ -60,7 +60,7 @@ impl Strip {
             return Some(Self { fps, n, frame: Some(shown * fps), plays: plays(fps, n), keys });
         }
         // A glTF model in its stored pose.
-        let length = world.get_resource::<CurrentScene>()?.0.facts.as_ref()?.animation_length?;
+        let length = world.get_resource::<CurrentScene>()?.0.model_length()?;
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
         let n = Animation::frames_to_key(length, fps);
         Some(Self { fps, n, frame: None, plays: plays(fps, n), keys: Vec::new() })

@@ -178,7 +178,7 @@ fn a_saved_scene_moves_as_its_model() {
     let scene = open(&kept.1, &ModelChoice { at: Some(1.0), ..ModelChoice::default() }).unwrap();
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
-    save_scene(&mut world, Some(&scene), &path).unwrap();
+    let text = save_scene(&mut world, Some(&scene), &path).unwrap().text;
     let choice = ModelChoice { at: Some(0.25), ..ModelChoice::default() };
     let options = LoadOptions { choice: Some(&choice), ..LoadOptions::default() };
     let moved = load(&SceneSource::Scene(path.clone()), &options).unwrap();
@@ -186,11 +186,6 @@ fn a_saved_scene_moves_as_its_model() {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &moved.trees);
     assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
     // Without its file, or with one that places less, it stands still.
-    let path = kept.0.path().join("b.ron");
-    let scene = open(&kept.1, &ModelChoice { at: Some(1.0), ..ModelChoice::default() }).unwrap();
-    let mut world = bevy_ecs::world::World::new();
-    scene.spawn(&mut world);
-    let text = save_scene(&mut world, Some(&scene), &path).unwrap().text;
     for (from, to, told) in [
         ("model: (\n            file: \"a.glb\"", "model: (\n            file: \"b.glb\"", "b.glb"),
         ("(\"morphed\", 0)", "(\"morphed\", 7)", "fewer objects"),
@@ -210,4 +205,23 @@ fn a_saved_scene_moves_as_its_model() {
         let error = load(&SceneSource::Scene(path.clone()), &LoadOptions::default()).err().unwrap().to_string();
         assert!(error.contains(told), "{error}");
     }
+}
+
+/// A file that only moves things is one of those that a scene needs.
+#[test]
+fn what_moves_other_objects_belongs_to_the_files_of_a_scene() {
+    let kept = keep("a.glb", &animated().glb());
+    let path = kept.0.path().join("c.ron");
+    let text = r#"(
+        camera: (eye: (0, 1, 6), look_at: (0, 0, 0)),
+        materials: {"m": diffuse(albedo: 0.7)},
+        objects: [sphere(name: "ball", center: (0, 0, 0), radius: 1, material: "m")],
+        animation: (model: (file: "a.glb", objects: [("ball", 0)])),
+    )"#;
+    std::fs::write(&path, text).unwrap();
+    let scene = load(&SceneSource::Scene(path.clone()), &LoadOptions::default()).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let names: Vec<String> = scene.read_files().into_iter().map(|read| read.name).collect();
+    assert_eq!(names, ["a.glb"]);
+    assert_eq!(scene.files(), [kept.1.clone(), path]);
 }

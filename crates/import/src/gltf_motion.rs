@@ -53,17 +53,20 @@ pub struct LastMoment {
 /// The meshes of skins and morph targets, by the index of their object.
 pub type DeformedMeshes = Arc<[(usize, Arc<Mesh>)]>;
 
-/// Returns what is kept for a time, or else makes and keeps it.
+/// Returns what is kept for a time, or else makes and keeps it; who makes it at the same time gets the same.
 fn kept<T: Clone>(last: &Mutex<Option<(u64, T)>>, seconds: f64, make: impl FnOnce() -> Option<T>) -> Option<T> {
-    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    match &*last {
+    let lock = || last.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = |last: &Option<(u64, T)>| match last {
         Some((bits, known)) if *bits == seconds.to_bits() => Some(known.clone()),
-        _ => {
-            let made = make()?;
-            *last = Some((seconds.to_bits(), made.clone()));
-            Some(made)
-        }
+        _ => None,
+    };
+    if let Some(known) = known(&lock()) {
+        return Some(known);
     }
+    // Not under the lock: meshes are built in parallel, and a waiting worker may take up another task that needs it.
+    let made = make()?;
+    let mut last = lock();
+    Some(known(&last).unwrap_or_else(|| last.insert((seconds.to_bits(), made)).1.clone()))
 }
 
 /// Which of the objects and lights of a [`GltfMotion`] are not the same at all times.

@@ -116,9 +116,8 @@ fn current(world: &World) -> Option<Arc<LoadedScene>> {
 
 /// The stored pose of a model that has animations is at no time.
 fn check_pose(world: &World) -> Result<(), String> {
-    let is_animated = |it: Arc<LoadedScene>| it.facts.as_ref().is_some_and(|facts| facts.animation_length.is_some());
     match world.get_resource::<Animation>() {
-        None if current(world).is_some_and(is_animated) => {
+        None if current(world).is_some_and(|it| it.model_length().is_some()) => {
             Err("the stored pose of the model has no time: show its animation first".to_owned())
         }
         _ => Ok(()),

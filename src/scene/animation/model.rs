@@ -11,7 +11,7 @@ use crate::scene::world::components::{MeshOrigin, Shape};
 use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::{light_of, put_light};
 use bevy_ecs::prelude::{Entity, World};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -25,6 +25,13 @@ pub(in crate::scene) struct ModelMotion {
     pub lights: Vec<Entity>,
     /// Whether the camera stands still, even if that of the file moves.
     pub holds_camera: bool,
+}
+
+/// What a model moves, at a time.
+#[derive(Default)]
+pub(super) struct Moved {
+    pub objects: BTreeMap<Entity, Placement>,
+    pub lights: BTreeMap<Entity, (LightKind, Placement)>,
 }
 
 impl PartialEq for ModelMotion {
@@ -104,20 +111,20 @@ impl ModelMotion {
     }
 
     /// Where the objects and lights are at a time.
-    #[expect(clippy::type_complexity, reason = "two lists of what an entity becomes")]
-    pub(super) fn at(&self, seconds: f64) -> (Vec<(Entity, Placement)>, Vec<(Entity, (LightKind, Placement))>) {
-        let Some(moment) = self.motion.at(seconds) else { return Default::default() };
+    pub(super) fn at(&self, seconds: f64) -> Moved {
+        let Some(moment) = self.motion.at(seconds) else { return Moved::default() };
         let object = |(i, placement): &(usize, Placement)| Some((*self.objects.get(*i)?, *placement));
         let light =
             |(i, kind, placement): &(usize, LightKind, Placement)| Some((*self.lights.get(*i)?, (*kind, *placement)));
-        (moment.objects.iter().filter_map(object).collect(), moment.lights.iter().filter_map(light).collect())
+        Moved {
+            objects: moment.objects.iter().filter_map(object).collect(),
+            lights: moment.lights.iter().filter_map(light).collect(),
+        }
     }
 
     /// Moves nodes; meshes of skins and morph targets keep their shape.
     pub(super) fn set_inputs(&self, inputs: &mut SceneInputs, seconds: f64) {
-        let (objects, lights) = self.at(seconds);
-        let (objects, lights): (HashMap<_, _>, HashMap<_, _>) =
-            (objects.into_iter().collect(), lights.into_iter().collect());
+        let Moved { objects, lights } = self.at(seconds);
         for object in &mut inputs.objects {
             if let Some(placement) = objects.get(&object.entity) {
                 object.placement = *placement;
@@ -132,7 +139,7 @@ impl ModelMotion {
 
     /// Moves nodes, and makes the meshes of skins and morph targets again.
     pub(super) fn set_world(&self, world: &mut World, seconds: f64) {
-        let (objects, lights) = self.at(seconds);
+        let Moved { objects, lights } = self.at(seconds);
         for (entity, placement) in objects {
             // A deleted entity may be restored by undo.
             if world.get::<Shape>(entity).is_some() {

@@ -5,7 +5,7 @@ use crate::format::camera::{camera, camera_part};
 use crate::format::placement::Placement;
 use crate::format::property::CameraProperty;
 use crate::format::view::{Lens, Projection, View};
-use crate::scene::animation::model::ModelMotion;
+use crate::scene::animation::model::{ModelMotion, Moved};
 use crate::scene::animation::{Animation, Channel};
 use crate::scene::world::components::put;
 use crate::scene::world::components::{Shape, SurfaceMaterial};
@@ -171,25 +171,23 @@ pub fn off_their_tracks(world: &World) -> Vec<Entity> {
     let place = |entity: Entity| world.get::<Shape>(entity).and(world.get::<Placement>(entity)).copied();
     let lit = |entity: Entity| Some((light_of(world, entity)?, *world.get::<Placement>(entity)?));
     // What tracks and a model move together is compared as a whole.
-    let (mut objects, mut lights) = match &animation.model {
-        Some(model) => model.at(seconds),
-        None => Default::default(),
-    };
+    let by_model = animation.model.as_ref().map(|model| model.at(seconds));
+    let Moved { mut objects, mut lights } = by_model.unwrap_or_default();
     for track in &animation.tracks {
         let value = track.at(seconds);
         match track.channel {
             Channel::Camera(_) => {}
             Channel::Object(entity, property) => {
                 let Some(now) = place(entity) else { continue };
-                match objects.iter_mut().find(|(it, _)| *it == entity) {
-                    Some((_, then)) => *then = property.set(*then, value),
+                match objects.get_mut(&entity) {
+                    Some(then) => *then = property.set(*then, value),
                     None => see(entity, property.set(now, value) != now),
                 }
             }
             Channel::Light(entity, property) => {
                 let Some(now) = lit(entity) else { continue };
-                match lights.iter_mut().find(|(it, _)| *it == entity) {
-                    Some((_, (light, placement))) => drop(property.set(light, placement, value)),
+                match lights.get_mut(&entity) {
+                    Some((light, placement)) => drop(property.set(light, placement, value)),
                     None => {
                         let (mut light, mut placement) = now;
                         property.set(&mut light, &mut placement, value);
@@ -205,8 +203,8 @@ pub fn off_their_tracks(world: &World) -> Vec<Entity> {
             }
         }
     }
-    objects.iter().for_each(|&(entity, then)| see(entity, place(entity).is_some_and(|now| now != then)));
-    lights.iter().for_each(|&(entity, then)| see(entity, lit(entity).is_some_and(|now| now != then)));
+    objects.iter().for_each(|(&entity, then)| see(entity, place(entity).is_some_and(|now| now != *then)));
+    lights.iter().for_each(|(&entity, then)| see(entity, lit(entity).is_some_and(|now| now != *then)));
     found.dedup();
     found
 }

@@ -16,7 +16,7 @@ const SAME_TIME: f64 = 1e-6;
 
 /// Seconds of the animations of the open glTF model, which is in the world only at a moment, not in its stored pose.
 fn length_of_model(session: &Session) -> Option<f64> {
-    session.world().get_resource::<CurrentScene>()?.0.facts.as_ref()?.animation_length
+    session.world().get_resource::<CurrentScene>()?.0.model_length()
 }
 
 /// Whether there is anything to play.
