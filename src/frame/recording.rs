@@ -83,6 +83,16 @@ impl Recorder {
             self.out = None;
         }
     }
+
+    /// Records that a scene was opened in the present frame, if one was: after the commands of the frame.
+    pub(super) fn note_opened(&mut self, adopted: &SceneGeneration, current: Option<&CurrentScene>) {
+        if self.out.is_none() || adopted.0 <= self.adopted {
+            return;
+        }
+        self.adopted = adopted.0;
+        let print = current.map_or_else(String::new, |current| current.0.content_fingerprint().to_string());
+        self.write(&RecordedLine::Opened(self.frame, adopted.0, print));
+    }
 }
 
 /// Records the commands of this frame; runs before they are executed.
@@ -99,14 +109,8 @@ pub fn record(
     if recorder.out.is_none() {
         return;
     }
+    recorder.note_opened(&adopted, current.as_deref());
     recorder.frame += 1;
-    // A scene is opened after the commands of its frame.
-    if adopted.0 > recorder.adopted {
-        recorder.adopted = adopted.0;
-        let print = current.map_or_else(String::new, |current| current.0.content_fingerprint().to_string());
-        let line = RecordedLine::Opened(recorder.frame - 1, adopted.0, print);
-        recorder.write(&line);
-    }
     for command in &queue.0 {
         let line = RecordedLine::Do(recorder.frame, clock.0.as_secs_f64(), command.clone());
         recorder.write(&line);

@@ -13,6 +13,7 @@ use crate::scene::{
     DisplaySettings, ModelChoice, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path,
     text_to_path,
 };
+use bevy_ecs::prelude::Mut;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -65,11 +66,14 @@ impl Session {
     pub fn end_record(&mut self) -> Option<String> {
         let status = self.status();
         let spp = if status.divider == 1 { status.spp } else { 0 };
-        let mut recorder = self.world_mut().resource_mut::<Recorder>();
-        let line = RecordedLine::End(recorder.frame, spp);
-        recorder.write(&line);
-        recorder.out = None;
-        recorder.trouble.take()
+        self.world_mut().resource_scope(|world, mut recorder: Mut<Recorder>| {
+            // In the last frame, too.
+            recorder.note_opened(world.resource::<SceneGeneration>(), world.get_resource::<CurrentScene>());
+            let line = RecordedLine::End(recorder.frame, spp);
+            recorder.write(&line);
+            recorder.out = None;
+            recorder.trouble.take()
+        })
     }
 }
 
@@ -355,6 +359,27 @@ mod tests {
         second.end_record();
         assert_eq!(read(&target, &|| false).unwrap().1.len(), 1);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+    }
+
+    /// A small scene is open, rendered and left within a frame.
+    #[test]
+    fn a_recording_that_ends_in_the_frame_of_its_scene_has_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.rec");
+        let source = SceneSource::Builtin("ball".to_owned());
+        let mut session = session();
+        session.record(&target, &source, None, &ModelChoice::DEFAULT).unwrap();
+        session.open(source);
+        for _ in 0..2000 {
+            session.update(Duration::ZERO);
+            if session.world().contains_resource::<CurrentScene>() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(session.end_record(), None);
+        let lines = read(&target, &|| false).unwrap().1;
+        assert!(matches!(&lines[..], [RecordedLine::Opened(..), RecordedLine::End(..)]), "{} lines", lines.len());
     }
 
     /// As on a full disk: when it happens, and at the end.
