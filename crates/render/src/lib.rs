@@ -64,6 +64,7 @@ pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};
 pub use film::surfaces::PixelSurface;
 pub use film::tiles::Film;
+pub use firstlight_kdtree::InstructionSet;
 pub use integrators::common::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
 pub use prepare::light::LightTable;
 pub use prepare::{Exposed, Features, Moments, Prepared, moment_of_sample};

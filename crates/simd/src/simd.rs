@@ -261,6 +261,10 @@ macro_rules! dispatch {
             // SAFETY: as above.
             $kernel$(::<_, $constant>)?(unsafe { $crate::Avx2::new() }, $($name),*)
         }
+        // Without optimisation, kernels inlined in the caller would add their stack frames to those of the others.
+        fn portable($($name: $kind),*) {
+            $kernel$(::<_, $constant>)?($crate::Portable, $($name),*)
+        }
         let set: $crate::InstructionSet = $set;
         assert!(set.is_available(), "this processor does not have {set:?}");
         match set {
@@ -270,7 +274,7 @@ macro_rules! dispatch {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             $crate::InstructionSet::Avx2 => unsafe { avx2($($name),*) },
-            _ => $kernel$(::<_, $constant>)?($crate::Portable, $($name),*),
+            _ => portable($($name),*),
         }
     }};
 }

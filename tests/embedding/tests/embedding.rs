@@ -6,7 +6,7 @@
 
 use firstlight::frame::render_offline;
 use firstlight::prelude::*;
-use firstlight::render::{Film, worker_threads};
+use firstlight::render::{Film, InstructionSet, RenderSettings, worker_threads};
 use firstlight::scene::{Extraction, LoadOptions, SceneInputs, load};
 use std::time::{Duration, Instant};
 
@@ -55,7 +55,8 @@ fn scenes_render_with_either_integrator() {
     }
 }
 
-/// So that the next kernel has room too: the workers get half the stack that they have in programs.
+/// So that the next kernel has room too: the workers get half the stack that they have in programs, with the instructions
+/// of any processor.
 #[test]
 fn half_of_the_stack_is_enough() {
     for name in SCENES {
@@ -64,12 +65,14 @@ fn half_of_the_stack_is_enough() {
         let mut world = World::new();
         loaded.spawn(&mut world);
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
-        let settings = world.resource::<Rendering>().0;
         let pool = worker_threads().num_threads(2).stack_size(16 << 20).build().expect("two threads");
         let target = Target { spp: Some(2), ..Target::default() };
-        let mut film = Film::new(40, 32);
-        pool.install(|| render_offline(&extraction.prepared, &settings, &mut film, target, |_| true));
-        assert_eq!(film.spp(), 2, "{name}");
+        for set in InstructionSet::available() {
+            let settings = RenderSettings { simd: Some(set), ..world.resource::<Rendering>().0 };
+            let mut film = Film::new(40, 32);
+            pool.install(|| render_offline(&extraction.prepared, &settings, &mut film, target, |_| true));
+            assert_eq!(film.spp(), 2, "{name} with {set:?}");
+        }
     }
 }
 
