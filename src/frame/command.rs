@@ -176,7 +176,8 @@ pub enum Command {
         /// Time in seconds; `None` for the stored pose of a glTF model.
         seconds: Option<f64>,
     },
-    /// Advance the time of the animation, from the end of what plays on at its start.
+    /// Advance the time of the animation, from the end of what plays on at its start. It is shown at whole frames; the rest
+    /// of the time counts for the next one.
     AdvanceMoment {
         /// Seconds.
         seconds: f64,

@@ -11,7 +11,9 @@ use crate::frame::input::ModelUp;
 use crate::frame::saving::SavedAs;
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{Clock, CurrentScene, FreeShare, PictureSize, PlayRange, Renderer, WantedMoment};
+use crate::frame::state::resources::{
+    Clock, CurrentScene, FreeShare, PictureSize, PlayRange, RenderState, Renderer, WantedMoment,
+};
 use crate::frame::watch::Watch;
 use crate::scene::{
     Animation, Description, LoadOptions, LoadedScene, ModelChoice, Moment, SceneContent, SceneError, SceneSource, load,
@@ -124,9 +126,13 @@ pub fn reload(world: &mut World) {
     }
 }
 
-/// Starts to load the open model at the requested time, unless a scene is being loaded.
+/// Frames by which a time may be short of a frame that it is at.
+const FRAME_ROUNDING: f64 = 1e-6;
+
+/// Shows the requested moment, unless a scene or the trees of the last one are awaited; loads a model at that time if it is
+/// in its stored pose.
 fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
-    if world.resource::<BackgroundTasks>().is_loading() {
+    if world.resource::<BackgroundTasks>().is_loading() || world.resource::<RenderState>().builds_missing {
         return;
     }
     let WantedMoment { at, advance } = std::mem::take(&mut *world.resource_mut::<WantedMoment>());
@@ -134,20 +140,21 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     let is_model = current.model_length().is_some();
     // A scene has time before it has an animation, so that keys can be set.
     if !is_model || animation.is_some_and(Animation::moves) {
-        let length = animation.map_or(0.0, Animation::length);
+        let (length, fps) = animation.map_or((0.0, 1.0), |animation| (animation.length(), animation.fps));
         let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
         match at {
             Some(None) => {}
             None if advance == 0.0 || length == 0.0 => return,
             _ => {
                 let at = at.flatten().unwrap_or(shown);
-                let wanted = at + advance;
-                let wanted = if advance == 0.0 {
-                    wanted.clamp(0.0, MOST_SECONDS)
-                } else {
-                    world.resource::<PlayRange>().wrap(wanted, length)
-                };
-                return set_moment(world, wanted);
+                if advance == 0.0 {
+                    return set_moment(world, at.clamp(0.0, MOST_SECONDS));
+                }
+                let wanted = world.resource::<PlayRange>().wrap(at + advance, length);
+                // What plays are the frames that would be rendered; there is time for each until the next.
+                let frame = (wanted * fps + FRAME_ROUNDING).floor() / fps;
+                world.resource_mut::<WantedMoment>().advance = wanted - frame;
+                return set_moment(world, frame);
             }
         }
     }

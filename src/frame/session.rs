@@ -413,7 +413,7 @@ impl Session {
     /// rest.
     pub fn next_wake(&self, now: Duration) -> Option<Duration> {
         let commands = (!self.world.resource::<CommandQueue>().0.is_empty()).then_some(now);
-        let sharing = self.world.resource::<RenderState>().next_sharing();
-        commands.into_iter().chain(sharing).min()
+        let shown = self.world.resource::<RenderState>();
+        [commands, shown.next_sharing(), shown.next_improving()].into_iter().flatten().min()
     }
 }

@@ -7,7 +7,8 @@ use crate::frame::navigation;
 use crate::frame::scene_bounds::{SceneBounds, ground_below};
 use crate::frame::state::background::{BackgroundTasks, Finished};
 use crate::frame::state::resources::{
-    Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
+    Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, ShownMoment, StopAt,
+    Threads, ViewMode,
 };
 use crate::frame::state::selection::Selection;
 use crate::frame::worker::{Job, Orders};
@@ -101,6 +102,10 @@ pub fn rebuild(
     }
     let has_new_keys = time.0.as_ref().is_some_and(|animation| animation.is_changed());
     let (animation, seconds) = (time.0.as_deref(), time.1.map_or(0.0, |moment| moment.0));
+    if shown.moment.seconds != seconds {
+        let per_frame = animation.map_or(0.0, |animation| animation.fps.recip());
+        shown.moment = ShownMoment { seconds, changed_at: Some(clock.0), per_frame, ..shown.moment };
+    }
     let exposure = animation.and_then(|animation| animation.open_shutter(seconds));
     let other_exposure = shown.exposure != exposure || has_new_keys && exposure.is_some();
     // Touched values are often equal to the previous ones; only differences count.
@@ -119,9 +124,14 @@ pub fn rebuild(
         let same_objects = inputs.objects == shown.inputs.objects
             && shown.extraction.as_ref().is_some_and(|extraction| extraction.origin == origin);
         let waits = !same_objects && builds_missing_trees(&inputs, &mut shown, origin, (&beside, &renderer));
+        shown.builds_missing = waits;
         if waits {
-            // The old image stays until the trees are built; the camera keeps moving.
-            inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
+            // The old image stays until the trees are built; the camera keeps moving, unless it moves with what they are of.
+            let is_animated = shown.moment.of_inputs != seconds && animation.is_some_and(Animation::moves_camera);
+            let camera = if is_animated { shown.inputs.camera } else { inputs.camera };
+            inputs = SceneInputs { camera, ..shown.inputs.clone() };
+        } else {
+            shown.moment.of_inputs = seconds;
         }
         let differences = compare(&shown.inputs, &inputs);
         let part = differences.part();
@@ -191,7 +201,7 @@ pub fn rebuild(
     }
     let selected = selection.as_ref().map_or(&[][..], |selection| &selection.0);
     prepare_moves(&mut shown, selected, &beside, &renderer);
-    improve_trees(&mut shown, &beside, &renderer);
+    improve_trees(&mut shown, &beside, &renderer, clock.0);
     share_trees(&mut shown, &beside, &renderer, clock.0);
     found.0 = changes;
 }
@@ -203,8 +213,12 @@ fn is_another_list(old: &SceneInputs, new: &SceneInputs) -> bool {
     !as_before || old.camera == new.camera
 }
 
-/// Starts building the final trees of those that have preview trees so far.
-fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer) {
+/// Starts building the final trees of those that have preview trees so far, unless an animation is about to replace them.
+fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer, now: Duration) {
+    if shown.next_improving().is_some_and(|then| now < then) {
+        return;
+    }
+    shown.moment.changed_at = None;
     let preview = shown.trees.preview();
     shown.improving.retain(|shape| preview.contains(shape));
     let new: Vec<Shape> = preview.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
@@ -231,6 +245,11 @@ fn prepare_moves(shown: &mut RenderState, selected: &[Entity], beside: &Backgrou
 const REST: Duration = Duration::from_millis(250);
 
 impl RenderState {
+    /// When trees are to be improved, if no other moment is shown until then.
+    pub(crate) fn next_improving(&self) -> Option<Duration> {
+        self.moment.changed_at.map(|since| since + REST)
+    }
+
     /// When meshes are to share trees, if they are not about to be moved on.
     pub(crate) fn next_sharing(&self) -> Option<Duration> {
         self.unsettled_since.filter(|_| !self.builds_statics).map(|since| since + REST)
@@ -382,6 +401,7 @@ pub fn accumulate(
             settings: shown.settings,
             width,
             height,
+            pace: shown.moment.changed_at.map(|_| shown.moment.per_frame),
         });
         shown.is_unordered = false;
     }

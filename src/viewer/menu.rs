@@ -143,6 +143,7 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         action if *action == REDO => history.redo_label().is_some(),
         Action::Gizmo(Some(_))
         | Action::Grab(_)
+        | Action::GrabCopy
         | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
             !session.world().resource::<Selection>().0.is_empty()
         }

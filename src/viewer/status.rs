@@ -14,8 +14,11 @@ const NOT_KNOWN: &str = "not known yet";
 const CLEAN: f64 = 0.01;
 
 /// What is on the image, how good it is, and how long it will take: one noise, that of what is shown.
-pub fn line(status: &Status, target: Target) -> String {
-    let loading = status.loading.as_ref().map(|loading| format!("{loading} …"));
+///
+/// - `is_slow`: what is being built has taken long enough to be told.
+pub fn line(status: &Status, target: Target, is_slow: bool) -> String {
+    let is_told = is_slow || status.opening.is_some() || status.scene.is_empty();
+    let loading = status.loading.as_ref().filter(|_| is_told).map(|loading| format!("{loading} …"));
     if let Some(loading) = &loading
         && (status.opening.is_some() || status.scene.is_empty())
     {
@@ -182,7 +185,7 @@ mod tests {
     fn the_line_has_one_noise_that_of_what_is_shown() {
         let mut status = Status { spp: 37, seconds: 10.0, divider: 4, ..Status::default() };
         let target = Target { error: Some(0.005), ..Target::default() };
-        let line = |status: &Status| line(status, target);
+        let line = |status: &Status| line(status, target, true);
         assert_eq!(line(&status), "preview");
         status.divider = 1;
         assert_eq!(line(&status), "first samples");
@@ -216,6 +219,7 @@ mod tests {
         assert_eq!(line(&status), "reading duck.glb …", "no figures of what is not there yet");
         (status.scene, status.loading) = ("duck.glb".to_owned(), Some("building a kd-tree".to_owned()));
         assert_eq!(line(&status), "building a kd-tree …   paused, noise 1.0 %");
+        assert_eq!(super::line(&status, target, false), "paused, noise 1.0 %");
     }
 
     #[test]
@@ -229,13 +233,13 @@ mod tests {
         assert_eq!(target(None, None, Some(0.05)), None, "reached");
         let target = Target { error: Some(0.005), ..Target::default() };
         let near = Status { spp: 9, seconds: 10.0, estimated_error: Some(0.05), ..Status::default() };
-        assert_eq!(line(&near, target), "noise 5.0 %, about 4 min to 1.0 %", "what most are content with");
+        assert_eq!(line(&near, target, true), "noise 5.0 %, about 4 min to 1.0 %", "what most are content with");
         let clean = Status { estimated_error: Some(0.009), ..near.clone() };
-        assert_eq!(line(&clean, target), "noise 0.90 %, about 20 s to 0.50 %");
+        assert_eq!(line(&clean, target, true), "noise 0.90 %, about 20 s to 0.50 %");
         let far = Status { estimated_error: Some(0.5), ..near };
-        assert_eq!(line(&far, target), "noise 50 %", "hours away");
+        assert_eq!(line(&far, target, true), "noise 50 %", "hours away");
         let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
-        assert_eq!(line(&denoised, target), "noise 5.0 %, denoised");
+        assert_eq!(line(&denoised, target, true), "noise 5.0 %, denoised");
         assert_eq!([0.2, 43.0, 200.0].map(about), ["about 1 s", "about 45 s", "about 3 min"]);
         assert_eq!([5000.0, 1e4, 1e6].map(about), ["about 83 min", "about 3 h", "about 12 days"]);
     }

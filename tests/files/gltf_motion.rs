@@ -1,9 +1,11 @@
 //! glTF files that move: poses, animations, motion blur.
 
 use super::gltf::{keep, meshes, open};
-use super::gltf_writer::animated;
+use super::gltf_writer::{Writer, animated};
+use firstlight::frame::{Command, Session, SessionOptions};
 use firstlight::scene::{
-    Animation, Extraction, LoadOptions, ModelChoice, SceneInputs, SceneSource, Shape, load, save_scene, show_moment,
+    Animation, Extraction, LoadOptions, ModelChoice, Moment, SceneInputs, SceneSource, Shape, load, save_scene,
+    show_moment,
 };
 use glam::DVec3;
 use serde_json::json;
@@ -224,4 +226,49 @@ fn what_moves_other_objects_belongs_to_the_files_of_a_scene() {
     let names: Vec<String> = scene.read_files().into_iter().map(|read| read.name).collect();
     assert_eq!(names, ["a.glb"]);
     assert_eq!(scene.files(), [kept.1.clone(), path]);
+}
+
+/// While the trees of a moment are awaited, no other one takes its place, or none would ever be seen.
+#[test]
+fn every_moment_that_plays_is_rendered() {
+    let n = 40_u32;
+    let mut writer = Writer::default();
+    let along = (0..n * n).map(|i| (i % n, i / n));
+    let flat: Vec<f32> = along.clone().flat_map(|(x, y)| [x as f32, y as f32, 0.0]).collect();
+    let lift: Vec<f32> = along.clone().flat_map(|(x, y)| [0.0, 0.0, (x * y) as f32 / 100.0]).collect();
+    let inner = along.filter(|(x, y)| x + 1 < n && y + 1 < n);
+    let corners: Vec<u32> = inner.flat_map(|(x, y)| [0, 1, n + 1, 0, n + 1, n].map(|step| y * n + x + step)).collect();
+    let (flat, lift, corners) =
+        (writer.floats("VEC3", &flat), writer.floats("VEC3", &lift), writer.indices(5125, &corners));
+    let targets = json!([{ "POSITION": lift }]);
+    writer.mesh(json!({ "attributes": { "POSITION": flat }, "indices": corners, "targets": targets }));
+    writer.json["nodes"] = json!([{ "name": "sheet", "mesh": 0 }]);
+    writer.json["scenes"] = json!([{ "nodes": [0] }]);
+    let times = writer.floats("SCALAR", &[0.0, 4.0]);
+    let weights = writer.floats("SCALAR", &[0.0, 1.0]);
+    writer.json["animations"] = json!([{ "samplers": [{ "input": times, "output": weights }], "channels": [
+        { "sampler": 0, "target": { "node": 0, "path": "weights" } },
+    ] }]);
+    let kept = keep("sheet.glb", &writer.glb());
+    let mut session = Session::new(SessionOptions { width: 8, height: 8, ..SessionOptions::default() }).unwrap();
+    session.adopt(open(&kept.1, &ModelChoice { at: Some(0.0), ..ModelChoice::default() }).unwrap());
+    let start = std::time::Instant::now();
+    let mut frame = |session: &mut Session| {
+        session.update(start.elapsed());
+        assert!(start.elapsed().as_secs() < 300, "{:?}", session.status());
+    };
+    while session.status().spp == 0 {
+        frame(&mut session);
+    }
+    let restarts = session.status().restarts;
+    let (mut n_moments, mut shown) = (0, 0.0);
+    while session.status().restarts < restarts + 20 {
+        session.send(Command::AdvanceMoment { seconds: 1.0 / 24.0 });
+        frame(&mut session);
+        let moment = session.world().resource::<Moment>().0;
+        n_moments += u64::from(moment != shown);
+        shown = moment;
+    }
+    // The last one may be awaited.
+    assert!((20..=21).contains(&n_moments), "{n_moments}");
 }

@@ -491,6 +491,15 @@ fn the_time_line_shows_a_moment_which_is_undone_and_no_change_of_the_scene() {
     driver.session.send(Command::AdvanceMoment { seconds: 2.125 });
     driver.frame();
     assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
+    // At whole frames, of which there are 24 a second: what is left of a step counts for the next one.
+    for (seconds, at) in [(0.03, 12.0 / 24.0), (0.03, 13.0 / 24.0), (0.03, 14.0 / 24.0), (-0.0901, 11.0 / 24.0)] {
+        driver.session.send(Command::AdvanceMoment { seconds });
+        driver.frame();
+        assert_eq!(shown(&mut driver).0, at);
+    }
+    driver.session.send(Command::SetMoment { seconds: Some(0.5) });
+    driver.frame();
+    assert_eq!(shown(&mut driver), (0.5, -1.0, 35.0));
     // All of that is one step.
     driver.session.send(Command::Edit(Edit::Undo));
     driver.frame();

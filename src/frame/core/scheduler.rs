@@ -19,6 +19,13 @@ const REACTION: f64 = 1.0 / 30.0;
 const SLOWEST: f64 = 1.0 / 80.0;
 /// Lower limit of that maximum, however long displaying takes.
 const QUICKEST: f64 = 1.0 / 200.0;
+/// Part of the time from a frame of an animation to the next that its image may take to be rendered and displayed; the rest is
+/// for what moves.
+const OF_FRAME: f64 = 0.8;
+/// Where images of that time are coarser than this divider, each may take the time of two frames: every second one is shown.
+const POOR: u32 = 8;
+/// Frames that are further apart, in seconds, are rendered as if they were not: the camera is to follow the hand.
+pub const SLOWEST_FRAME: f64 = 1.0 / 15.0;
 /// A finer resolution is tried if it would take less than this part of the maximum.
 const FASTEST: f64 = 0.5;
 /// Part of the maximum that a new choice aims at: inside the hysteresis band, so that it does not change again at once.
@@ -31,8 +38,10 @@ const SMOOTHING: f64 = 0.002;
 /// Part of the aimed time that finding surfaces at a finer resolution may take: edges and textures are as sharp as they are,
 /// and the light on them as fine as the rest allows.
 const SURFACES: f64 = 0.5;
-/// Assumed time for a surface over that for a path before the first measurement.
+/// Assumed time for a surface over that for a path before the first measurement, and the most that is assumed, in seconds:
+/// where paths take long, it is for their bounces.
 const GUESSED_SURFACE: f64 = 0.35;
+const SLOWEST_SURFACE: f64 = 2e-7;
 
 /// Time after the last restart at which motion is considered to have ended, and the image gets finer. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
@@ -112,6 +121,8 @@ pub struct Scheduler {
     smoothing: f64,
     /// Seconds per pixel of finding surfaces and putting light on them, once it is known.
     relighting: Option<f64>,
+    /// Seconds from a frame of the animation to the next, while it plays.
+    pace: Option<f64>,
     /// Divider of coarse images; kept across restarts.
     coarse: u32,
     /// Divider of the surfaces that their light is put on; the same where finer ones do not fit.
@@ -151,6 +162,7 @@ impl Scheduler {
             showing: 0.0,
             smoothing: 0.0,
             relighting: None,
+            pace: None,
             coarse: 1,
             surfaces: 1,
             phase: Phase::Full,
@@ -196,6 +208,12 @@ impl Scheduler {
         if self.phase == Phase::Full {
             (self.spp, self.error) = (spp, error);
         }
+    }
+
+    /// Tells the seconds from a frame of the animation to the next while it plays: an image of one need not be there sooner
+    /// than the next one is due.
+    pub fn set_pace(&mut self, pace: Option<f64>) {
+        self.pace = pace;
     }
 
     /// Discards the measured speed, because the number of threads has changed.
@@ -359,7 +377,11 @@ impl Scheduler {
     /// Maximum render time of a coarse image in seconds: an input may arrive while the previous image is being
     /// displayed, and its own image has to be displayed too.
     fn slowest(&self) -> f64 {
-        (REACTION - 2.0 * self.showing).clamp(QUICKEST, SLOWEST)
+        let of_input = (REACTION - 2.0 * self.showing).clamp(QUICKEST, SLOWEST);
+        let Some(pace) = self.pace else { return of_input };
+        let within = |frames: f64| (frames * OF_FRAME * pace.min(SLOWEST_FRAME) - self.showing).max(of_input);
+        let is_poor = self.finest_within(AIM * within(1.0)).0 > POOR;
+        within(if is_poor { 2.0 } else { 1.0 })
     }
 
     fn speed(&self) -> f64 {
@@ -380,7 +402,7 @@ impl Scheduler {
 
     /// Seconds to find surfaces and to put light on them.
     fn seconds_for_surfaces(&self, divider: u32) -> f64 {
-        self.pixels(divider) * self.relighting.unwrap_or(GUESSED_SURFACE / self.speed())
+        self.pixels(divider) * self.relighting.unwrap_or((GUESSED_SURFACE / self.speed()).min(SLOWEST_SURFACE))
     }
 
     fn pixels(&self, divider: u32) -> f64 {
@@ -483,6 +505,31 @@ mod tests {
             // As fine as possible.
             let finer = DIVIDERS.iter().rev().find(|&&finer| finer < divider).expect("a coarse one");
             assert!(machine.scheduler.seconds_for(*finer) > AIM * slowest, "{showing}: {took} s at 1/{divider}");
+        }
+    }
+
+    #[test]
+    fn an_image_of_an_animation_may_take_until_the_next_frame() {
+        let took = |showing: f64, pace: Option<f64>| {
+            let mut machine = Machine::new(1280, 720, 4e6, Target::default());
+            (0..100).for_each(|_| machine.scheduler.shown_after(Duration::from_secs_f64(showing)));
+            while machine.now < 2.0 {
+                machine.step();
+            }
+            machine.scheduler.set_pace(pace);
+            machine.restart();
+            machine.shown.clear();
+            let at = machine.now;
+            machine.step();
+            machine.shown[0].1 - at
+        };
+        for showing in [0.001, 0.02] {
+            let (still, played, slow) =
+                (took(showing, None), took(showing, Some(1.0 / 24.0)), took(showing, Some(1.0)));
+            assert!(played > 2.0 * still && played + showing <= OF_FRAME / 24.0, "{showing}: {still}, {played}");
+            assert!((played..OF_FRAME * SLOWEST_FRAME - showing).contains(&slow), "{showing}: {slow}");
+            // Of a fast one, as much as of a moving camera.
+            assert_eq!(took(showing, Some(1.0 / 120.0)), still);
         }
     }
 

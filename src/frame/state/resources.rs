@@ -93,8 +93,20 @@ pub struct CurrentScene(pub Arc<LoadedScene>);
 pub struct WantedMoment {
     /// Seconds, or `None` for the stored pose of a glTF model.
     pub at: Option<Option<f64>>,
-    /// Seconds by which to advance.
+    /// Seconds by which to advance; of playing, what is left to the next frame.
     pub advance: f64,
+}
+
+/// The moment of an animation that is shown.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ShownMoment {
+    pub seconds: f64,
+    /// When it last changed, until it has rested.
+    pub changed_at: Option<Duration>,
+    /// Seconds from a frame of the animation to the next.
+    pub per_frame: f64,
+    /// The moment of the rendered inputs: an earlier one while trees are awaited.
+    pub of_inputs: f64,
 }
 
 /// The part of the animation that plays over and over, seconds; `None` for all of it.
@@ -134,8 +146,11 @@ pub struct RenderState {
     /// Whether the workers have not got the job of what is to be rendered.
     pub(crate) is_unordered: bool,
     pub(crate) region: Option<[f64; 4]>,
-    /// Whether the world has changes that wait for a tree.
+    /// Whether a tree has arrived that changes of the world may have waited for.
     pub(crate) waiting: bool,
+    /// Whether the world has changes that wait for a tree: another moment would only replace this one unseen.
+    pub(crate) builds_missing: bool,
+    pub(crate) moment: ShownMoment,
     /// When the objects last changed, if that may be a reason to build trees that meshes share.
     pub(crate) unsettled_since: Option<Duration>,
     /// Whether such trees are being built.

@@ -214,7 +214,7 @@ mod tests {
             panic!("no image came: {:?}", worker.stats());
         };
         worker.set_look(ViewOptions { denoising: Denoising::Denoised, ..ViewOptions::default() });
-        let job = Job { generation: 1, prepared: prepared.clone(), settings, width: 48, height: 36 };
+        let job = Job { generation: 1, prepared: prepared.clone(), settings, width: 48, height: 36, pace: None };
         worker.order(Orders { job: Some(job), ..Orders::default() });
         next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
         worker.set_prepared(1, prepared);

@@ -37,6 +37,8 @@ pub struct Job {
     pub settings: RenderSettings,
     pub width: u32,
     pub height: u32,
+    /// While an animation plays: seconds from a frame of it to the next.
+    pub pace: Option<f64>,
 }
 
 /// Display of the job; samples do not depend on it.

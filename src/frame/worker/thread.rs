@@ -2,7 +2,7 @@
 
 use crate::frame::core::denoising::Denoising;
 use crate::frame::core::offline::Target;
-use crate::frame::core::scheduler::{RenderStep, Scheduler, StepReport};
+use crate::frame::core::scheduler::{RenderStep, SLOWEST_FRAME, Scheduler, StepReport};
 use crate::frame::core::status::Picture;
 use crate::frame::worker::denoiser::Denoiser;
 use crate::frame::worker::idle::IdleFilms;
@@ -23,6 +23,9 @@ use std::time::{Duration, Instant};
 
 /// How long the workers wait for a coarse image to be displayed before they continue.
 const LONGEST_DRAW: Duration = Duration::from_millis(33);
+
+/// Frames of an animation after which the workers no longer wait for the next one.
+const LATE: f64 = 2.0;
 
 /// Images before that the light of a moving image is the mean of, at most: what light changes with the camera lags by as
 /// many.
@@ -160,6 +163,7 @@ impl<'a> Loop<'a> {
         if let Some(job) = orders.job {
             let size = (job.width, job.height);
             self.denoiser.want(job.generation);
+            self.scheduler.set_pace(job.pace);
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
@@ -377,7 +381,8 @@ impl<'a> Loop<'a> {
     }
 
     /// Pauses the workers until a coarse image is displayed: if the processors draw the window too, more samples for a
-    /// coarse film would delay the image or the next input.
+    /// coarse film would delay the image or the next input. While an animation plays, until the next frame of it is due, which
+    /// needs the processors for its meshes.
     ///
     /// - `finished`: when its samples were complete, later by what its surfaces took.
     fn let_it_be_seen(&mut self, finished: Instant) {
@@ -386,12 +391,17 @@ impl<'a> Loop<'a> {
         if seen() == 0 || seen() >= number {
             return;
         }
+        let is_interrupted = || self.shared.interrupt.load(Ordering::Acquire);
         let inbox = lock(&self.shared.inbox);
-        let waits = |_: &mut _| seen() < number && !self.shared.interrupt.load(Ordering::Acquire);
         // The next step follows whether the window displayed the image in time or not.
-        drop(self.shared.arrived.wait_timeout_while(inbox, LONGEST_DRAW, waits));
+        drop(self.shared.arrived.wait_timeout_while(inbox, LONGEST_DRAW, |_| seen() < number && !is_interrupted()));
         if seen() >= number {
             self.scheduler.shown_after(finished.elapsed());
+        }
+        if let Some(pace) = self.job.as_ref().and_then(|job| job.pace) {
+            let due = self.restarted_at + Duration::from_secs_f64(LATE * pace.min(SLOWEST_FRAME));
+            let left = due.saturating_duration_since(Instant::now());
+            drop(self.shared.arrived.wait_timeout_while(lock(&self.shared.inbox), left, |_| !is_interrupted()));
         }
     }
 

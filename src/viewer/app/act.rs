@@ -189,6 +189,7 @@ impl App {
                 self.announce_handles(now);
             }
             Action::Grab(mode) => self.begin_grab(mode, now),
+            Action::GrabCopy => self.grab_copy(now),
             Action::TogglePlay => self.toggle_play(now),
             Action::PlayRange(end) => {
                 if let Some((strip, frame)) =

@@ -31,7 +31,8 @@ impl App {
             right.push("Set key (Ctrl+K) keeps this change".to_owned());
         }
         right.extend(hints.iter().map(|hint| (*hint).to_owned()));
-        Figures { left: status::line(status, world.resource::<StopAt>().0), right }
+        let is_slow = self.loading_since.is_some_and(|since| since.elapsed() >= SLOW);
+        Figures { left: status::line(status, world.resource::<StopAt>().0, is_slow), right }
     }
 
     fn draw(&mut self, now: Instant) -> Result<(), PresentError> {

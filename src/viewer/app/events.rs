@@ -167,8 +167,9 @@ impl ApplicationHandler<Wake> for App {
                     self.handles.press_body(self.mouse());
                 }
                 let is_shift = self.input.modifiers() == ModifiersState::SHIFT && !self.input.is_captured();
+                let focuses = is_shift && !self.input.shift_selects();
                 let is_selected = !self.session.world().resource::<Selection>().0.is_empty();
-                if button == MouseButton::Left && state.is_pressed() && is_shift && is_selected {
+                if button == MouseButton::Left && state.is_pressed() && focuses && is_selected {
                     // Elsewhere that is how one selects several.
                     self.toasts.add(Tone::News, "focused here; Ctrl+click adds to the selection", now);
                 }

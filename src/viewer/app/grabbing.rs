@@ -1,7 +1,7 @@
 //! Changes of the selection that follow the mouse at once: their keys and buttons take precedence over all others.
 
 use crate::frame::gizmo::Mode;
-use crate::frame::{Command, Edit};
+use crate::frame::{Command, Edit, Selection};
 use crate::viewer::app::App;
 use crate::viewer::grab::{Answer, Grab};
 use crate::viewer::toasts::Tone;
@@ -19,6 +19,16 @@ impl App {
         };
         self.session.send(Command::Edit(Edit::Begin));
         self.grab = Some(Grab::new(gizmo, projector, self.mouse()));
+    }
+
+    /// Duplicates the selection and moves the copy; without a selection, that is told.
+    pub(super) fn grab_copy(&mut self, now: Instant) {
+        let is_selected = !self.session.world().resource::<Selection>().0.is_empty();
+        self.session.send(Command::Edit(Edit::Duplicate));
+        self.session.update(now - self.start);
+        if is_selected {
+            self.begin_grab(Mode::Move, now);
+        }
     }
 
     /// Ends a change: keeps it, or restores what was there.

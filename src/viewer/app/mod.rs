@@ -156,6 +156,8 @@ struct App {
     inspected_since: Option<(Inspection, Instant)>,
     /// Since when a scene is being opened.
     opening_since: Option<Instant>,
+    /// Since when anything is being built.
+    loading_since: Option<Instant>,
     /// The active entity of the selection, as far as it has been told.
     selected: Option<Entity>,
     last_tick: Option<Instant>,
@@ -260,6 +262,7 @@ impl App {
             shown_figures: Figures::default(),
             inspected_since: None,
             opening_since: None,
+            loading_since: None,
             last_tick: None,
             last_draw: None,
             wake_at: None,

@@ -48,6 +48,7 @@ impl App {
             (None, Some(_)) => (self.opening_since, self.repaint_at) = (None, Some(now)),
             (None, None) => {}
         }
+        self.loading_since = status.loading.is_some().then(|| self.loading_since.unwrap_or(now));
         for text in &status.withdrawn {
             self.toasts.withdraw(text);
         }

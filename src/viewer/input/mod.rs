@@ -345,6 +345,12 @@ impl Input {
         })
     }
 
+    /// Whether Shift with a click adds to the selection, as in other programs, rather than focus there; with a drag it
+    /// focuses.
+    pub fn shift_selects(&self) -> bool {
+        self.navigation != Navigation::Firstlight
+    }
+
     /// Handles a mouse button press or release; returns true for a right click, which asks for a menu.
     pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) -> bool {
         if self.captured {
@@ -357,13 +363,16 @@ impl Input {
                 let second = self.last_press.is_none();
                 self.sum.pick = (!second).then(|| (self.place(), drag.ctrl)).or(self.sum.pick);
             }
+            if drag.kind == DragKind::Focus && !drag.moved && self.shift_selects() {
+                self.sum.pick = Some((self.place(), true));
+            }
             if drag.kind == DragKind::Fly {
                 self.release_motions(now, Motion::flies);
             }
             return button == MouseButton::Right && !drag.moved && drag.kind != DragKind::Zoom;
         }
         let Some(kind) = self.kind_of_drag(button) else { return false };
-        if kind == DragKind::Focus {
+        if kind == DragKind::Focus && !self.shift_selects() {
             self.sum.focus = Some(self.place());
         }
         if kind == DragKind::Look {

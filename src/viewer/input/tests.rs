@@ -322,6 +322,26 @@ fn drags_are_those_of_the_program_that_was_chosen() {
 }
 
 #[test]
+fn shift_with_a_click_adds_to_the_selection_where_other_programs_do() {
+    use Navigation::{Blender, Firstlight, Maya};
+    for navigation in [Firstlight, Blender, Maya] {
+        let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
+        input.set_modifiers(ModifiersState::SHIFT, start);
+        input.cursor(200.0, 100.0);
+        input.button(MouseButton::Left, true, start);
+        input.button(MouseButton::Left, false, start);
+        let commands = input.take(start);
+        let is_as_expected = match navigation {
+            Firstlight => matches!(commands[..], [Command::FocusAt { .. }]),
+            Blender | Maya => matches!(commands[..], [Command::Edit(Edit::PickAt { add: true, .. })]),
+        };
+        assert!(is_as_expected, "{navigation:?}: {commands:?}");
+        let commands = dragged(navigation, MouseButton::Left, ModifiersState::SHIFT);
+        assert!(matches!(commands[..], [Command::FocusAt { x: 0.125, .. }]), "{navigation:?}: {commands:?}");
+    }
+}
+
+#[test]
 fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
     for navigation in [Navigation::Blender, Navigation::Maya] {
         let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());

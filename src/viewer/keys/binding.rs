@@ -135,6 +135,8 @@ pub enum Action {
     Gizmo(Option<gizmo::Mode>),
     /// Moves, rotates or scales the selection with the mouse at once.
     Grab(gizmo::Mode),
+    /// Duplicate the selection, and move the copy with the mouse.
+    GrabCopy,
     /// Starts or stops the animation.
     TogglePlay,
     /// Begins or ends what plays at the shown frame.

@@ -51,10 +51,12 @@ static BLENDER: &[KeyGroup] = &[
             row!("delete the selection", text("x", DELETE), named(NamedKey::Delete, DELETE)),
             row!("select everything", shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))),
             row!(
-                "duplicate the selection",
-                shifted(Typed::Text("d"), true, Action::Send(Command::Edit(Edit::Duplicate))),
-                edit("d", None, Edit::Duplicate)
+                "duplicate the selection, and move the copy with the mouse",
+                shifted(Typed::Text("d"), true, Action::GrabCopy)
             ),
+            row!("duplicate the selection", edit("d", None, Edit::Duplicate)),
+            ADD_TO_SELECTION,
+            FOCUS,
         ],
     },
 ];
@@ -88,6 +90,8 @@ static MAYA: &[KeyGroup] = &[
             row!("handles: rotate", text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))),
             row!("handles: scale", text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))),
             row!("frame the selection, or the whole scene", send("a", Command::FrameAll)),
+            ADD_TO_SELECTION,
+            FOCUS,
         ],
     },
 ];
@@ -97,6 +101,9 @@ const FLY: Binding = row!(
     Trigger::Mouse("Right drag"),
     Trigger::Mouse("with W A S D Q E")
 );
+const ADD_TO_SELECTION: Binding =
+    row!("add to, remove from the selection", Trigger::Mouse("Shift+click"), Trigger::Mouse("Ctrl+click"));
+const FOCUS: Binding = row!("focus on what is under the mouse", Trigger::Mouse("Shift+drag"));
 const FLY_SPEED: Binding =
     row!("change the flying speed", Trigger::Mouse("Right drag + wheel"), Trigger::Mouse("Ctrl+wheel"));
 
@@ -113,13 +120,23 @@ pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {
 pub fn shown(navigation: Navigation) -> Vec<(&'static str, Vec<&'static Binding>)> {
     let own = groups_of(navigation);
     let chords: Vec<_> = own.iter().flat_map(|group| group.bindings).flat_map(chords_of).collect();
-    let is_taken =
-        |binding: &&Binding| chords_of(binding).any(|chord| chords.iter().any(|other| chord.overlaps(other)));
+    let gestures: Vec<_> = own.iter().flat_map(|group| group.bindings).flat_map(gestures_of).collect();
+    let is_taken = |binding: &&Binding| {
+        chords_of(binding).any(|chord| chords.iter().any(|other| chord.overlaps(other)))
+            || gestures_of(binding).any(|gesture| gestures.contains(&gesture))
+    };
     let rest = BINDINGS
         .iter()
         .filter(|group| own.is_empty() || !REPLACED.contains(&group.title))
         .map(|group| (group.title, group.bindings.iter().filter(|binding| !is_taken(binding)).collect()));
     own.iter().map(|group| (group.title, group.bindings.iter().collect())).chain(rest).collect()
+}
+
+fn gestures_of(binding: &Binding) -> impl Iterator<Item = &'static str> {
+    binding.triggers.iter().filter_map(|trigger| match trigger {
+        Trigger::Mouse(gesture) => Some(*gesture),
+        _ => None,
+    })
 }
 
 fn chords_of(binding: &Binding) -> impl Iterator<Item = &crate::viewer::keys::Chord> {
