@@ -94,6 +94,7 @@ impl ObjectMap {
         let meant: Vec<bool> = self.entities.iter().map(|entity| of.contains(entity)).collect();
         let (width, height) = (self.size.x as usize, self.size.y as usize);
         let is_in = |x: usize, y: usize| meant.get(self.objects[y * width + x] as usize).copied().unwrap_or_default();
+        let entity_at = |x: usize, y: usize| self.entities.get(self.objects[y * width + x] as usize);
         let mut border = Vec::new();
         let (mut min, mut max) = (UVec2::MAX, UVec2::ZERO);
         for y in 0..height {
@@ -105,7 +106,8 @@ impl ObjectMap {
                 (min, max) = (min.min(place), max.max(place));
                 // At the edge of the image there is no line: the object goes on.
                 let nearest = NEARER * self.distances[y * width + x];
-                let ends = |x: usize, y: usize| !is_in(x, y) && self.distances[y * width + x] >= nearest;
+                let own = entity_at(x, y);
+                let ends = |x: usize, y: usize| entity_at(x, y) != own && self.distances[y * width + x] >= nearest;
                 let differs = (x > 0 && ends(x - 1, y))
                     || (x + 1 < width && ends(x + 1, y))
                     || (y > 0 && ends(x, y - 1))
@@ -189,6 +191,14 @@ mod tests {
             outline.pixels.iter().filter(|[line, _]| *line == 1.0).count()
         };
         assert_eq!([lines(floor), lines(ball)], [9, 6], "the horizon alone, and all of what is in front");
+    }
+
+    #[test]
+    fn each_of_several_objects_has_its_line() {
+        let (map, [a, b]) = map(&["000111", "000111"]);
+        let outline = map.outline(&HashSet::from([a, b]), 0.5).unwrap();
+        let row: Vec<bool> = outline.pixels[..6].iter().map(|[line, _]| *line == 1.0).collect();
+        assert_eq!(row, [false, false, true, true, false, false]);
     }
 
     #[test]

@@ -19,8 +19,9 @@ pub struct Palette {
 }
 
 impl Palette {
-    pub fn open(&mut self) {
-        *self = Self { open: true, is_new: true, ..Self::default() };
+    /// - `search`: what is searched for at first.
+    pub fn open(&mut self, search: &str) {
+        *self = Self { open: true, is_new: true, search: search.to_owned(), ..Self::default() };
     }
 
     /// Draws the list of all commands; returns the one to run.
@@ -125,7 +126,7 @@ mod tests {
             vec![line("Focus", Action::FocusHere), line("Play", Action::TogglePlay), line("Brush", Action::Brush)]
         };
         let (context, mut palette) = (Context::default(), Palette::default());
-        palette.open();
+        palette.open("");
         let enter = Event::Key {
             key: Key::Enter,
             physical_key: None,

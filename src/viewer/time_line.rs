@@ -12,6 +12,8 @@ use egui::{
 
 /// Points.
 const HEIGHT: f32 = 30.0;
+/// Seconds that the time line has at least where keys are set.
+const ROOM: f64 = 5.0;
 /// Distance of two labels of frames, points.
 const LABELS: f64 = 56.0;
 /// Why there is no strip.
@@ -27,6 +29,8 @@ pub struct Strip {
     pub fps: f64,
     /// Number of frames, at least 1.
     pub n: u32,
+    /// Number of frames that can be shown, at least as many: keys may be set beyond the last one.
+    reach: u32,
     /// The frame that is shown; `None` for the pose that a model is stored in.
     pub frame: Option<f64>,
     /// First and last frame of what plays.
@@ -57,13 +61,16 @@ impl Strip {
             let fps = animation.fps;
             let keys = animation.key_times().iter().map(|time| time * fps).collect();
             let n = animation.n_frames();
-            return Some(Self { fps, n, frame: Some(shown * fps), plays: plays(fps, n), keys });
+            // What has been made in files has its length.
+            let more = if animation.can_grow() { Animation::frames_to_key(ROOM, fps) } else { 0 };
+            let reach = n.max(more).max((shown * fps) as u32 + 1);
+            return Some(Self { fps, n, reach, frame: Some(shown * fps), plays: plays(fps, n), keys });
         }
         // A glTF model in its stored pose.
         let length = world.get_resource::<CurrentScene>()?.0.model_length()?;
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
         let n = Animation::frames_to_key(length, fps);
-        Some(Self { fps, n, frame: None, plays: plays(fps, n), keys: Vec::new() })
+        Some(Self { fps, n, reach: n, frame: None, plays: plays(fps, n), keys: Vec::new() })
     }
 
     /// Begins or ends what plays at a frame; the other end gives way.
@@ -95,19 +102,19 @@ impl Strip {
 
     /// The frame at a place of the track, 0..1; a whole one.
     fn frame_at(&self, place: f64) -> f64 {
-        let last = f64::from(self.n.saturating_sub(1));
+        let last = f64::from(self.reach.saturating_sub(1));
         (place.clamp(0.0, 1.0) * last).round()
     }
 
     /// Where a frame is on the track, 0..1.
     fn place_of(&self, frame: f64) -> f64 {
-        let last = f64::from(self.n.saturating_sub(1)).max(1.0);
+        let last = f64::from(self.reach.saturating_sub(1)).max(1.0);
         (frame / last).clamp(0.0, 1.0)
     }
 
     /// Frames between two labels on a track of this width, points: a step of 1, 2 or 5 times a power of ten.
     fn step(&self, width: f32) -> u32 {
-        let wanted = f64::from(self.n) * LABELS / f64::from(width.max(1.0));
+        let wanted = f64::from(self.reach) * LABELS / f64::from(width.max(1.0));
         let power = 10f64.powf(wanted.max(1.0).log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|of| of * power).find(|step| *step >= wanted);
         step.unwrap_or(wanted).max(1.0) as u32
@@ -133,7 +140,7 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 asked.push(Ask::Act(Action::TogglePlay));
             }
             let shown = strip.frame.map_or("–".to_owned(), |frame| whole_frame(frame).to_string());
-            let last = strip.n.saturating_sub(1);
+            let last = strip.reach.saturating_sub(1);
             // As wide as the last one, so that the track does not move.
             let width = 18.0 + 15.0 * last.to_string().len() as f32;
             let (label, _) = ui.allocate_exact_size(egui::vec2(width, HEIGHT), Sense::hover());
@@ -206,7 +213,7 @@ fn draw_track(painter: &egui::Painter, rect: Rect, strip: &Strip) {
     }
     let step = strip.step(rect.width());
     let weak = Color32::from_gray(150);
-    for frame in (0..strip.n).step_by(step as usize) {
+    for frame in (0..strip.reach).step_by(step as usize) {
         let at = x(f64::from(frame));
         painter.vline(at, line - 4.0..=line + 4.0, Stroke::new(1.0, weak));
         // The last one would be cut.
@@ -237,7 +244,7 @@ mod tests {
     use super::*;
 
     fn strip(n: u32) -> Strip {
-        Strip { fps: 24.0, n, frame: Some(0.0), plays: [0, n - 1], keys: Vec::new() }
+        Strip { fps: 24.0, n, reach: n, frame: Some(0.0), plays: [0, n - 1], keys: Vec::new() }
     }
 
     #[test]
@@ -319,5 +326,14 @@ mod tests {
         assert_eq!(strip("ball"), None);
         let carousel = strip("carousel").unwrap();
         assert!(carousel.n > 1 && carousel.keys.len() > 1 && carousel.frame.is_some(), "{carousel:?}");
+        // Where the first key is, there is room for the next one.
+        let options = SessionOptions { width: 8, height: 8, ..SessionOptions::default() };
+        let mut session = Session::new(options).unwrap();
+        session.adopt(load(&SceneSource::Builtin("ball".to_owned()), &LoadOptions::default()).unwrap());
+        session.send(Command::Edit(crate::frame::Edit::SelectAll));
+        session.send(Command::Edit(crate::frame::Edit::SetKeys { camera: false }));
+        session.update(std::time::Duration::ZERO);
+        let one_key = Strip::of(&session).unwrap();
+        assert_eq!((one_key.n, one_key.frame_at(1.0), one_key.plays), (1, 120.0, [0, 0]));
     }
 }

@@ -253,7 +253,7 @@ fn every_moment_that_plays_is_rendered() {
     let mut session = Session::new(SessionOptions { width: 8, height: 8, ..SessionOptions::default() }).unwrap();
     session.adopt(open(&kept.1, &ModelChoice { at: Some(0.0), ..ModelChoice::default() }).unwrap());
     let start = std::time::Instant::now();
-    let mut frame = |session: &mut Session| {
+    let frame = |session: &mut Session| {
         session.update(start.elapsed());
         assert!(start.elapsed().as_secs() < 300, "{:?}", session.status());
     };

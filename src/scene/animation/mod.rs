@@ -147,6 +147,11 @@ impl Animation {
         }
     }
 
+    /// Whether a key beyond the last one makes it longer.
+    pub fn can_grow(&self) -> bool {
+        self.duration.is_none() && self.model.is_none()
+    }
+
     /// Number of frames from 0 s to that of a key at this time, seconds.
     pub fn frames_to_key(last: f64, fps: f64) -> u32 {
         (last * fps + 1e-6).floor().clamp(0.0, f64::from(u32::MAX - 1)) as u32 + 1

@@ -218,9 +218,15 @@ impl App {
                 (self.panel.shown, self.panel.section) = (true, Some(title));
                 self.overlays = true;
             }
-            Action::Palette => self.palette.open(),
+            Action::Palette => self.palette.open(""),
+            Action::PaletteOf(search) => self.palette.open(search),
             Action::ToggleHelp => self.help.toggle(),
-            Action::ToggleOverlays => self.overlays = !self.overlays,
+            Action::ToggleOverlays => {
+                self.overlays = !self.overlays;
+                if !self.overlays {
+                    self.toasts.add(Tone::News, "Tab or Esc shows everything again", now);
+                }
+            }
             Action::ToggleFullscreen => {
                 if let Some(window) = &self.window {
                     let full = window.fullscreen().is_some();
@@ -229,6 +235,7 @@ impl App {
             }
             Action::Leave if self.input.is_captured() => self.capture_mouse(false, now),
             Action::Leave if self.help.open => self.help.open = false,
+            Action::Leave if !self.overlays => self.overlays = true,
             Action::Leave if self.brush.is_armed() => drop(self.brush.toggle()),
             Action::Leave if self.session.world().resource::<Explaining>().story.is_some() => {
                 self.session.send(Command::ForgetExplanation);

@@ -140,8 +140,8 @@ impl App {
                 } else if session.world().resource::<SceneBounds>().is_below_ground(session.status().rig.view.eye) {
                     overlay::legend(context, &below_ground(navigation), None);
                 }
-                clicked = clicked.take().or(overlay::toasts(context, toasts));
             }
+            clicked = clicked.take().or(overlay::toasts(context, toasts));
             if let Some((stage, since)) = opening {
                 let text = session.status().loading.as_deref().unwrap_or_default();
                 overlay::opening(context, stage, text, (now - since).as_secs());

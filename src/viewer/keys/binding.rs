@@ -3,7 +3,7 @@
 use crate::frame::navigation::Rig;
 use crate::frame::{Command, gizmo};
 use crate::render::Inspection;
-use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey};
+use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
 /// A line of the table: triggers and their effect.
 pub struct Binding {
@@ -65,6 +65,7 @@ pub enum Menu {
 pub struct Chord {
     pub key: Typed,
     pub ctrl: bool,
+    pub alt: bool,
     /// `None` if typing the character may or may not need Shift.
     pub shift: Option<bool>,
 }
@@ -74,6 +75,8 @@ pub struct Chord {
 pub enum Typed {
     Text(&'static str),
     Named(NamedKey),
+    /// A key of the number pad, whatever it types, and its name.
+    Pad(KeyCode, &'static str),
 }
 
 /// The movement of a held key.
@@ -163,6 +166,8 @@ pub enum Action {
     Section(&'static str),
     /// Shows the list of commands, with its search.
     Palette,
+    /// The same, with this in its search.
+    PaletteOf(&'static str),
     ToggleHelp,
     ToggleOverlays,
     ToggleFullscreen,
@@ -189,18 +194,22 @@ impl Chord {
     /// Whether one press may match both.
     pub(super) fn overlaps(&self, other: &Self) -> bool {
         let apart = self.shift.is_some() && other.shift.is_some() && self.shift != other.shift;
-        self.key == other.key && self.ctrl == other.ctrl && !apart
+        self.key == other.key && (self.ctrl, self.alt) == (other.ctrl, other.alt) && !apart
     }
 
-    pub(super) fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
+    pub(super) fn matches(&self, physical: PhysicalKey, key: &Key, modifiers: ModifiersState) -> bool {
         let same_key = match (self.key, key) {
+            (Typed::Pad(code, _), _) => physical == PhysicalKey::Code(code),
             // With Shift or Caps Lock the letter is reported as a capital.
             (Typed::Text(text), Key::Character(typed)) => text.eq_ignore_ascii_case(typed),
             (Typed::Named(name), Key::Named(typed)) => name == *typed,
             _ => false,
         };
+        // Other characters may need Alt to be typed.
+        let is_letter = matches!(self.key, Typed::Text(text) if text.chars().all(|c| c.is_ascii_alphabetic()));
         same_key
             && self.ctrl == modifiers.control_key()
+            && (self.alt == modifiers.alt_key() || (!self.alt && !is_letter))
             && self.shift.is_none_or(|shift| shift == modifiers.shift_key())
             && !modifiers.super_key()
     }

@@ -18,31 +18,43 @@ pub const fn hold(key: KeyCode, motion: Motion) -> Trigger {
 }
 
 pub const fn text(key: &'static str, action: Action) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, shift: None }, action)
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, alt: false, shift: None }, action)
 }
 
 pub const fn named(key: NamedKey, action: Action) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Named(key), ctrl: false, shift: None }, action)
+    Trigger::Press(Chord { key: Typed::Named(key), ctrl: false, alt: false, shift: None }, action)
 }
 
 pub const fn shifted(key: Typed, shift: bool, action: Action) -> Trigger {
-    Trigger::Press(Chord { key, ctrl: false, shift: Some(shift) }, action)
+    Trigger::Press(Chord { key, ctrl: false, alt: false, shift: Some(shift) }, action)
+}
+
+pub const fn alt(key: &'static str, action: Action) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, alt: true, shift: Some(false) }, action)
+}
+
+/// - `name`: of the key, for display.
+pub const fn pad(key: KeyCode, name: &'static str, action: Action) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Pad(key, name), ctrl: false, alt: false, shift: None }, action)
 }
 
 pub const fn ctrl(key: &'static str, action: Action) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: None }, action)
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, alt: false, shift: None }, action)
 }
 
 pub const fn ctrl_shifted(key: &'static str, shift: bool, action: Action) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: Some(shift) }, action)
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, alt: false, shift: Some(shift) }, action)
 }
 
 pub const fn edit(key: &'static str, shift: Option<bool>, edit: Edit) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift }, Action::Send(Command::Edit(edit)))
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, alt: false, shift }, Action::Send(Command::Edit(edit)))
 }
 
 pub const fn inspect(key: &'static str, inspection: Inspection) -> Trigger {
-    Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, shift: Some(false) }, Action::Inspect(inspection))
+    Trigger::Press(
+        Chord { key: Typed::Text(key), ctrl: false, alt: false, shift: Some(false) },
+        Action::Inspect(inspection),
+    )
 }
 
 pub const fn send(key: &'static str, command: Command) -> Trigger {

@@ -72,7 +72,7 @@ pub fn action_of(
     let digit = digit_of(physical).filter(|_| !modifiers.super_key() && !modifiers.alt_key());
     let own = presets::groups_of(navigation).iter().flat_map(|group| group.bindings);
     own.flat_map(|binding| binding.triggers).chain(triggers()).find_map(|trigger| match trigger {
-        Trigger::Press(chord, action) if chord.matches(key, modifiers) => Some(action.clone()),
+        Trigger::Press(chord, action) if chord.matches(physical, key, modifiers) => Some(action.clone()),
         Trigger::Digit { ctrl, shift, action }
             if (*ctrl, *shift) == (modifiers.control_key(), modifiers.shift_key()) =>
         {

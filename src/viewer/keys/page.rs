@@ -15,10 +15,12 @@ impl Chord {
             Typed::Named(NamedKey::PageUp) => "Page Up".to_owned(),
             Typed::Named(NamedKey::PageDown) => "Page Down".to_owned(),
             Typed::Named(name) => format!("{name:?}"),
+            Typed::Pad(_, name) => name.to_owned(),
         };
         let ctrl = if self.ctrl { "Ctrl+" } else { "" };
         let shift = if self.shift == Some(true) { "Shift+" } else { "" };
-        format!("{ctrl}{shift}{key}")
+        let alt = if self.alt { "Alt+" } else { "" };
+        format!("{ctrl}{alt}{shift}{key}")
     }
 }
 

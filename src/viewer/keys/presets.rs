@@ -3,9 +3,9 @@
 
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::build::{edit, named, row, send, shifted, text};
+use crate::viewer::keys::build::{alt, edit, named, pad, row, send, shifted, text};
 use crate::viewer::keys::table::BINDINGS;
-use winit::keyboard::NamedKey;
+use winit::keyboard::{KeyCode, NamedKey};
 
 /// Groups of the table that presets replace.
 const REPLACED: [&str; 2] = ["Fly", "Orbit"];
@@ -29,6 +29,11 @@ static BLENDER: &[KeyGroup] = &[
                 Trigger::Mouse("Ctrl+middle drag"),
                 Trigger::Mouse("Ctrl+Alt+drag")
             ),
+            // Without Num Lock that key types Delete, which has another meaning below.
+            row!(
+                "frame the selection, or the whole scene",
+                pad(KeyCode::NumpadDecimal, "Numpad .", Action::Send(Command::FrameAll))
+            ),
             FLY,
             FLY_SPEED,
         ],
@@ -50,6 +55,9 @@ static BLENDER: &[KeyGroup] = &[
             row!("keep, restore", Trigger::Mouse("Enter or click"), Trigger::Mouse("Esc or right click")),
             row!("delete the selection", text("x", DELETE), named(NamedKey::Delete, DELETE)),
             row!("select everything", shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))),
+            row!("select nothing", alt("a", Action::Send(Command::Edit(Edit::SelectNone)))),
+            row!("find what can be added", shifted(Typed::Text("a"), true, Action::PaletteOf("add"))),
+            row!("set keys", text("i", Action::Send(Command::Edit(Edit::SetKeys { camera: false })))),
             row!(
                 "duplicate the selection, and move the copy with the mouse",
                 shifted(Typed::Text("d"), true, Action::GrabCopy)
@@ -151,7 +159,7 @@ mod tests {
     use super::*;
     use crate::viewer::keys::action_of;
     use crate::viewer::keys::binding::Typed;
-    use winit::keyboard::{Key, KeyCode, ModifiersState, PhysicalKey};
+    use winit::keyboard::{Key, ModifiersState, PhysicalKey};
 
     fn pressed(navigation: Navigation, key: &str, modifiers: ModifiersState) -> Option<Action> {
         action_of(navigation, PhysicalKey::Code(KeyCode::F24), &Key::Character(key.into()), modifiers)
@@ -169,6 +177,16 @@ mod tests {
         assert_eq!(pressed(Navigation::Blender, "X", ModifiersState::SHIFT), Some(DELETE));
         assert_eq!(pressed(Navigation::Firstlight, "x", none), Some(Action::Send(Command::Level)));
         assert_eq!(pressed(Navigation::Maya, "x", none), Some(Action::Send(Command::Level)));
+        let edit = |edit| Some(Action::Send(Command::Edit(edit)));
+        assert_eq!(pressed(Navigation::Blender, "a", none), edit(Edit::SelectAll));
+        assert_eq!(pressed(Navigation::Blender, "a", ModifiersState::ALT), edit(Edit::SelectNone));
+        assert_eq!(pressed(Navigation::Blender, "i", none), edit(Edit::SetKeys { camera: false }));
+        assert_eq!(pressed(Navigation::Firstlight, "i", ModifiersState::ALT), None, "another key");
+        // Whether the number pad types or not.
+        for key in [Key::Character(".".into()), Key::Named(NamedKey::Delete)] {
+            let pressed = action_of(Navigation::Blender, PhysicalKey::Code(KeyCode::NumpadDecimal), &key, none);
+            assert_eq!(pressed, Some(Action::Send(Command::FrameAll)));
+        }
         // Other keys are unchanged.
         for navigation in Navigation::ALL {
             assert_eq!(pressed(navigation, "k", none), Some(Action::Screenshot { linear: false }));

@@ -132,24 +132,23 @@ fn property_row(
                 _ => None,
             };
             labelled(ui, &mut |ui| {
-                let contents = |ui: &mut Ui| {
-                    match paint {
-                        ColorParam::Rgb(rgb) => {
-                            if let Some(value) = color(ui, *rgb, unit) {
-                                set(asked, value);
-                            }
-                        }
-                        ColorParam::Texture(texture) => drop(ui.label(&*crate::files::printable::name(&texture.name))),
+                let shown = |ui: &mut Ui| match paint {
+                    ColorParam::Rgb(rgb) => color(ui, *rgb, unit),
+                    ColorParam::Texture(texture) => {
+                        ui.label(&*crate::files::printable::name(&texture.name));
+                        None
+                    }
+                };
+                // The strength of a light, and textures, have lines of their own.
+                ui.vertical(|ui| {
+                    let chosen = if unit.is_some() { shown(ui) } else { ui.horizontal(shown).inner };
+                    if let Some(value) = chosen {
+                        set(asked, value);
                     }
                     if let Some(session) = texture_of {
                         texture::menu(ui, session, id, frame::Property::Material(name), paint, asked);
                     }
-                };
-                // The strength of a light, and its textures, have lines of their own.
-                match unit {
-                    Some(_) => ui.vertical(contents),
-                    None => ui.horizontal_wrapped(contents),
-                };
+                });
             });
         }
         Param::Rgb(rgb) => labelled(ui, &mut |ui| {
