@@ -6,7 +6,7 @@ use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
     BadSample, CausticPlan, Channel, ColorInput, Cone, DeltaLight, Encoding, Environment, Falloff, Film, Fresnel,
     Geometry, ImageTexture, Integrator, LightImage, Material, Object, PixelFilter, Prepared, RenderSettings,
-    ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
+    ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, gather_features, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -320,6 +320,20 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
         ("layers that shine", with_emission(&room(vec![ball()], sky.clone(), fog))),
         ("meshes that shine", room(vec![shining(), small(), ball(), lamp()], Environment::Black, Vec3::ZERO)),
     ]
+}
+
+#[test]
+fn lanes_see_the_features_that_one_hit_at_a_time_has() {
+    for (name, scene) in rooms() {
+        let features = |simd| {
+            let settings = RenderSettings { simd, ..RenderSettings::default() };
+            gather_features(&scene, &settings, UVec2::new(120, 90), 2, &|| false).expect("nothing stops it")
+        };
+        let one_at_a_time = features(None);
+        for set in InstructionSet::available() {
+            assert!(features(Some(set)) == one_at_a_time, "{name}, {set:?}");
+        }
+    }
 }
 
 #[test]

@@ -7,13 +7,13 @@
 //! What guides the denoiser must have as little noise as possible: there both the reflected and the refracted path of
 //! the first glass are followed, mixed by their probabilities, and later the more probable one.
 //!
-//! Diffuse surfaces are handled sixteen at a time (`simd/first_hits.rs`), all others one by one. Start reading at
+//! Diffuse and layered surfaces are handled sixteen at a time (`simd/first_hits.rs`), all others one by one. Start reading at
 //! [`FeatureWave::trace`].
 
 use crate::core::material::{Material, MaterialId};
 use crate::core::settings::RenderSettings;
 use crate::integrators::common::seen::Seen;
-use crate::integrators::simd::first_hits::{DiffuseHits, see_diffuse};
+use crate::integrators::simd::first_hits::{FirstHits, see_first_hits};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::visible_albedo::visible_albedo;
 use crate::prepare::prepared::Prepared;
@@ -25,7 +25,6 @@ use crate::shading::paths::{Path, PathBatch};
 use crate::shading::principled::at::principled_at;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use crate::shading::sides::Sides;
-use crate::shading::simd::lanes::DIFFUSE;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::geometry::Ray;
@@ -78,6 +77,8 @@ pub(crate) struct FeatureWave {
     sets: MediumSets,
     camera: MediumId,
     seen: Vec<Seen>,
+    /// Hits that are not handled sixteen at a time.
+    left: Vec<u32>,
     /// Per slot: depth along the view axis so far in metres, and depth per metre of the present segment.
     way: Vec<(f32, f32)>,
     /// The second paths of slots, in slots of their own.
@@ -143,12 +144,18 @@ impl FeatureWave {
         // Later segments are few, and have state.
         let in_lanes = depth == 1 && settings.simd.is_some() && !scene.tables.features.media;
         for kind in 0..KINDS {
-            if kind == DIFFUSE + 1 && in_lanes {
+            if kind != MISSES && in_lanes {
                 let order = self.sorted.of_kind(kind);
                 let (paths, hits, materials) = (&self.paths, &self.hits, &self.sorted.materials);
-                let group = DiffuseHits { scene, paths, hits, materials, order, seen: &mut self.seen };
-                see_diffuse(set, group);
-                continue;
+                let (seen, left) = (&mut self.seen[..], &mut self.left);
+                let group = FirstHits { scene, paths, hits, materials, order, seen, left };
+                if see_first_hits(set, kind - 1, group) {
+                    for k in 0..self.left.len() {
+                        self.see_one(scene, depth, is_last, self.left[k] as usize);
+                    }
+                    self.left.clear();
+                    continue;
+                }
             }
             for k in 0..self.sorted.of_kind(kind).len() {
                 let i = self.sorted.of_kind(kind)[k] as usize;

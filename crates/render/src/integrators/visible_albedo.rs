@@ -47,9 +47,7 @@ fn albedo_of_part(scene: &Prepared, vertex: &Vertex, id: MaterialId, depth: u32)
         Material::Principled { .. } => {
             let Some(layers) = principled_at(scene, id, vertex, &mut None, 0, false) else { return Vec3::ZERO };
             let transmitted = layers.transmission.map_or(Vec3::ZERO, |passed| passed.share * passed.tint);
-            // The layers below the dielectric get what it does not reflect.
-            let [facing, diffuse, metal] = [layers.facing, layers.diffuse, layers.metal].map(Vec3::from);
-            layers.dielectric * facing + (Vec3::ONE - facing) * diffuse + layers.metallic * metal + transmitted
+            Vec3::from(layers.color()) + transmitted
         }
         _ => lobe_at(scene, id, vertex, None).map_or(Vec3::ZERO, |lobe| lobe.albedo()),
     }

@@ -6,12 +6,11 @@
 //! specular surface that they met first.
 
 use crate::integrators::common::seen::Seen;
-use crate::integrators::simd::first_hits::{DiffuseHits, see_diffuse};
+use crate::integrators::simd::first_hits::{FirstHits, see_first_hits};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::visible_albedo::visible_albedo;
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::PathBatch;
-use crate::shading::simd::lanes::DIFFUSE;
 use crate::shading::vertex::Vertex;
 use firstlight_kdtree::{HitBatch, InstructionSet};
 use glam::Vec3;
@@ -29,6 +28,8 @@ pub(crate) struct FirstSurfaces {
     /// By slot: has seen nothing but specular surfaces.
     is_pending: Vec<bool>,
     n_pending: usize,
+    /// Hits that are not handled sixteen at a time.
+    left: Vec<u32>,
 }
 
 impl FirstSurfaces {
@@ -56,17 +57,22 @@ impl FirstSurfaces {
         if depth > MOST_SEGMENTS || self.n_pending == 0 {
             return;
         }
+        let mut left = std::mem::take(&mut self.left);
         for kind in 0..KINDS {
-            let order = sorted.of_kind(kind);
-            if kind == DIFFUSE + 1
-                && depth == 1
+            let mut order = sorted.of_kind(kind);
+            if depth == 1
+                && kind != MISSES
                 && let Some(set) = set.filter(|_| !scene.tables.features.media)
             {
-                let materials = &sorted.materials;
-                see_diffuse(set, DiffuseHits { scene, paths, hits, materials, order, seen: &mut self.seen });
-                order.iter().for_each(|&i| self.is_pending[paths.slot[i as usize] as usize] = false);
-                self.n_pending = self.n_pending.saturating_sub(order.len());
-                continue;
+                let (materials, seen) = (&sorted.materials, &mut self.seen[..]);
+                left.clear();
+                let group = FirstHits { scene, paths, hits, materials, order, seen, left: &mut left };
+                if see_first_hits(set, kind - 1, group) {
+                    order.iter().for_each(|&i| self.is_pending[paths.slot[i as usize] as usize] = false);
+                    left.iter().for_each(|&i| self.is_pending[paths.slot[i as usize] as usize] = true);
+                    self.n_pending = self.n_pending.saturating_sub(order.len() - left.len());
+                    order = &left;
+                }
             }
             for &i in order {
                 let i = i as usize;
@@ -84,6 +90,7 @@ impl FirstSurfaces {
                 }
             }
         }
+        self.left = left;
     }
 
     /// Looks at one hit; whether it is specular, so that what lies beyond it counts.

@@ -153,6 +153,14 @@ impl<R: Real> Principled<R> {
             | (self.has_coat() & !self.is_coat_smooth())
     }
 
+    /// Approximate albedo of what reflects, without sheen and coat: its colour without lighting. The diffuse layer gets what the
+    /// dielectric does not reflect at normal incidence.
+    #[inline(always)]
+    pub fn color(&self) -> Vector3<R> {
+        let below = Vector3::all(self.metallic.all(1.0)) - self.facing;
+        self.facing * self.dielectric + below.times(self.diffuse) + self.metal * self.metallic
+    }
+
     /// Albedo of the dielectric's reflection, per channel.
     #[inline(always)]
     pub fn dielectric_albedo(&self, albedo: SchlickAlbedo<R>) -> Vector3<R> {

@@ -10,9 +10,16 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::tangent::tangent_axes;
 use firstlight_simd::{Bits, Float, Kernel, Real, Simd, Vector, select_vector};
 
-/// Prepares the surfaces, and turns their normals by their maps.
+/// Prepares the surfaces as they are seen, and turns their normals by their maps.
 #[inline(always)]
 pub(crate) fn layers_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut SurfaceLanes<S>) -> Seen<Float<S>> {
+    let layers = principled_of(s, at, place);
+    Seen::new(layers, place.wo, place.normal)
+}
+
+/// Evaluates the parameters of the surfaces, and turns their normals by their maps.
+#[inline(always)]
+pub(crate) fn principled_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut SurfaceLanes<S>) -> Principled<Float<S>> {
     let inputs = InputLanes::of(at, place);
     let flags = Bits::gather(&at.scene.tables.materials.flags, Bits::gather(at.materials, at.index));
     let unmapped = place.unmapped_normal();
@@ -57,7 +64,7 @@ pub(crate) fn layers_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut SurfaceLane
             layers.tangent = Some(select_vector(elongated, direction, Vector::all(zero)));
         }
     }
-    Seen::new(layers, place.wo, place.normal)
+    layers
 }
 
 /// Arguments of [`Seen::eval`], which has one copy for all of its callers.
