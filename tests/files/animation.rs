@@ -282,6 +282,23 @@ fn with(line: &str) -> String {
 }
 
 #[test]
+fn keys_turn_and_scale_what_a_matrix_places_unless_it_is_sheared() {
+    let placed = |matrix: &str| {
+        let parts = "(translate: (1, 1, -2), scale: 0.5)";
+        let scene = MOVING.replace(parts, &format!("(matrix: {matrix})"));
+        scene.replace("object(name: \"ring\", property: scale, keys: [(0, 0.5), (4, (1, 0.5, 0.5))]),", "")
+    };
+    let plain = placed("((0.5, 0, 0, 1), (0, 0.25, 0, 1), (0, 0, 0.5, -2))");
+    let (mut world, _) = open_at(&plain, Some(1.0));
+    let ring = called(&mut world, "ring");
+    // Half of a turn about the vertical.
+    let found = world.get::<Placement>(ring).unwrap().affine().transform_point3(DVec3::new(2.0, 4.0, 0.0));
+    assert!(found.abs_diff_eq(DVec3::new(0.0, 2.0, -2.0), 1e-12), "{found}");
+    let error = errors(&placed("((0.5, 0.1, 0, 1), (0, 0.5, 0, 1), (0, 0, 0.5, -2))"));
+    assert!(error.contains("`rotate` needs a transform without shear"), "{error}");
+}
+
+#[test]
 fn mistakes_have_a_place_and_a_name() {
     let line = MOVING.lines().position(|line| line.contains("tracks: [")).unwrap() + 2;
     let at = |column: usize| format!("a.ron:{line}:{column}: ");

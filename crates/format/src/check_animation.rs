@@ -12,6 +12,7 @@ use crate::key::{Curve, Interpolation, Key, KeyValue};
 use crate::light::LightKind;
 use crate::material_property::MaterialProperty;
 use crate::parts::ObjectPart;
+use crate::placement::Placement;
 use crate::property::{LightProperty, ObjectProperty};
 use crate::quantity::Quantity;
 use crate::view::unit_direction;
@@ -252,8 +253,8 @@ impl Check<'_> {
     }
 
     fn object_track(&mut self, path: &str, object: &ObjectPart, property: ObjectProperty, track: &TrackPart) {
-        if property != ObjectProperty::Translate && object.transform().matrix.is_some() {
-            let message = format!("`{}` needs a transform without `matrix`", property.name());
+        if property.get(&Placement::from_part(object.transform())).is_none() {
+            let message = format!("`{}` needs a transform without shear; this `matrix` has some", property.name());
             return self.wrong(&format!("{path}/property"), message);
         }
         if property != ObjectProperty::Scale {

@@ -2,7 +2,7 @@
 
 use crate::bounds::{MAX_COORDINATE, MIN_SIZE};
 use crate::parts::{ScalePart, TransformPart};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
 /// From object space to the world: `linear` is applied first, then `translation`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,6 +32,40 @@ impl Default for Linear {
     fn default() -> Self {
         Self::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::ONE }
     }
+}
+
+impl Linear {
+    /// Rotation in degrees and scale as in [`Linear::Turned`]; `None` for a matrix with shear. Axes of a matrix that are
+    /// perpendicular, or as long as each other, to the rounding of `f32` are so exactly here: files have such matrices.
+    pub fn rotation_and_scale(&self) -> Option<(DVec3, DVec3)> {
+        const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+        let matrix = match *self {
+            Self::Turned { rotation_deg, scale } => return Some((rotation_deg, scale)),
+            Self::Matrix(matrix) => matrix,
+        };
+        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        let lengths = DVec3::from_array(axes.map(DVec3::length));
+        let units = [0, 1, 2].map(|i| axes[i] / lengths[i]);
+        let is_square = [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| units[i].dot(units[j]).abs() <= ROUNDING);
+        if !is_square {
+            return None;
+        }
+        let is_even = lengths.max_element() - lengths.min_element() <= ROUNDING * lengths.max_element();
+        let lengths = if is_even { DVec3::splat(lengths.element_sum() / 3.0) } else { lengths };
+        // A mirrored one is turned after its X axis was flipped.
+        let handedness = matrix.determinant().signum();
+        let x = (handedness * units[0]).normalize();
+        let y = (units[1] - x * units[1].dot(x)).normalize();
+        let turn = DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y)));
+        let (z, y, x) = turn.to_euler(EulerRot::ZYX);
+        Some((DVec3::new(x, y, z).map(tidy_degrees), lengths * DVec3::new(handedness, 1.0, 1.0)))
+    }
+}
+
+/// Radians to degrees. A billionth of a degree is invisible, and rounding to it removes the rounding errors of right
+/// angles.
+pub fn tidy_degrees(angle: f64) -> f64 {
+    (angle.to_degrees() * 1e9).round() / 1e9 + 0.0
 }
 
 impl Placement {
@@ -149,7 +183,6 @@ fn sin_cos_deg(angle: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DQuat, EulerRot};
 
     #[test]
     fn scale_comes_first_then_x_y_z_then_the_move() {
@@ -185,6 +218,27 @@ mod tests {
         assert_eq!(Placement::from_part(&matrix.to_part()).affine(), turned.affine());
         assert_eq!(Placement::from_part(&turned.to_part()), turned);
         assert!((turned.even_scale().unwrap() - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_matrix_without_shear_has_a_rotation_and_a_scale() {
+        for rotation_deg in [DVec3::ZERO, DVec3::new(10.0, 20.0, 30.0), DVec3::new(-100.0, 90.0, 45.0)] {
+            for scale in [DVec3::splat(0.01), DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 2.0, 0.5)] {
+                let turned = Placement { linear: Linear::Turned { rotation_deg, scale }, ..Placement::default() };
+                let exact = turned.linear();
+                // As in a file with `f32`.
+                for matrix in [exact, exact.as_mat3().as_dmat3()] {
+                    let (found, found_scale) = Linear::Matrix(matrix).rotation_and_scale().unwrap();
+                    let parts = Linear::Turned { rotation_deg: found, scale: found_scale };
+                    let again = Placement { linear: parts, ..turned }.linear();
+                    assert!(again.abs_diff_eq(exact, 2e-6 * scale.length()), "{rotation_deg} {scale}: {found}");
+                    assert_eq!(found_scale.min_element() == found_scale.max_element(), scale == DVec3::splat(0.01));
+                }
+            }
+        }
+        assert_eq!(Linear::Matrix(DMat3::from_rotation_y(0.5)).rotation_and_scale().unwrap().1, DVec3::ONE);
+        let sheared = DMat3::from_cols(DVec3::X, DVec3::new(1e-4, 1.0, 0.0), DVec3::Z);
+        assert_eq!(Linear::Matrix(sheared).rotation_and_scale(), None);
     }
 
     #[test]

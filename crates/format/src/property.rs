@@ -214,29 +214,29 @@ impl CameraProperty {
 }
 
 impl ObjectProperty {
-    /// The value of a placement; `None` for a rotation and a scale that are given as a matrix.
+    /// The value of a placement; `None` for the rotation and the scale of a matrix with shear.
     pub fn get(self, placement: &Placement) -> Option<DVec3> {
-        match (self, placement.linear) {
-            (Self::Translate, _) => Some(placement.translation),
-            (Self::Rotate, Linear::Turned { rotation_deg, .. }) => Some(rotation_deg),
-            (Self::Scale, Linear::Turned { scale, .. }) => Some(scale),
-            (Self::Rotate | Self::Scale, Linear::Matrix(_)) => None,
+        match self {
+            Self::Translate => Some(placement.translation),
+            Self::Rotate => placement.linear.rotation_and_scale().map(|(rotation_deg, _)| rotation_deg),
+            Self::Scale => placement.linear.rotation_and_scale().map(|(_, scale)| scale),
         }
     }
 
-    /// The placement with this value changed. If its linear part is a matrix, that part is kept.
+    /// The placement with this value changed. A matrix with shear keeps its rotation and scale.
     #[must_use]
     pub fn set(self, placement: Placement, value: DVec3) -> Placement {
         let Placement { translation, linear } = placement;
-        match (self, linear) {
-            (Self::Translate, linear) => Placement { translation: value, linear },
-            (Self::Rotate, Linear::Turned { scale, .. }) => {
+        let parts = linear.rotation_and_scale();
+        match (self, parts) {
+            (Self::Translate, _) => Placement { translation: value, linear },
+            (Self::Rotate, Some((_, scale))) => {
                 Placement { translation, linear: Linear::Turned { rotation_deg: value, scale } }
             }
-            (Self::Scale, Linear::Turned { rotation_deg, .. }) => {
+            (Self::Scale, Some((rotation_deg, _))) => {
                 Placement { translation, linear: Linear::Turned { rotation_deg, scale: value } }
             }
-            (Self::Rotate | Self::Scale, Linear::Matrix(_)) => placement,
+            (Self::Rotate | Self::Scale, None) => placement,
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Amounts are relative to the start of a change ([`crate::frame::edit::Edit::Begin`]), not to the previous frame, so that a long
 //! drag rounds no more than a short one, and dragging back restores the same bits.
 
+use crate::format::placement::tidy_degrees;
 use crate::frame::state::history::History;
 use crate::frame::state::selection::{OwnBox, Selection, box_of};
 use crate::scene::{Linear, Placement, Shape};
@@ -77,9 +78,7 @@ fn turned(linear: &Linear, turn: DQuat) -> Linear {
         Linear::Turned { rotation_deg, scale } => {
             let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
             let (z, y, x) = (turn * DQuat::from_euler(EulerRot::ZYX, z, y, x)).to_euler(EulerRot::ZYX);
-            // A billionth of a degree is invisible, and rounding to it removes the rounding errors of right angles.
-            let tidy = |angle: f64| (angle.to_degrees() * 1e9).round() / 1e9 + 0.0;
-            Linear::Turned { rotation_deg: DVec3::new(x, y, z).map(tidy), scale }
+            Linear::Turned { rotation_deg: DVec3::new(x, y, z).map(tidy_degrees), scale }
         }
         Linear::Matrix(matrix) => Linear::Matrix(DMat3::from_quat(turn) * matrix),
     }

@@ -3,7 +3,6 @@
 use crate::format::animation::{AnimationPart, EditedPart};
 use crate::format::camera::camera_part;
 use crate::format::names::Names;
-use crate::format::placement::{Linear, Placement};
 use crate::scene::animation::model::ModelMotion;
 use crate::scene::animation::written::to_part;
 use crate::scene::animation::{Animation, Channel};
@@ -160,8 +159,8 @@ fn has_property(
         Channel::Camera(_) => true,
         Channel::Object(entity, property) => {
             let object = objects.get(&entity)?;
-            let is_matrix = matches!(object.placement, Placement { linear: Linear::Matrix(_), .. });
-            !(is_matrix && matches!(property, Rotate | Scale))
+            let is_sheared = object.placement.linear.rotation_and_scale().is_none();
+            !(is_sheared && matches!(property, Rotate | Scale))
         }
         Channel::Light(entity, property) => {
             let light = lights.get(&entity)?;

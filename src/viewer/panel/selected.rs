@@ -78,7 +78,7 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: 
 
 /// The row of a property of an object, a light or the environment.
 ///
-/// - `value`: `None` for a rotation or a scale that a matrix defines.
+/// - `value`: `None` for the rotation and the scale of a matrix with shear.
 pub fn property_row(
     ui: &mut Ui,
     id: u64,
@@ -88,7 +88,7 @@ pub fn property_row(
     asked: &mut Asked,
 ) {
     row_with_hint(ui, info.label, info.help, |ui| {
-        let Some(value) = value else { return drop(ui.weak("defined by a matrix")) };
+        let Some(value) = value else { return drop(ui.weak("a matrix with shear")) };
         let [least, most] = info.range;
         let new = match info.quantity {
             Quantity::Position | Quantity::Direction => vector(ui, value, 0.01),
