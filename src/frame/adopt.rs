@@ -8,7 +8,7 @@ use crate::frame::navigation;
 use crate::frame::saving::SavedAs;
 use crate::frame::scene_bounds::SceneBounds;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::{Clock, CurrentScene, PlayRange, RenderState, SceneGeneration};
+use crate::frame::state::resources::{Clock, CurrentScene, PlayRange, RenderState, SceneGeneration, ViewMode};
 use crate::frame::views::ViewTrail;
 use crate::scene::{
     Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
@@ -30,6 +30,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<History>().forget();
     world.resource_mut::<ViewTrail>().forget();
     world.insert_resource(Focus::default());
+    world.resource_mut::<ViewMode>().0.sharp_zone = false;
     world.insert_resource(PlayRange::default());
     world.insert_resource(crate::frame::state::selection::Selection::default());
     world.resource_mut::<crate::frame::state::explain::Explaining>().forget();

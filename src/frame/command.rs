@@ -6,7 +6,7 @@
 
 use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 use crate::frame::core::offline::Target;
-use crate::frame::core::rig::Rig;
+use crate::frame::core::rig::{Rig, Side};
 use crate::frame::{Bookmarks, Edit};
 use crate::render::{Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
@@ -75,6 +75,10 @@ pub enum Command {
     },
     /// Remove the roll: the horizon is level again.
     Level,
+    /// Look at the pivot from a side of the scene, at the same distance.
+    ViewFrom(Side),
+    /// Look at the pivot from the side opposite to this one.
+    ViewFromBehind,
     /// Switch between turning about the vertical, which keeps the horizon, and turning freely about the image axes.
     ToggleTurntable,
     /// Return to the view with which the scene was opened; focus and aperture stay.

@@ -1,7 +1,7 @@
 //! The strip of an animation above the bar: play, the frame, its keys, what part of it plays, and a button that renders
 //! the frames.
 
-use crate::frame::{Command, CurrentScene, PlayRange, Session};
+use crate::frame::{Command, CurrentScene, Edit, PlayRange, Session};
 use crate::scene::{Animation, Moment};
 use crate::viewer::keys::{Action, PlayEnd};
 use crate::viewer::overlay::{GLASS, KEY, TEXT, TEXT_SIZE};
@@ -63,7 +63,7 @@ impl Strip {
             let n = animation.n_frames();
             // What has been made in files has its length.
             let more = if animation.can_grow() { Animation::frames_to_key(ROOM, fps) } else { 0 };
-            let reach = n.max(more).max((shown * fps) as u32 + 1);
+            let reach = n.max(more).max((shown * fps).ceil() as u32 + 1);
             return Some(Self { fps, n, reach, frame: Some(shown * fps), plays: plays(fps, n), keys });
         }
         // A glTF model in its stored pose.
@@ -71,6 +71,16 @@ impl Strip {
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
         let n = Animation::frames_to_key(length, fps);
         Some(Self { fps, n, reach: n, frame: None, plays: plays(fps, n), keys: Vec::new() })
+    }
+
+    /// The frame, and the last one of the animation unless it lies beyond that.
+    fn label(&self) -> String {
+        let last = self.n.saturating_sub(1);
+        match self.frame.map(whole_frame) {
+            None => format!("– / {last}"),
+            Some(frame) if last > 0 && frame <= f64::from(last) => format!("{frame} / {last}"),
+            Some(frame) => frame.to_string(),
+        }
     }
 
     /// Begins or ends what plays at a frame; the other end gives way.
@@ -112,6 +122,13 @@ impl Strip {
         (frame / last).clamp(0.0, 1.0)
     }
 
+    /// The key next to a frame, as far as `reach` of the track; else the frame.
+    fn key_near(&self, frame: f64, reach: f32) -> f64 {
+        let away = |key: &f64| (self.place_of(*key) - self.place_of(frame)).abs();
+        let nearest = self.keys.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.filter(|key| away(key) <= f64::from(reach)).unwrap_or(frame)
+    }
+
     /// Frames between two labels on a track of this width, points: a step of 1, 2 or 5 times a power of ten.
     fn step(&self, width: f32) -> u32 {
         let wanted = f64::from(self.reach) * LABELS / f64::from(width.max(1.0));
@@ -139,13 +156,12 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
             if ui.button(sign).on_hover_text(hint).clicked() {
                 asked.push(Ask::Act(Action::TogglePlay));
             }
-            let shown = strip.frame.map_or("–".to_owned(), |frame| whole_frame(frame).to_string());
             let last = strip.reach.saturating_sub(1);
             // As wide as the last one, so that the track does not move.
             let width = 18.0 + 15.0 * last.to_string().len() as f32;
             let (label, _) = ui.allocate_exact_size(egui::vec2(width, HEIGHT), Sense::hover());
             let font = FontId::proportional(TEXT_SIZE);
-            ui.painter().text(label.center(), Align2::CENTER_CENTER, format!("{shown} / {last}"), font, TEXT);
+            ui.painter().text(label.center(), Align2::CENTER_CENTER, strip.label(), font, TEXT);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let hint = "render the frames to a folder in the background";
                 if ui.button("Render frames …").on_hover_text(hint).clicked() {
@@ -158,12 +174,16 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 let (whole, track) = ui.allocate_exact_size(size, Sense::click_and_drag());
                 let rect = whole.shrink2(egui::vec2(MARK, 0.0));
                 draw_track(ui.painter(), rect, strip);
-                let about = track.on_hover_text("drag: another frame; yellow marks are keys");
+                let about = track.on_hover_text("drag: another frame; yellow marks are keys: right click");
                 let frame_at = |place: Pos2| strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));
+                about.context_menu(|ui| asked.extend(key_menu(ui)));
                 // A button that is released in the frame in which it was pressed was never seen down.
                 let is_meant = about.is_pointer_button_down_on() || about.clicked();
                 if let Some(place) = about.interact_pointer_pos().filter(|_| is_meant) {
-                    let frame = frame_at(place);
+                    let frame = match ui.input(|input| input.pointer.secondary_down()) {
+                        true => strip.key_near(frame_at(place), MARK / rect.width()),
+                        false => frame_at(place),
+                    };
                     if strip.frame != Some(frame) {
                         asked.push(Ask::Send(strip.moment(frame)));
                     }
@@ -175,6 +195,13 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
         });
     });
     asked
+}
+
+/// What can be done with the keys at the shown frame.
+fn key_menu(ui: &mut Ui) -> Option<Ask> {
+    let lines = [("Set key", Edit::SetKeys { camera: false }), ("Delete keys here", Edit::DeleteKeys)];
+    let chosen = lines.into_iter().find_map(|(name, edit)| ui.button(name).clicked().then_some(edit));
+    chosen.map(|edit| Ask::Send(Command::Edit(edit)))
 }
 
 /// Draws an end of what plays below the line, and returns where it was dragged.
@@ -255,6 +282,8 @@ mod tests {
             [0.0, 0.0, 30.0, 60.0]
         );
         assert_eq!(strip.place_of(30.0), 0.5);
+        let keyed = Strip { keys: vec![10.0, 40.5], ..strip.clone() };
+        assert_eq!([30.0, 41.0, 39.0].map(|frame| keyed.key_near(frame, 0.02)), [30.0, 40.5, 39.0]);
         assert_eq!(strip.moment(12.0), Command::SetMoment { seconds: Some(0.5) });
         // At 30 a second, some whole frames are a little earlier than their number.
         assert!((0..1000).all(|i| whole_frame(f64::from(i) / 29.97 * 29.97) == f64::from(i)));
@@ -335,5 +364,9 @@ mod tests {
         session.update(std::time::Duration::ZERO);
         let one_key = Strip::of(&session).unwrap();
         assert_eq!((one_key.n, one_key.frame_at(1.0), one_key.plays), (1, 120.0, [0, 0]));
+        let label = |frame| Strip { frame, ..strip("carousel").unwrap() }.label();
+        let last = carousel.n - 1;
+        assert_eq!([label(None), label(Some(7.0))], [format!("– / {last}"), format!("7 / {last}")]);
+        assert_eq!([label(Some(1e6)), one_key.label()], ["1000000", "0"]);
     }
 }

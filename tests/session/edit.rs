@@ -40,6 +40,10 @@ impl Driver {
         id
     }
 
+    fn has(&self, name: &str) -> bool {
+        self.session.inputs().objects.iter().any(|object| object.name.as_deref() == Some(name))
+    }
+
     pub fn selected(&self) -> &Selection {
         self.session.world().resource()
     }
@@ -190,6 +194,21 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     driver.edit([Edit::Duplicate]);
     let copy: Placement = driver.get("ball 2");
     assert!(copy.translation.x > place.translation.x);
+    // A copy that is moved next begins where its original is; what is cancelled was never there.
+    let by = DVec3::new(0.0, 2.0, 0.0);
+    let copying = [Edit::Begin, Edit::DuplicateInPlace, Edit::Move { by: 3.0 * by }];
+    driver.edit(copying.clone());
+    assert_eq!(driver.get::<Placement>("ball 3").translation, copy.translation + 3.0 * by);
+    driver.edit([Edit::Move { by }]);
+    assert_eq!(driver.get::<Placement>("ball 3").translation, copy.translation + by, "from where it began");
+    driver.edit([Edit::Cancel]);
+    assert_eq!((driver.has("ball 3"), driver.selected().active()), (false, Some(driver.named("ball 2"))));
+    driver.edit(copying.into_iter().chain([Edit::End, Edit::Undo]));
+    assert_eq!((driver.has("ball 3"), driver.selected().active()), (false, Some(driver.named("ball 2"))), "one step");
+    driver.edit([Edit::Begin, Edit::Move { by }, Edit::Cancel]);
+    assert_eq!(driver.get::<Placement>("ball 2"), copy);
+    driver.edit([Edit::Redo]);
+    assert_eq!(driver.get::<Placement>("ball 2"), copy, "nothing to do again");
     assert_eq!(driver.get::<MaterialSlots>("ball"), driver.get::<MaterialSlots>("ball 2"), "they share a material");
     let id = driver.named("ball 2").to_bits();
     driver.edit([Edit::OwnMaterial { id }]);

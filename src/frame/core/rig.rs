@@ -26,6 +26,23 @@ impl Rig {
     }
 }
 
+/// A side of the scene: Y is up, and its front faces +Z, as that of glTF models.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Side {
+    /// From +Z.
+    Front,
+    /// From -Z.
+    Back,
+    /// From +X.
+    Right,
+    /// From -X.
+    Left,
+    /// From +Y, with the front below.
+    Top,
+    /// From -Y, with the front above.
+    Bottom,
+}
+
 /// The mode of turning the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Turning {

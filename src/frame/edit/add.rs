@@ -6,6 +6,7 @@
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
+use crate::frame::state::history::History;
 use crate::frame::state::resources::RenderState;
 use crate::frame::state::selection::{Selection, box_of};
 use crate::mesh::procedural;
@@ -170,28 +171,31 @@ pub fn delete(world: &mut World) {
     crate::frame::edit::keys::say(world, deleted);
 }
 
-pub fn duplicate(world: &mut World) {
+/// Copies the selection, and selects the copies.
+///
+/// - `step`: from an original to its copy, metres.
+pub fn duplicate(world: &mut World, step: DVec3) {
     let selected = world.resource::<Selection>().0.clone();
-    let step = step_aside(world, &selected);
     let mut copies = Vec::new();
     for entity in selected {
         let mut state = EntityState::of(world, entity);
         let name = state.name.as_ref().map_or("copy", |name| plain_name(name.as_str()));
         (state.name, state.ordinal) = (Some(Name::new(free_name(world, name, false))), Some(next_ordinal(world)));
-        // Offset, because the copy would otherwise be invisible.
         state.placement.get_or_insert_default().translation += step;
         let copy = world.spawn_empty().id();
         state.put(world, copy);
+        world.resource_mut::<History>().add_to_begin(copy, state);
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;
 }
 
-/// The way from the original to its copy: to its right as it is seen, along an axis of the world, by a little more than
-/// its width.
-fn step_aside(world: &mut World, selected: &[Entity]) -> DVec3 {
+/// The way from the selection to a copy that does not hide it: to its right as it is seen, along an axis of the world, by
+/// a little more than its width.
+pub fn step_aside(world: &mut World) -> DVec3 {
     /// A tenth of the width stays free.
     const GAP: f64 = 1.1;
+    let selected = world.resource::<Selection>().0.clone();
     let view = world.resource::<RenderState>().inputs.camera.map_or_else(View::default, |camera| camera.view);
     let right = view.right();
     let axis = if right.x.abs() >= right.z.abs() { DVec3::X * right.x.signum() } else { DVec3::Z * right.z.signum() };

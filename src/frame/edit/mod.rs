@@ -87,14 +87,18 @@ pub enum Edit {
     Begin,
     /// End the step of [`Edit::Begin`].
     End,
+    /// End it, and restore what was there.
+    Cancel,
     /// Undo the last step.
     Undo,
     /// Redo the last undone step.
     Redo,
     /// Remove the selection.
     Delete,
-    /// Copy the selection, and select the copies.
+    /// Copy the selection to its right, and select the copies.
     Duplicate,
+    /// Copy it where it is, for copies that are moved next.
+    DuplicateInPlace,
     /// Add an object or a light in the middle of the image, and select it.
     Add(NewThing),
     /// The same at a position in the image, 0..1 from the upper left corner; a light goes beside what is selected.
@@ -273,6 +277,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::SelectNone => world.resource_mut::<Selection>().0.clear(),
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
+        Edit::Cancel => History::cancel(world),
         Edit::Undo => {
             if crate::frame::edit::remesh::take_back(world).is_none() {
                 History::step_back(world).ok_or("nothing to undo")?;
@@ -286,7 +291,11 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             label.into_iter().for_each(|text| keys::say(world, text));
         }
         Edit::Delete => add::delete(world),
-        Edit::Duplicate => add::duplicate(world),
+        Edit::Duplicate => {
+            let aside = add::step_aside(world);
+            add::duplicate(world, aside);
+        }
+        Edit::DuplicateInPlace => add::duplicate(world, DVec3::ZERO),
         Edit::Add(new) => add::add(world, &new, spot::MIDDLE),
         Edit::AddAt { thing, x, y } => add::add(world, &thing, [x, y]),
         Edit::Move { by } => place::displace(world, |_| place::Change::Move(by)),

@@ -3,7 +3,7 @@
 //! There are two modes of turning: on a turntable, which preserves the roll and stops short of straight up and down,
 //! and freely about the image axes.
 
-use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::core::rig::{Rig, Side, Turning};
 use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;
@@ -133,6 +133,30 @@ pub fn level(view: &View) -> View {
         return *view;
     }
     View { up: VERTICAL, ..*view }.orthonormalized()
+}
+
+/// Looks at the pivot from a side of the scene, at the same distance.
+pub fn view_from(view: &View, side: Side) -> View {
+    let (forward, up) = match side {
+        Side::Front => (-DVec3::Z, DVec3::Y),
+        Side::Back => (DVec3::Z, DVec3::Y),
+        Side::Right => (-DVec3::X, DVec3::Y),
+        Side::Left => (DVec3::X, DVec3::Y),
+        Side::Top => (-DVec3::Y, -DVec3::Z),
+        Side::Bottom => (DVec3::Y, DVec3::Z),
+    };
+    about_pivot(view, forward, up)
+}
+
+/// Looks at the pivot from the opposite side; a level view stays level.
+pub fn view_from_behind(view: &View) -> View {
+    // From above, right stays to the right.
+    let is_vertical = elevation(view).abs() > MAX_ELEVATION;
+    about_pivot(view, -view.forward, if is_vertical { -view.up } else { view.up })
+}
+
+fn about_pivot(view: &View, forward: DVec3, up: DVec3) -> View {
+    finite_or(view, View { eye: view.pivot() - forward * view.pivot_distance, forward, up, ..*view })
 }
 
 /// Like [`frame_points`], for both kinds of cameras: an orthographic one gets the height that the points need, and is
@@ -441,6 +465,24 @@ mod tests {
         let one = frame_points(&start(), &Projection::default(), 1.0, &[DVec3::ZERO]);
         assert!(close(one.pivot(), DVec3::ZERO, 1e-12) && one.pivot_distance == start().pivot_distance);
         assert_eq!(frame_points(&start(), &Projection::default(), 1.0, &[]), start());
+    }
+
+    #[test]
+    fn sides_are_looked_at_from_where_they_face_and_from_behind() {
+        use Side::{Back, Bottom, Front, Left, Right, Top};
+        for (side, behind, eye) in
+            [(Front, Back, DVec3::Z), (Right, Left, DVec3::X), (Top, Bottom, DVec3::Y), (Back, Front, -DVec3::Z)]
+        {
+            let view = view_from(&start(), side);
+            assert!(close(view.pivot(), start().pivot(), 1e-12) && view.pivot_distance == start().pivot_distance);
+            assert!(close(view.eye, view.pivot() + view.pivot_distance * eye, 1e-12), "{side:?}");
+            let other = view_from_behind(&view);
+            assert!(close(other.eye, view_from(&start(), behind).eye, 1e-12), "{side:?}");
+            assert!(close(other.up, view_from(&start(), behind).up, 1e-12), "{side:?}");
+        }
+        assert!(close(view_from(&start(), Top).right(), DVec3::X, 1e-12), "as a map");
+        let turned = view_from_behind(&start());
+        assert!(turned.up == start().up && close(turned.pivot(), start().pivot(), 1e-12));
     }
 
     #[test]

@@ -143,6 +143,23 @@ impl History {
         world.resource_mut::<Self>().begun = None;
     }
 
+    /// Ends the step of [`Self::begin`], and restores what was before it.
+    pub fn cancel(world: &mut World) {
+        Self::remember_now(world);
+        let begun = world.resource_mut::<Self>().begun.take();
+        if begun.is_some_and(|(_, has_step)| has_step) {
+            Self::step_back(world);
+            world.resource_mut::<Self>().redo.pop();
+        }
+    }
+
+    /// Adds a new entity to what was there at the beginning of a continuous change, so that it can be moved in it.
+    pub(crate) fn add_to_begin(&mut self, entity: Entity, state: EntityState) {
+        if let Some((entities, _)) = &mut self.begun {
+            Arc::make_mut(entities).insert(entity, Arc::new(state));
+        }
+    }
+
     /// Records changes now instead of at the end of the frame.
     fn remember_now(world: &mut World) {
         let mut history = world.resource_mut::<Self>();

@@ -61,6 +61,10 @@ impl App {
         let (outlines, grab) = (&self.outlines, &self.grab);
         let active = self.session.world().resource::<Selection>().active().filter(|_| self.here.is_open());
         let chosen_name = active.and_then(|entity| self.panel.label_of(&self.session, entity));
+        let chosen_name = chosen_name.map(|name| match selected.len() {
+            1 => name,
+            n => format!("{name} and {} more", n - 1),
+        });
         let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
         let path_filter = &mut self.path_filter;
         let around = panel::Around {

@@ -1,7 +1,7 @@
 //! Changes of the selection that follow the mouse at once: their keys and buttons take precedence over all others.
 
 use crate::frame::gizmo::Mode;
-use crate::frame::{Command, Edit, Selection};
+use crate::frame::{Command, Edit};
 use crate::viewer::app::App;
 use crate::viewer::grab::{Answer, Grab};
 use crate::viewer::toasts::Tone;
@@ -21,13 +21,11 @@ impl App {
         self.grab = Some(Grab::new(gizmo, projector, self.mouse()));
     }
 
-    /// Duplicates the selection and moves the copy; without a selection, that is told.
+    /// Moves a copy of the selection, in one step with its making.
     pub(super) fn grab_copy(&mut self, now: Instant) {
-        let is_selected = !self.session.world().resource::<Selection>().0.is_empty();
-        self.session.send(Command::Edit(Edit::Duplicate));
-        self.session.update(now - self.start);
-        if is_selected {
-            self.begin_grab(Mode::Move, now);
+        self.begin_grab(Mode::Move, now);
+        if self.grab.is_some() {
+            self.session.send(Command::Edit(Edit::DuplicateInPlace));
         }
     }
 
@@ -36,10 +34,7 @@ impl App {
         if self.grab.take().is_none() {
             return;
         }
-        if !keep {
-            self.session.send(Command::Edit(Grab::identity()));
-        }
-        self.session.send(Command::Edit(Edit::End));
+        self.session.send(Command::Edit(if keep { Edit::End } else { Edit::Cancel }));
         (self.repaint_at, self.needs_tick) = (Some(now), true);
     }
 

@@ -128,6 +128,7 @@ impl App {
             late,
             figures,
             repaint_at,
+            self.loading_since.map(|since| since + SLOW).filter(|at| *at > now),
             self.keep_size_at,
             self.leaving.wake_at(),
             self.outlines.wake_at(),

@@ -1,5 +1,6 @@
 //! How the lines of the table are written.
 
+use crate::frame::navigation::Side;
 use crate::frame::{Command, Edit, NewThing};
 use crate::render::Inspection;
 use crate::viewer::keys::binding::{Action, Chord, Item, Menu, Motion, Trigger, Typed};
@@ -36,6 +37,15 @@ pub const fn alt(key: &'static str, action: Action) -> Trigger {
 /// - `name`: of the key, for display.
 pub const fn pad(key: KeyCode, name: &'static str, action: Action) -> Trigger {
     Trigger::Press(Chord { key: Typed::Pad(key, name), ctrl: false, alt: false, shift: None }, action)
+}
+
+/// - `name`: of the key, for display.
+pub const fn ctrl_pad(key: KeyCode, name: &'static str, action: Action) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Pad(key, name), ctrl: true, alt: false, shift: None }, action)
+}
+
+pub const fn side(side: Side) -> Action {
+    Action::Send(Command::ViewFrom(side))
 }
 
 pub const fn ctrl(key: &'static str, action: Action) -> Trigger {

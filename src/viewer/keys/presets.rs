@@ -1,14 +1,22 @@
 //! Presets with keys and gestures of other programs. The bindings of a preset take precedence over those of the
 //! [`table`](crate::viewer::keys::table) with the same key, and its first groups replace the table's [`REPLACED`] groups.
 
+use crate::frame::navigation::Side;
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::build::{alt, edit, named, pad, row, send, shifted, text};
+use crate::viewer::keys::build::{alt, ctrl_pad, edit, named, pad, row, send, shifted, side, text};
 use crate::viewer::keys::table::BINDINGS;
 use winit::keyboard::{KeyCode, NamedKey};
 
 /// Groups of the table that presets replace.
 const REPLACED: [&str; 2] = ["Fly", "Orbit"];
+
+/// Degrees per press.
+const ORBIT_STEP: f64 = 15.0;
+
+const fn orbit(yaw_deg: f64, pitch_deg: f64) -> Action {
+    Action::Send(Command::Orbit { yaw_deg, pitch_deg })
+}
 
 const DELETE: Action = Action::Send(Command::Edit(Edit::Delete));
 
@@ -34,6 +42,27 @@ static BLENDER: &[KeyGroup] = &[
                 "frame the selection, or the whole scene",
                 pad(KeyCode::NumpadDecimal, "Numpad .", Action::Send(Command::FrameAll))
             ),
+            row!(
+                "look from the front, the right, above, the opposite side",
+                pad(KeyCode::Numpad1, "Numpad 1", side(Side::Front)),
+                pad(KeyCode::Numpad3, "Numpad 3", side(Side::Right)),
+                pad(KeyCode::Numpad7, "Numpad 7", side(Side::Top)),
+                pad(KeyCode::Numpad9, "Numpad 9", Action::Send(Command::ViewFromBehind))
+            ),
+            row!(
+                "look from the back, the left, below",
+                ctrl_pad(KeyCode::Numpad1, "Numpad 1", side(Side::Back)),
+                ctrl_pad(KeyCode::Numpad3, "Numpad 3", side(Side::Left)),
+                ctrl_pad(KeyCode::Numpad7, "Numpad 7", side(Side::Bottom))
+            ),
+            row!(
+                "orbit by 15°",
+                pad(KeyCode::Numpad4, "Numpad 4", orbit(-ORBIT_STEP, 0.0)),
+                pad(KeyCode::Numpad6, "Numpad 6", orbit(ORBIT_STEP, 0.0)),
+                pad(KeyCode::Numpad8, "Numpad 8", orbit(0.0, ORBIT_STEP)),
+                pad(KeyCode::Numpad2, "Numpad 2", orbit(0.0, -ORBIT_STEP))
+            ),
+            row!("go to the initial view of the scene", pad(KeyCode::Numpad0, "Numpad 0", Action::Send(Command::Home))),
             FLY,
             FLY_SPEED,
         ],
@@ -186,6 +215,18 @@ mod tests {
         for key in [Key::Character(".".into()), Key::Named(NamedKey::Delete)] {
             let pressed = action_of(Navigation::Blender, PhysicalKey::Code(KeyCode::NumpadDecimal), &key, none);
             assert_eq!(pressed, Some(Action::Send(Command::FrameAll)));
+        }
+        let views = [
+            (KeyCode::Numpad1, "1", none, side(Side::Front)),
+            (KeyCode::Numpad1, "1", ModifiersState::CONTROL, side(Side::Back)),
+            (KeyCode::Numpad7, "7", none, side(Side::Top)),
+            (KeyCode::Numpad9, "9", none, Action::Send(Command::ViewFromBehind)),
+            (KeyCode::Numpad4, "4", none, orbit(-ORBIT_STEP, 0.0)),
+        ];
+        for (code, typed, modifiers, action) in views {
+            let pressed =
+                action_of(Navigation::Blender, PhysicalKey::Code(code), &Key::Character(typed.into()), modifiers);
+            assert_eq!(pressed, Some(action));
         }
         // Other keys are unchanged.
         for navigation in Navigation::ALL {

@@ -1,8 +1,9 @@
 //! Keys and commands that move the camera and set its lens.
 
 use crate::frame::Command;
+use crate::frame::navigation::Side;
 use crate::viewer::keys::binding::{Action, KeyGroup, Menu, Motion, Trigger, Typed};
-use crate::viewer::keys::build::{ctrl, hold, item, named, row, send, send_item, shifted, text};
+use crate::viewer::keys::build::{ctrl, hold, item, named, row, send, send_item, shifted, side, text};
 use winit::keyboard::{KeyCode, NamedKey};
 
 /// Factor per press of a dolly or zoom key.
@@ -105,6 +106,16 @@ pub const VIEW: KeyGroup = KeyGroup {
             "go to the initial view of the scene",
             named(NamedKey::Home, Action::Send(Command::Home)),
             send_item("Initial view", &[Menu::View], Command::Home)
+        ),
+        row!(
+            "look at the pivot from a side: a model faces its front",
+            item("View from the front", &[Menu::View], side(Side::Front)),
+            item("View from the right", &[Menu::View], side(Side::Right)),
+            item("View from above", &[Menu::View], side(Side::Top)),
+            item("View from the back", &[], side(Side::Back)),
+            item("View from the left", &[], side(Side::Left)),
+            item("View from below", &[], side(Side::Bottom)),
+            send_item("View from the opposite side", &[Menu::View], Command::ViewFromBehind)
         ),
         row!(
             "frame the selection, or the whole scene, and focus on it",

@@ -55,8 +55,8 @@ fn scenes_render_with_either_integrator() {
     }
 }
 
-/// So that the next kernel has room too: the workers get half the stack that they have in programs, with the instructions
-/// of any processor.
+/// So that the next kernel has room too: the workers get half the stack that they have in programs, with every
+/// instruction set of this processor.
 #[test]
 fn half_of_the_stack_is_enough() {
     for name in SCENES {
