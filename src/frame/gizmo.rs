@@ -86,6 +86,8 @@ pub struct Mark {
 
 /// Length of an axis in the window, in points.
 const LENGTH: f64 = 86.0;
+/// Length of the head of an arrow beyond its axis, in points.
+pub const ARROW_HEAD: f64 = 14.0;
 /// Maximum distance of the mouse from a handle, in points.
 const REACH: f64 = 8.0;
 /// Range of the squares between two axes, as parts of their length.
@@ -145,6 +147,10 @@ impl Gizmo {
             (Handle::Middle, _) => (mark.line[0] - mouse).length() - 4.0,
             (_, true) if is_inside(mouse, &mark.line) => 0.0,
             (_, true) => f64::INFINITY,
+            (Handle::Axis(_), false) if self.mode == Mode::Move => {
+                let [start, end] = [mark.line[0], mark.line[1]];
+                to_segment(mouse, start, end + ARROW_HEAD * (end - start).normalize_or_zero())
+            }
             (_, false) => {
                 mark.line.windows(2).map(|ends| to_segment(mouse, ends[0], ends[1])).fold(f64::INFINITY, f64::min)
             }
@@ -279,6 +285,11 @@ mod tests {
         assert_eq!(mover.handle_at(place(square), &projector), Some(Handle::Plane(2)));
         assert_eq!(mover.handle_at(place(mover.center), &projector), Some(Handle::Middle));
         assert_eq!(mover.handle_at(DVec2::new(5.0, 5.0), &projector), None);
+        for i in 0..3 {
+            let (middle, end) = (place(mover.center), place(mover.center + mover.size * mover.axes[i]));
+            let tip = end + ARROW_HEAD * (end - middle).normalize();
+            assert_eq!(mover.handle_at(tip, &projector), Some(Handle::Axis(i)), "the tip of an arrow");
+        }
         let on_ring = ring.center + ring.size * DVec3::new(0.6, 0.0, 0.8);
         assert_eq!(ring.handle_at(place(on_ring), &projector), Some(Handle::Axis(1)));
         assert_eq!(ring.handle_at(place(ring.center), &projector), None, "the middle of a ring is free");

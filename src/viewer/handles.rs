@@ -1,6 +1,6 @@
 //! Overlays of the selection: its bounds and its handles, and dragging them.
 
-use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
+use crate::frame::gizmo::{ARROW_HEAD, Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, OwnBox, Projector, SceneBounds, Selection, Session};
 use crate::scene::{Placement, light_of};
 use bevy_ecs::name::Name;
@@ -154,6 +154,11 @@ impl Handles {
         self.grabbed.is_some()
     }
 
+    /// Whether a press would take a handle, or has taken one.
+    pub fn is_lit(&self) -> bool {
+        self.is_grabbed() || self.hovered.is_some()
+    }
+
     /// Draws an arrow at the edge of `free`, the uncovered part of the window, if the selection is out of view.
     pub fn draw_hint(&self, context: &Context, free: Rect) {
         let (Some(projector), Some((name, middle))) = (&self.projector, &self.out_of_view) else { return };
@@ -292,7 +297,7 @@ fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color:
 fn draw_arrow(painter: &egui::Painter, start: Pos2, end: Pos2, color: Color32) {
     let along = (end - start).normalized();
     let across = egui::vec2(-along.y, along.x);
-    let points = vec![end + 14.0 * along, end + 6.5 * across, end - 6.5 * across];
+    let points = vec![end + ARROW_HEAD as f32 * along, end + 6.5 * across, end - 6.5 * across];
     painter.add(egui::Shape::convex_polygon(points, color, Stroke::new(1.5, Color32::from_black_alpha(170))));
 }
 

@@ -329,8 +329,13 @@ impl OrderForm {
                 if ui.button("Choose …").clicked() {
                     *wish = Some(Wish::Choose(purpose));
                 }
-                let name = egui::Label::new(crate::files::printable::name(&name).into_owned()).truncate();
-                ui.add(name).on_hover_text(full.display().to_string());
+                let folder = full.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+                let text = match &*folder {
+                    "" => name,
+                    folder => format!("{name} in {folder}"),
+                };
+                let text = egui::Label::new(crate::files::printable::name(&text).into_owned()).truncate();
+                ui.add(text).on_hover_text(full.display().to_string());
             });
         });
         ui.end_row();

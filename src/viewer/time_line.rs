@@ -176,11 +176,12 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 draw_track(ui.painter(), rect, strip);
                 let about = track.on_hover_text("drag: another frame; yellow marks are keys: right click");
                 let frame_at = |place: Pos2| strip.frame_at(f64::from((place.x - rect.left()) / rect.width()));
-                about.context_menu(|ui| asked.extend(key_menu(ui)));
+                about.context_menu(|ui| asked.extend(key_menu(ui, strip)));
                 // A button that is released in the frame in which it was pressed was never seen down.
-                let is_meant = about.is_pointer_button_down_on() || about.clicked();
+                let is_meant = about.is_pointer_button_down_on() || about.clicked() || about.secondary_clicked();
+                let is_for_keys = about.secondary_clicked() || ui.input(|input| input.pointer.secondary_down());
                 if let Some(place) = about.interact_pointer_pos().filter(|_| is_meant) {
-                    let frame = match ui.input(|input| input.pointer.secondary_down()) {
+                    let frame = match is_for_keys {
                         true => strip.key_near(frame_at(place), MARK / rect.width()),
                         false => frame_at(place),
                     };
@@ -198,7 +199,8 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
 }
 
 /// What can be done with the keys at the shown frame.
-fn key_menu(ui: &mut Ui) -> Option<Ask> {
+fn key_menu(ui: &mut Ui, strip: &Strip) -> Option<Ask> {
+    ui.strong(format!("frame {}", strip.frame.map_or(0.0, whole_frame)));
     let lines = [("Set key", Edit::SetKeys { camera: false }), ("Delete keys here", Edit::DeleteKeys)];
     let chosen = lines.into_iter().find_map(|(name, edit)| ui.button(name).clicked().then_some(edit));
     chosen.map(|edit| Ask::Send(Command::Edit(edit)))
@@ -254,15 +256,15 @@ fn draw_track(painter: &egui::Painter, rect: Rect, strip: &Strip) {
             );
         }
     }
-    for frame in &strip.keys {
-        let at = Pos2::new(x(*frame), line);
-        let corners = [(0.0, -4.5), (4.5, 0.0), (0.0, 4.5), (-4.5, 0.0)].map(|(dx, dy)| at + egui::vec2(dx, dy));
-        painter.add(egui::Shape::convex_polygon(corners.to_vec(), KEY, Stroke::new(1.0, Color32::BLACK)));
-    }
     if let Some(frame) = strip.frame {
         let at = x(frame);
         painter.vline(at, rect.top() + 3.0..=rect.bottom() - 3.0, Stroke::new(3.0, Color32::from_black_alpha(160)));
         painter.vline(at, rect.top() + 3.0..=rect.bottom() - 3.0, Stroke::new(1.5, Color32::from_rgb(120, 180, 255)));
+    }
+    for frame in &strip.keys {
+        let at = Pos2::new(x(*frame), line);
+        let corners = [(0.0, -4.5), (4.5, 0.0), (0.0, 4.5), (-4.5, 0.0)].map(|(dx, dy)| at + egui::vec2(dx, dy));
+        painter.add(egui::Shape::convex_polygon(corners.to_vec(), KEY, Stroke::new(1.0, Color32::BLACK)));
     }
 }
 
@@ -306,13 +308,10 @@ mod tests {
     }
 
     /// Shows the strip, with a press and a release within a frame.
-    fn click(context: &Context, strip: &Strip, at: Pos2) -> Vec<f64> {
-        let button = |pressed| egui::Event::PointerButton {
-            pos: at,
-            button: egui::PointerButton::Primary,
-            pressed,
-            modifiers: egui::Modifiers::NONE,
-        };
+    fn click(strip: &Strip, at: Pos2, button: egui::PointerButton) -> Vec<f64> {
+        let context = Context::default();
+        let button =
+            |pressed| egui::Event::PointerButton { pos: at, button, pressed, modifiers: egui::Modifiers::NONE };
         let mut frames = Vec::new();
         for events in [vec![], vec![egui::Event::PointerMoved(at), button(true), button(false)], vec![]] {
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, egui::vec2(800.0, 100.0)));
@@ -329,8 +328,14 @@ mod tests {
 
     #[test]
     fn a_click_within_one_frame_goes_to_its_frame() {
-        let frames = click(&Context::default(), &strip(61), Pos2::new(400.0, 80.0));
+        use egui::PointerButton::{Primary, Secondary};
+        let (strip, at) = (strip(61), Pos2::new(400.0, 80.0));
+        let frames = click(&strip, at, Primary);
         assert!(matches!(frames[..], [frame] if (10.0..50.0).contains(&frame)), "{frames:?}");
+        // What the menu sets and deletes is there, or at the key beside it.
+        assert_eq!(click(&strip, at, Secondary), frames);
+        let keyed = Strip { keys: vec![frames[0] + 0.5], ..strip };
+        assert_eq!(click(&keyed, at, Secondary), [(frames[0] + 0.5).round()]);
     }
 
     #[test]

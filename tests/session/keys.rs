@@ -92,7 +92,7 @@ fn a_still_scene_gets_an_animation_by_moving_things_and_setting_keys() {
     assert!(!driver.session.has_unsaved_edits() && driver.animation().is_none());
     driver.edit([Edit::Select { id, add: false }, Edit::Move { by: DVec3::X }, KEY]);
     assert_eq!(driver.tracks(), [("translate", vec![0.0, 2.0], Interpolation::Linear)]);
-    assert!(driver.said(MessageKind::Note).contains("keys at 2 s: translate of `ball`"));
+    assert!(driver.said(MessageKind::Note).contains("keys at frame 48: translate of `ball`"));
     assert!(driver.session.has_unsaved_edits());
     driver.go_to(1.0);
     assert_eq!(driver.ball(), DVec3::new(0.5, 0.5, 0.0));

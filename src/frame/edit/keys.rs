@@ -25,12 +25,11 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     let selected = world.resource::<Selection>().0.clone();
     let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
     let channels = checked(world, |world| set_keys(world, &before, written.as_ref(), of))?;
-    let seconds = world.resource::<Moment>().0;
     let single = match is_single(world, &channels) {
         true => ": set another one at another time",
         false => "",
     };
-    let text = format!("keys at {} s: {}{single}", number(seconds), named(world, &channels));
+    let text = format!("keys at {}: {}{single}", moment(world), named(world, &channels));
     say(world, text);
     Ok(())
 }
@@ -49,12 +48,12 @@ pub fn tell_what_needs_keys(world: &mut World, known: &[Entity]) {
 pub fn delete(world: &mut World) -> Result<(), String> {
     let selected = world.resource::<Selection>().0.clone();
     let n = checked(world, |world| Ok(delete_keys(world, &selected)))?;
-    let seconds = number(world.resource::<Moment>().0);
+    let at = moment(world);
     let of = if selected.is_empty() { "" } else { " of the selection" };
     let text = match n {
-        0 => return Err(format!("there are no keys{of} at {seconds} s")),
-        1 => format!("key{of} at {seconds} s deleted"),
-        n => format!("{n} keys{of} at {seconds} s deleted"),
+        0 => return Err(format!("there are no keys{of} at {at}")),
+        1 => format!("key{of} at {at} deleted"),
+        n => format!("{n} keys{of} at {at} deleted"),
     };
     say(world, text);
     Ok(())
@@ -182,9 +181,14 @@ fn named(world: &World, channels: &[Channel]) -> String {
     text
 }
 
-/// Seconds with at most three decimal places.
-fn number(seconds: f64) -> String {
-    ((seconds * 1e3).round() / 1e3).to_string()
+/// The current time, as the time line counts it: its frame, or between two of them seconds.
+fn moment(world: &World) -> String {
+    let seconds = world.resource::<Moment>().0;
+    let frame = world.get_resource::<Animation>().map(|animation| seconds * animation.fps);
+    match frame.map(|frame| (frame.round(), (frame - frame.round()).abs())) {
+        Some((frame, away)) if away < 1e-6 * (1.0 + frame) => format!("frame {frame}"),
+        _ => format!("{} s", (seconds * 1e3).round() / 1e3),
+    }
 }
 
 /// Notes what has been done.

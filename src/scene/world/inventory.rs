@@ -5,10 +5,11 @@
 //! since they change more often than the lists.
 
 use crate::files::printable;
-use crate::scene::world::components::{Material, Ordinal, Shape, SurfaceMaterial};
+use crate::scene::world::components::{ColorParam, Material, Ordinal, Shape, SurfaceMaterial};
 use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
+use glam::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// All lists, in the order of the scene file.
@@ -74,7 +75,7 @@ impl Inventory {
             }
             for &material in &of_object {
                 users.entry(material).or_default().push(object.entity);
-                if let Some(SurfaceMaterial(Material::Emissive { .. })) = world.get(material) {
+                if SurfaceMaterial::of(world, material).is_some_and(emits) {
                     let kind = light_kind(&object.shape);
                     let (entity, label) = (object.entity, label.clone());
                     lights.push(LightEntry { entity, label, kind, material: Some(material) });
@@ -111,6 +112,14 @@ impl Inventory {
     /// The entry of a material; `None` if the entity is not a material.
     pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
         self.materials.iter().find(|entry| entry.entity == entity)
+    }
+}
+
+fn emits(material: &Material) -> bool {
+    match material {
+        Material::Emissive { .. } => true,
+        Material::Principled { emission, .. } => *emission != ColorParam::Rgb(Vec3::ZERO),
+        _ => false,
     }
 }
 

@@ -114,6 +114,15 @@ impl App {
         self.here.open(egui::pos2(point.x as f32, point.y as f32), [x, y]);
     }
 
+    /// Says that focus is not seen while depth of field is off.
+    pub(super) fn offer_depth_of_field(&mut self, now: Instant) {
+        if !self.session.status().rig.lens.enabled {
+            let text = "focus is set, but everything is sharp: depth of field is off (O)".to_owned();
+            let switch = Action::Send(Command::ToggleDepthOfField);
+            self.toasts.add_offer(text, "Switch it on", switch, now);
+        }
+    }
+
     /// Carries out an action; one that is about a place of the image, at `place`, fractions of its size.
     pub(super) fn act_at(&mut self, action: Action, place: [f64; 2]) {
         let now = Instant::now();
@@ -160,6 +169,7 @@ impl App {
             Action::FocusHere => {
                 self.session.send(Command::FocusAt { x, y });
                 self.session.send(Command::PivotAt { x, y });
+                self.offer_depth_of_field(now);
             }
             Action::Brush => self.toggle_brush(now),
             Action::ClearRegion => self.session.send(Command::SetRegion { region: None }),

@@ -243,7 +243,7 @@ impl App {
         let is_elsewhere = self.over_widgets
             || self.input.is_dragging()
             || self.input.is_captured()
-            || self.handles.is_grabbed()
+            || self.handles.is_lit()
             || self.brush.is_armed();
         self.outlines.mouse_at((!is_elsewhere && self.overlays).then(|| self.input.place()), now)
     }

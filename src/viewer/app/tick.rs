@@ -1,6 +1,6 @@
 //! A tick: passes input to the session, advances it, and checks for anything new to show.
 
-use crate::frame::{CurrentScene, MessageKind, Selection};
+use crate::frame::{Command, CurrentScene, MessageKind, Selection};
 use crate::scene::SceneSource;
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
@@ -168,10 +168,16 @@ impl App {
         if commands.is_empty() {
             return;
         }
+        // A double click is for the pivot as well.
+        let is_for_focus = |command: &Command| matches!(command, Command::FocusAt { .. });
+        let only_focuses = commands.iter().all(is_for_focus);
         for command in commands {
             self.session.send(command);
         }
         self.session.update(clock);
+        if only_focuses {
+            self.offer_depth_of_field(now);
+        }
         self.steered_at = now;
     }
 }

@@ -38,6 +38,7 @@ pub const EDIT: KeyGroup = KeyGroup {
         row!(
             "duplicate the selection",
             edit("d", None, Edit::Duplicate),
+            edit("v", None, Edit::Duplicate),
             edit_item("Duplicate", &[Menu::Edit, Menu::Here], Edit::Duplicate)
         ),
         row!(

@@ -69,19 +69,20 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
         }
         return;
     }
-    let Some(material) = entry.material else { return };
-    match SurfaceMaterial::of(world, material) {
-        Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
+    let Some(id) = entry.material else { return };
+    let (radiance, property) = match SurfaceMaterial::of(world, id) {
+        Some(Material::Emissive { radiance }) => (radiance, MaterialProperty::main_color(MaterialKind::Emissive)),
+        Some(Material::Principled { emission, .. }) => (emission, MaterialProperty::named("emission")),
+        _ => return,
+    };
+    match radiance {
+        ColorParam::Rgb(rgb) => {
             if let Some(value) = short_color(ui, *rgb, Some(RADIANCE)) {
-                let main = MaterialProperty::main_color(MaterialKind::Emissive).expect("it has a radiance");
-                let property = Property::Material(main);
-                asked.edit(Edit::Set { id: material.to_bits(), property, value });
+                let property = Property::Material(property.expect("it is in the table"));
+                asked.edit(Edit::Set { id: id.to_bits(), property, value });
             }
         }
-        Some(Material::Emissive { radiance: ColorParam::Texture(texture) }) => {
-            drop(ui.weak(&*crate::files::printable::name(&texture.name)))
-        }
-        _ => {}
+        ColorParam::Texture(texture) => drop(ui.weak(&*crate::files::printable::name(&texture.name))),
     }
 }
 

@@ -141,6 +141,12 @@ pub(crate) fn load_library(
         }
         material.beside.extend(named);
     }
+    let is_unseen = |it: &ImportedMaterial| it.opacity == Some(0.0) && it.opacity_texture.is_none();
+    // Some are meant, as for what only stops a ball; but nobody stores a model that cannot be seen.
+    if !materials.is_empty() && materials.iter().all(is_unseen) {
+        warn("every material has `d 0`, so nothing would be seen: they are shown opaque".to_owned());
+        materials.iter_mut().for_each(|material| material.opacity = None);
+    }
     if !unused.is_empty() {
         warn(format!("not modelled and ignored: {}", unused.into_iter().collect::<Vec<_>>().join(", ")));
     }
@@ -368,6 +374,17 @@ mod tests {
         assert_eq!(of(meshlab, "Tr 0.25"), 0.25);
         assert_eq!(["Tr 1", "Tr 0", "Tr 1\nd 1", "Tr 0.7\nd 1"].map(|lines| of("", lines)), [1.0; 4]);
         assert_eq!(["Tr 1", "Tr 0"].map(|lines| of(meshlab, lines)), [1.0; 2]);
+    }
+
+    #[test]
+    fn a_library_in_which_nothing_would_be_seen_is_opaque() {
+        let (hidden, warnings) = parse("newmtl skin\nd 0\nKd 0.8 0.8 0.8\nnewmtl eyes\nd 0.0\n");
+        assert_eq!(hidden.iter().map(|it| it.opacity).collect::<Vec<_>>(), [None, None]);
+        assert!(warnings.len() == 1 && warnings[0].contains("shown opaque"), "{warnings:?}");
+        for seen in ["newmtl box\nd 0\nnewmtl floor\nd 1\n", "newmtl leaf\nd 0\nmap_d leaf.png\n"] {
+            let (materials, warnings) = parse(seen);
+            assert!(materials[0].opacity == Some(0.0) && warnings.is_empty(), "{seen}: {warnings:?}");
+        }
     }
 
     #[test]
