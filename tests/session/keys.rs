@@ -146,7 +146,7 @@ fn a_still_scene_gets_an_animation_by_moving_things_and_setting_keys() {
 
     // Keys are deleted where they are.
     driver.edit([Edit::DeleteKeys]);
-    assert!(driver.said(MessageKind::Warning).contains("there are no keys at 0.8 s"));
+    assert!(driver.said(MessageKind::Warning).contains("there are no keys at frame 8"));
     driver.go_to(0.0);
     driver.edit([Edit::Select { id, add: false }, Edit::DeleteKeys]);
     assert_eq!(driver.tracks()[0].1, [2.0]);

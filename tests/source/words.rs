@@ -67,8 +67,8 @@ const RETIRED: [(&str, &str); 52] = [
 /// In the window the environment may be a sky.
 const FINE_IN_THE_PROGRAM: [&str; 3] = ["sky", "skies", "house"];
 
-/// Of another renderer.
-const FIELD_OF_A_MEDIUM: &str = "density";
+/// Names of other renderers: a field of a medium, a material.
+const OF_OTHER_RENDERERS: [&str; 2] = ["density", "matte"];
 
 /// One kind of environment, which is called so, and the files that are about nothing else.
 const CLEAR_SKY: [&str; 2] = ["clear sky", "sky and sun"];
@@ -204,7 +204,9 @@ fn texts_of_the_program_are_in_words_of_the_field() {
         if path.starts_with("src/cli/") {
             texts.extend(help(&source));
         }
-        for (line, text) in texts.into_iter().filter(|(_, text)| !is_grammar(text) && text != FIELD_OF_A_MEDIUM) {
+        for (line, text) in
+            texts.into_iter().filter(|(_, text)| !is_grammar(text) && !OF_OTHER_RENDERERS.contains(&&**text))
+        {
             let text = without_placeholders(&text);
             for (word, better) in retired_words(&text, &scenes) {
                 if !FINE_IN_THE_PROGRAM.contains(&word) {

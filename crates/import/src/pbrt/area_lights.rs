@@ -4,6 +4,7 @@ use crate::pbrt::build::{Builder, Geometry};
 use crate::pbrt::lights::color;
 use crate::pbrt::params::Params;
 use crate::pbrt::state::{AreaLight, State};
+use crate::pbrt::version3::factor;
 use firstlight_files::printable;
 use firstlight_format::sources::{MeshSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb};
@@ -25,7 +26,7 @@ impl Builder<'_> {
         let AreaLight { params: light, radiance } = light;
         let is_two_sided = light.flag("twosided").unwrap_or(false);
         let mut told = Vec::new();
-        let of_light = || color(light, "L", &mut |what| told.push(what)) * light.number("scale").unwrap_or(1.0);
+        let of_light = || color(light, "L", &mut |what| told.push(what)) * factor(light, "scale");
         let mut radiance = *radiance.get_or_init(of_light);
         if let Some(power) = light.number("power").filter(|power| *power > 0.0) {
             let world = state.ctm;

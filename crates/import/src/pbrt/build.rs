@@ -343,7 +343,7 @@ impl<'a> Builder<'a> {
 
     /// A light that is no shape.
     pub(crate) fn light(&mut self, kind: &str, params: &Params, ctm: &DAffine3) {
-        if let Some(image) = params.string("filename") {
+        for image in ["filename", "mapname"].into_iter().filter_map(|name| params.string(name)) {
             // Tells what is wrong with it.
             self.file(image);
         }

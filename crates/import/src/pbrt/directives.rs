@@ -72,10 +72,6 @@ const DIRECTIVES: &[&str] = &[
     "WorldBegin",
 ];
 
-/// Directives that version 4 has no more.
-const OF_VERSION_3: [&str; 7] =
-    ["AreaLight", "PixelSampler", "Renderer", "SurfaceIntegrator", "Volume", "VolumeIntegrator", "WorldEnd"];
-
 const MORE_THAN_SHOWN: &str = "the scene has more objects than can be shown: use fewer shapes or instances";
 
 /// Textures may consist of later ones to this depth.
@@ -104,6 +100,8 @@ pub(crate) struct Reader<'a> {
     n_includes: usize,
     /// Bytes of text that may still be read.
     bytes_left: u64,
+    /// After `WorldEnd` of version 3.
+    has_ended: bool,
 }
 
 impl<'a> Reader<'a> {
@@ -121,6 +119,7 @@ impl<'a> Reader<'a> {
             known_files: HashSet::new(),
             n_includes: 0,
             bytes_left: Limits::of_this_process().scene_bytes,
+            has_ended: false,
         }
     }
 
@@ -182,7 +181,7 @@ impl<'a> Reader<'a> {
 
     fn run(&mut self, source: &SourceText, depth: usize) -> Result<(), SceneError> {
         let mut cursor = Cursor::new(source);
-        while let Some((name, at)) = cursor.directive()? {
+        while let Some((name, at)) = cursor.directive()?.filter(|_| !self.has_ended) {
             self.directive(&mut cursor, name, at, depth)?;
         }
         Ok(())
@@ -190,6 +189,12 @@ impl<'a> Reader<'a> {
 
     fn directive(&mut self, cursor: &mut Cursor, name: &str, at: usize, depth: usize) -> Result<(), SceneError> {
         let is_in_world = self.view.is_some();
+        // Names of versions 2 and 3.
+        let name = match name {
+            "SurfaceIntegrator" => "Integrator",
+            "AreaLight" => "AreaLightSource",
+            name => name,
+        };
         let needs_world = ["AttributeBegin", "AreaLightSource", "LightSource", "Material", "MakeNamedMaterial"];
         let needs_world =
             needs_world.contains(&name) || name.starts_with("Object") || matches!(name, "Shape" | "Texture");
@@ -309,7 +314,7 @@ impl<'a> Reader<'a> {
                 }
             }
             "Option" => cursor.option()?,
-            "Sampler" | "Accelerator" => {
+            "Sampler" | "Accelerator" | "PixelSampler" | "Renderer" | "VolumeIntegrator" => {
                 cursor.string()?;
                 cursor.params()?;
             }
@@ -366,7 +371,7 @@ impl<'a> Reader<'a> {
             "AreaLightSource" => {
                 let kind = cursor.string()?;
                 let params = cursor.params()?.with_attributes("light", &self.state.attributes);
-                if kind != "diffuse" {
+                if kind != "diffuse" && kind != "area" {
                     let kind = printable::name(&kind).into_owned();
                     self.builder.tell(format!("area lights of the kind `{kind}` are taken for diffuse ones"));
                 }
@@ -388,10 +393,12 @@ impl<'a> Reader<'a> {
                     self.builder.warnings.push(format!("{place}: {complaint}"));
                 }
             }
-            other if OF_VERSION_3.contains(&other) => {
-                let message = format!("`{other}` is of pbrt 3 or older: convert the scene with `pbrt --upgrade`");
-                return Err(cursor.wrong(at, message));
+            "Volume" => {
+                cursor.string()?;
+                cursor.params()?;
+                self.builder.tell("volumes are not modelled");
             }
+            "WorldEnd" => self.has_ended = true,
             other => {
                 let hint = suggestion(other, DIRECTIVES.iter().copied());
                 return Err(cursor.wrong(at, format!("there is no directive `{}`{hint}", printable::name(other))));

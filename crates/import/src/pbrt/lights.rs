@@ -2,7 +2,8 @@
 
 use crate::model::projection::{LightImage, projection, stretched};
 use crate::pbrt::params::Params;
-use crate::pbrt::spectrum::UnknownSpectrum;
+use crate::pbrt::spectrum::{UnknownSpectrum, peak_luminance};
+use crate::pbrt::version3::factor;
 use firstlight_files::printable;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource, TextureSource};
@@ -24,6 +25,12 @@ pub(crate) enum Light {
 /// The colour of a light by a parameter, white if there is none.
 pub(crate) fn color(params: &Params, name: &str, tell: &mut impl FnMut(String)) -> DVec3 {
     let color = params.spectrum(name).map_or(Ok(DVec3::ONE), |spectrum| spectrum.light());
+    // Version 3: a temperature, and the factor of a spectrum whose peak is 1.
+    let factor = match (params.find(name).map(|param| &*param.kind), params.numbers_of(name)) {
+        (Some("blackbody"), [kelvins, factor]) => factor * peak_luminance(*kelvins),
+        _ => 1.0,
+    };
+    let color = color.map(|color| factor * color);
     color.unwrap_or_else(|UnknownSpectrum(name)| {
         tell(format!("the spectrum `{}` is not known: white light is used", printable::name(&name)));
         DVec3::ONE
@@ -50,7 +57,7 @@ pub(crate) fn light(
     file: impl Fn(&str) -> Option<String>,
     tell: &mut impl FnMut(String),
 ) -> Light {
-    let scale = params.number("scale").unwrap_or(1.0);
+    let scale = factor(params, "scale");
     let positive = |name: &str| params.number(name).filter(|value| *value > 0.0);
     let from = params.point("from").unwrap_or(DVec3::ZERO);
     let towards = params.point("to").unwrap_or(DVec3::Z) - from;
@@ -96,7 +103,9 @@ pub(crate) fn light(
             if params.has("portal") {
                 tell("portals of environments are ignored: the image is the same, with more noise".to_owned());
             }
-            let Some(image) = params.string("filename") else {
+            // The latter is that of version 3, which maps it by longitude and latitude.
+            let of_version_3 = params.string("mapname");
+            let Some(image) = params.string("filename").or(of_version_3) else {
                 let illuminance = positive("illuminance").map_or(1.0, |illuminance| illuminance / PI);
                 return Light::Environment(EnvironmentSource::Constant(rgb(scale
                     * illuminance
@@ -106,20 +115,29 @@ pub(crate) fn light(
                 tell("`illuminance` of an environment image is ignored".to_owned());
             }
             let Some(file) = file(image) else { return Light::Nothing };
-            let image_from_world = world.matrix3.inverse();
-            let image_from_world = if image_from_world.is_finite() { image_from_world } else { DMat3::IDENTITY };
-            let rows = image_from_world.transpose();
+            let light_from_world = world.matrix3.inverse();
+            let light_from_world = if light_from_world.is_finite() { light_from_world } else { DMat3::IDENTITY };
+            let (layout, image_from_light) = match of_version_3 {
+                None => (EnvironmentLayout::EqualArea, DMat3::IDENTITY),
+                // The pole there is +Z, and u grows from +X to +Y; ours is +Y, with −Z in the middle.
+                Some(_) => {
+                    let image_from_light = DMat3::from_cols(DVec3::Z, DVec3::NEG_X, DVec3::Y);
+                    (EnvironmentLayout::Equirectangular, image_from_light)
+                }
+            };
+            let scale = if of_version_3.is_some() { scale * color(params, "L", tell) } else { scale };
+            let rows = (image_from_light * light_from_world).transpose();
             Light::Environment(EnvironmentSource::Image {
                 file,
-                scale: rgb(DVec3::splat(scale)),
+                scale: rgb(scale),
                 rotate: 0.0,
-                layout: EnvironmentLayout::EqualArea,
+                layout,
                 axes: Some([rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.to_array())),
             })
         }
         "projection" => {
             let Some(direction) = world.transform_vector3(DVec3::Z).try_normalize() else { return nowhere(tell) };
-            let Some(file) = params.string("filename").and_then(file) else {
+            let Some(file) = params.string("filename").or(params.string("mapname")).and_then(file) else {
                 tell("a `projection` light without an image is left out".to_owned());
                 return Light::Nothing;
             };
@@ -142,7 +160,7 @@ pub(crate) fn light(
             if let LightPart::Spot { name: a, position: b, direction: c, intensity: d, up: e, .. } = &mut light {
                 let up = world.transform_vector3(DVec3::Y).try_normalize().unwrap_or(DVec3::Y);
                 (*a, *b, *c) = (name, world.transform_point3(DVec3::ZERO), direction);
-                (*d, *e) = (rgb(DVec3::splat(scale * power)), up);
+                (*d, *e) = (rgb(scale * power), up);
             }
             Light::Projector(light, source)
         }

@@ -1,9 +1,9 @@
-//! pbrt, version 4: a scene in text, with PLY files beside it.
+//! pbrt, versions 3 and 4: a scene in text, with PLY files beside it.
 //!
 //! Words (`tokens`), arguments (`cursor`, `params`) and directives (`directives`) with the graphics state (`state`); what
 //! they describe is collected (`build`, `geometry`, `instances`, `area_lights`, `surfaces`) from `shapes`, `materials`, `textures`,
-//! `lights` and `spectrum`, and the camera and film before the world are in `view`. Lengths are metres. Start reading at
-//! [`read`].
+//! `lights` and `spectrum`, and the camera and film before the world are in `view`. What version 3 says otherwise is
+//! known by its names: its materials are in `version3`. Lengths are metres. Start reading at [`read`].
 //!
 //! Source of what a directive means: the description of the format, "pbrt-v4 Input File Format", and Pharr, Jakob and
 //! Humphreys 2023, "Physically Based Rendering", fourth edition.
@@ -16,6 +16,7 @@ mod directives;
 mod geometry;
 mod instances;
 mod lights;
+mod material_inputs;
 mod materials;
 mod named_spectra;
 mod params;
@@ -30,6 +31,7 @@ mod tests;
 mod textures;
 mod tokens;
 mod transforms;
+mod version3;
 mod view;
 
 use crate::model::foreign::{ForeignOptions, ForeignScene};

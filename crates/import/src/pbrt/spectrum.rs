@@ -108,10 +108,13 @@ fn at(spectrum: &Spectrum, is_eta: bool, nm: f64) -> Result<f64, UnknownSpectrum
         Spectrum::Sampled(samples) => Ok(interpolated(samples, nm)),
         Spectrum::Blackbody(_) => Err(UnknownSpectrum("blackbody".to_owned())),
         Spectrum::Named(name) => {
-            let data = name.strip_prefix("metal-").and_then(|name| match is_eta {
-                true => name.strip_suffix("-eta"),
-                false => name.strip_suffix("-k"),
-            });
+            // Version 3 names a file of its scenes instead, such as `spds/Au.eta.spd`.
+            let file = name.strip_suffix(".spd").map(|path| path.rsplit('/').next().unwrap_or(path));
+            let ends = if is_eta { ["-eta", ".eta"] } else { ["-k", ".k"] };
+            let data = match file {
+                Some(file) => file.strip_suffix(ends[1]),
+                None => name.strip_prefix("metal-").and_then(|name| name.strip_suffix(ends[0])),
+            };
             let data = data.and_then(conductor_data).ok_or_else(|| UnknownSpectrum(name.clone()))?;
             let column = |&(nm, eta, k): &(f64, f64, f64)| (nm, if is_eta { eta } else { k });
             Ok(interpolated(&data.iter().map(column).collect::<Vec<_>>(), nm))
@@ -145,6 +148,15 @@ fn planck(nm: f64, kelvins: f64) -> f64 {
     /// Keeps the numbers in range; the unit does not matter.
     const GREEN: f64 = 555.0;
     (GREEN / nm).powi(5) / (C2 / (nm * kelvins)).exp_m1()
+}
+
+/// Luminance of a black body whose spectrum has a peak of 1, beside one that is 1 everywhere.
+pub(crate) fn peak_luminance(kelvins: f64) -> f64 {
+    /// Wien's displacement constant, nm·K (CODATA 2018).
+    const WIEN: f64 = 2.897_771_955e6;
+    let peak = planck(WIEN / kelvins, kelvins);
+    let luminance = xyz_of(|nm| planck(nm, kelvins) / peak).y / xyz_of(|_| 1.0).y;
+    if luminance.is_finite() { luminance } else { 0.0 }
 }
 
 /// Linear between samples, constant beyond them.

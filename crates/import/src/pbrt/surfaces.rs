@@ -2,7 +2,8 @@
 
 use crate::model::foreign::{LIGHT_SHARE, cut, tinted, told_of_long};
 use crate::pbrt::build::Builder;
-use crate::pbrt::materials::{MaterialScope, material, principled, with_layers, with_normals};
+use crate::pbrt::material_inputs::{MaterialScope, principled};
+use crate::pbrt::materials::{material, with_layers, with_normals};
 use crate::pbrt::params::Params;
 use crate::pbrt::shapes::{has_uvs, with_own_uvs};
 use crate::pbrt::spectrum::UnknownSpectrum;

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use std::fmt::Write;
 use std::sync::Arc;
 
-const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
+pub(super) const SQUARE: &str = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]\n";
 const TRIANGLES: &str =
     "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] \"integer indices\" [0 1 2 0 2 3]\n";
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
@@ -19,13 +19,17 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\npr
 
 /// The scene of this world, with images and meshes beside it; a scene file can say it.
 fn read(world: &str) -> ForeignScene {
+    read_text(&format!("WorldBegin\n{world}"))
+}
+
+pub(super) fn read_text(text: &str) -> ForeignScene {
     let folder = tempfile::tempdir().unwrap();
     for name in ["n.png", "m.png"] {
         image::RgbImage::from_pixel(2, 2, image::Rgb([128, 128, 255])).save(folder.path().join(name)).unwrap();
     }
     std::fs::write(folder.path().join("bare.ply"), PLY).unwrap();
     let path = folder.path().join("a.pbrt");
-    std::fs::write(&path, format!("WorldBegin\n{world}")).unwrap();
+    std::fs::write(&path, text).unwrap();
     let light_images = LightImages::new(|_| None);
     let options = ForeignOptions { allow_outside: false, defines: Vec::new(), light_images, meshes: Arc::default() };
     let scene = super::read(&path, &options).unwrap_or_else(|error| panic!("{error}"));
@@ -33,7 +37,7 @@ fn read(world: &str) -> ForeignScene {
     scene
 }
 
-fn told(scene: &ForeignScene) -> Vec<String> {
+pub(super) fn told(scene: &ForeignScene) -> Vec<String> {
     scene.warnings.iter().map(|it| it.to_string()).collect()
 }
 
@@ -48,7 +52,7 @@ fn named<'a>(scene: &'a ForeignScene, name: &str) -> &'a MaterialPart {
 }
 
 /// The material of the first object.
-fn part(scene: &ForeignScene) -> &MaterialPart {
+pub(super) fn part(scene: &ForeignScene) -> &MaterialPart {
     named(scene, scene.file.objects[0].material().unwrap())
 }
 

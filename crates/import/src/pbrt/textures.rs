@@ -82,8 +82,15 @@ impl Textures {
         match class {
             "constant" => part("value", 1.0),
             "scale" => {
-                let scale = self.parameter(true, params, "scale").unwrap_or(Texture::Constant(Vec3::ONE));
-                let tex = part("tex", 1.0);
+                // Version 3 multiplies two of a kind.
+                let is_of_version_3 = params.has("tex1") || params.has("tex2");
+                let (tex, scale) = match is_of_version_3 {
+                    true => (part("tex1", 1.0), part("tex2", 1.0)),
+                    false => (
+                        part("tex", 1.0),
+                        self.parameter(true, params, "scale").unwrap_or(Texture::Constant(Vec3::ONE)),
+                    ),
+                };
                 product(&tex, &scale).unwrap_or_else(|| {
                     tell("the product of these two textures is not modelled: the first is used".to_owned());
                     tex
@@ -139,7 +146,9 @@ impl Textures {
                         Wrap::Clamp
                     }
                 };
-                let encoding = match params.string("encoding").unwrap_or("sRGB") {
+                // Version 3 has a flag in its place.
+                let default = if params.flag("gamma") == Some(false) { "linear" } else { "sRGB" };
+                let encoding = match params.string("encoding").unwrap_or(default) {
                     "linear" => Encoding::Linear,
                     "sRGB" => Encoding::Auto,
                     other => {

@@ -84,7 +84,8 @@ impl ViewOptions {
                     printable::name(kind)
                 ));
             }
-            let fov = params.number("fov").unwrap_or(90.0).clamp(1e-3, 179.0).to_radians();
+            let of_half = params.number("halffov").map(|half| 2.0 * half);
+            let fov = params.number("fov").or(of_half).unwrap_or(90.0).clamp(1e-3, 179.0).to_radians();
             // `fov` belongs to the side of the window that reaches from -1 to 1.
             camera.vfov = (2.0 * (0.5 * height * (0.5 * fov).tan()).atan()).to_degrees().clamp(1e-3, 179.0);
         }
@@ -97,21 +98,29 @@ impl ViewOptions {
         camera
     }
 
+    /// Whether the film is that of version 3, which has no exposure, and other sizes and filters where none is given.
+    fn is_of_version_3(&self) -> bool {
+        self.film.as_ref().is_some_and(|(kind, _)| kind == "image")
+    }
+
     /// Size and filter, and width over height.
     fn film(&self, tell: &mut impl FnMut(String)) -> (FilmPart, f64) {
         let none = (String::new(), Params::default());
         let (_, params) = self.film.as_ref().unwrap_or(&none);
         let size = |name: &str, default| params.count(name).filter(|size| *size > 0).unwrap_or(default);
-        let (width, height) = (size("xresolution", 1280), size("yresolution", 720));
+        let usual = if self.is_of_version_3() { [640, 480] } else { [1280, 720] };
+        let (width, height) = (size("xresolution", usual[0]), size("yresolution", usual[1]));
         if params.has("cropwindow") || params.has("pixelbounds") {
             tell("a part of the film is not modelled: the whole image is rendered".to_owned());
         }
         let (kind, filter) = self.filter.as_ref().unwrap_or(&none);
+        let radius = |default| filter.number("xradius").or(filter.number("xwidth")).unwrap_or(default);
         let (filter, radius) = match kind.as_str() {
-            "box" => (PixelFilter::Box, filter.number("xradius").unwrap_or(0.5)),
-            "triangle" => (PixelFilter::Tent, filter.number("xradius").unwrap_or(2.0)),
-            "mitchell" => (PixelFilter::Mitchell, filter.number("xradius").unwrap_or(2.0)),
-            "" | "gaussian" => (PixelFilter::Gaussian, filter.number("xradius").unwrap_or(1.5)),
+            "box" => (PixelFilter::Box, radius(0.5)),
+            "" if self.is_of_version_3() => (PixelFilter::Box, 0.5),
+            "triangle" => (PixelFilter::Tent, radius(2.0)),
+            "mitchell" => (PixelFilter::Mitchell, radius(2.0)),
+            "" | "gaussian" => (PixelFilter::Gaussian, radius(if self.is_of_version_3() { 2.0 } else { 1.5 })),
             other => {
                 tell(format!(
                     "the filter `{}` is not modelled: a Blackman–Harris filter is used",
@@ -129,6 +138,10 @@ impl ViewOptions {
     /// The sensor as an exposure. With `cie1931` luminance 1 is shown as 1 times the exposure time and ISO / 100.
     fn display(&self, tell: &mut impl FnMut(String)) -> DisplayPart {
         let Some((_, film)) = &self.film else { return DisplayPart::default() };
+        if self.is_of_version_3() {
+            let scale = film.number("scale").filter(|scale| *scale > 0.0).unwrap_or(1.0);
+            return DisplayPart { exposure: scale.log2().clamp(-64.0, 64.0) as f32, ..DisplayPart::default() };
+        }
         if let Some(sensor) = film.string("sensor").filter(|sensor| *sensor != "cie1931") {
             tell(format!("the sensor `{}` is not modelled: colours are those of `cie1931`", printable::name(sensor)));
         }
