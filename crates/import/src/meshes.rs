@@ -17,7 +17,6 @@ use firstlight_format::model_format::ModelFormat;
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
 use firstlight_mesh::{Mesh, NormalWeight, procedural, simplify};
-use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,7 +30,7 @@ fn builtin_mesh(name: &str) -> Option<(Mesh, Option<f32>)> {
         "asteroid" => (procedural::displaced_sphere(&procedural::DisplacedSphere::default()), None),
         "blob-in-bowl" => (procedural::blob_in_bowl(), sharp),
         "bored-block" => (procedural::bored_block(64), sharp),
-        "cube" => (procedural::cuboid(DVec3::ONE), sharp),
+        "cube" => (procedural::cube(), sharp),
         "icosphere" => (procedural::icosphere(32), None),
         "room" => (procedural::room(), sharp),
         "serpent-knot" => (procedural::serpent_knot(&procedural::SerpentKnot::default()), None),

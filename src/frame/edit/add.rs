@@ -47,7 +47,7 @@ impl NewThing {
     /// What can be added without a file, by its name in the window.
     pub const NAMED: [(&str, Self); 7] = [
         ("Sphere", Self::Sphere),
-        ("Plane", Self::Plane),
+        ("Ground plane", Self::Plane),
         ("Cube", Self::Cube),
         ("Area light", Self::AreaLight),
         ("Point light", Self::PointLight),
@@ -131,13 +131,15 @@ fn add_object(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity>
             )
         }
         NewThing::Plane => {
+            // It has no end: in the middle of things it would hide half of them.
+            let place = place.with_y(lowest(world).unwrap_or(place.y));
             let material = new_material(world, "ground", Material::diffuse(Vec3::splat(0.5)));
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
         }
         NewThing::Cube => {
             let material = new_material(world, "cube", Material::diffuse(Vec3::new(0.25, 0.4, 0.6)));
-            let mesh = procedural::cuboid(DVec3::ONE);
+            let mesh = procedural::cube();
             let shape = Shape::Mesh(std::sync::Arc::new(mesh));
             let placement = sized(Placement::at(place + up), 2.0 * size);
             let origin = MeshOrigin {
@@ -188,6 +190,13 @@ pub fn duplicate(world: &mut World, step: DVec3) {
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;
+}
+
+/// Height of the lowest point of all objects that have an end, metres.
+fn lowest(world: &mut World) -> Option<f64> {
+    let objects: Vec<Entity> = world.resource::<RenderState>().inputs.objects.iter().map(|it| it.entity).collect();
+    let boxes = objects.into_iter().filter_map(|entity| box_of(world, entity)).filter(|own| own.min != own.max);
+    boxes.flat_map(|own| own.corners()).map(|corner| corner.y).min_by(f64::total_cmp)
 }
 
 /// The way from the selection to a copy that does not hide it: to its right as it is seen, along an axis of the world, by

@@ -29,7 +29,14 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
         true => ": set another one at another time",
         false => "",
     };
-    let text = format!("keys at {}: {}{single}", moment(world), named(world, &channels));
+    // What the file of a model moves as well.
+    let is_of_model = current(world).is_some_and(|scene| scene.model_length().is_some());
+    let is_placed = |channel: &Channel| matches!(channel, Channel::Object(..) | Channel::Camera(_));
+    let replaced = match is_of_model && channels.iter().any(is_placed) {
+        true => "; its keys count now, and no longer what the file says of its motion",
+        false => "",
+    };
+    let text = format!("keys at {}: {}{single}{replaced}", moment(world), named(world, &channels));
     say(world, text);
     Ok(())
 }

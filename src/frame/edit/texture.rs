@@ -4,9 +4,10 @@ use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::edit::set::set_if_different;
 use crate::frame::edit::sky;
 use crate::frame::state::background::{BackgroundTasks, PicturePurpose};
-use crate::frame::state::resources::{Clock, CurrentScene};
+use crate::frame::state::resources::{Clock, CurrentScene, RenderState};
 use crate::render::{ImageTexture, TexturePattern};
-use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of};
+use crate::scene::{ColorParam, Material, Shape, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of, users_of};
+use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -112,10 +113,26 @@ fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
     }
 }
 
+/// Says which object cannot show a texture as a whole.
+fn tell_what_has_no_coordinates(world: &mut World, material: Entity) {
+    let users = users_of(world, &world.resource::<RenderState>().inputs, material);
+    let lacks = |entity: &Entity| matches!(world.get(*entity), Some(Shape::Mesh(mesh)) if mesh.uvs.is_empty());
+    let Some(object) = users.into_iter().find(lacks) else { return };
+    let name = world.get::<Name>(object).map_or("this mesh".to_owned(), |name| format!("`{name}`"));
+    let text = format!("{name} has no texture coordinates: each of its triangles shows the image; unwrap it first");
+    let now = world.resource::<Clock>().0;
+    world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
+}
+
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
     let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or("not a material")?;
+    let is_new = !matches!(material.0.color(), Some(ColorParam::Texture(_)));
+    let needs_coordinates = !matches!(texture.part, TextureSource::VertexColors { .. });
     *material.0.color_mut().ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
+    if is_new && needs_coordinates {
+        tell_what_has_no_coordinates(world, entity);
+    }
     Ok(())
 }
 

@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use winit::window::{CursorGrabMode, Fullscreen};
 
+/// Begins what is said about focus while depth of field is off.
+pub(super) const FOCUS_IS_UNSEEN: &str = "focus is set, but everything is sharp";
+
 impl App {
     /// Executes the requests of the panel.
     pub(super) fn execute(&mut self, asked: panel::Asked, now: Instant) {
@@ -117,7 +120,7 @@ impl App {
     /// Says that focus is not seen while depth of field is off.
     pub(super) fn offer_depth_of_field(&mut self, now: Instant) {
         if !self.session.status().rig.lens.enabled {
-            let text = "focus is set, but everything is sharp: depth of field is off (O)".to_owned();
+            let text = format!("{FOCUS_IS_UNSEEN}: depth of field is off (O)");
             let switch = Action::Send(Command::ToggleDepthOfField);
             self.toasts.add_offer(text, "Switch it on", switch, now);
         }

@@ -2,6 +2,7 @@
 
 use crate::frame::{Command, CurrentScene, MessageKind, Selection};
 use crate::scene::SceneSource;
+use crate::viewer::app::act::FOCUS_IS_UNSEEN;
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::keys::Action;
@@ -49,6 +50,9 @@ impl App {
             (None, None) => {}
         }
         self.loading_since = status.loading.is_some().then(|| self.loading_since.unwrap_or(now));
+        if status.rig.lens.enabled {
+            self.toasts.end(FOCUS_IS_UNSEEN);
+        }
         for text in &status.withdrawn {
             self.toasts.withdraw(text);
         }

@@ -155,7 +155,9 @@ impl Input {
     /// Whether holding this key moves: under a preset, letters fly only during a fly drag.
     fn moves(&self, motion: Motion) -> bool {
         let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
-        self.navigation == Navigation::Firstlight || !motion.flies() || flies
+        // Z undoes there.
+        let is_taken = self.navigation == Navigation::Maya && motion == Motion::RollLeft;
+        self.navigation == Navigation::Firstlight || !motion.flies() && !is_taken || flies
     }
 
     /// Strides per second.

@@ -4,7 +4,7 @@
 use crate::frame::navigation::Side;
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::build::{alt, ctrl_pad, edit, named, pad, row, send, shifted, side, text};
+use crate::viewer::keys::build::{UNDO, alt, ctrl_pad, edit, named, pad, row, send, shifted, side, text};
 use crate::viewer::keys::table::BINDINGS;
 use winit::keyboard::{KeyCode, NamedKey};
 
@@ -127,6 +127,11 @@ static MAYA: &[KeyGroup] = &[
             row!("handles: rotate", text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))),
             row!("handles: scale", text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))),
             row!("frame the selection, or the whole scene", send("a", Command::FrameAll)),
+            row!("undo", text("z", UNDO)),
+            row!(
+                "set keys",
+                shifted(Typed::Text("s"), false, Action::Send(Command::Edit(Edit::SetKeys { camera: false })))
+            ),
             ADD_TO_SELECTION,
             FOCUS,
         ],

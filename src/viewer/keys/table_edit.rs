@@ -74,7 +74,7 @@ pub const EDIT: KeyGroup = KeyGroup {
             "add it to the scene and select it (menu Add)",
             add_item("Sphere", NewThing::Sphere),
             add_item("Cube", NewThing::Cube),
-            add_item("Plane", NewThing::Plane),
+            add_item("Ground plane", NewThing::Plane),
             add_item("Area light", NewThing::AreaLight),
             add_item("Point light", NewThing::PointLight),
             add_item("Spot light", NewThing::SpotLight),

@@ -51,6 +51,10 @@ pub(super) fn material(
             MaterialPart::Diffuse { albedo: color(scope, params, "Kd", 0.5) }
         }
         "plastic" => layered(scope, params, 0.25, 1.5),
+        // Nothing but smooth reflection and transmission.
+        "uber" if params.has("Kd") && is_black(scope, params, "Kd") && !is_black(scope, params, "Kt") => {
+            dielectric(scope, params, index_name(params), absorption, &SMOOTH)
+        }
         "uber" => uber(scope, params),
         "substrate" => substrate(scope, params),
         "metal" => {
@@ -68,8 +72,8 @@ pub(super) fn material(
             }
             // Without any roughness the surface is smooth, which the fit is not.
             let is_smooth = ["roughness", "uroughness", "vroughness"].iter().all(|name| is_black(scope, params, name));
-            let widths = if is_smooth { Widths { default: 0.0, of_roughness: |_| 0.0 } } else { widths(0.0) };
-            dielectric(scope, params, index_name(params), absorption, &widths)
+            let widths = if is_smooth { &SMOOTH } else { &widths(0.0) };
+            dielectric(scope, params, index_name(params), absorption, widths)
         }
         "translucent" => {
             let base = scope.color(params, "Kd").unwrap_or(Texture::Constant(Vec3::splat(0.25)));
@@ -92,6 +96,9 @@ pub(super) fn material(
         _ => return None,
     })
 }
+
+/// Whatever the roughness is.
+const SMOOTH: Widths = Widths { default: 0.0, of_roughness: |_| 0.0 };
 
 /// The parameter with the index of refraction.
 fn index_name(params: &Params) -> &'static str {
@@ -261,6 +268,8 @@ mod tests {
         let MaterialPart::Principled { opacity: ScalarValue::Number(opacity), clearcoat, .. } = uber else { panic!() };
         assert!((opacity - 0.3).abs() < 1e-6 && clearcoat == 0.5.into());
         assert!(matches!(shown("Material \"glass\" \"float index\" [1.33]"), MaterialPart::Glass { ior: 1.33, .. }));
+        let pane = "Material \"uber\" \"color Kd\" [0 0 0] \"color Kt\" [1 1 1]";
+        assert!(matches!(shown(pane), MaterialPart::Glass { ior: 1.5, .. }));
         let frosted = shown("Material \"glass\" \"float uroughness\" [0.1] \"float vroughness\" [0.1]");
         let MaterialPart::RoughGlass { alpha: ScalarValue::Number(alpha), ior, .. } = frosted else { panic!() };
         assert!((alpha - 0.4618).abs() < 1e-3 && ior == 1.5);

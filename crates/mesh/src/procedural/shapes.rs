@@ -16,6 +16,29 @@ pub fn cuboid(size: DVec3) -> Mesh {
     built(&(0..8).map(corner).collect::<Vec<_>>(), triangles)
 }
 
+/// A cube of 1 m about the origin. Texture coordinates run 0..1 over each side, upright on those around the y axis;
+/// vertices are duplicated along the edges.
+pub fn cube() -> Mesh {
+    let sides = [
+        (DVec3::X, DVec3::Y),
+        (DVec3::NEG_X, DVec3::Y),
+        (DVec3::Z, DVec3::Y),
+        (DVec3::NEG_Z, DVec3::Y),
+        (DVec3::Y, DVec3::NEG_Z),
+        (DVec3::NEG_Y, DVec3::Z),
+    ];
+    let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for (normal, up) in sides {
+        let (right, first) = (up.cross(normal), positions.len() as u32);
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+            positions.push(0.5 * normal + (u - 0.5) * right + (v - 0.5) * up);
+            uvs.push(Vec2::new(u as f32, v as f32));
+        }
+        triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    Mesh { uvs, ..built(&positions, triangles) }
+}
+
 /// A torus about the y axis of `nu` segments around the axis and `nv` around the tube, each at least 3.
 ///
 /// Texture coordinates run 0..1 around both; vertices are duplicated at the seams.
