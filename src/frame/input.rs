@@ -18,6 +18,7 @@ use crate::frame::state::resources::{
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
+use crate::frame::walls::within_walls;
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
@@ -99,7 +100,11 @@ impl CommandParams<'_, '_> {
             if steered.lens.focus_distance != rig.lens.focus_distance {
                 self.focus.set_if_neq(Focus::default());
             }
-            self.set_rig(steered);
+            let is_from_side = matches!(command, Command::ViewFrom(_) | Command::ViewFromBehind);
+            self.set_rig(match &self.shown.extraction {
+                Some(scene) if is_from_side => Rig { view: within_walls(scene, &rig.view, steered.view), ..steered },
+                _ => steered,
+            });
             return;
         }
         match command {

@@ -38,6 +38,7 @@ pub(crate) mod state;
 mod steer;
 mod systems;
 mod views;
+mod walls;
 mod watch;
 pub(crate) mod worker;
 

@@ -248,11 +248,12 @@ impl Program<'_> {
     /// Drags with a button from here by so many pixels, in steps as a hand does.
     pub fn drag(&self, button: u32, from: (i32, i32), by: (i32, i32)) {
         self.xdotool(&format!("mousemove --window {} {} {} mousedown {button}", self.window, from.0, from.1));
-        // What is under the pointer is known to the next frame.
-        std::thread::sleep(Duration::from_millis(50));
+        // What is under the pointer is known to the next frame, which may take long beside other tests.
+        std::thread::sleep(Duration::from_millis(200));
         for step in 1..=5 {
             let (x, y) = (from.0 + by.0 * step / 5, from.1 + by.1 * step / 5);
             self.xdotool(&format!("mousemove --window {} {x} {y}", self.window));
+            std::thread::sleep(Duration::from_millis(30));
         }
         self.xdotool(&format!("mouseup {button}"));
     }

@@ -10,8 +10,8 @@ use firstlight::frame::{
 use firstlight::render::{Environment, Inspection, Integrator, MaterialKind};
 use firstlight::scene::animation::LightProperty;
 use firstlight::scene::{
-    ColorParam, DirectionalLight, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight,
-    Rgb, SceneInputs, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
+    ColorParam, DirectionalLight, Inventory, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
+    PointLight, Rgb, SceneInputs, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
 
@@ -505,6 +505,27 @@ fn focus_follows_a_place_of_the_picture_wherever_the_camera_goes() {
 }
 
 #[test]
+fn a_new_plane_lies_below_everything_and_what_emits_is_a_light() {
+    let mut driver = Driver::builtin("gallery");
+    driver.select("gold ball");
+    driver.edit([Edit::Move { by: DVec3::new(0.0, -3.0, 0.0) }]);
+    let (Shape::Sphere { radius }, place) = (driver.get("gold ball"), driver.get::<Placement>("gold ball")) else {
+        panic!()
+    };
+    driver.edit([Edit::Add(NewThing::Plane)]);
+    let plane = driver.selected().active().unwrap();
+    let height = driver.session.world().get::<Placement>(plane).unwrap().translation.y;
+    assert!((height - (place.translation.y - radius)).abs() < 1e-6, "{height}");
+    let id = driver.named("red").to_bits();
+    let n_lights = |driver: &Driver| Inventory::of(driver.session.world(), driver.session.inputs()).lights.len();
+    let before = n_lights(&driver);
+    driver.edit([Edit::SetKind { id, kind: MaterialKind::Principled }]);
+    assert_eq!(n_lights(&driver), before);
+    driver.edit([Edit::Set { id, property: of_material("emission"), value: DVec3::ONE }]);
+    assert!(n_lights(&driver) > before);
+}
+
+#[test]
 fn colours_become_textures_and_textures_change() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("stripes.png");
@@ -544,7 +565,22 @@ fn colours_become_textures_and_textures_change() {
     assert!(text.contains("\"stripes.png\""), "{text}");
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
-    // What cannot be read is told, and changes nothing.
+    // A mesh without texture coordinates shows no image, which is told; the cube has some.
+    let told = |driver: &Driver| {
+        let messages = driver.session.status().messages.iter();
+        messages.filter(|message| message.text.contains("no texture coordinates")).count()
+    };
+    for (name, expected) in [("cube", 0), ("icosphere", 1)] {
+        driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Builtin(name.to_owned())))]);
+        driver.run_until(|session| {
+            session.is_idle() && session.inputs().objects.iter().any(|object| object.name.as_deref() == Some(name))
+        });
+        let slots: MaterialSlots = driver.get(name);
+        driver.edit([Edit::Paint { id: slots.0[0].to_bits(), part: checker(8.0) }]);
+        driver.edit([Edit::Paint { id: slots.0[0].to_bits(), part: checker(4.0) }]);
+        assert_eq!(told(&driver), expected, "{name}, once");
+        driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+    }
     // It can light the scene from all around, too.
     let light = |driver: &mut Driver| SceneInputs::of(driver.session.world_mut()).environment;
     let before = light(&mut driver);
@@ -554,6 +590,7 @@ fn colours_become_textures_and_textures_change() {
     assert_eq!((image.width, image.height), (4, 4));
     driver.edit([Edit::Undo]);
     assert_eq!(light(&mut driver), before);
+    // What cannot be read is told, and changes nothing.
     let missing = TextureSource::image("nowhere.png".to_owned());
     driver.edit([Edit::Paint { id, part: missing }]);
     driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));

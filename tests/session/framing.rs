@@ -1,9 +1,11 @@
 //! Models and selections are framed for the part of the image that nothing covers.
 
 use crate::driver::{Drive, Driver};
+use firstlight::frame::navigation::Side;
 use firstlight::frame::{Command, Projector, SessionOptions, Target};
-use firstlight::scene::SceneSource;
+use firstlight::scene::{SceneSource, View};
 use glam::{DVec2, DVec3};
+use std::path::{Path, PathBuf};
 
 /// The leftmost and the rightmost place of a wide bar, as fractions of the width of the image.
 fn seen(driver: &Driver) -> (f64, f64) {
@@ -13,13 +15,16 @@ fn seen(driver: &Driver) -> (f64, f64) {
     places.fold((1.0, 0.0), |(left, right), x| (x.min(left), x.max(right)))
 }
 
-#[test]
-fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("bar.obj");
+/// A bar of 8 m × 1 m × 1 m, closed on all sides.
+fn bar(folder: &Path) -> PathBuf {
+    let path = folder.join("bar.obj");
     let corners = ["0 0 0", "8 0 0", "8 1 0", "0 1 0", "0 0 1", "8 0 1", "8 1 1", "0 1 1"].map(|v| format!("v {v}\n"));
     std::fs::write(&path, corners.concat() + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n")
         .unwrap();
+    path
+}
+
+fn opened(path: &Path) -> Driver {
     let options = SessionOptions {
         width: 64,
         height: 32,
@@ -27,8 +32,16 @@ fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
         target: Target { spp: Some(1), ..Target::default() },
         ..SessionOptions::default()
     };
-    let mut driver = Driver::new(options, SceneSource::Model(path.clone()));
+    let mut driver = Driver::new(options, SceneSource::Model(path.to_owned()));
     driver.settle();
+    driver
+}
+
+#[test]
+fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = bar(folder.path());
+    let mut driver = opened(&path);
     let (left, right) = seen(&driver);
     assert!(left > 0.0 && left < 0.15 && right > 0.85 && right < 1.0, "all of the image: {left} to {right}");
     let is_between = |driver: &Driver, from: f64, to: f64| {
@@ -47,5 +60,35 @@ fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
     // Nothing else is a share.
     for share in [0.0, -1.0, 1.5, f64::NAN] {
         assert!(Command::SetFreeShare { share }.check().is_err());
+    }
+}
+
+#[test]
+fn a_view_from_a_side_stays_in_the_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = opened(&bar(folder.path()));
+    let mut view_from = |eye: DVec3, pivot: DVec3, side: Side| {
+        driver.session.send(Command::SetView(View::look_at(eye, pivot, DVec3::Y).unwrap()));
+        driver.session.send(Command::ViewFrom(side));
+        driver.frame();
+        let view = driver.session.status().rig.view;
+        assert!((view.pivot() - pivot).length() < 1e-9);
+        view.eye
+    };
+    let (inside, pivot) = (DVec3::new(1.0, 0.5, 0.5), DVec3::new(6.0, 0.5, 0.5));
+    for (side, expected) in [
+        (Side::Top, pivot + 0.475 * DVec3::Y),
+        (Side::Bottom, pivot - 0.475 * DVec3::Y),
+        (Side::Right, pivot + 1.9 * DVec3::X),
+        (Side::Left, pivot - 5.0 * DVec3::X),
+    ] {
+        let eye = view_from(inside, pivot, side);
+        assert!((eye - expected).length() < 1e-6, "{side:?}: {eye}");
+    }
+    // From outside, the walls are what one looks at.
+    let outside = DVec3::new(4.0, 0.5, 20.0);
+    for (side, expected) in [(Side::Top, DVec3::Y), (Side::Right, DVec3::X), (Side::Back, -DVec3::Z)] {
+        let eye = view_from(outside, DVec3::new(4.0, 0.5, 0.5), side);
+        assert!((eye - DVec3::new(4.0, 0.5, 0.5) - 19.5 * expected).length() < 1e-6, "{side:?}: {eye}");
     }
 }

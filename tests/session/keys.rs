@@ -273,6 +273,10 @@ fn keys_take_the_place_of_what_a_model_does() {
     driver.go_to(1.0);
     driver.edit([Edit::Move { by: 3.0 * DVec3::Y }, KEY]);
     assert!(!driver.session.needs_keys(), "{}", driver.said(MessageKind::Warning));
+    let told = |driver: &Driver| driver.said(MessageKind::Note).matches("no longer as its file says").count();
+    assert_eq!(told(&driver), 1);
+    driver.edit([Edit::Move { by: DVec3::Y }, KEY, Edit::Undo, Edit::Undo]);
+    assert_eq!(told(&driver), 1, "of the first key alone");
     assert_eq!(driver.tracks(), [("translate", vec![0.0, 1.0], Interpolation::Linear)]);
     driver.go_to(0.5);
     let half = DVec3::new(0.25, 1.5, 0.0);

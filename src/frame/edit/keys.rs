@@ -24,19 +24,15 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     let (before, written) = before(world);
     let selected = world.resource::<Selection>().0.clone();
     let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
+    let earlier = world.get_resource::<Animation>().cloned();
     let channels = checked(world, |world| set_keys(world, &before, written.as_ref(), of))?;
     let single = match is_single(world, &channels) {
         true => ": set another one at another time",
         false => "",
     };
-    // What the file of a model moves as well.
-    let is_of_model = current(world).is_some_and(|scene| scene.model_length().is_some());
-    let is_placed = |channel: &Channel| matches!(channel, Channel::Object(..) | Channel::Camera(_));
-    let replaced = match is_of_model && channels.iter().any(is_placed) {
-        true => "; its keys count now, and no longer what the file says of its motion",
-        false => "",
-    };
-    let text = format!("keys at {}: {}{single}{replaced}", moment(world), named(world, &channels));
+    let is_held = earlier.is_some_and(|earlier| channels.iter().any(|channel| earlier.follows_model(*channel)));
+    let held = if is_held { "; it moves by its keys from now on, no longer as its file says" } else { "" };
+    let text = format!("keys at {}: {}{single}{held}", moment(world), named(world, &channels));
     say(world, text);
     Ok(())
 }

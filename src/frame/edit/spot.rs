@@ -6,8 +6,7 @@
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
 use crate::frame::state::resources::{PictureSize, RenderState};
-use crate::frame::state::selection::{Selection, box_of, pick};
-use crate::geometry::Ray;
+use crate::frame::state::selection::{Selection, box_of, distance, pick};
 use crate::scene::{Extraction, Shape, View};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DVec3};
@@ -183,10 +182,4 @@ fn directions() -> impl Iterator<Item = DVec3> {
         let across = (1.0 - y * y).sqrt();
         DVec3::new(cos * across, y, sin * across)
     })
-}
-
-/// Returns the distance in metres from a world position along a unit direction to the closest hit.
-fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64> {
-    let ray = Ray::new((from - scene.origin).as_vec3(), direction.as_vec3());
-    scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
 }

@@ -80,6 +80,12 @@ fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Opti
     (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, point, depth })
 }
 
+/// Returns the distance in metres from a world position along a unit direction to the closest hit.
+pub fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64> {
+    let ray = Ray::new((from - scene.origin).as_vec3(), direction.as_vec3());
+    scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
+}
+
 fn middle_ray(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Ray> {
     // A film of height 1.
     let size = Vec2::new(aspect as f32, 1.0);

@@ -126,6 +126,19 @@ impl Animation {
         !self.tracks.is_empty() || self.model.is_some()
     }
 
+    /// Whether what a channel moves moves as a glTF file says, without a track of its own.
+    pub fn follows_model(&self, channel: Channel) -> bool {
+        let Some(model) = &self.model else { return false };
+        match channel {
+            Channel::Camera(_) => model.moves_camera() && !self.has_camera_track(),
+            Channel::Object(entity, _) | Channel::Light(entity, _) => {
+                let has_track = self.tracks.iter().any(|track| track.channel.entity() == Some(entity));
+                !has_track && model.moved().any(|moved| moved == entity)
+            }
+            Channel::Material(..) => false,
+        }
+    }
+
     /// Whether it moves as a glTF file says.
     pub fn has_model(&self) -> bool {
         self.model.is_some()

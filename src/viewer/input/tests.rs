@@ -365,3 +365,18 @@ fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
         assert!(input.is_moving());
     }
 }
+
+#[test]
+fn with_the_keys_of_maya_z_undoes_and_s_sets_keys() {
+    use crate::frame::Edit;
+    let typed = |navigation, code, letter: &str| {
+        let (mut input, start) = input();
+        input.set_navigation(navigation, start);
+        let key = Key::Character(letter.into());
+        (input.key(PhysicalKey::Code(code), &key, true, false, start), input.is_moving())
+    };
+    let edit = |edit| Some(Action::Send(Command::Edit(edit)));
+    assert_eq!(typed(Navigation::Maya, KeyCode::KeyZ, "z"), (edit(Edit::Undo), false));
+    assert_eq!(typed(Navigation::Maya, KeyCode::KeyS, "s"), (edit(Edit::SetKeys { camera: false }), false));
+    assert_eq!(typed(Navigation::Firstlight, KeyCode::KeyZ, "z"), (None, true), "it rolls");
+}

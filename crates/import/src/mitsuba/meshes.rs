@@ -11,7 +11,7 @@ use crate::ply::load_ply_colored;
 use crate::ply::vertices::ColourSource;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::model_format::ModelFormat;
-use firstlight_mesh::{Mesh, NormalWeight};
+use firstlight_mesh::{Mesh, NormalWeight, procedural};
 use glam::DVec3;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -135,30 +135,18 @@ fn is_mirrored(mesh: &Mesh) -> bool {
     mesh.triangles.iter().any(|&[a, b, c]| (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)) < 0.0)
 }
 
-/// From −1 to 1 along each axis; every side has the whole texture.
+/// From −1 to 1 along each axis.
 fn cube() -> Mesh {
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-    // Normal, and the directions of u and v.
-    let sides = [
+    let mut mesh = procedural::cube_of(&[
         (DVec3::NEG_Y, DVec3::Z, DVec3::X),
         (DVec3::Y, DVec3::NEG_X, DVec3::NEG_Z),
         (DVec3::X, DVec3::Y, DVec3::NEG_Z),
         (DVec3::Z, DVec3::Y, DVec3::X),
         (DVec3::NEG_X, DVec3::Y, DVec3::Z),
         (DVec3::NEG_Z, DVec3::NEG_Y, DVec3::X),
-    ];
-    for (normal, u, v) in sides {
-        let first = vertices.len() as u32;
-        // Counter-clockwise seen from outside, whatever the handedness of the texture.
-        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        vertices.extend(corners.map(|[a, b]| (normal + (2.0 * a - 1.0) * u + (2.0 * b - 1.0) * v, normal, [a, b])));
-        let is_right = u.cross(v).dot(normal) > 0.0;
-        for triangle in [[0, 1, 2], [0, 2, 3]] {
-            let [a, b, c] = triangle.map(|corner| first + corner);
-            triangles.push(if is_right { [a, b, c] } else { [a, c, b] });
-        }
-    }
-    made_mesh(&vertices, triangles)
+    ]);
+    mesh.positions.iter_mut().for_each(|position| *position *= 2.0);
+    mesh
 }
 
 /// From −1 to 1 in the plane z = 0, facing +Z.

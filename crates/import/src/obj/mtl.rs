@@ -142,7 +142,7 @@ pub(crate) fn load_library(
         material.beside.extend(named);
     }
     let is_unseen = |it: &ImportedMaterial| it.opacity == Some(0.0) && it.opacity_texture.is_none();
-    // Some are meant, as for what only stops a ball; but nobody stores a model that cannot be seen.
+    // Some are meant, as those of shapes for collisions; but nobody stores a model that cannot be seen.
     if !materials.is_empty() && materials.iter().all(is_unseen) {
         warn("every material has `d 0`, so nothing would be seen: they are shown opaque".to_owned());
         materials.iter_mut().for_each(|material| material.opacity = None);

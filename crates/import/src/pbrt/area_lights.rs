@@ -1,10 +1,9 @@
 //! Shapes that emit.
 
 use crate::pbrt::build::{Builder, Geometry};
-use crate::pbrt::lights::color;
+use crate::pbrt::lights::{color, factor};
 use crate::pbrt::params::Params;
 use crate::pbrt::state::{AreaLight, State};
-use crate::pbrt::version3::factor;
 use firstlight_files::printable;
 use firstlight_format::sources::{MeshSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb};

@@ -1,9 +1,8 @@
 //! The lights of pbrt that are no shapes.
 
 use crate::model::projection::{LightImage, projection, stretched};
-use crate::pbrt::params::Params;
-use crate::pbrt::spectrum::{UnknownSpectrum, peak_luminance};
-use crate::pbrt::version3::factor;
+use crate::pbrt::params::{Param, Params, Values};
+use crate::pbrt::spectrum::{Spectrum, UnknownSpectrum, peak_luminance};
 use firstlight_files::printable;
 use firstlight_format::parts::{LightPart, TransformPart};
 use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource, TextureSource};
@@ -26,15 +25,30 @@ pub(crate) enum Light {
 pub(crate) fn color(params: &Params, name: &str, tell: &mut impl FnMut(String)) -> DVec3 {
     let color = params.spectrum(name).map_or(Ok(DVec3::ONE), |spectrum| spectrum.light());
     // Version 3: a temperature, and the factor of a spectrum whose peak is 1.
-    let factor = match (params.find(name).map(|param| &*param.kind), params.numbers_of(name)) {
-        (Some("blackbody"), [kelvins, factor]) => factor * peak_luminance(*kelvins),
+    let strength = match params.find(name) {
+        Some(Param { kind, values: Values::Numbers(numbers), .. }) if kind == "blackbody" => match numbers[..] {
+            [kelvins, factor] => factor * peak_luminance(kelvins),
+            _ => 1.0,
+        },
         _ => 1.0,
     };
-    let color = color.map(|color| factor * color);
-    color.unwrap_or_else(|UnknownSpectrum(name)| {
-        tell(format!("the spectrum `{}` is not known: white light is used", printable::name(&name)));
-        DVec3::ONE
-    })
+    strength
+        * color.unwrap_or_else(|UnknownSpectrum(name)| {
+            tell(format!("the spectrum `{}` is not known: white light is used", printable::name(&name)));
+            DVec3::ONE
+        })
+}
+
+/// A factor of a light, which version 3 has as a colour.
+pub(super) fn factor(params: &Params, name: &str) -> DVec3 {
+    match params.find(name).map(|param| param.kind.as_str()) {
+        None | Some("float") => DVec3::splat(params.number(name).unwrap_or(1.0)),
+        Some(_) => match params.spectrum(name) {
+            Some(Spectrum::Rgb(rgb)) => rgb,
+            Some(other) => other.light().unwrap_or(DVec3::ONE),
+            None => DVec3::ONE,
+        },
+    }
 }
 
 fn rgb(color: DVec3) -> Rgb {

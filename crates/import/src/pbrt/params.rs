@@ -156,14 +156,6 @@ impl Params {
         }
     }
 
-    /// The numbers of a parameter of any kind, without a complaint.
-    pub(crate) fn numbers_of(&self, name: &str) -> &[f64] {
-        match self.find(name).map(|param| &param.values) {
-            Some(Values::Numbers(numbers)) => numbers,
-            _ => &[],
-        }
-    }
-
     fn exactly<const N: usize>(&self, name: &str, expected: &str) -> Option<[f64; N]> {
         let param = self.find(name)?;
         // Names of textures and spectra are read by others.

@@ -17,11 +17,10 @@ use crate::pbrt::material_inputs::{
     Conductor, MaterialScope, Widths, alpha, color, conductor, dielectric, of_conductor, principled, roughness,
 };
 use crate::pbrt::params::Params;
-use crate::pbrt::spectrum::Spectrum;
 use crate::pbrt::textures::{Texture, product};
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::value::{ColorValue, ScalarValue};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// The width α of GGX for a roughness: a fit that version 4 has no more.
 fn width(roughness: f32) -> f32 {
@@ -179,6 +178,9 @@ fn disney(scope: &mut impl MaterialScope, params: &Params) -> MaterialPart {
         let value = scope.number(params, name).unwrap_or(Texture::Constant(Vec3::splat(default)));
         scope.scalar_value(value)
     };
+    let thin_walled = params.flag("thin").unwrap_or(false);
+    // Twice the share that passes a sheet, as ours is.
+    let passes = if thin_walled { params.number("difftrans").unwrap_or(1.0) as f32 } else { 0.0 };
     MaterialPart::Disney {
         base_color,
         metallic: share("metallic", 0.0),
@@ -187,27 +189,13 @@ fn disney(scope: &mut impl MaterialScope, params: &Params) -> MaterialPart {
         ior: params.number("eta").map_or(1.5, |ior| (ior as f32).clamp(1.0, 1e3)),
         specular_tint: share("speculartint", 0.0),
         transmission: share("spectrans", 0.0),
-        thin_walled: params.flag("thin").unwrap_or(false),
-        diffuse_transmission: ScalarValue::Number(
-            params.number("difftrans").map_or(0.0, |share| share as f32).clamp(0.0, 2.0),
-        ),
+        thin_walled,
+        diffuse_transmission: ScalarValue::Number(passes.clamp(0.0, 2.0)),
         flatness: share("flatness", 0.0),
         sheen: share("sheen", 0.0),
         sheen_tint: share("sheentint", 0.5),
         clearcoat: share("clearcoat", 0.0),
         clearcoat_gloss: share("clearcoatgloss", 1.0),
-    }
-}
-
-/// A factor of a light, which version 3 has as a colour.
-pub(super) fn factor(params: &Params, name: &str) -> DVec3 {
-    match params.find(name).map(|param| param.kind.as_str()) {
-        None | Some("float") => DVec3::splat(params.number(name).unwrap_or(1.0)),
-        Some(_) => match params.spectrum(name) {
-            Some(Spectrum::Rgb(rgb)) => rgb,
-            Some(other) => other.light().unwrap_or(DVec3::ONE),
-            None => DVec3::ONE,
-        },
     }
 }
 
@@ -220,7 +208,7 @@ mod tests {
     use firstlight_format::sources::{EnvironmentLayout, EnvironmentSource};
     use firstlight_format::value::Rgb;
     use firstlight_render::PixelFilter;
-    use glam::DMat3;
+    use glam::{DMat3, DVec3};
 
     /// The first object of a scene of version 3, which has this before it.
     fn surface(before: &str) -> (MaterialPart, Vec<String>) {
@@ -242,7 +230,7 @@ mod tests {
         let scene = read_text(&format!("{before}WorldBegin\n{SQUARE}WorldEnd\nCamera of another frame"));
         assert_eq!(told(&scene), Vec::<String>::new());
         let (film, file) = (&scene.file.film, &scene.file);
-        assert_eq!((film.width, film.height, film.filter), (640, 480, PixelFilter::Box));
+        assert_eq!((film.width, film.height, film.filter), (1280, 720, PixelFilter::Box));
         assert_eq!((file.display.exposure, file.max_depth), (1.0, Some(10)), "no shutter");
         assert!((file.camera.vfov - 40.0).abs() < 1e-12);
         let filtered =
@@ -258,7 +246,7 @@ mod tests {
         let plastic = shown("Material \"plastic\" \"rgb Kd\" [0.4 0.4 0.4] \"rgb Ks\" [0.1 0.1 0.1]");
         let MaterialPart::Principled { base_color, specular, roughness, ior, .. } = plastic else { panic!() };
         assert_eq!((base_color, specular, ior), (grey(0.4), 0.1.into(), 1.5));
-        // The widths that pbrt 3 prints for 0.1 and 0.01.
+        // The fit at 0.1 and 0.01, by hand.
         let ScalarValue::Number(roughness) = roughness else { panic!() };
         assert!((roughness * roughness - 0.4618).abs() < 1e-3 && (width(0.01) - 0.1389).abs() < 1e-3, "{roughness}");
         let substrate = shown("Material \"substrate\" \"rgb Ks\" [0.04 0.04 0.04]");
@@ -286,6 +274,8 @@ mod tests {
         assert_eq!((reflectance, transmittance), (grey(0.2), grey(0.4)));
         let disney = shown("Material \"disney\" \"color color\" [0.5 0.4 0.3] \"float metallic\" [0.7]");
         assert!(matches!(disney, MaterialPart::Disney { metallic: ScalarValue::Number(0.7), thin_walled: false, .. }));
+        let thin = shown("Material \"disney\" \"bool thin\" \"true\"");
+        assert!(matches!(thin, MaterialPart::Disney { diffuse_transmission: ScalarValue::Number(1.0), .. }));
         assert!(surface("Material \"matte\" \"float sigma\" [20]").1[0].contains("Lambertian"));
         assert!(surface("Material \"kdsubsurface\"").1[0].contains("subsurface"));
     }

@@ -98,7 +98,7 @@ impl ViewOptions {
         camera
     }
 
-    /// Whether the film is that of version 3, which has no exposure, and other sizes and filters where none is given.
+    /// Whether the film is that of version 3, which has no exposure, and another filter where none is given.
     fn is_of_version_3(&self) -> bool {
         self.film.as_ref().is_some_and(|(kind, _)| kind == "image")
     }
@@ -108,8 +108,7 @@ impl ViewOptions {
         let none = (String::new(), Params::default());
         let (_, params) = self.film.as_ref().unwrap_or(&none);
         let size = |name: &str, default| params.count(name).filter(|size| *size > 0).unwrap_or(default);
-        let usual = if self.is_of_version_3() { [640, 480] } else { [1280, 720] };
-        let (width, height) = (size("xresolution", usual[0]), size("yresolution", usual[1]));
+        let (width, height) = (size("xresolution", 1280), size("yresolution", 720));
         if params.has("cropwindow") || params.has("pixelbounds") {
             tell("a part of the film is not modelled: the whole image is rendered".to_owned());
         }

@@ -9,7 +9,7 @@ use crate::model::mesh_budget::MeshBudget;
 use crate::model::placing::made_mesh;
 use crate::obj::load_obj_with;
 use firstlight_files::input_file::{FileKind, InputFile};
-use firstlight_mesh::{Mesh, NormalWeight};
+use firstlight_mesh::{Mesh, NormalWeight, procedural};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -156,16 +156,11 @@ fn quad() -> Mesh {
 
 /// Texture coordinates are those of the two axes that follow the axis of the side.
 fn cube() -> Mesh {
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-    for (axis, sign) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)] {
-        let first = vertices.len() as u32;
+    let side = |axis: usize, sign: f64| {
         let [normal, u, v] = [0, 1, 2].map(|i| DVec3::AXES[(axis + i) % 3]);
-        let at = |[a, b]: [f64; 2]| 0.5 * sign * normal + (a - 0.5) * u + (b - 0.5) * v;
-        vertices.extend(CORNERS.map(|corner| (at(corner), sign * normal, corner)));
-        let of_side = if sign > 0.0 { [[0, 1, 2], [0, 2, 3]] } else { [[0, 2, 1], [0, 3, 2]] };
-        triangles.extend(of_side.map(|triangle| triangle.map(|corner| first + corner)));
-    }
-    made_mesh(&vertices, triangles)
+        (sign * normal, u, v)
+    };
+    procedural::cube_of(&[side(0, -1.0), side(0, 1.0), side(1, -1.0), side(1, 1.0), side(2, -1.0), side(2, 1.0)])
 }
 
 /// A profile of radius and height, turned about Y; its edges stay hard.

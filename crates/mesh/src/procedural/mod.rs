@@ -12,7 +12,7 @@ mod terrain;
 
 pub use bench::{blob_in_bowl, room, slivers};
 pub use serpent::{SerpentKnot, serpent_knot};
-pub use shapes::{bored_block, cube, cuboid, torus};
+pub use shapes::{bored_block, cube, cube_of, cuboid, torus};
 pub use spheres::{DisplacedSphere, displaced_sphere, icosphere};
 pub use terrain::{Terrain, terrain};
 

@@ -16,27 +16,42 @@ pub fn cuboid(size: DVec3) -> Mesh {
     built(&(0..8).map(corner).collect::<Vec<_>>(), triangles)
 }
 
-/// A cube of 1 m about the origin. Texture coordinates run 0..1 over each side, upright on those around the y axis;
-/// vertices are duplicated along the edges.
+/// A cube of 1 m about the origin, with the whole texture on each side, upright on those around the y axis.
 pub fn cube() -> Mesh {
     let sides = [
-        (DVec3::X, DVec3::Y),
-        (DVec3::NEG_X, DVec3::Y),
-        (DVec3::Z, DVec3::Y),
-        (DVec3::NEG_Z, DVec3::Y),
-        (DVec3::Y, DVec3::NEG_Z),
-        (DVec3::NEG_Y, DVec3::Z),
+        (DVec3::X, DVec3::NEG_Z, DVec3::Y),
+        (DVec3::NEG_X, DVec3::Z, DVec3::Y),
+        (DVec3::Z, DVec3::X, DVec3::Y),
+        (DVec3::NEG_Z, DVec3::NEG_X, DVec3::Y),
+        (DVec3::Y, DVec3::X, DVec3::NEG_Z),
+        (DVec3::NEG_Y, DVec3::X, DVec3::Z),
     ];
-    let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
-    for (normal, up) in sides {
-        let (right, first) = (up.cross(normal), positions.len() as u32);
-        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
-            positions.push(0.5 * normal + (u - 0.5) * right + (v - 0.5) * up);
+    Mesh { normals: Vec::new(), ..cube_of(&sides) }
+}
+
+/// A cube of 1 m about the origin, with the whole texture on each side; vertices are duplicated along the edges.
+///
+/// - `sides`: the normal of each, outwards, and the directions in which u and v grow.
+pub fn cube_of(sides: &[(DVec3, DVec3, DVec3); 6]) -> Mesh {
+    let (mut positions, mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for &(normal, along_u, along_v) in sides {
+        let first = positions.len() as u32;
+        for [u, v] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            positions.push(0.5 * normal + (u - 0.5) * along_u + (v - 0.5) * along_v);
+            normals.push(normal.as_vec3());
             uvs.push(Vec2::new(u as f32, v as f32));
         }
-        triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        // Counter-clockwise seen from outside, whatever the handedness of the texture.
+        let is_right = along_u.cross(along_v).dot(normal) > 0.0;
+        for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+            triangles.push(if is_right {
+                [first + a, first + b, first + c]
+            } else {
+                [first + a, first + c, first + b]
+            });
+        }
     }
-    Mesh { uvs, ..built(&positions, triangles) }
+    Mesh { normals, uvs, ..built(&positions, triangles) }
 }
 
 /// A torus about the y axis of `nu` segments around the axis and `nv` around the tube, each at least 3.
@@ -113,6 +128,7 @@ mod tests {
     fn shapes_are_closed_and_have_the_volumes_of_the_formulas() {
         let cases = [
             ("cuboid", cuboid(dvec3(1.0, 2.0, 3.0)), 6.0, 1e-6, 0),
+            ("cube", cube(), 1.0, 1e-6, 0),
             ("torus", torus(2.0, 0.5, 300, 100), 2.0 * PI * PI * 2.0 * 0.25, 2e-3, 1),
             ("bored block", bored_block(256), 4.0 - PI / 4.0, 1e-3, 1),
         ];
@@ -122,6 +138,20 @@ mod tests {
             assert_eq!((topology.genus(), topology.degenerate_triangles), (genus, 0), "{name}");
             let relative = mesh.signed_volume() / volume - 1.0;
             assert!(relative.abs() < tolerance, "{name}: {} against {volume}", mesh.signed_volume());
+        }
+    }
+
+    #[test]
+    fn an_image_lies_upright_and_not_mirrored_on_each_side_of_a_cube() {
+        let cube = cube();
+        for corners in &cube.triangles {
+            let [a, b, c] = corners.map(|vertex| cube.positions[vertex as usize]);
+            let uv = corners.map(|vertex| cube.uvs[vertex as usize]);
+            assert_eq!((uv[1] - uv[0]).perp_dot(uv[2] - uv[0]), 1.0, "half of the image, as seen from outside");
+            let is_around = (b - a).cross(c - a).y == 0.0;
+            for (corner, uv) in [a, b, c].into_iter().zip(uv).filter(|_| is_around) {
+                assert_eq!(uv.y, corner.y + 0.5);
+            }
         }
     }
 }
