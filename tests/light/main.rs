@@ -19,6 +19,7 @@ mod light_transport;
 mod materials;
 mod motion_blur;
 mod orthographic;
+mod panes;
 mod phong;
 mod portals;
 mod principled;

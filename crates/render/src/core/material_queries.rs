@@ -136,6 +136,19 @@ impl Material {
         (!is_whole || !has_back).then_some(Cutout { opacity, cutoff, has_back })
     }
 
+    /// Whether light can go straight on through it, or through a part of it, as through a pane without thickness.
+    pub(crate) fn is_pane(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::ThinGlass { .. } => true,
+            Self::Principled { transmission, roughness, thin_walled: true, .. } => {
+                let is_rough = matches!(roughness, ScalarInput::Constant(r) if r * r >= SMALLEST_ALPHA);
+                can_be_above_zero(transmission) && !is_rough
+            }
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].is_pane(materials)),
+            _ => false,
+        }
+    }
+
     /// Whether it scatters transmitted light, so that light is sampled on both sides.
     pub(crate) fn scatters_through(&self) -> bool {
         match self {

@@ -34,7 +34,7 @@ pub struct Prepared {
     snapshot: Snapshot,
     pub(crate) surfaces: Arc<SurfaceTable>,
     pub(crate) tables: Arc<Tables>,
-    /// `None` for a scene without cutouts, or without other objects.
+    /// `None` for a scene without objects that rays may pass, or without others.
     pub(crate) occluders: Option<Arc<Occluders>>,
     /// `None` if nothing moves while the shutter is open.
     moments: Option<SharedMoments>,
@@ -92,6 +92,8 @@ pub(crate) struct Tables {
     pub(crate) large_textures: LargeTextures,
     /// Per material, see [`Material::cutout`].
     pub(crate) cutouts: Vec<Option<Cutout>>,
+    /// Per material, see [`Material::is_pane`].
+    pub(crate) panes: Vec<bool>,
     /// Per material: whether it needs tangents.
     pub(crate) with_tangents: Vec<bool>,
     pub(crate) coats: CoatTable,
@@ -131,6 +133,8 @@ pub struct Features {
     pub textures: bool,
     /// Some surfaces have holes or no back.
     pub cutouts: bool,
+    /// Some surfaces let light pass straight on.
+    pub panes: bool,
     /// Some specular object focuses the light of an emitter, so paths are traced from lights as well.
     pub caustics: bool,
 }
@@ -147,7 +151,7 @@ impl Prepared {
     /// Returns the same objects with other materials and lights.
     pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
         let tables = Arc::new(Tables::build(&self.geometry, &shading, Some(self)));
-        let is_same = self.tables.cutouts.iter().map(Option::is_some).eq(tables.cutouts.iter().map(Option::is_some));
+        let is_same = self.tables.passable().eq(tables.passable());
         let occluders = if is_same { self.occluders.clone() } else { occluders(&self.geometry, &tables) };
         let snapshot = Snapshot { shading, ..self.snapshot.clone() };
         Self { snapshot, tables, surfaces: self.surfaces.clone(), occluders, moments: None, portals: OnceLock::new() }
@@ -300,12 +304,14 @@ impl Tables {
             textures: materials.iter().any(|material| material.is_textured(materials)),
             caustics: casters.is_some(),
             cutouts: materials.iter().any(|material| material.cutout().is_some()),
+            panes: materials.iter().any(|material| material.is_pane(materials)),
         };
         Self {
             radiance_unit: radiance_unit(&lights, &ambient, reach_of(geometry)),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             large_textures: LargeTextures::build(materials, textures),
             cutouts: materials.iter().map(Material::cutout).collect(),
+            panes: materials.iter().map(|material| material.is_pane(materials)).collect(),
             coats: CoatTable::build(materials),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())
@@ -325,13 +331,19 @@ impl Tables {
         }
     }
 
+    /// Per material: whether rays may pass it.
+    fn passable(&self) -> impl Iterator<Item = bool> {
+        self.cutouts.iter().zip(&self.panes).map(|(cutout, is_pane)| cutout.is_some() || *is_pane)
+    }
+
     fn last_portals(&self) -> FoundPortals {
         self.portals.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
 fn occluders(geometry: &Geometry, tables: &Tables) -> Option<Arc<Occluders>> {
-    tables.features.cutouts.then(|| Occluders::build(geometry, &tables.cutouts))?.map(Arc::new)
+    let can_pass = tables.features.cutouts || tables.features.panes;
+    can_pass.then(|| Occluders::build(geometry, &tables.passable().collect::<Vec<_>>()))?.map(Arc::new)
 }
 
 /// Whether two environments are equal; images only if they are shared.

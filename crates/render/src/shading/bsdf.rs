@@ -135,6 +135,14 @@ impl Scatter for Lobe<'_> {
     }
 
     #[inline]
+    fn straight(&self, wo: Vec3, normal: Vec3) -> Vec3 {
+        match *self {
+            Self::ThinGlass { ior, transmittance, .. } => (1.0 - pane_reflectance(normal.dot(wo), ior)) * transmittance,
+            _ => Vec3::ZERO,
+        }
+    }
+
+    #[inline]
     fn sample(&self, wo: Vec3, normal: Vec3, u_choice: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         let specular =
             |probability, wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, probability, through };
@@ -171,11 +179,8 @@ impl Scatter for Lobe<'_> {
                 let through = passes.then(|| Interface::thin(here));
                 sampled.reflected().map(|sample| BsdfSample { through, ..sample })
             }
-            Self::ThinGlass { ior, reflectance, transmittance, here } => {
-                let once = fresnel(normal.dot(wo).clamp(0.0, 1.0), 1.0 / ior).0;
-                // R + T² R + T² R³ + …, by light that goes to and fro inside.
-                let all = 2.0 * once / (1.0 + once);
-                let (back, on) = (all * reflectance, (1.0 - all) * transmittance);
+            Self::ThinGlass { ior, reflectance, here, .. } => {
+                let (back, on) = (pane_reflectance(normal.dot(wo), ior) * reflectance, self.straight(wo, normal));
                 let pmf = luminance(back) / luminance(back + on);
                 if u_choice() < pmf {
                     Some(specular(pmf, mirrored(wo, normal), back / pmf, None))
@@ -199,6 +204,13 @@ impl Scatter for Lobe<'_> {
             }
         }
     }
+}
+
+/// Share of light that a pane reflects: R + T² R + T² R³ + …, by light that goes to and fro inside.
+#[inline]
+fn pane_reflectance(cos: f32, ior: f32) -> f32 {
+    let once = fresnel(cos.clamp(0.0, 1.0), 1.0 / ior).0;
+    2.0 * once / (1.0 + once)
 }
 
 #[inline]

@@ -40,6 +40,10 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
         self.surface.through()
     }
 
+    fn straight(&self, wo: Vec3, normal: Vec3) -> Vec3 {
+        self.surface.straight(wo, normal)
+    }
+
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         let choice = u_lobe();
         let wi = if choice < SHARE {

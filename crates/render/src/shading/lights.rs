@@ -77,7 +77,9 @@ pub(crate) fn emitter_weight(
     }
     match lights.light_of(hit.object, hit.prim, vertex.front) {
         Some(id) => {
-            let pdf = lights.pdf(techniques, id, path.position, path.normal, -vertex.wo, hit.t);
+            // Behind a pane, the ray starts closer.
+            let distance = if scene.tables.features.panes { path.position.distance(vertex.position) } else { hit.t };
+            let pdf = lights.pdf(techniques, id, path.position, path.normal, -vertex.wo, distance);
             let share = environment_share(scene, techniques, path.position.into(), path.normal.into());
             bounce_weight(techniques, path.pdf, (1.0 - share) * pdf)
         }

@@ -4,7 +4,6 @@ pub(crate) mod anisotropic_albedo;
 pub(crate) mod bsdf;
 pub(crate) mod coat;
 pub(crate) mod conductor;
-pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
 pub(crate) mod disney;

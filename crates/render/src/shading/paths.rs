@@ -217,9 +217,18 @@ impl ShadowBatch {
         get(&self.light, i)
     }
 
-    /// Traces the rays by `trace`, and adds the contributions of unoccluded ones to `radiance`.
-    pub fn settle(&mut self, radiance: &mut [Vec3], trace: impl FnOnce(&RayBatch, &mut Vec<bool>)) {
-        trace(&self.rays, &mut self.occluded);
+    /// Traces the rays, and adds the contributions of unoccluded ones to `radiance`.
+    ///
+    /// - `trace`: returns rays of which only a share of the light arrives.
+    pub fn settle(
+        &mut self,
+        radiance: &mut [Vec3],
+        trace: impl FnOnce(&RayBatch, &mut Vec<bool>) -> Vec<(usize, Vec3)>,
+    ) {
+        for (i, share) in trace(&self.rays, &mut self.occluded) {
+            let light = share * get(&self.light, i);
+            set(&mut self.light, i, light);
+        }
         for i in 0..self.rays.len() {
             if !self.occluded[i] {
                 radiance[self.slot[i] as usize] += get(&self.light, i);

@@ -23,6 +23,12 @@ pub(crate) trait Scatter {
     /// sampling finds light from other media, as if it were specular: each part leads into a different one.
     fn through(&self) -> Option<Interface>;
 
+    /// Share of light from straight behind the surface that goes on as it came: that of panes without thickness.
+    /// [`Self::sample`] returns exactly `-wo` for it, as a perfectly specular lobe.
+    fn straight(&self, _wo: Vec3, _normal: Vec3) -> Vec3 {
+        Vec3::ZERO
+    }
+
     /// Samples a direction; `None` if the sample carries no light.
     ///
     /// - `u_lobe`: selects the lobe, and between reflection and refraction; evaluated only if there is a choice;

@@ -1,9 +1,11 @@
-//! What all integrators share: survival, resampling, work of a pass, and the passes of light tracing.
+//! What all integrators share: rays through holes and panes, survival, resampling, work of a pass, and the passes of
+//! light tracing.
 
 pub(crate) mod batches;
 pub(crate) mod caustics_pass;
 pub(crate) mod caustics_weight;
 pub(crate) mod emission;
+mod passing;
 pub(crate) mod record;
 pub(crate) mod resampling;
 pub(crate) mod seen;

@@ -153,8 +153,8 @@ impl Record {
             } else if let Some(light) = delta {
                 (LightSource::Delta(light), Place::Light { position: ray.at(ray.t_max), light })
             } else {
-                // The ray ends just before the emitter without a hit, so the next hit behind it is the emitter.
-                let emitter = scene.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
+                // The ray ends just before the emitter without a hit but for panes, so the next hit behind it is the emitter.
+                let emitter = scene.closest_hit_behind_panes(&Ray { t_max: f32::INFINITY, ..ray });
                 let emitter = emitter.filter(|hit| scene.tables.lights.shines(hit.object, hit.prim));
                 let object = emitter.map_or(HitBatch::MISS, |hit| hit.object);
                 let source = emitter.map_or(LightSource::Rim, |hit| LightSource::Object(hit.object));

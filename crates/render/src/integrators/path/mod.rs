@@ -159,7 +159,7 @@ impl PathWave {
                 record.see_shaded(&self.paths, radiance);
             }
             let class = if depth == 1 { class_of_first_shadows(&self.shadows.rays) } else { class };
-            self.shadows.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
+            self.shadows.settle(radiance, |rays, occluded| scene.shadows(rays, class, occluded));
             if let Some(record) = &mut self.record {
                 record.see_settled(scene, &self.shadows, radiance);
             }

@@ -260,10 +260,14 @@ impl PathWave {
         if path.throughput == Vec3::ZERO {
             return;
         }
-        path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
-        path.pdf /= step.n_candidates as f32;
-        path.position = vertex.position;
-        path.normal = lit_side(vertex, bsdf);
+        // Behind a pane, light is still that of the vertex before: light sampling finds it from there.
+        let is_straight = scene.tables.panes[material as usize] && sample.pdf.is_infinite() && sample.wi == -vertex.wo;
+        if !is_straight {
+            path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
+            path.pdf /= step.n_candidates as f32;
+            path.position = vertex.position;
+            path.normal = lit_side(vertex, bsdf);
+        }
         let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         self.next.push(&Ray::new(origin, sample.wi), &path);
     }

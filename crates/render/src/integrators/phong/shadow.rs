@@ -126,7 +126,10 @@ impl Shadows {
             let batch = &mut self.asked[k].batch;
             if !batch.rays.is_empty() {
                 n_rays += batch.rays.len() as u64;
-                batch.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
+                batch.settle(radiance, |rays, occluded| {
+                    scene.any_hits(rays, class, occluded);
+                    Vec::new()
+                });
             }
         }
         n_rays

@@ -110,7 +110,7 @@ fn trace(scene: &Prepared, first: u32, bounces: &mut Vec<Bounce>) {
     }
     for depth in 1..=BOUNCES + 1 {
         let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-        scene.closest_hits(&rays, class, &mut hits);
+        scene.closest_hits_behind_panes(&rays, class, &mut hits);
         let (mut next, mut next_paths) = (RayBatch::default(), Vec::new());
         let known = bounces.len() - if depth == 1 { 0 } else { paths.len() };
         for (i, &path) in paths.iter().enumerate() {
@@ -163,7 +163,9 @@ fn variance(scene: &Prepared, bounces: &[Bounce], portals: Option<&Portals>) -> 
         }
     }
     let mut occluded = Vec::new();
-    scene.any_hits(&rays, RayClass::Incoherent, &mut occluded);
+    for (i, share) in scene.shadows(&rays, RayClass::Incoherent, &mut occluded) {
+        parts[i].1 *= f64::from(luminance(share));
+    }
     let mut estimates = vec![0.0; 2 * bounces.len().div_ceil(STEP)];
     for ((estimate, part), _) in parts.into_iter().zip(occluded).filter(|(_, occluded)| !occluded) {
         estimates[estimate] += part;

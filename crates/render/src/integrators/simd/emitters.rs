@@ -46,10 +46,12 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits) {
             }
             let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
-            let mut other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
+            // Behind a pane, the ray starts closer.
+            let from_vertex = if tables.features.panes { (place.position - from[0]).length() } else { distance };
+            let mut other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, from_vertex);
             other = other * (other.all(1.0) - environment_share(scene, techniques, from[0], from[1]));
             if tables.materials.two_sided {
-                other = with_two_sided(other, &group, &indices, known);
+                other = with_two_sided(other, from_vertex, &group, &indices, known);
             }
             weight = select(known, bounce_weight(techniques, pdf, other), weight);
         }
@@ -70,16 +72,22 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits) {
 }
 
 /// Replaces the pdfs of light sampling for points that sampled both sides, one at a time.
-fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANES], mask: Mask) -> Float<S> {
+fn with_two_sided<S: Simd>(
+    pdf: Float<S>,
+    distance: Float<S>,
+    group: &KindHits,
+    indices: &[u32; LANES],
+    mask: Mask,
+) -> Float<S> {
     let KindHits { scene, techniques, paths, hits, .. } = *group;
-    let mut pdfs = pdf.to_array();
+    let (mut pdfs, distances) = (pdf.to_array(), distance.to_array());
     for lane in lanes_of(mask) {
         let i = indices[lane] as usize;
         let path = paths.get(i);
         if path.normal == Vec3::ZERO
             && let Some(id) = scene.tables.lights.light_of(hits.object[i], hits.prim[i], true)
         {
-            let (dir, distance) = (paths.rays.get(i).dir, hits.t[i]);
+            let (dir, distance) = (paths.rays.get(i).dir, distances[lane]);
             let pdf = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);
             let share = environment_share(scene, techniques, path.position.into(), path.normal.into());
             pdfs[lane] = (1.0 - share) * pdf;

@@ -44,8 +44,12 @@ impl Scatter for Principled {
         self.is_transmission_rough().then(|| transmission.interface())
     }
 
+    fn straight(&self, wo: Vec3, normal: Vec3) -> Vec3 {
+        Seen::new(*self, wo.into(), normal.into()).straight()
+    }
+
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        Seen::new(*self, wo.into(), normal.into()).sample(u_lobe(), u)
+        Seen::new(*self, wo.into(), normal.into()).sample(wo, u_lobe(), u)
     }
 }
 

@@ -86,13 +86,31 @@ impl Seen {
         (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3))
     }
 
+    /// Share of light to or from a direction that the layers above the transmissive one let pass.
+    fn below(&self, wi: Vec3) -> f32 {
+        let cos = self.axes[2].dot(wi.into()).abs();
+        self.below_coat(wi.into()) * self.past_sheen.min(past_sheen(&self.of, cos))
+    }
+
+    /// See [`Scatter::straight`](crate::shading::scatter::Scatter::straight).
+    pub fn straight(&self) -> Vec3 {
+        match self.of.transmission {
+            Some(Transmission { share, tint, inside: Inside::Thin(_), .. })
+                if self.of.is_smooth() && self.is_valid && self.pmf[3] > 0.0 =>
+            {
+                tint * self.passed(self.wo.z) * (share * self.below(-self.in_world(self.wo)))
+            }
+            _ => Vec3::ZERO,
+        }
+    }
+
     /// Samples a direction on either side.
     ///
-    /// - `u_lobe`: selects the technique; `u`: the direction.
-    pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+    /// - `wo`: that of the view, in world space; `u_lobe`: selects the technique; `u`: the direction.
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let proposed = self.propose(u_lobe, u.to_array());
         if proposed.passes {
-            return self.sample_transmission(proposed.rest, u);
+            return self.sample_transmission(wo, proposed.rest, u);
         }
         if !proposed.go_on {
             return None;
@@ -101,17 +119,13 @@ impl Seen {
         self.weighted(&proposed, value.into(), pdf).reflected()
     }
 
-    fn sample_transmission(&self, u_choice: f32, u: Vec2) -> Option<BsdfSample> {
+    fn sample_transmission(&self, seen_from: Vec3, u_choice: f32, u: Vec2) -> Option<BsdfSample> {
         let transmission = self.of.transmission?;
         let pmf = self.pmf[3];
         let share = transmission.share / pmf;
-        let below = |wi: Vec3| {
-            let cos = self.axes[2].dot(wi.into()).abs();
-            self.below_coat(wi.into()) * self.past_sheen.min(past_sheen(&self.of, cos))
-        };
         let specular = |probability: f32, wi: Vec3, weight: Vec3, passes: bool| {
             let through = passes.then(|| transmission.interface());
-            let weight = weight * (share * below(wi));
+            let weight = weight * (share * self.below(wi));
             Some(BsdfSample { wi, weight, pdf: f32::INFINITY, probability: pmf * probability, through })
         };
         let wo = self.in_world(self.wo);
@@ -128,7 +142,7 @@ impl Seen {
                         through: None,
                     });
                 }
-                let weight = transmission.tint * (found.weight * share * below(found.wi));
+                let weight = transmission.tint * (found.weight * share * self.below(found.wi));
                 let pdf = if transmission.is_lit { found.pdf * pmf } else { f32::INFINITY };
                 Some(BsdfSample { wi: found.wi, weight, pdf, probability: 1.0, through: Some(interface) })
             }
@@ -148,7 +162,7 @@ impl Seen {
                 }
             }
             Inside::Thin(_) if self.of.is_smooth() => {
-                specular(1.0, -wo, transmission.tint * self.passed(self.wo.z), true)
+                specular(1.0, -seen_from, transmission.tint * self.passed(self.wo.z), true)
             }
             Inside::Thin(_) => {
                 let above = reflect(self.wo, sample_visible_normal(self.wo, self.of.alpha, u.to_array()));

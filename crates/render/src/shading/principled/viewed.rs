@@ -45,11 +45,15 @@ impl Scatter for Viewed<'_> {
         self.layers.through()
     }
 
+    fn straight(&self, wo: Vec3, normal: Vec3) -> Vec3 {
+        if self.is_about(wo, normal) { self.seen.straight() } else { self.layers.straight(wo, normal) }
+    }
+
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         if !self.is_about(wo, normal) {
             return self.layers.sample(wo, normal, u_lobe, u);
         }
-        self.seen.sample(u_lobe(), u)
+        self.seen.sample(wo, u_lobe(), u)
     }
 }
 

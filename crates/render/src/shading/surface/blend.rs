@@ -91,6 +91,13 @@ impl Part<'_> {
         }
     }
 
+    fn straight(self, layers: &[Principled], wo: Vec3, normal: Vec3) -> Vec3 {
+        match self {
+            Self::Lobe(lobe) => lobe.straight(wo, normal),
+            Self::Layers(k) => layers[usize::from(k)].straight(wo, normal),
+        }
+    }
+
     fn sample(self, layers: &[Principled], wo: Vec3, normal: Vec3, fresh: f32, u: Vec2) -> Option<BsdfSample> {
         match self {
             Self::Lobe(lobe) => lobe.sample(wo, normal, || fresh, u),
@@ -121,6 +128,12 @@ impl Scatter for Blend<'_> {
 
     fn through(&self) -> Option<Interface> {
         self.parts.iter().find(|p| p.part.is_thin()).and_then(|p| p.part.through(&self.layers))
+    }
+
+    fn straight(&self, wo: Vec3, normal: Vec3) -> Vec3 {
+        let of_parts = self.parts.iter().filter(|p| p.pmf > 0.0);
+        let sum: Vec3 = of_parts.map(|p| p.weight * p.part.straight(&self.layers, wo, normal)).sum();
+        self.lit_share(-wo) * sum
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {

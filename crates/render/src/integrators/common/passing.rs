@@ -1,18 +1,25 @@
-//! Rays through cutouts: surfaces with an opacity map, and the invisible backs of one-sided surfaces.
+//! Rays through cutouts: surfaces with an opacity map, and the invisible backs of one-sided surfaces; and rays to lights
+//! through panes.
 //!
 //! A ray that hits such a point continues behind it, in the same direction and at the same path depth. Where opacity is
 //! fractional, the decision is random: it is a hash of the ray and the hit, so that a ray gets the same answer in every
 //! query, and on average the transmitted share of light continues. Scenes without such surfaces have no cost.
+//!
+//! A pane without thickness does not bend light: what it lets pass of a point on a light is known, so light sampling
+//! finds lights behind it. A path that goes straight on through it is weighted against that as if it were not there.
 
-use crate::core::material::{MaterialId, ScalarInput};
-use crate::core::material_queries::Cutout;
+use crate::core::material::{Material, MaterialId, ScalarInput};
 use crate::core::texture::TexturePoint;
 use crate::prepare::occluders::Occluders;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{hash_combine, hash_u32};
+use crate::shading::principled::at::principled_at;
+use crate::shading::scatter::Scatter;
+use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
 use firstlight_kdtree::geometry::{Ray, robust};
-use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, SurfacePoint};
+use glam::Vec3;
 
 /// Maximum number of surfaces that a ray may pass: bounds the work, far above any real scene.
 const MOST_PASSED: usize = 10_000;
@@ -24,58 +31,106 @@ impl Prepared {
     pub(crate) fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         self.geometry.tree.closest_hits(rays, class, hits);
         if self.tables.features.cutouts {
-            self.pass_cutouts(rays, hits, |rays, hits| {
-                self.geometry.tree.closest_hits(rays, RayClass::Incoherent, hits);
-            });
+            self.pass_on(rays, hits, self.in_all(), |_, ray, hit| self.past_cutout(ray, hit));
+        }
+    }
+
+    /// Like [`Self::closest_hits`], behind all panes.
+    pub(crate) fn closest_hits_behind_panes(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+        self.geometry.tree.closest_hits(rays, class, hits);
+        if self.tables.features.cutouts || self.tables.features.panes {
+            self.pass_on(rays, hits, self.in_all(), |_, ray, hit| Some(self.past(ray, hit)?.0));
         }
     }
 
     /// Whether rays are occluded; see [`firstlight_kdtree::SceneTree::any_hits`].
-    ///
-    /// Among cutouts the closest hit tells where a ray continues.
     pub(crate) fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
-        if !self.tables.features.cutouts {
-            return self.geometry.tree.any_hits(rays, class, occluded);
+        if self.tables.features.cutouts {
+            self.any_hits_passing(rays, class, occluded, |_, ray, hit| self.past_cutout(ray, hit));
+        } else {
+            self.geometry.tree.any_hits(rays, class, occluded);
         }
+    }
+
+    /// Whether rays to lights are occluded, where panes are no obstacle. Returns those that pass panes, and the shares of
+    /// light that these let pass.
+    pub(crate) fn shadows(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) -> Vec<(usize, Vec3)> {
+        let mut passed: Vec<(usize, Vec3)> = Vec::new();
+        if !self.tables.features.panes {
+            self.any_hits(rays, class, occluded);
+            return passed;
+        }
+        self.any_hits_passing(rays, class, occluded, |i, ray, hit| {
+            let (onwards, share) = self.past(ray, hit)?;
+            if share != Vec3::ONE {
+                passed.push((i, share));
+            }
+            Some(onwards)
+        });
+        passed
+    }
+
+    /// Among surfaces that rays may pass, the closest hit tells where a ray continues.
+    ///
+    /// - `past`: returns the continuation behind a hit of the ray with this number, if it may pass.
+    fn any_hits_passing(
+        &self,
+        rays: &RayBatch,
+        class: RayClass,
+        occluded: &mut Vec<bool>,
+        mut past: impl FnMut(usize, &Ray, &Hit) -> Option<Ray>,
+    ) {
         let mut hits = HitBatch::default();
         let Some(occluders) = &self.occluders else {
-            self.closest_hits(rays, class, &mut hits);
+            self.geometry.tree.closest_hits(rays, class, &mut hits);
+            self.pass_on(rays, &mut hits, self.in_all(), past);
             occluded.clear();
             occluded.extend((0..rays.len()).map(|i| hits.get(i).is_some()));
             return;
         };
         occluders.opaque.any_hits(rays, class, occluded);
-        let mut passed = RayBatch::default();
-        (0..rays.len()).filter(|&i| !occluded[i]).for_each(|i| passed.push(&rays.get(i)));
-        occluders.cut.closest_hits(&passed, RayClass::Incoherent, &mut hits);
-        in_scene(&mut hits, occluders);
-        self.pass_cutouts(&passed, &mut hits, |rays, hits| {
-            occluders.cut.closest_hits(rays, RayClass::Incoherent, hits);
+        let (mut open, mut numbers) = (RayBatch::default(), Vec::new());
+        for i in (0..rays.len()).filter(|&i| !occluded[i]) {
+            open.push(&rays.get(i));
+            numbers.push(i);
+        }
+        let in_passable = |rays: &RayBatch, hits: &mut HitBatch| {
+            occluders.passable.closest_hits(rays, RayClass::Incoherent, hits);
             in_scene(hits, occluders);
-        });
-        occluded.iter_mut().filter(|occluded| !**occluded).enumerate().for_each(|(i, occluded)| {
-            *occluded = hits.get(i).is_some();
-        });
+        };
+        in_passable(&open, &mut hits);
+        self.pass_on(&open, &mut hits, in_passable, |k, ray, hit| past(numbers[k], ray, hit));
+        for (k, &i) in numbers.iter().enumerate() {
+            occluded[i] = hits.get(k).is_some();
+        }
     }
 
-    /// Like [`Self::closest_hits`], for one ray.
-    pub(crate) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        if !self.tables.features.cutouts {
-            return self.geometry.tree.closest_hit(ray);
-        }
-        let mut rays = RayBatch::default();
+    fn in_all(&self) -> impl Fn(&RayBatch, &mut HitBatch) {
+        |rays, hits| self.geometry.tree.closest_hits(rays, RayClass::Incoherent, hits)
+    }
+
+    /// Like [`Self::closest_hits_behind_panes`], for one ray.
+    pub(crate) fn closest_hit_behind_panes(&self, ray: &Ray) -> Option<Hit> {
+        let (mut rays, mut hits) = (RayBatch::default(), HitBatch::default());
         rays.push(ray);
-        let mut hits = HitBatch::default();
-        self.closest_hits(&rays, RayClass::Incoherent, &mut hits);
+        self.closest_hits_behind_panes(&rays, RayClass::Incoherent, &mut hits);
         hits.get(0)
     }
 
-    /// Replaces hits of cutouts by the next ones behind them, which `closest_hits` finds.
-    fn pass_cutouts(&self, rays: &RayBatch, hits: &mut HitBatch, closest_hits: impl Fn(&RayBatch, &mut HitBatch)) {
+    /// Replaces hits that rays pass by the next ones behind them, which `closest_hits` finds.
+    ///
+    /// - `past`: returns the continuation behind a hit of the ray with this number, if it may pass.
+    fn pass_on(
+        &self,
+        rays: &RayBatch,
+        hits: &mut HitBatch,
+        closest_hits: impl Fn(&RayBatch, &mut HitBatch),
+        mut past: impl FnMut(usize, &Ray, &Hit) -> Option<Ray>,
+    ) {
         let mut open: Vec<(usize, Ray)> = Vec::new();
         for i in 0..rays.len() {
             let ray = rays.get(i);
-            if let Some(onwards) = hits.get(i).and_then(|hit| self.onwards(&ray, &hit)) {
+            if let Some(onwards) = hits.get(i).and_then(|hit| past(i, &ray, &hit)) {
                 open.push((i, onwards));
             }
         }
@@ -91,7 +146,7 @@ impl Prepared {
             open.retain_mut(|(i, ray)| {
                 let hit = found.get(k);
                 k += 1;
-                if let Some(onwards) = hit.and_then(|hit| self.onwards(ray, &hit)) {
+                if let Some(onwards) = hit.and_then(|hit| past(*i, ray, &hit)) {
                     *ray = onwards;
                     return true;
                 }
@@ -104,15 +159,10 @@ impl Prepared {
 
     /// Returns the continuation of a ray behind its hit, if that is cut out.
     #[inline]
-    fn onwards(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
+    fn past_cutout(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
         let id = material_of(self, hit);
-        self.behind_cutout(self.tables.cutouts[id as usize].as_ref()?, id, ray, hit)
-    }
-
-    fn behind_cutout(&self, cutout: &Cutout, id: MaterialId, ray: &Ray, hit: &Hit) -> Option<Ray> {
-        let length = ray.dir.length();
-        let unit = Ray { dir: ray.dir / length, ..*ray };
-        let of_unit = Hit { t: hit.t * length, ..*hit };
+        let cutout = self.tables.cutouts[id as usize].as_ref()?;
+        let (unit, of_unit) = of_unit_length(ray, hit);
         // Most hits are decided by their side: a whole vertex, with its textures, costs several times as much.
         let point = self.geometry.tree.surface_point(&unit, &of_unit);
         let front = (-unit.dir).dot(point.geometric_normal) >= 0.0;
@@ -129,13 +179,29 @@ impl Prepared {
                 return None;
             }
         }
-        let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
-        Some(if ray.t_max.is_finite() {
-            // Ends exactly at the end of the first ray, wherever it starts.
-            Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
-        } else {
-            Ray { origin, ..*ray }
-        })
+        Some(behind(&point, ray))
+    }
+
+    /// Returns the continuation of a ray behind its hit, and the share of light that passes; `None` where none does.
+    fn past(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, Vec3)> {
+        if let Some(onwards) = self.past_cutout(ray, hit) {
+            return Some((onwards, Vec3::ONE));
+        }
+        let id = material_of(self, hit);
+        if !self.tables.panes[id as usize] {
+            return None;
+        }
+        let (unit, of_unit) = of_unit_length(ray, hit);
+        let vertex = Vertex::new(self, &unit, &of_unit, id);
+        let share = match &self.shading.materials[id as usize] {
+            Material::Principled { .. } => {
+                principled_at(self, id, &vertex, &mut None, 0, true)?.straight(vertex.wo, vertex.normal)
+            }
+            Material::Blend { .. } => blend_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
+            _ => lobe_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
+        };
+        let point = self.geometry.tree.surface_point(&unit, &of_unit);
+        (share != Vec3::ZERO).then(|| (behind(&point, ray), share))
     }
 
     /// Returns the point of a hit for texture lookups; `ray` is of unit length.
@@ -147,15 +213,31 @@ impl Prepared {
     }
 }
 
-/// Replaces the objects of hits among objects with cutouts by those of the scene.
+/// Replaces the objects of hits among those that rays may pass by those of the scene.
 fn in_scene(hits: &mut HitBatch, occluders: &Occluders) {
     for object in hits.object.iter_mut().filter(|object| **object != HitBatch::MISS) {
-        *object = occluders.cut_objects[*object as usize];
+        *object = occluders.passable_objects[*object as usize];
+    }
+}
+
+fn of_unit_length(ray: &Ray, hit: &Hit) -> (Ray, Hit) {
+    let length = ray.dir.length();
+    (Ray { dir: ray.dir / length, ..*ray }, Hit { t: hit.t * length, ..*hit })
+}
+
+/// Returns a ray from behind a point of its surface.
+fn behind(point: &SurfacePoint, ray: &Ray) -> Ray {
+    let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
+    if ray.t_max.is_finite() {
+        // Ends exactly at the end of the first ray, wherever it starts.
+        Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
+    } else {
+        Ray { origin, ..*ray }
     }
 }
 
 /// Returns the parameter of a point along a ray, in lengths of its direction.
-fn along(ray: &Ray, point: glam::Vec3) -> f32 {
+fn along(ray: &Ray, point: Vec3) -> f32 {
     (point - ray.origin).dot(ray.dir) / ray.dir.length_squared()
 }
 
@@ -170,12 +252,11 @@ fn probability(ray: &Ray, hit: &Hit) -> f32 {
 mod tests {
     use super::*;
     use crate::core::environment::Environment;
-    use crate::core::material::{Material, MaterialKind};
+    use crate::core::material::MaterialKind;
     use crate::core::snapshot::Object;
     use crate::sampling::Sampler;
     use crate::test_scene::prepared;
     use firstlight_kdtree::Shape;
-    use glam::Vec3;
 
     /// A scene of small quads and spheres, of materials by turns, and rays of any length through it.
     fn crowd(materials: Vec<Material>, used: &[u32]) -> (Prepared, RayBatch) {
