@@ -149,9 +149,8 @@ impl RenderJob {
     /// Shows a moment from now on, seconds. The image does not depend on the moments before.
     pub fn set_moment(&mut self, seconds: f64) -> Result<(), Failure> {
         let mut trees = std::mem::take(&mut self.scene.trees);
-        let shown = scene_at(&mut self.world, &self.scene, &mut trees, seconds);
+        (self.extraction, self.draft) = scene_at(&mut self.world, &self.scene, &mut trees, seconds);
         self.scene.trees = trees;
-        (self.extraction, self.draft) = shown.map_err(Failure::Failed)?;
         for problem in &self.extraction.problems {
             // Of a sequence, only the first frame with this problem.
             if !self.told.contains(problem) {

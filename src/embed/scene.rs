@@ -209,9 +209,7 @@ impl Default for Scene {
 /// Builds the trees of shapes that were added to the world after the scene was opened.
 fn add_trees(trees: &mut Trees, inputs: &SceneInputs) {
     for object in &inputs.objects {
-        if let Err(reason) = trees.add(&object.shape) {
-            trees.mark_unfit(&object.shape, reason);
-        }
+        trees.add_or_mark(&object.shape);
     }
 }
 

@@ -90,7 +90,7 @@ impl CommandParams<'_, '_> {
         }
         let surroundings = self.around.surroundings(self.size.aspect());
         if let Some(rig) = self.rig()
-            && let Some(steered) = steer(&rig, &command, &surroundings)
+            && let Some(steered) = steer(&self.turning_in_perspective(rig, &command), &command, &surroundings)
         {
             // Limits that also hold for recordings: cameras that cannot be rendered are rejected.
             if steered.check().is_err() {
@@ -238,6 +238,26 @@ impl CommandParams<'_, '_> {
             // All other commands move the camera, and there is none.
             _ => {}
         }
+    }
+
+    /// Returns a camera with parallel rays for a view from a side as one in perspective, if the command turns it.
+    fn turning_in_perspective(&mut self, rig: Rig, command: &Command) -> Rig {
+        let has_parallel = rig.projection.orthographic_height.is_some();
+        let was_side_view = self.around.is_side_view && has_parallel;
+        match command {
+            Command::ViewFrom(_) => self.around.is_side_view = was_side_view || !has_parallel,
+            Command::SetProjection(_) => self.around.is_side_view = false,
+            Command::Turn { .. } | Command::Orbit { .. } if was_side_view => {
+                self.around.is_side_view = false;
+                let turned = navigation::in_perspective(&rig);
+                return match &self.shown.extraction {
+                    Some(scene) => Rig { view: within_walls(scene, &rig.view, turned.view), ..turned },
+                    None => turned,
+                };
+            }
+            _ => {}
+        }
+        rig
     }
 
     /// The components of the first camera.

@@ -68,7 +68,7 @@ pub use crate::frame::state::resources::{
     CurrentScene, FrameChanges, FreeShare, Hidden, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads,
     ViewMode,
 };
-pub use crate::frame::state::selection::{OwnBox, Picked, Projector, Selection, pick};
+pub use crate::frame::state::selection::{ActivePart, OwnBox, Picked, Projector, Selection, pick};
 pub use camera_path::{along, turntable};
 pub use command::Command;
 #[cfg(feature = "cli")]

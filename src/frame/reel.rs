@@ -67,10 +67,7 @@ impl Reel {
 
 impl OpenReel {
     /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
-    ///
-    /// # Errors
-    /// If a mesh of that moment is not valid.
-    pub fn at(&mut self, seconds: f64) -> Result<(Extraction, MetadataDraft), String> {
+    pub fn at(&mut self, seconds: f64) -> (Extraction, MetadataDraft) {
         scene_at(&mut self.world, &self.current, &mut self.trees, seconds)
     }
 }
@@ -78,22 +75,19 @@ impl OpenReel {
 /// Shows a moment of a world from now on, seconds; returns its snapshot and the metadata of its image.
 ///
 /// - `loaded`: the scene that was opened into the world.
-///
-/// # Errors
-/// If a mesh of that moment is not valid.
 pub fn scene_at(
     world: &mut World,
     loaded: &LoadedScene,
     trees: &mut Trees,
     seconds: f64,
-) -> Result<(Extraction, MetadataDraft), String> {
+) -> (Extraction, MetadataDraft) {
     show_moment(world, seconds);
     let inputs = SceneInputs::of(world);
     // Skins and morph targets have other meshes at each moment.
     trees.keep_used(&inputs);
     for object in &inputs.objects {
-        trees.add(&object.shape).map_err(|reason| format!("at {seconds} s: {reason}"))?;
+        trees.add_or_mark(&object.shape);
     }
     let extraction = Extraction::of_world(world, &inputs, trees);
-    Ok((extraction, MetadataDraft::of(world, Some(loaded))))
+    (extraction, MetadataDraft::of(world, Some(loaded)))
 }

@@ -22,7 +22,7 @@ use crate::frame::state::resources::{
     Clock, CurrentScene, FrameChanges, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
     RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
-use crate::frame::state::selection::{OwnBox, Selection};
+use crate::frame::state::selection::{ActivePart, OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
 use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::frame::worker::{Waker, Worker};
@@ -138,6 +138,7 @@ impl Session {
             corners: Vec::new(),
             home: Rig::default(),
             turning: Turning::default(),
+            is_side_view: false,
             pace: None,
             ground: None,
         };
@@ -160,6 +161,7 @@ impl Session {
         world.insert_resource(HotReload::new(waker));
         world.init_resource::<EditQueue>();
         world.init_resource::<Selection>();
+        world.init_resource::<ActivePart>();
         world.init_resource::<History>();
         world.init_resource::<Focus>();
         world.init_resource::<Bookmarks>();

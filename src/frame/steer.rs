@@ -3,8 +3,8 @@
 use crate::frame::command::Command;
 use crate::frame::core::rig::Rig;
 use crate::frame::navigation::{
-    Surroundings, dolly_above, fly, focus_at, level, orbit_above, pan, roll, scale_aperture, scale_focus, set_aperture,
-    stride, toggle_depth_of_field, turn, view_from, view_from_behind, zoom,
+    Surroundings, dolly_above, fly, focus_at, in_parallel, level, orbit_above, pan, roll, scale_aperture, scale_focus,
+    set_aperture, stride, toggle_depth_of_field, turn, view_from, view_from_behind, zoom,
 };
 use glam::DVec3;
 
@@ -33,7 +33,10 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
         Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
         Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
         Command::Level => with_view(level(&view)),
-        Command::ViewFrom(side) => with_view(view_from(&view, side)),
+        Command::ViewFrom(side) => {
+            let projection = in_parallel(&projection, view.pivot_distance);
+            Some(Rig { view: view_from(&view, side), projection, ..*rig })
+        }
         Command::ViewFromBehind => with_view(view_from_behind(&view)),
         // What is in focus, and how much, is no matter of where one stands.
         Command::Home => Some(Rig { lens, ..around.home }),

@@ -317,8 +317,8 @@ fn missing_trees(inputs: &SceneInputs, trees: &mut Trees, origin: DVec3) -> Vec<
         }
         if size > AT_ONCE {
             missing.push(object.shape.clone());
-        } else if let Err(reason) = trees.add(&object.shape) {
-            trees.mark_unfit(&object.shape, reason);
+        } else {
+            trees.add_or_mark(&object.shape);
         }
     }
     // Meshes that share no tree need one of their own.

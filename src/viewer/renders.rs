@@ -284,7 +284,7 @@ impl Work {
         let (mut saved, mut short) = (0, String::new());
         for number in frames {
             let done = number - first;
-            let (extraction, draft) = reel.at(f64::from(number) / fps)?;
+            let (extraction, draft) = reel.at(f64::from(number) / fps);
             let subject = Subject { scene: extraction.prepared, settings, draft };
             let tell = |now: Advance| {
                 self.tell(now, (f64::from(done) + now.share) / f64::from(n), Some((done + 1, n)));

@@ -3,6 +3,7 @@
 use crate::driver::{Drive, Driver, of_material};
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
+use bevy_ecs::name::Name;
 use firstlight::frame::{
     Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
     Selection, Session, SessionOptions, Target, wanted_mesh,
@@ -595,4 +596,50 @@ fn colours_become_textures_and_textures_change() {
     driver.edit([Edit::Paint { id, part: missing }]);
     driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
+}
+
+#[test]
+fn a_material_is_for_the_part_that_was_clicked() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("two.mtl"), "newmtl left\nKd 1 0 0\nnewmtl right\nKd 0 0 1\n").unwrap();
+    let corners = "v -1 -1 0\nv 0 -1 0\nv 1 -1 0\nv -1 1 0\nv 0 1 0\nv 1 1 0\n";
+    let faces = "usemtl left\nf 1 2 5 4\nusemtl right\nf 2 3 6 5\n";
+    std::fs::write(folder.path().join("two.obj"), format!("mtllib two.mtl\n{corners}{faces}")).unwrap();
+    let scene = "(camera: (eye: (0, 0, 4), look_at: (0, 0, 0)), environment: constant(1), \
+                 objects: [mesh(name: \"wall\", source: obj(\"two.obj\"))])";
+    let path = folder.path().join("scene.ron");
+    std::fs::write(&path, scene).unwrap();
+    let target = Target { spp: Some(2), ..Target::default() };
+    let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
+    let mut driver = Driver::new(options, SceneSource::Scene(path));
+    driver.settle();
+    let names = |driver: &Driver| {
+        let slots: MaterialSlots = driver.get("wall");
+        let name = |slot: &Entity| driver.session.world().get::<Name>(*slot).unwrap().as_str().to_owned();
+        slots.0.iter().map(name).collect::<Vec<_>>()
+    };
+    let dress = |name: &str| Edit::Dress { name: name.to_owned() };
+    assert_eq!(names(&driver), ["left", "right"]);
+    let id = driver.named("wall").to_bits();
+    let left = driver.get::<MaterialSlots>("wall").0[0].to_bits();
+    let click = |x| Edit::PickAt { x, y: 0.5, add: false };
+    driver.edit([click(0.6), dress("gold")]);
+    assert_eq!(names(&driver), ["left", "gold"]);
+    driver.edit([click(0.4), dress("clay")]);
+    assert_eq!(names(&driver), ["clay", "gold"]);
+    driver.edit([Edit::Assign { id, material: left }, Edit::OwnMaterial { id }]);
+    assert_eq!(names(&driver), ["left 2", "gold"]);
+    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+    assert_eq!(names(&driver), ["left", "gold"]);
+    // What is saved has the same parts.
+    let saved = folder.path().join("saved.ron");
+    driver.session.send(Command::SaveScene { path: saved.clone() });
+    driver.run_until(|session| saved.exists() && session.is_idle());
+    assert!(std::fs::read_to_string(&saved).unwrap().contains("materials: [\"left\", \"gold\"]"));
+    // From a list, it is the whole object, or the part that was chosen there.
+    driver.edit([Edit::ChoosePart { id, part: Some(0) }, dress("glass")]);
+    assert_eq!(names(&driver), ["glass", "gold"]);
+    driver.select("wall");
+    driver.edit([dress("glass")]);
+    assert_eq!(names(&driver), ["glass"]);
 }

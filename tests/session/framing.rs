@@ -1,9 +1,9 @@
 //! Models and selections are framed for the part of the image that nothing covers.
 
 use crate::driver::{Drive, Driver};
-use firstlight::frame::navigation::Side;
+use firstlight::frame::navigation::{Rig, Side};
 use firstlight::frame::{Command, Projector, SessionOptions, Target};
-use firstlight::scene::{SceneSource, View};
+use firstlight::scene::{Projection, SceneSource, View};
 use glam::{DVec2, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -63,18 +63,20 @@ fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
     }
 }
 
+/// Where the camera is when a scene is seen from a side.
+fn view_from(driver: &mut Driver, eye: DVec3, pivot: DVec3, side: Side) -> DVec3 {
+    driver.session.send(Command::SetView(View::look_at(eye, pivot, DVec3::Y).unwrap()));
+    driver.session.send(Command::ViewFrom(side));
+    driver.frame();
+    let view = driver.session.status().rig.view;
+    assert!((view.pivot() - pivot).length() < 1e-9);
+    view.eye
+}
+
 #[test]
 fn a_view_from_a_side_stays_in_the_room() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = opened(&bar(folder.path()));
-    let mut view_from = |eye: DVec3, pivot: DVec3, side: Side| {
-        driver.session.send(Command::SetView(View::look_at(eye, pivot, DVec3::Y).unwrap()));
-        driver.session.send(Command::ViewFrom(side));
-        driver.frame();
-        let view = driver.session.status().rig.view;
-        assert!((view.pivot() - pivot).length() < 1e-9);
-        view.eye
-    };
     let (inside, pivot) = (DVec3::new(1.0, 0.5, 0.5), DVec3::new(6.0, 0.5, 0.5));
     for (side, expected) in [
         (Side::Top, pivot + 0.475 * DVec3::Y),
@@ -82,13 +84,40 @@ fn a_view_from_a_side_stays_in_the_room() {
         (Side::Right, pivot + 1.9 * DVec3::X),
         (Side::Left, pivot - 5.0 * DVec3::X),
     ] {
-        let eye = view_from(inside, pivot, side);
+        let eye = view_from(&mut driver, inside, pivot, side);
         assert!((eye - expected).length() < 1e-6, "{side:?}: {eye}");
     }
-    // From outside, the walls are what one looks at.
+    // With parallel rays, of as much as before; in perspective, of as much, when one turns.
+    let camera = |driver: &mut Driver, command: Command| {
+        driver.session.send(command);
+        driver.frame();
+        driver.session.status().rig
+    };
+    let height = |rig: &Rig| 2.0 * rig.projection.half_height(rig.view.pivot_distance);
+    camera(&mut driver, Command::SetProjection(Projection::default()));
+    let before = camera(&mut driver, Command::SetView(View::look_at(inside, pivot, DVec3::Y).unwrap()));
+    let plan = camera(&mut driver, Command::ViewFrom(Side::Right));
+    assert!(plan.projection.orthographic_height.is_some() && (height(&plan) - height(&before)).abs() < 1e-9);
+    let closer = camera(&mut driver, Command::Dolly { factor: 0.25 });
+    assert!((height(&closer) - 0.25 * height(&before)).abs() < 1e-9);
+    let turned = camera(&mut driver, Command::Orbit { yaw_deg: 1.0, pitch_deg: 0.0 });
+    assert_eq!(turned.projection, before.projection);
+    assert!((height(&turned) - height(&closer)).abs() < 1e-9 && (turned.view.pivot() - pivot).length() < 1e-9);
+    // What somebody chose stays.
+    let parallel = Projection { orthographic_height: Some(1.0), ..before.projection };
+    camera(&mut driver, Command::SetProjection(parallel));
+    camera(&mut driver, Command::ViewFrom(Side::Right));
+    let turned = camera(&mut driver, Command::Orbit { yaw_deg: 1.0, pitch_deg: 0.0 });
+    assert_eq!(turned.projection, parallel);
+}
+
+#[test]
+fn from_outside_the_walls_of_a_room_are_what_a_view_from_a_side_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = opened(&bar(folder.path()));
     let outside = DVec3::new(4.0, 0.5, 20.0);
     for (side, expected) in [(Side::Top, DVec3::Y), (Side::Right, DVec3::X), (Side::Back, -DVec3::Z)] {
-        let eye = view_from(outside, DVec3::new(4.0, 0.5, 0.5), side);
+        let eye = view_from(&mut driver, outside, DVec3::new(4.0, 0.5, 0.5), side);
         assert!((eye - DVec3::new(4.0, 0.5, 0.5) - 19.5 * expected).length() < 1e-6, "{side:?}: {eye}");
     }
 }

@@ -1,7 +1,7 @@
 //! Keys that are set in a session: they are what was shown, can be undone, and are in the file that is saved.
 
 use crate::driver::{Drive, of_material};
-use firstlight::frame::{Command, Edit, MessageKind, Property, Session, SessionOptions, Target, render_offline};
+use firstlight::frame::{Command, Edit, MessageKind, Property, Reel, Session, SessionOptions, Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::animation::{Interpolation, KeyValue, LightProperty, ObjectProperty, Shutter};
 use firstlight::scene::{Animation, Extraction, LoadOptions, Moment, Rendering, SceneInputs, SceneSource, load};
@@ -318,4 +318,19 @@ fn edits_that_no_file_could_hold_change_nothing() {
     let said = driver.said(MessageKind::Warning);
     assert!(said.contains("must lie between 1e-12 and 1e12 m"), "{said}");
     assert!(driver.inputs().objects[0] == before);
+}
+
+#[test]
+fn frames_of_a_scene_without_one_of_its_meshes_have_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = STILL.replace("objects: [", "objects: [mesh(name: \"gone\", source: obj(\"gone.obj\")), ");
+    let mut driver = Driver::open(folder.path(), "scene.ron", &text);
+    let id = driver.inputs().objects.iter().find(|object| object.name.as_deref() == Some("ball")).unwrap().entity;
+    driver.edit([Edit::Select { id: id.to_bits(), add: false }, KEY]);
+    driver.go_to(1.0);
+    driver.edit([Edit::Move { by: DVec3::Y }, KEY]);
+    let mut reel = Reel::of(&mut driver.session).unwrap().open().unwrap();
+    for seconds in [0.0, 1.0] {
+        assert_eq!(reel.at(seconds).0.entities.len(), 1, "the ball");
+    }
 }

@@ -8,7 +8,7 @@ use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
 use crate::frame::state::history::History;
 use crate::frame::state::resources::RenderState;
-use crate::frame::state::selection::{Selection, box_of};
+use crate::frame::state::selection::{ActivePart, Selection, box_of};
 use crate::mesh::procedural;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
@@ -215,15 +215,17 @@ pub fn step_aside(world: &mut World) -> DVec3 {
     axis * if high > low { GAP * (high - low) } else { 2.0 * spot::find(world, spot::MIDDLE).size }
 }
 
-/// Gives `object` its own copy of its first material; plain grey if it has none.
+/// Gives `object` its own copy of its first material, or of that of the clicked part; plain grey if it has none.
 pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
-    let old = world.get::<MaterialSlots>(object).and_then(|slots| slots.0.first().copied());
+    let slots = world.get::<MaterialSlots>(object).ok_or("this object has no material")?;
+    let part = world.resource::<ActivePart>().of(object, slots.0.len()).unwrap_or(0);
+    let old = slots.0.get(part).copied();
     let material = old.and_then(|old| SurfaceMaterial::of(world, old)).cloned().unwrap_or(GREY);
     let name = old.and_then(|old| world.get::<Name>(old)).map(|name| plain_name(name.as_str()).to_owned());
     let material = new_material(world, &name.unwrap_or_else(|| "material".to_owned()), material);
     let mut slots = world.get_mut::<MaterialSlots>(object).ok_or("this object has no material")?;
-    match slots.0.first_mut() {
-        Some(first) => *first = material,
+    match slots.0.get_mut(part) {
+        Some(old) => *old = material,
         None => slots.0.push(material),
     }
     Ok(())

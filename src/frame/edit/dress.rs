@@ -1,7 +1,7 @@
-//! Ready materials for the selection.
+//! Materials for the selection.
 
 use crate::frame::edit::new_entity::{new_material, plain_name};
-use crate::frame::state::selection::Selection;
+use crate::frame::state::selection::{ActivePart, Selection};
 use crate::scene::{MaterialSlots, SurfaceMaterial, library};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -21,11 +21,19 @@ pub fn dress(world: &mut World, name: &str) -> Result<(), String> {
     let known = known.map(|(entity, ..)| entity).next();
     let material = known.unwrap_or_else(|| new_material(world, name, material.0.clone()));
     for object in objects {
-        if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {
-            slots.0 = vec![material];
-        }
+        give(world, object, material);
     }
     Ok(())
+}
+
+/// Gives an object a material, or the part of it that was clicked.
+pub fn give(world: &mut World, object: Entity, material: Entity) {
+    let active = world.get_resource::<ActivePart>().copied().unwrap_or_default();
+    let Some(mut slots) = world.get_mut::<MaterialSlots>(object) else { return };
+    match active.of(object, slots.0.len()) {
+        Some(part) => slots.0[part] = material,
+        None => slots.0 = vec![material],
+    }
 }
 
 #[cfg(test)]

@@ -40,10 +40,10 @@ pub use texture::textures;
 use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, PictureSize, RenderState};
-use crate::frame::state::selection::{Selection, pick};
+use crate::frame::state::selection::{ActivePart, Selection, pick};
 use crate::render::MaterialKind;
 use crate::scene::animation::{Interpolation, off_their_tracks};
-use crate::scene::{MaterialSlots, MeshShading, TextureSource, users_of};
+use crate::scene::{MeshShading, TextureSource, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
@@ -163,7 +163,14 @@ pub enum Edit {
         /// Its path, as in scene files.
         file: String,
     },
-    /// Assign an existing material to an object.
+    /// Choose a part of an object, which materials are given to then.
+    ChoosePart {
+        /// The object.
+        id: Id,
+        /// Index of its material; `None` for all parts.
+        part: Option<u32>,
+    },
+    /// Assign an existing material to an object, or to the part of it that was clicked.
     Assign {
         /// The object.
         id: Id,
@@ -249,6 +256,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             let aspect = world.resource::<PictureSize>().aspect();
             let picked =
                 world.resource::<RenderState>().extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
+            world.resource_mut::<ActivePart>().0 = picked.map(|picked| (picked.entity, picked.part));
             let mut selection = world.resource_mut::<Selection>();
             match picked {
                 Some(picked) => selection.choose(picked.entity, add),
@@ -259,6 +267,11 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::Select { id, add } => {
             let entity = thing(world, id)?;
             world.resource_mut::<Selection>().choose(entity, add);
+            world.resource_mut::<ActivePart>().0 = None;
+        }
+        Edit::ChoosePart { id, part } => {
+            let entity = thing(world, id)?;
+            world.resource_mut::<ActivePart>().0 = part.map(|part| (entity, part as usize));
         }
         Edit::SelectAll => {
             let inputs = &world.resource::<RenderState>().inputs;
@@ -318,9 +331,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::LightFrom { file } => texture::light_from(world, file),
         Edit::Assign { id, material } => {
             let (object, material) = (thing(world, id)?, existing(world, material)?);
-            if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {
-                slots.0 = vec![material];
-            }
+            dress::give(world, object, material);
         }
         Edit::Dress { name } => dress::dress(world, &name)?,
         Edit::OwnMaterial { id } => {

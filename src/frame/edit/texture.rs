@@ -116,10 +116,17 @@ fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
 /// Says which object cannot show a texture as a whole.
 fn tell_what_has_no_coordinates(world: &mut World, material: Entity) {
     let users = users_of(world, &world.resource::<RenderState>().inputs, material);
-    let lacks = |entity: &Entity| matches!(world.get(*entity), Some(Shape::Mesh(mesh)) if mesh.uvs.is_empty());
-    let Some(object) = users.into_iter().find(lacks) else { return };
+    // All at one point, which some programs write instead of none, they show one texel everywhere.
+    let effect = |entity: Entity| match world.get(entity) {
+        Some(Shape::Mesh(mesh)) if mesh.uvs.is_empty() => Some((entity, "each of its triangles shows the image")),
+        Some(Shape::Mesh(mesh)) if mesh.uvs.iter().all(|uv| *uv == mesh.uvs[0]) => {
+            Some((entity, "all of it has one colour of the image"))
+        }
+        _ => None,
+    };
+    let Some((object, effect)) = users.into_iter().find_map(effect) else { return };
     let name = world.get::<Name>(object).map_or("this mesh".to_owned(), |name| format!("`{name}`"));
-    let text = format!("{name} has no texture coordinates: each of its triangles shows the image; unwrap it first");
+    let text = format!("{name} has no texture coordinates: {effect}; unwrap it first");
     let now = world.resource::<Clock>().0;
     world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
 }

@@ -148,6 +148,20 @@ pub fn view_from(view: &View, side: Side) -> View {
     about_pivot(view, forward, up)
 }
 
+/// Parallel rays that show as much at this distance, metres.
+pub fn in_parallel(projection: &Projection, distance: f64) -> Projection {
+    Projection { orthographic_height: Some(2.0 * projection.half_height(distance)), ..*projection }
+}
+
+/// Shows what parallel rays show around the pivot in perspective, from where that is as large.
+pub fn in_perspective(rig: &Rig) -> Rig {
+    let Some(height) = rig.projection.orthographic_height else { return *rig };
+    let projection = Projection { orthographic_height: None, ..rig.projection };
+    let pivot_distance = 0.5 * height / projection.tan_half_vfov();
+    let eye = rig.view.pivot() - pivot_distance * rig.view.forward;
+    Rig { view: finite_or(&rig.view, View { eye, pivot_distance, ..rig.view }), projection, ..*rig }
+}
+
 /// Looks at the pivot from the opposite side; a level view stays level.
 pub fn view_from_behind(view: &View) -> View {
     // From above, right stays to the right.

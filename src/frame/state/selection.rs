@@ -34,11 +34,25 @@ impl Selection {
     }
 }
 
+/// The part of an object that was clicked last, by the index of its material in
+/// [`MaterialSlots`](crate::scene::MaterialSlots); `None` for all of it.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ActivePart(pub Option<(Entity, usize)>);
+
+impl ActivePart {
+    /// The part of an object with so many, if one was clicked.
+    pub fn of(self, object: Entity, n_parts: usize) -> Option<usize> {
+        self.0.filter(|(of, part)| *of == object && n_parts > 1 && *part < n_parts).map(|(_, part)| part)
+    }
+}
+
 /// Result of picking at a position in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
     /// The object or light.
     pub entity: Entity,
+    /// The index of its material.
+    pub part: usize,
     /// World position, metres.
     pub point: DVec3,
     /// Depth along the view axis, metres.
@@ -77,7 +91,8 @@ fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Opti
     let depth = f64::from(hit.t * ray.dir.dot(camera.forward));
     let point = scene.origin + ray.at(hit.t).as_dvec3();
     let entity = *scene.entities.get(hit.object as usize)?;
-    (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, point, depth })
+    let part = scene.prepared.geometry.objects.get(hit.object as usize)?.slot_of(hit.prim);
+    (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, part, point, depth })
 }
 
 /// Returns the distance in metres from a world position along a unit direction to the closest hit.

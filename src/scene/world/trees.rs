@@ -125,6 +125,13 @@ impl Trees {
         self.has_preview_statics || !self.preview().is_empty()
     }
 
+    /// Adds a shape, or records why it can have no tree: its objects are left out.
+    pub fn add_or_mark(&mut self, shape: &Shape) {
+        if let Err(reason) = self.add(shape) {
+            self.mark_unfit(shape, reason);
+        }
+    }
+
     /// Records that no tree can be built, so that it is not tried again; without a reason if it was told already.
     pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
         if let Some(key) = shared(shape) {

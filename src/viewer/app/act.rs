@@ -67,7 +67,7 @@ impl App {
             DroppedMaterial::Ready(name) => Edit::Dress { name },
             DroppedMaterial::Own(material) => Edit::Assign { id: object.to_bits(), material: material.to_bits() },
         };
-        vec![Command::Edit(Edit::Select { id: object.to_bits(), add: false }), Command::Edit(give)]
+        vec![Command::Edit(Edit::PickAt { x, y, add: false }), Command::Edit(give)]
     }
 
     /// Does what the time line asks for.
@@ -110,7 +110,9 @@ impl App {
     pub(super) fn open_menu_here(&mut self) {
         let [x, y] = self.input.place();
         let there = self.session.entity_at(x, y);
-        if there.is_none_or(|entity| !self.session.world().resource::<Selection>().0.contains(&entity)) {
+        let selected = &self.session.world().resource::<Selection>().0;
+        // One object alone may have several parts.
+        if selected.len() < 2 || there.is_none_or(|entity| !selected.contains(&entity)) {
             self.session.send(Command::Edit(Edit::PickAt { x, y, add: false }));
         }
         let point = self.mouse();

@@ -108,7 +108,7 @@ pub const VIEW: KeyGroup = KeyGroup {
             send_item("Initial view", &[Menu::View], Command::Home)
         ),
         row!(
-            "look at the pivot from a side: a model faces its front",
+            "look at the pivot from a side, with parallel rays until one turns: a model faces its front",
             item("View from the front", &[Menu::View], side(Side::Front)),
             item("View from the right", &[Menu::View], side(Side::Right)),
             item("View from above", &[Menu::View], side(Side::Top)),

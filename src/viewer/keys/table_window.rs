@@ -47,7 +47,7 @@ pub const PANEL: KeyGroup = KeyGroup {
             section("Panel: Animation", "Animation")
         ),
         row!(
-            "position, target, field of view, fly speed, drag, navigation preset (Blender, Maya)",
+            "position, target, perspective or orthographic, field of view, fly speed, drag, navigation preset (Blender, Maya)",
             section("Panel: Camera", "Camera")
         ),
         row!("frame, home, level, previous and next view, turntable, bookmarks", section("Panel: Views", "Views")),
@@ -73,7 +73,7 @@ pub const PANEL: KeyGroup = KeyGroup {
             section("Panel: Lights", "Lights")
         ),
         row!(
-            "colours of the sky, or strength and rotation of the environment image",
+            "colours of the sky, a clear sky with the sun, or strength and rotation of the environment image",
             section("Panel: Environment", "Environment")
         ),
         row!("open a file by dialog, or a recent file", section("Panel: Open", "Open")),

@@ -122,7 +122,8 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.weak("bookmarks");
+        ui.weak("bookmarks")
+            .on_hover_text("a click keeps this view under a free number, or goes to that of a taken one");
         for slot in 1..=9 {
             let kept = bookmarks.get(slot).is_some();
             let hint = if kept { "go to the bookmark; Ctrl+click replaces it by this view" } else { "save this view" };
@@ -132,9 +133,6 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
             }
         }
     });
-    let hint = "render frames for a video: firstlight render SCENE -o frame.png --turntable 120, or --bookmarks 1,2,3 \
-                --frames 120 for a path through the bookmarks";
-    ui.weak("video frames: render --turntable, --frames").on_hover_text(hint);
 }
 
 pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {

@@ -3,7 +3,7 @@
 //! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
 //! objects ([`shared_by`]).
 
-use crate::frame::{self, Edit, Session};
+use crate::frame::{self, ActivePart, Edit, Session};
 use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
 use crate::scene::thousands;
 use crate::scene::{
@@ -20,11 +20,35 @@ use glam::DVec3;
 /// The material of an object, with its editor.
 pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: &ObjectInput, asked: &mut Asked) {
     let id = object.entity.to_bits();
-    let slot = object.slots.first().copied();
+    let active = *session.world().resource::<ActivePart>();
+    let part = active.of(object.entity, object.slots.len());
+    let slot = object.slots.get(part.unwrap_or(0)).copied();
+    let label = |slot: Entity| inventory.material(slot).map_or("plain grey", |entry| entry.label.as_str());
     let current = slot.and_then(|slot| inventory.material(slot));
     rows(ui, "which material", |ui| {
+        if object.slots.len() > 1 {
+            let hint = "the part of the object that gets a material: click one in the image to choose it";
+            row_with_hint(ui, "part", hint, |ui| {
+                let all = format!("all {}", thousands(object.slots.len()));
+                let text = part.map_or(all.clone(), |part| format!("{}: {}", part + 1, label(object.slots[part])));
+                let combo = egui::ComboBox::from_id_salt("part").selected_text(text).width(150.0).truncate();
+                combo.show_ui(ui, |ui| {
+                    if ui.selectable_label(part.is_none(), all).clicked() {
+                        asked.edit(Edit::ChoosePart { id, part: None });
+                    }
+                    for (i, slot) in object.slots.iter().enumerate() {
+                        if ui.selectable_label(part == Some(i), format!("{}: {}", i + 1, label(*slot))).clicked() {
+                            asked.edit(Edit::ChoosePart { id, part: Some(i as u32) });
+                        }
+                    }
+                });
+            });
+        }
         row(ui, "material", |ui| {
-            let text = current.map_or("plain grey", |entry| entry.label.as_str());
+            let text = match part {
+                None if object.slots.len() > 1 => "several",
+                _ => slot.map_or("plain grey", label),
+            };
             let combo = egui::ComboBox::from_id_salt("material").selected_text(text).width(150.0).truncate();
             combo.show_ui(ui, |ui| {
                 for entry in &inventory.materials {
@@ -35,6 +59,10 @@ pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: 
             });
         });
     });
+    if part.is_none() && object.slots.len() > 1 {
+        ui.weak("click a part in the image to change its material");
+        return;
+    }
     if current.is_none_or(|entry| entry.users.len() > 1 || !entry.blends.is_empty()) {
         ui.horizontal_wrapped(|ui| {
             if let Some(current) = current {
@@ -47,9 +75,6 @@ pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: 
         });
     }
     let Some(current) = current else { return };
-    if object.slots.len() > 1 {
-        ui.weak(format!("the first of {}: see Materials for the others", object.slots.len()));
-    }
     editor(ui, session, inventory, current.entity, asked);
 }
 

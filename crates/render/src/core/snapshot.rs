@@ -65,12 +65,15 @@ impl Object {
     pub(crate) fn material_of(&self, prim: u32) -> MaterialId {
         match &self.materials[..] {
             [only] => *only,
-            many => {
-                let mesh = self.mesh.as_ref().expect("only meshes have several slots");
-                let slot = mesh.slots.get(prim as usize).map_or(0, |&slot| usize::from(slot));
-                many[slot.min(many.len() - 1)]
-            }
+            many => many[self.slot_of(prim)],
         }
+    }
+
+    /// Returns the index in [`Self::materials`] of a primitive's material.
+    #[inline]
+    pub fn slot_of(&self, prim: u32) -> usize {
+        let slot = self.mesh.as_ref().and_then(|mesh| mesh.slots.get(prim as usize)).map_or(0, |&slot| slot.into());
+        self.materials.len().saturating_sub(1).min(slot)
     }
 }
 
