@@ -68,7 +68,7 @@ pub use crate::frame::state::resources::{
     CurrentScene, FrameChanges, FreeShare, Hidden, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads,
     ViewMode,
 };
-pub use crate::frame::state::selection::{ActivePart, OwnBox, Picked, Projector, Selection, pick};
+pub use crate::frame::state::selection::{OwnBox, Picked, Projector, Selection, active_part, pick};
 pub use camera_path::{along, turntable};
 pub use command::Command;
 #[cfg(feature = "cli")]
@@ -85,6 +85,6 @@ pub use replay::{ReplayOptions, Replayed, replay};
 pub use saving::SavedAs;
 pub use scene_bounds::SceneBounds;
 pub use session::{Session, SessionError, SessionOptions, Stage};
-pub use settings::{Navigation, SceneBookmarks, Settings, SettingsStore, scene_name};
+pub use settings::{LeftView, Navigation, SceneBookmarks, Settings, SettingsStore, scene_name};
 pub use views::{Bookmarks, ViewTrail};
 pub use worker::{ViewOptions, Waker};

@@ -3,7 +3,7 @@
 //! Traced through the pixel centres and the centre of the lens, as [`pick`](crate::frame::pick) does. Knows no window:
 //! a map is made on any thread, and gives lists of pixels.
 
-use crate::kdtree::{HitBatch, RayBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use crate::render::Prepared;
 use crate::scene::Extraction;
 use bevy_ecs::prelude::Entity;
@@ -26,8 +26,9 @@ pub struct ObjectMapSource {
 #[derive(Clone, Debug)]
 pub struct ObjectMap {
     size: UVec2,
-    /// Row by row from the top: indices of `entities`, and distances in metres.
+    /// Row by row from the top: indices of `entities`, those of their materials, and distances in metres.
     objects: Vec<u32>,
+    parts: Vec<u16>,
     distances: Vec<f32>,
     entities: Vec<Entity>,
 }
@@ -53,7 +54,9 @@ impl ObjectMapSource {
         let Self { scene, entities } = self;
         let (mut rays, mut hits) = (RayBatch::default(), HitBatch::default());
         let n = size.x as usize * size.y as usize;
-        let (mut objects, mut distances) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let (mut objects, mut parts) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut distances = Vec::with_capacity(n);
+        let part = |hit: Hit| scene.geometry.objects[hit.object as usize].slot_of(hit.prim) as u16;
         for y in 0..size.y {
             if stop() {
                 return None;
@@ -66,10 +69,11 @@ impl ObjectMapSource {
             scene.geometry.tree.closest_hits(&rays, RayClass::Coherent, &mut hits);
             for hit in (0..rays.len()).map(|i| hits.get(i)) {
                 objects.push(hit.map_or(NONE, |hit| hit.object));
+                parts.push(hit.map_or(0, part));
                 distances.push(hit.map_or(f32::INFINITY, |hit| hit.t));
             }
         }
-        Some(ObjectMap { size, objects, distances, entities })
+        Some(ObjectMap { size, objects, parts, distances, entities })
     }
 }
 
@@ -89,25 +93,34 @@ impl ObjectMap {
     /// The line around all pixels that show one of these; `None` if no pixel does. Where something stands in front, there
     /// is none: around all that stands on a floor, it would say that all of that is meant.
     ///
+    /// - `part`: an object of which only that part is meant, by the index of its material.
     /// - `radius`: half of its width, pixels; its rim is a pixel wide on either side.
-    pub fn outline(&self, of: &HashSet<Entity>, radius: f32) -> Option<Outline> {
-        let meant: Vec<bool> = self.entities.iter().map(|entity| of.contains(entity)).collect();
+    pub fn outline(&self, of: &HashSet<Entity>, part: Option<(Entity, usize)>, radius: f32) -> Option<Outline> {
         let (width, height) = (self.size.x as usize, self.size.y as usize);
-        let is_in = |x: usize, y: usize| meant.get(self.objects[y * width + x] as usize).copied().unwrap_or_default();
-        let entity_at = |x: usize, y: usize| self.entities.get(self.objects[y * width + x] as usize);
+        let entity_of = |i: usize| self.entities.get(self.objects[i] as usize).copied();
+        let patch = part.map(|(entity, part)| {
+            let is_in = |i: usize| entity_of(i) == Some(entity) && usize::from(self.parts[i]) == part;
+            closed((0..width * height).map(is_in).collect(), width)
+        });
+        // What is meant there.
+        let region = |x: usize, y: usize| match (&patch, part) {
+            (Some(patch), Some((entity, _))) if patch[y * width + x] => Some(entity),
+            (_, part) => entity_of(y * width + x)
+                .filter(|entity| of.contains(entity) && part.is_none_or(|(parted, _)| parted != *entity)),
+        };
         let mut border = Vec::new();
         let (mut min, mut max) = (UVec2::MAX, UVec2::ZERO);
         for y in 0..height {
             for x in 0..width {
-                if !is_in(x, y) {
+                let own = region(x, y);
+                if own.is_none() {
                     continue;
                 }
                 let place = UVec2::new(x as u32, y as u32);
                 (min, max) = (min.min(place), max.max(place));
                 // At the edge of the image there is no line: the object goes on.
                 let nearest = NEARER * self.distances[y * width + x];
-                let own = entity_at(x, y);
-                let ends = |x: usize, y: usize| entity_at(x, y) != own && self.distances[y * width + x] >= nearest;
+                let ends = |x: usize, y: usize| region(x, y) != own && self.distances[y * width + x] >= nearest;
                 let differs = (x > 0 && ends(x - 1, y))
                     || (x + 1 < width && ends(x + 1, y))
                     || (y > 0 && ends(x, y - 1))
@@ -141,6 +154,27 @@ impl ObjectMap {
     }
 }
 
+/// Fills gaps: where two surfaces are in one place, pixels show the one or the other by chance.
+fn closed(mut pixels: Vec<bool>, width: usize) -> Vec<bool> {
+    /// Half of the width of what is filled, pixels.
+    const REACH: usize = 3;
+    // Grown along both axes, then shrunk by as much; beyond the edge of the image, everything goes on as it is there.
+    for value in [true, false] {
+        for stride in [1, width] {
+            let before = pixels.clone();
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let (at, n) = if stride == 1 { (i % width, width) } else { (i / width, before.len() / width) };
+                let line = i - at * stride;
+                let near = at.saturating_sub(REACH)..(at + REACH + 1).min(n);
+                if before[i] != value && near.into_iter().any(|at| before[line + at * stride] == value) {
+                    *pixel = value;
+                }
+            }
+        }
+    }
+    pixels
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,8 +185,8 @@ mod tests {
         let entities = [world.spawn_empty().id(), world.spawn_empty().id()];
         let objects = rows.iter().flat_map(|row| row.chars()).map(|c| c.to_digit(10).unwrap_or(NONE)).collect();
         let size = UVec2::new(rows[0].len() as u32, rows.len() as u32);
-        let distances = vec![1.0; (size.x * size.y) as usize];
-        (ObjectMap { size, objects, distances, entities: entities.to_vec() }, entities)
+        let (distances, parts) = (vec![1.0; (size.x * size.y) as usize], vec![0; (size.x * size.y) as usize]);
+        (ObjectMap { size, objects, parts, distances, entities: entities.to_vec() }, entities)
     }
 
     #[test]
@@ -168,7 +202,7 @@ mod tests {
     fn the_line_follows_the_border_and_not_the_edge_of_the_image() {
         let rows = [".........", ".........", "000000...", "000000...", "000000...", "000000...", "000000..."];
         let (map, [a, b]) = map(&rows);
-        let outline = map.outline(&HashSet::from([a]), 0.5).unwrap();
+        let outline = map.outline(&HashSet::from([a]), None, 0.5).unwrap();
         let line =
             |x: u32, y: u32| outline.pixels[((y - outline.start.y) * outline.size.x + x - outline.start.x) as usize];
         assert_eq!(line(2, 2), [1.0, 1.0], "its upper row");
@@ -176,7 +210,7 @@ mod tests {
         assert_eq!(line(2, 1)[0], 0.0);
         assert!(line(2, 1)[1] > 0.4, "the rim is beside the line");
         assert_eq!([line(0, 5), line(2, 5)], [[0.0; 2]; 2], "not inside, nor at the edge of the image");
-        assert_eq!(map.outline(&HashSet::from([b]), 0.5), None);
+        assert_eq!(map.outline(&HashSet::from([b]), None, 0.5), None);
     }
 
     #[test]
@@ -187,7 +221,7 @@ mod tests {
             *distance = if *object == 1 { 0.9 } else { 1.0 };
         }
         let lines = |of: Entity| {
-            let outline = map.outline(&HashSet::from([of]), 0.5).unwrap();
+            let outline = map.outline(&HashSet::from([of]), None, 0.5).unwrap();
             outline.pixels.iter().filter(|[line, _]| *line == 1.0).count()
         };
         assert_eq!([lines(floor), lines(ball)], [9, 6], "the horizon alone, and all of what is in front");
@@ -196,9 +230,41 @@ mod tests {
     #[test]
     fn each_of_several_objects_has_its_line() {
         let (map, [a, b]) = map(&["000111", "000111"]);
-        let outline = map.outline(&HashSet::from([a, b]), 0.5).unwrap();
+        let outline = map.outline(&HashSet::from([a, b]), None, 0.5).unwrap();
         let row: Vec<bool> = outline.pixels[..6].iter().map(|[line, _]| *line == 1.0).collect();
         assert_eq!(row, [false, false, true, true, false, false]);
+    }
+
+    #[test]
+    fn a_part_has_a_line_of_its_own() {
+        let (mut map, [a, _]) = map(&["00000000000000000000"; 2]);
+        map.parts = (0..40).map(|i| u16::from(i % 20 >= 10)).collect();
+        let line = |part| {
+            let outline = map.outline(&HashSet::from([a]), part, 0.5)?;
+            let at = |x: usize| outline.start.x + x as u32;
+            Some((0..outline.size.x as usize).filter(|x| outline.pixels[*x][0] == 1.0).map(at).collect::<Vec<_>>())
+        };
+        assert_eq!([line(Some((a, 0))), line(Some((a, 1))), line(None)], [Some(vec![9]), Some(vec![10]), Some(vec![])]);
+        assert_eq!(line(Some((a, 2))), None, "it is not seen");
+    }
+
+    #[test]
+    fn a_part_in_the_place_of_another_is_whole() {
+        let rows = ["00000000000000000000"; 20];
+        let (mut map, [a, _]) = map(&rows);
+        // Every other pixel of a square, as two walls in one place show.
+        for (i, part) in map.parts.iter_mut().enumerate() {
+            let (x, y) = (i % 20, i / 20);
+            *part = u16::from((5..15).contains(&x) && (5..15).contains(&y) && (x + y) % 2 == 0);
+        }
+        let outline = map.outline(&HashSet::from([a]), Some((a, 1)), 0.5).unwrap();
+        let width = outline.size.x;
+        let lines = (0..).zip(&outline.pixels).filter(|(_, [line, _])| *line == 1.0);
+        let places: Vec<UVec2> = lines.map(|(i, _)| outline.start + UVec2::new(i % width, i / width)).collect();
+        assert!((32..=36).contains(&places.len()), "{places:?}");
+        // Corners may be cut.
+        let is_at_border = |place: &UVec2| place.x.min(place.y) <= 6 || place.x.max(place.y) >= 13;
+        assert!(places.iter().all(is_at_border), "{places:?}");
     }
 
     #[test]

@@ -108,7 +108,16 @@ pub struct SceneBookmarks {
     /// Views by number, 1 to 9.
     pub views: BTreeMap<u8, Rig>,
     /// The view at which the window was left, if it is not the one that the scene opens with.
-    pub left: Option<Rig>,
+    pub left: Option<LeftView>,
+}
+
+/// The view at which a window was left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftView {
+    /// The camera.
+    pub rig: Rig,
+    /// Exposure and tone curve.
+    pub display: DisplayPart,
 }
 
 /// Data of files that users may have edited.
@@ -125,7 +134,8 @@ impl KeptSettings for Settings {
 
 impl KeptSettings for SceneBookmarks {
     fn check(&self) -> Result<(), BadValue> {
-        self.views.values().chain(&self.left).try_for_each(Rig::check)
+        self.views.values().try_for_each(Rig::check)?;
+        self.left.map_or(Ok(()), |LeftView { rig, display }| rig.check().and(display.check()))
     }
 }
 

@@ -48,6 +48,8 @@ struct Tracing {
 struct Line {
     view: u64,
     of: HashSet<Entity>,
+    /// The part that is meant of one of them.
+    part: Option<(Entity, usize)>,
     /// `None` where nothing of it is seen.
     drawn: Option<(TextureHandle, UVec2, UVec2)>,
 }
@@ -141,7 +143,9 @@ impl Outlines {
     }
 
     /// Makes the lines of what is selected, the last one being the active one, and of what is under the mouse.
-    pub fn update(&mut self, context: &Context, selected: &[Entity]) {
+    ///
+    /// - `part`: the part that is meant of the active one.
+    pub fn update(&mut self, context: &Context, selected: &[Entity], part: Option<(Entity, usize)>) {
         let Some((view, map)) = &self.map else { return };
         let (active, others) =
             selected.split_last().map_or((None, selected), |(active, others)| (Some(*active), others));
@@ -151,16 +155,17 @@ impl Outlines {
         let scale = map.size().x as f32 / context.content_rect().width().max(1.0);
         for ((line, of), color) in self.lines.iter_mut().zip(wanted).zip([OTHERS, ACTIVE, HOVERED]) {
             let of: HashSet<Entity> = of.into_iter().collect();
-            if line.as_ref().is_some_and(|line| line.view == *view && line.of == of) {
+            let part = part.filter(|_| color == ACTIVE);
+            if line.as_ref().is_some_and(|line| line.view == *view && line.of == of && line.part == part) {
                 continue;
             }
             let radius = if color == HOVERED { 0.6 } else { 1.1 };
-            let outline = if of.is_empty() { None } else { map.outline(&of, (radius * scale).max(0.5)) };
+            let outline = if of.is_empty() { None } else { map.outline(&of, part, (radius * scale).max(0.5)) };
             let drawn = outline.map(|outline| {
                 let texture = context.load_texture("outline", image_of(&outline, color), TextureOptions::LINEAR);
                 (texture, outline.start, outline.size)
             });
-            *line = Some(Line { view: *view, of, drawn });
+            *line = Some(Line { view: *view, of, part, drawn });
         }
     }
 

@@ -41,7 +41,7 @@ impl Prompt {
                     None => "the window closes".to_owned(),
                 };
                 let kept = match *renders && then.is_none() {
-                    true => " What is being rendered is kept as it stands.",
+                    true => " Images that are being rendered are kept as they stand, and frames that are finished.",
                     false => "",
                 };
                 (

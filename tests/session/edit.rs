@@ -67,22 +67,35 @@ fn clicking_selects_what_is_seen_there() {
     assert_eq!(driver.selected().0.len(), 12);
 }
 
-/// How the scene is rendered and shown is no edit: an undo after it undoes the edit before it.
+/// How the scene is rendered is no edit: an undo after it undoes the edit before it. How bright it is shown is one.
 #[test]
-fn an_undo_leaves_the_integrator_and_the_exposure_alone() {
+fn an_undo_leaves_the_integrator_alone_and_takes_the_exposure_back() {
     let mut driver = Driver::builtin("gallery");
-    let (before, exposure) = (driver.session.inputs().clone(), driver.session.status().display.exposure_stops);
+    let (before, display) = (driver.session.inputs().clone(), driver.session.status().display);
     driver.select("gold ball");
     driver.edit([Edit::Move { by: DVec3::new(0.5, 0.25, -1.0) }]);
-    for command in [Command::SetIntegrator(Integrator::Phong), Command::AdjustExposure { stops: 1.0 }] {
+    let moved = driver.session.inputs().clone();
+    let send = |driver: &mut Driver, command: Command| {
         driver.session.send(command);
         driver.frame();
+    };
+    for stops in [0.5, 1.0] {
+        send(&mut driver, Command::SetExposure { stops });
     }
+    send(&mut driver, Command::NextToneCurve);
+    send(&mut driver, Command::SetIntegrator(Integrator::Phong));
+    let shown = |driver: &Driver| driver.session.status().display;
+    driver.edit([Edit::Undo]);
+    driver.frame();
+    assert_eq!((shown(&driver).exposure_stops, shown(&driver).tone_curve), (1.0, display.tone_curve));
+    driver.edit([Edit::Undo]);
+    driver.frame();
+    assert_eq!(shown(&driver), display, "both changes of the exposure are one step");
+    assert_eq!(driver.session.inputs(), &moved);
     driver.edit([Edit::Undo]);
     driver.frame();
     assert_eq!(driver.session.inputs(), &before);
     assert_eq!(driver.session.status().integrator, Integrator::Phong);
-    assert_eq!(driver.session.status().display.exposure_stops, exposure + 1.0);
     // A change of settings between two steps does not end what can be redone.
     driver.session.send(Command::SetIntegrator(Integrator::Path));
     driver.frame();

@@ -2,8 +2,8 @@
 //!
 //! Changes need not be announced. When a frame has touched anything, the scene is read and compared with its previous
 //! state; a difference becomes a step. So commands, panels and user systems can all be undone. A continuous drag
-//! ([`crate::frame::Edit::Begin`] to [`crate::frame::Edit::End`]) is one step, and so is camera motion between two edits. Render
-//! settings and display settings, such as the integrator and the exposure, are not part of the scene, so undo keeps them.
+//! ([`crate::frame::Edit::Begin`] to [`crate::frame::Edit::End`]) is one step, and so is camera motion between two edits, or a
+//! change of the exposure. Render settings, such as the integrator, are not part of the scene, so undo keeps them.
 //!
 //! States share equal entities, and meshes and images are shared anyway.
 
@@ -11,8 +11,8 @@ use crate::frame::core::rig::Rig;
 use crate::frame::state::selection::Selection;
 use crate::scene::world::entity_state::{EntityState, SceneChanges, put};
 use crate::scene::{
-    Animation, CameraInput, Lens, Linear, Moment, Ordinal, Placement, Projection, SceneEnvironment, SceneInputs, Shape,
-    SurfaceMaterial, View, WithLight,
+    Animation, CameraInput, DisplaySettings, Lens, Linear, Moment, Ordinal, Placement, Projection, SceneEnvironment,
+    SceneInputs, Shape, SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::prelude::{DetectChanges, Entity, Local, Mut, Or, Res, ResMut, Resource, With, World};
 use std::collections::BTreeMap;
@@ -24,6 +24,7 @@ struct State {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
     camera: Option<(Entity, Rig)>,
+    display: DisplaySettings,
     moment: Option<Moment>,
     animation: AnimationKeys,
 }
@@ -315,6 +316,7 @@ pub fn notice(
     mut changes: SceneChanges,
     environment: Option<Res<SceneEnvironment>>,
     (moment, animation): (Option<Res<Moment>>, Option<Res<Animation>>),
+    display: Res<DisplaySettings>,
     (mut had_environment, mut had_animation): (Local<bool>, Local<bool>),
     mut history: ResMut<History>,
 ) {
@@ -324,7 +326,7 @@ pub fn notice(
     let animation_changed = animation.as_ref().is_some_and(|animation| animation.is_changed())
         || std::mem::replace(&mut *had_animation, animation.is_some()) != animation.is_some();
     history.touched |= changes.of_content() || environment_changed || moment_changed || animation_changed;
-    history.camera_touched |= changes.of_cameras();
+    history.camera_touched |= changes.of_cameras() || display.is_changed();
 }
 
 /// Reads what was touched, and stores a step if it has changed.
@@ -345,7 +347,9 @@ pub fn remember(world: &mut World) {
         .map(|(entity, _, view, projection, lens)| (entity, Rig { view: *view, projection: *projection, lens: *lens }));
     let environment = world.get_resource::<SceneEnvironment>().cloned();
     let animation = if touched { AnimationKeys::of(world, &old.animation) } else { old.animation };
-    let state = State { entities, environment, camera, moment: world.get_resource::<Moment>().copied(), animation };
+    let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default();
+    let moment = world.get_resource::<Moment>().copied();
+    let state = State { entities, environment, camera, display, moment, animation };
     world.resource_mut::<History>().record(state);
     remember_selection(world);
 }
@@ -396,6 +400,9 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     {
         world.insert_resource(environment.clone());
     }
+    if wanted.display != now.display {
+        world.insert_resource(wanted.display);
+    }
     if let Some(moment) = wanted.moment.filter(|_| wanted.moment != now.moment) {
         world.insert_resource(moment);
     }
@@ -443,6 +450,8 @@ fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     let without_lens = |state: &State| state.camera.map(|(entity, rig)| (entity, rig.view, rig.projection));
     let (label, goes_on) = match () {
         () if old.environment != new.environment => ("environment", false),
+        () if old.display.0.tone_curve != new.display.0.tone_curve => ("tone curve", false),
+        () if old.display != new.display => ("exposure", true),
         () if without_lens(old) == without_lens(new) => ("lens", true),
         () => ("camera", true),
     };

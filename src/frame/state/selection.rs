@@ -5,7 +5,7 @@ use crate::frame::state::resources::RenderState;
 use crate::geometry::Ray;
 use crate::render::Camera;
 use crate::scene::light_of;
-use crate::scene::{Extraction, Placement, Projection, View};
+use crate::scene::{Extraction, MaterialSlots, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
@@ -44,6 +44,13 @@ impl ActivePart {
     pub fn of(self, object: Entity, n_parts: usize) -> Option<usize> {
         self.0.filter(|(of, part)| *of == object && n_parts > 1 && *part < n_parts).map(|(_, part)| part)
     }
+}
+
+/// The part that is meant of the active object; `None` for all of it.
+pub fn active_part(world: &World) -> Option<(Entity, usize)> {
+    let active = world.resource::<Selection>().active()?;
+    let n_parts = world.get::<MaterialSlots>(active)?.0.len();
+    Some((active, world.resource::<ActivePart>().of(active, n_parts)?))
 }
 
 /// Result of picking at a position in the image.

@@ -105,7 +105,14 @@ impl<'a> Loop<'a> {
                 None => RenderStep::Sleep,
             };
             match step {
-                RenderStep::Render { .. } => self.render(step),
+                RenderStep::Render { divider, .. } => {
+                    // The first samples of the next size may take seconds, during which the exposure may change.
+                    let is_new = |(of, film): &(u32, Film)| *of != divider || film.spp() == 0;
+                    if self.redraw && self.film.as_ref().is_none_or(is_new) {
+                        self.show(false);
+                    }
+                    self.render(step);
+                }
                 RenderStep::Sleep => self.sleep(),
             }
         }

@@ -3,7 +3,8 @@
 use crate::console;
 use crate::frame::navigation::Rig;
 use crate::frame::{
-    Command, Denoising, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
+    Command, Denoising, Edit, Explaining, Focus, FocusTarget, LeftView, Navigation, PictureFormat, Selection, ViewMode,
+    gizmo,
 };
 use crate::render::{Inspection, Integrator};
 use crate::viewer::app::App;
@@ -20,6 +21,8 @@ use winit::window::{CursorGrabMode, Fullscreen};
 
 /// Begins what is said about focus while depth of field is off.
 pub(super) const FOCUS_IS_UNSEEN: &str = "focus is set, but everything is sharp";
+/// Says that a scene was left at another view.
+pub(super) const LEFT: &str = "another view was left here last time";
 
 impl App {
     /// Executes the requests of the panel.
@@ -165,10 +168,17 @@ impl App {
             }
             Action::CopyImage => self.copy_image(now),
             Action::ShowSaved => self.show_saved(now),
-            Action::ReturnTo(rig) => {
-                let Rig { view, projection, lens } = *rig;
-                let commands = [Command::SetView(view), Command::SetProjection(projection), Command::SetLens(lens)];
+            Action::ReturnTo(left) => {
+                let LeftView { rig: Rig { view, projection, lens }, display } = *left;
+                let commands = [
+                    Command::SetView(view),
+                    Command::SetProjection(projection),
+                    Command::SetLens(lens),
+                    Command::SetExposure { stops: display.exposure },
+                    Command::SetToneCurve(display.tone_curve),
+                ];
                 commands.into_iter().for_each(|command| self.session.send(command));
+                self.toasts.end(LEFT);
             }
             Action::Explain => self.session.send(Command::ExplainAt { x, y }),
             Action::FocusHere => {

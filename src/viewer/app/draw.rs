@@ -1,6 +1,6 @@
 //! Drawing of the image and the overlays to the window.
 
-use crate::frame::{Command, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode};
+use crate::frame::{Command, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode, active_part};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
@@ -57,7 +57,7 @@ impl App {
         let aside = self.aside as f32 / presenter.pixels_per_point();
         let selected = self.session.world().resource::<Selection>().0.clone();
         self.outlines.leave(self.session.status().restarts);
-        self.outlines.update(presenter.egui_context(), &selected);
+        self.outlines.update(presenter.egui_context(), &selected, active_part(self.session.world()));
         let (outlines, grab) = (&self.outlines, &self.grab);
         let active = self.session.world().resource::<Selection>().active().filter(|_| self.here.is_open());
         let chosen_name = active.and_then(|entity| self.panel.label_of(&self.session, entity));

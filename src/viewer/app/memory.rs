@@ -1,10 +1,11 @@
 //! State kept between runs: the bookmarks of each scene, recent files, the window's size, and its noise.
 
-use crate::frame::navigation::Rig;
+use crate::format::DisplayPart;
 use crate::frame::{
-    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, Navigation, Picture, Recovery, SceneBookmarks, Session,
-    SettingsStore, ViewMode, scene_name,
+    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, LeftView, Navigation, Picture, Recovery,
+    SceneBookmarks, Session, SettingsStore, ViewMode, scene_name,
 };
+use crate::render::Display;
 use crate::scene::{Animation, SceneSource, builtin_text, text_to_path};
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
@@ -21,9 +22,9 @@ pub struct Memory {
     /// As they are in the store.
     bookmarks: Bookmarks,
     /// The view that the scene opened with, and the one that is seen now.
-    views: Option<[Rig; 2]>,
+    views: Option<[LeftView; 2]>,
     /// The view at which the scene was left last time, as it is in the store.
-    left: Option<Rig>,
+    left: Option<LeftView>,
     /// Whether that has been offered.
     has_offered: bool,
     recent: Vec<String>,
@@ -121,8 +122,8 @@ impl Memory {
         }
         // A camera on tracks is where its time says.
         if session.world().get_resource::<Animation>().is_none_or(|animation| !animation.moves_camera()) {
-            let rig = session.status().rig;
-            self.views = Some([self.views.map_or(rig, |[first, _]| first), rig]);
+            let view = seen(session);
+            self.views = Some([self.views.map_or(view, |[first, _]| first), view]);
         }
         let look = session.world().resource::<ViewMode>().0;
         if (look.denoising, look.filter) != self.noise {
@@ -164,11 +165,11 @@ impl Memory {
     }
 
     /// The view at which this scene was left last time, once after it was opened, if another one is seen now.
-    pub fn take_left(&mut self, session: &Session) -> Option<Box<Rig>> {
+    pub fn take_left(&mut self, session: &Session) -> Option<Box<LeftView>> {
         if std::mem::replace(&mut self.has_offered, true) {
             return None;
         }
-        self.left.filter(|left| *left != session.status().rig).map(Box::new)
+        self.left.filter(|left| *left != seen(session)).map(Box::new)
     }
 
     fn open(&mut self, source: SceneSource, session: &mut Session) -> Vec<String> {
@@ -249,6 +250,13 @@ impl Memory {
     }
 }
 
+/// What is on the screen.
+fn seen(session: &Session) -> LeftView {
+    let status = session.status();
+    let Display { exposure_stops, tone_curve } = status.display;
+    LeftView { rig: status.rig, display: DisplayPart { exposure: exposure_stops, tone_curve } }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -281,7 +289,11 @@ mod tests {
         session.send(Command::SetBookmark { slot: 2 });
         session.update(Duration::ZERO);
         first.follow(&mut session);
-        let left = session.status().rig;
+        session.send(Command::SetExposure { stops: 1.5 });
+        session.update(Duration::ZERO);
+        first.follow(&mut session);
+        let left = seen(&session);
+        assert_eq!(left.display.exposure, 1.5);
         assert_eq!(first.leave(), None);
         // Who opens it and leaves it as it was loses nothing either.
         for _ in 0..2 {
@@ -292,7 +304,7 @@ mod tests {
             assert_eq!(next.leave(), None);
         }
         let kept = memory().store.bookmarks(&SceneSource::Builtin("cornell".to_owned())).0;
-        assert_eq!((kept.left, kept.views.get(&2)), (Some(left), Some(&left)));
+        assert_eq!((kept.left, kept.views.get(&2)), (Some(left), Some(&left.rig)));
     }
 
     #[test]

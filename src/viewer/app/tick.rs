@@ -2,7 +2,7 @@
 
 use crate::frame::{Command, CurrentScene, MessageKind, Selection};
 use crate::scene::SceneSource;
-use crate::viewer::app::act::FOCUS_IS_UNSEEN;
+use crate::viewer::app::act::{FOCUS_IS_UNSEEN, LEFT};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
 use crate::viewer::keys::Action;
@@ -35,8 +35,7 @@ impl App {
             self.toasts.add(Tone::Problem, trouble, now);
         }
         if let Some(left) = self.memory.take_left(&self.session) {
-            let text = "another view was left here last time".to_owned();
-            self.toasts.add_offer(text, "Go back to it", Action::ReturnTo(left), now);
+            self.toasts.add_offer(LEFT.to_owned(), "Go back to it", Action::ReturnTo(left), now);
         }
         let scene = self.session.world().get_resource::<CurrentScene>();
         self.input.set_model(scene.is_some_and(|scene| matches!(scene.0.source, SceneSource::Model(_))));

@@ -1,7 +1,6 @@
 //! Triggers and what they do: the types of the table.
 
-use crate::frame::navigation::Rig;
-use crate::frame::{Command, gizmo};
+use crate::frame::{Command, LeftView, gizmo};
 use crate::render::Inspection;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
@@ -121,7 +120,7 @@ pub enum Action {
     /// Opens the folder of what was saved last.
     ShowSaved,
     /// Shows this view again.
-    ReturnTo(Box<Rig>),
+    ReturnTo(Box<LeftView>),
     /// Toggles between this inspection and the image.
     Inspect(Inspection),
     /// Explains the pixel under the mouse.

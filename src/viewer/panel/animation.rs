@@ -68,9 +68,8 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
                     }
                 })
             });
-        } else {
-            keys(ui, session, animation, at, asked);
         }
+        keys(ui, session, animation, at, asked);
         if !is_stored_pose {
             settings(ui, animation, length, asked);
         }

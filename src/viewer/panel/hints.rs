@@ -35,6 +35,7 @@ const HINTS: &[(&str, &str)] = &[
     ("rotation", "angle by which it is turned"),
     ("colours", "the two colours of the squares"),
     ("wrap", "what is beyond the edge of the image"),
+    ("smooth", "colours between those of the image, where it is enlarged"),
     ("samples", "samples per pixel, and the time of rendering since the last restart"),
     ("resolution", "pixels that are rendered; fewer while the view moves"),
     ("rays", "rays per second"),

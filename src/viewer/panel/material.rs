@@ -3,7 +3,7 @@
 //! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
 //! objects ([`shared_by`]).
 
-use crate::frame::{self, ActivePart, Edit, Session};
+use crate::frame::{self, Edit, Session, active_part};
 use crate::render::{Domain, Fresnel, MaterialKind, Param, ParamRef, Property};
 use crate::scene::thousands;
 use crate::scene::{
@@ -20,8 +20,7 @@ use glam::DVec3;
 /// The material of an object, with its editor.
 pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: &ObjectInput, asked: &mut Asked) {
     let id = object.entity.to_bits();
-    let active = *session.world().resource::<ActivePart>();
-    let part = active.of(object.entity, object.slots.len());
+    let part = active_part(session.world()).filter(|(active, _)| *active == object.entity).map(|(_, part)| part);
     let slot = object.slots.get(part.unwrap_or(0)).copied();
     let label = |slot: Entity| inventory.material(slot).map_or("plain grey", |entry| entry.label.as_str());
     let current = slot.and_then(|slot| inventory.material(slot));

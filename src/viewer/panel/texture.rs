@@ -73,9 +73,9 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
                             *wrap = kind;
                         }
                     }
-                    ui.checkbox(smooth, "smooth");
                 })
             });
+            row(ui, "smooth", |ui| ui.checkbox(smooth, ""));
         }
         TextureSource::VertexColors { .. } => {}
     }

@@ -181,7 +181,8 @@ fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> O
     let mut rgb = hue.to_array();
     let mut pick = |ui: &mut Ui| {
         let is_picked = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed();
-        is_picked.then(|| Vec3::from(rgb).as_dvec3())
+        // It rounds what it is given when it opens, which is no change.
+        (is_picked && hex_of(rgb.into()) != hex_of(hue)).then(|| Vec3::from(rgb).as_dvec3())
     };
     let new_hue = match has_code {
         true => ui.horizontal(|ui| pick(ui).or(hex_field(ui, hue))).inner,

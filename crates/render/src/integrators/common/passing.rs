@@ -18,7 +18,7 @@ use crate::shading::scatter::Scatter;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
 use firstlight_kdtree::geometry::{Ray, robust};
-use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, SurfacePoint};
+use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use glam::Vec3;
 
 /// Maximum number of surfaces that a ray may pass: bounds the work, far above any real scene.
@@ -179,7 +179,8 @@ impl Prepared {
                 return None;
             }
         }
-        Some(behind(&point, ray))
+        let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
+        Some(from_behind(origin, ray))
     }
 
     /// Returns the continuation of a ray behind its hit, and the share of light that passes; `None` where none does.
@@ -200,8 +201,7 @@ impl Prepared {
             Material::Blend { .. } => blend_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
             _ => lobe_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
         };
-        let point = self.geometry.tree.surface_point(&unit, &of_unit);
-        (share != Vec3::ZERO).then(|| (behind(&point, ray), share))
+        (share != Vec3::ZERO).then(|| (from_behind(vertex.passing(ray.dir), ray), share))
     }
 
     /// Returns the point of a hit for texture lookups; `ray` is of unit length.
@@ -225,9 +225,8 @@ fn of_unit_length(ray: &Ray, hit: &Hit) -> (Ray, Hit) {
     (Ray { dir: ray.dir / length, ..*ray }, Hit { t: hit.t * length, ..*hit })
 }
 
-/// Returns a ray from behind a point of its surface.
-fn behind(point: &SurfacePoint, ray: &Ray) -> Ray {
-    let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
+/// Returns the rest of a ray from a point behind its hit.
+fn from_behind(origin: Vec3, ray: &Ray) -> Ray {
     if ray.t_max.is_finite() {
         // Ends exactly at the end of the first ray, wherever it starts.
         Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
