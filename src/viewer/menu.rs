@@ -2,14 +2,16 @@
 //!
 //! Their lines are those of the table of [`keys`](crate::viewer::keys), scenes and recent files aside.
 
-use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session};
+use crate::files::printable;
+use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session, active_part};
 use crate::render::Integrator;
-use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MeshSource, Rendering, library};
+use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MaterialSlots, MeshSource, Rendering, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::submenu::{part, scrolled};
 use crate::viewer::thumbnails::Thumbnails;
 use crate::viewer::time_line::NOTHING_MOVES;
+use bevy_ecs::name::Name;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
 
 /// What menus show.
@@ -153,6 +155,15 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
     }
 }
 
+/// Says which part of an object gets a material.
+fn material_title(session: &Session) -> String {
+    let world = session.world();
+    let of_part =
+        active_part(world).and_then(|(object, part)| world.get::<MaterialSlots>(object)?.0.get(part).copied());
+    let name = of_part.map(|slot| world.get::<Name>(slot).map_or("this part", |name| name.as_str()));
+    name.map_or("Material".to_owned(), |name| format!("Material of {}", printable::name(name)))
+}
+
 /// The menu of the image at the place of a right click.
 #[derive(Default)]
 pub struct HereMenu {
@@ -187,7 +198,9 @@ impl HereMenu {
                 for item in menu(Menu::Here) {
                     chosen = chosen.take().or(line(ui, input, item));
                 }
-                part(ui, "Material", |ui| chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails)));
+                part(ui, &material_title(input.session), |ui| {
+                    chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails))
+                });
                 part(ui, "Add", |ui| {
                     for item in menu(Menu::Add) {
                         chosen = chosen.take().or(line(ui, input, item));

@@ -149,6 +149,8 @@ impl Outlines {
         let Some((view, map)) = &self.map else { return };
         let (active, others) =
             selected.split_last().map_or((None, selected), |(active, others)| (Some(*active), others));
+        // A part is meant for its material; whatever else is done, is done to the whole object.
+        let others = if part.is_some() { selected } else { others };
         let hovered = self.hovered.filter(|entity| self.hover_until.is_some() && !selected.contains(entity));
         let wanted = [others.to_vec(), active.into_iter().collect(), hovered.into_iter().collect()];
         // Pixels of the map for each point of the window.

@@ -126,7 +126,7 @@ fn tell_what_has_no_coordinates(world: &mut World, material: Entity) {
     };
     let Some((object, effect)) = users.into_iter().find_map(effect) else { return };
     let name = world.get::<Name>(object).map_or("this mesh".to_owned(), |name| format!("`{name}`"));
-    let text = format!("{name} has no texture coordinates: {effect}; unwrap it first");
+    let text = format!("{name} has no texture coordinates: {effect}; another program can unwrap it");
     let now = world.resource::<Clock>().0;
     world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
 }

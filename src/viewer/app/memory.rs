@@ -23,6 +23,8 @@ pub struct Memory {
     bookmarks: Bookmarks,
     /// The view that the scene opened with, and the one that is seen now.
     views: Option<[LeftView; 2]>,
+    /// Whether it was opened since the last question.
+    is_opened: bool,
     /// The view at which the scene was left last time, as it is in the store.
     left: Option<LeftView>,
     /// Whether that has been offered.
@@ -50,6 +52,7 @@ impl Memory {
             adopted: 0,
             bookmarks: Bookmarks::default(),
             views: None,
+            is_opened: false,
             left: None,
             has_offered: true,
             recent,
@@ -164,6 +167,11 @@ impl Memory {
         self.keep_views(&source, &self.bookmarks)
     }
 
+    /// Whether a scene was opened since the last call.
+    pub fn take_opened(&mut self) -> bool {
+        std::mem::take(&mut self.is_opened)
+    }
+
     /// The view at which this scene was left last time, once after it was opened, if another one is seen now.
     pub fn take_left(&mut self, session: &Session) -> Option<Box<LeftView>> {
         if std::mem::replace(&mut self.has_offered, true) {
@@ -184,7 +192,7 @@ impl Memory {
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
         let troubles = trouble.into_iter().chain(self.remember(&source)).collect();
-        (self.scene, self.is_pictured) = (Some(source), false);
+        (self.scene, self.is_pictured, self.is_opened) = (Some(source), false, true);
         troubles
     }
 

@@ -34,6 +34,10 @@ impl App {
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
         }
+        // It is about the scene before.
+        if self.memory.take_opened() {
+            self.toasts.end(LEFT);
+        }
         if let Some(left) = self.memory.take_left(&self.session) {
             self.toasts.add_offer(LEFT.to_owned(), "Go back to it", Action::ReturnTo(left), now);
         }

@@ -291,6 +291,10 @@ impl Input {
                     self.sum.pace = Some(self.place());
                 }
                 if !repeat && !self.held.iter().any(|held| held.motion == motion) {
+                    // What flies is no click.
+                    if let Some(drag) = &mut self.drag {
+                        drag.moved = true;
+                    }
                     self.held.push(Held { motion, since: now, counted: 0.0 });
                 }
                 return None;
