@@ -243,12 +243,15 @@ impl CommandParams<'_, '_> {
     /// Returns a camera with parallel rays for a view from a side as one in perspective, if the command turns it.
     fn turning_in_perspective(&mut self, rig: Rig, command: &Command) -> Rig {
         let has_parallel = rig.projection.orthographic_height.is_some();
-        let was_side_view = self.around.is_side_view && has_parallel;
+        // Another view may have parallel rays of its own.
+        let was_side_view = has_parallel && self.around.side_view == Some(rig.view.forward);
         match command {
-            Command::ViewFrom(_) => self.around.is_side_view = was_side_view || !has_parallel,
-            Command::SetProjection(_) => self.around.is_side_view = false,
+            Command::ViewFrom(side) => {
+                let forward = navigation::view_from(&rig.view, *side).forward;
+                self.around.side_view = (was_side_view || !has_parallel).then_some(forward);
+            }
+            Command::SetProjection(_) => self.around.side_view = None,
             Command::Turn { .. } | Command::Orbit { .. } if was_side_view => {
-                self.around.is_side_view = false;
                 let turned = navigation::in_perspective(&rig);
                 return match &self.shown.extraction {
                     Some(scene) => Rig { view: within_walls(scene, &rig.view, turned.view), ..turned },

@@ -17,8 +17,8 @@ pub struct SceneBounds {
     pub home: Rig,
     /// The mode of turning.
     pub turning: Turning,
-    /// Whether the camera has parallel rays for a view from a side, until it turns.
-    pub is_side_view: bool,
+    /// The direction of a view from a side, for which the camera has parallel rays until it turns.
+    pub side_view: Option<DVec3>,
     /// Distance to the target of flying, metres.
     pub pace: Option<f64>,
     /// Height of the ground that the home position is above, metres: of a plane, of which there is nothing to be seen from

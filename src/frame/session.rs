@@ -138,7 +138,7 @@ impl Session {
             corners: Vec::new(),
             home: Rig::default(),
             turning: Turning::default(),
-            is_side_view: false,
+            side_view: None,
             pace: None,
             ground: None,
         };

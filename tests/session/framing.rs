@@ -103,8 +103,16 @@ fn a_view_from_a_side_stays_in_the_room() {
     let turned = camera(&mut driver, Command::Orbit { yaw_deg: 1.0, pitch_deg: 0.0 });
     assert_eq!(turned.projection, before.projection);
     assert!((height(&turned) - height(&closer)).abs() < 1e-9 && (turned.view.pivot() - pivot).length() < 1e-9);
-    // What somebody chose stays.
+    // Parallel rays of another view stay.
     let parallel = Projection { orthographic_height: Some(1.0), ..before.projection };
+    camera(&mut driver, Command::SetProjection(parallel));
+    camera(&mut driver, Command::SetBookmark { slot: 1 });
+    camera(&mut driver, Command::SetProjection(before.projection));
+    camera(&mut driver, Command::ViewFrom(Side::Top));
+    camera(&mut driver, Command::GoToBookmark { slot: 1 });
+    let turned = camera(&mut driver, Command::Orbit { yaw_deg: 1.0, pitch_deg: 0.0 });
+    assert_eq!(turned.projection, parallel, "that of the bookmark");
+    // What somebody chose stays.
     camera(&mut driver, Command::SetProjection(parallel));
     camera(&mut driver, Command::ViewFrom(Side::Right));
     let turned = camera(&mut driver, Command::Orbit { yaw_deg: 1.0, pitch_deg: 0.0 });
