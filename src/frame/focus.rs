@@ -83,8 +83,13 @@ pub fn radius_of_f_stop(f_stop: f64, projection: &Projection) -> f64 {
 }
 
 /// Focal length in metres, for a film 24 mm high.
-fn focal_length(projection: &Projection) -> f64 {
+pub fn focal_length(projection: &Projection) -> f64 {
     0.012 / projection.tan_half_vfov()
+}
+
+/// Vertical field of view in degrees of a focal length in metres, for a film 24 mm high.
+pub fn vfov_of_focal_length(metres: f64) -> f64 {
+    2.0 * (0.012 / metres).atan().to_degrees()
 }
 
 /// What the focal plane follows.

@@ -129,7 +129,11 @@ impl CommandParams<'_, '_> {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
                     let framed = navigation::frame_rig(&rig, self.free.aspect(*self.size), &points);
-                    let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
+                    // A focus that is seen stays where it was set.
+                    let lens = match rig.lens.enabled {
+                        true => rig.lens,
+                        false => navigation::focus_at(&rig.lens, framed.view.pivot_distance),
+                    };
                     self.set_rig(Rig { lens, ..framed });
                 }
             }
@@ -320,15 +324,15 @@ impl CommandParams<'_, '_> {
         pick(self.shown.extraction.as_ref()?, x, y, self.size.aspect())
     }
 
-    /// Corners of the boxes of the selection, or else of the scene.
+    /// Outermost points of the selection, or else corners of the boxes of the scene.
     fn what_to_frame(&mut self) -> Vec<DVec3> {
         let RenderState { inputs, extents, .. } = &mut *self.shown;
         let selected: Vec<DVec3> = (self.selection.0.iter())
             .flat_map(|entity| {
                 let object = inputs.objects.iter().find(|object| object.entity == *entity);
                 let light = inputs.lights.iter().find(|light| light.entity == *entity);
-                let corners = object.map(|object| extents.corners_of(object)).unwrap_or_default();
-                corners.into_iter().chain(light.map(|light| light.placement.translation))
+                let outermost = object.map(|object| extents.outermost_of(object)).unwrap_or_default();
+                outermost.into_iter().chain(light.map(|light| light.placement.translation))
             })
             .collect();
         if selected.is_empty() { self.around.corners.clone() } else { selected }

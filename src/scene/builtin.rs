@@ -27,6 +27,7 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = scenes! {
     "gi-balls": "diffuse and mirror spheres next to a large mesh",
     "glass-balls": "glass spheres and a glass torus with caustics",
     "ten-thousand-balls": "a mesh of 344,064 triangles above 10,000 spheres",
+    "studio": "a ground and a light: an empty scene to put things in",
     "carousel": "an animation: a sphere orbits a turning ring, and the camera moves",
 };
 

@@ -4,7 +4,7 @@ use crate::format::bounds;
 use crate::format::choice::UpAxis;
 use crate::format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use crate::format::scene_file::SceneFile;
-use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource};
+use crate::format::sources::{EnvironmentSource, MeshSource};
 use crate::format::value::{ColorValue, Rgb};
 use crate::import::framing::Framing;
 use crate::import::meshes::LoadedMesh;
@@ -143,15 +143,8 @@ pub fn around(
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
     let mut framing = Framing::new(side, aspect);
     framing.add(&loaded.mesh, corners_of(&loaded.mesh), &world);
-    let model = ObjectPart::Mesh {
-        name: Some("model".to_owned()),
-        source: source.clone(),
-        shading: MeshShading::Auto,
-        simplify: None,
-        material: (!has_materials).then(|| CLAY.to_owned()),
-        materials: None,
-        transform,
-    };
+    let material = (!has_materials).then(|| CLAY.to_owned());
+    let model = ObjectPart::mesh(Some("model".to_owned()), source.clone(), material, None, transform);
     let file = SceneFile {
         materials: (!has_materials).then(|| (CLAY.to_owned(), clay)).into_iter().collect(),
         objects: vec![model],

@@ -15,7 +15,7 @@ use crate::format::parts::{
 };
 use crate::format::placement::Placement;
 use crate::format::scene_file::SceneFile;
-use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::format::sources::{EnvironmentSource, MeshOptions, MeshSource, TextureSource};
 use crate::format::units::radians;
 use crate::format::value::Named;
 use crate::format::value::{ColorValue, Rgb, ScalarValue, hex_color};
@@ -420,15 +420,16 @@ impl<'a> Writer<'a> {
             [slot] => (Some(self.material_name(Some(*slot))), None),
             slots => (None, Some(slots.iter().map(|slot| self.material_name(Some(*slot))).collect())),
         };
-        let (source, shading, simplify) = match &item.origin {
-            Some(origin) => (origin.source.clone(), origin.shading, origin.simplify),
+        let (source, options) = match &item.origin {
+            Some(origin) => (origin.source.clone(), origin.options),
             None => {
                 self.loose_meshes.push((index, mesh.clone()));
-                (MeshSource::Obj(String::new()), MeshShading::Auto, None)
+                (MeshSource::Obj(String::new()), MeshOptions::default())
             }
         };
         let (name, transform) = (item.name.clone(), item.placement.to_part());
-        ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform }
+        let MeshOptions { shading, texture_coordinates, simplify } = options;
+        ObjectPart::Mesh { name, source, shading, texture_coordinates, simplify, material, materials, transform }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::format::material_textures::emits;
 use crate::format::model_format::ModelFormat;
 use crate::format::parts::{ObjectPart, RadiiPart, ball_grid};
 use crate::format::scene_file::SceneFile;
-use crate::format::sources::{EnvironmentLayout, EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::format::sources::{EnvironmentLayout, EnvironmentSource, MeshOptions, MeshSource, TextureSource};
 use crate::import::documents::Documents;
 use crate::import::environment_image::equirectangular;
 use crate::import::gltf_motion::GltfMotion;
@@ -144,8 +144,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mesh_source = MeshSource::of_file(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
-            let mesh =
-                kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
+            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshOptions::default(), &folder, &documents), Ok)?;
             let (file, framing, side) = default_scene::around(&mesh, &mesh_source, options.up, options.aspect());
             let emits = mesh.slots.iter().any(|(_, part)| emits(part));
             let bounds = framing.bounds();

@@ -5,21 +5,21 @@ use crate::files::stamp::stamp;
 use crate::format::error::SceneError;
 use crate::format::parts::ObjectPart;
 use crate::format::scene_file::SceneFile;
-use crate::format::sources::{MeshShading, MeshSource};
+use crate::format::sources::{MeshShading, MeshSource, TextureCoordinates};
 use crate::import::documents::Documents;
 use crate::import::meshes::{LoadedMesh, load_mesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Identity of a mesh: source, shading and bits of the simplification ratio.
-pub(super) type LoadedMeshKey = (MeshSource, MeshShading, Option<u64>);
+/// Identity of a mesh: source, shading, texture coordinates and bits of the simplification ratio.
+pub(super) type LoadedMeshKey = (MeshSource, MeshShading, TextureCoordinates, Option<u64>);
 
 /// What an object needs; `None` if it is no mesh.
 pub(super) fn mesh_key(object: &ObjectPart) -> Option<LoadedMeshKey> {
     match object {
-        ObjectPart::Mesh { source, shading, simplify, .. } => {
-            Some((source.clone(), *shading, simplify.map(f64::to_bits)))
+        ObjectPart::Mesh { source, shading, texture_coordinates, simplify, .. } => {
+            Some((source.clone(), *shading, *texture_coordinates, simplify.map(f64::to_bits)))
         }
         _ => None,
     }
@@ -65,11 +65,12 @@ pub(super) fn load_meshes(
         }))
     };
     let number_of: Vec<Option<usize>> = file.objects.iter().enumerate().map(number_of).collect();
-    let read = |(object, (source, shading, simplify)): &(usize, LoadedMeshKey)| {
-        known(&file.objects[*object]).map_or_else(
+    let read = |(object, (source, ..)): &(usize, LoadedMeshKey)| {
+        let object = &file.objects[*object];
+        known(object).map_or_else(
             || {
                 say(source);
-                load_mesh(source, *shading, simplify.map(f64::from_bits), folder, documents)
+                load_mesh(source, object.mesh_options().unwrap_or_default(), folder, documents)
             },
             Ok,
         )

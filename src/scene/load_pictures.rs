@@ -7,7 +7,8 @@ use crate::files::stamp::{Stamp, stamp};
 use crate::format::error::SceneError;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::parts::LightPart;
-use crate::format::sources::{EnvironmentSource, TextureSource};
+use crate::format::sources::{BUILTIN_IMAGE, EnvironmentSource, TextureSource};
+use crate::import::builtin_images::builtin_image;
 use crate::import::documents::Documents;
 use crate::import::gltf::images::part_of_model;
 use crate::render::ImageTexture;
@@ -30,6 +31,10 @@ impl LoadedScene {
         documents: &Documents,
     ) -> Result<(), SceneError> {
         if self.pictures.contains_key(name) {
+            return Ok(());
+        }
+        if let Some(image) = builtin_image(name) {
+            self.pictures.insert(name.to_owned(), image);
             return Ok(());
         }
         let on_disk = file_of(path);
@@ -61,6 +66,7 @@ impl LoadedScene {
             let on_disk = file_of(path);
             known_picture(options, file, &on_disk, stamp(&on_disk)).is_none() && !self.pictures.contains_key(*file)
         };
+        let files = files.filter(|file| !file.starts_with(BUILTIN_IMAGE));
         let paths = files.map(|file| (file, self.folder.join(text_to_path(file)))).filter(is_new);
         let paths: HashSet<PathBuf> = paths.map(|(_, path)| path).collect();
         documents.decode(paths.into_iter().collect());

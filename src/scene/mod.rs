@@ -61,7 +61,8 @@ pub use crate::format::material_property::MaterialProperty;
 pub use crate::format::paths::each_path;
 pub use crate::format::placement::{Linear, Placement};
 pub use crate::format::sources::{
-    BUILTIN_NAMES as BUILTIN_MESHES, EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource,
+    BUILTIN_NAMES as BUILTIN_MESHES, EnvironmentSource, MeshOptions, MeshShading, MeshSource, Seconds,
+    TextureCoordinates, TextureSource,
 };
 pub use crate::format::value::{ColorValue, Rgb, ScalarValue};
 pub use crate::format::view::{Lens, Projection, View, ViewError};
@@ -72,7 +73,7 @@ pub(crate) use crate::import::picture::{decode_picture, picture_reader};
 pub use crate::scene::default_scene::SKY as GRADIENT;
 pub use crate::scene::world::components::{
     Balls, ColorParam, DisplaySettings, GREY, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal, Rendering,
-    ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
+    ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture, textures_of,
 };
 pub use crate::scene::world::extent::{Extent, ExtentCache};
 pub use crate::scene::world::inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};

@@ -139,11 +139,10 @@ impl LoadedScene {
             if let ObjectPart::Mesh { source: MeshSource::Gltf { .. }, .. } = object {
                 meshes.push(entity.id());
             }
-            if let ObjectPart::Mesh { source, shading, simplify, material, materials, .. } = object {
+            if let ObjectPart::Mesh { source, material, materials, .. } = object {
                 entity.insert(MeshOrigin {
                     source: source.clone(),
-                    shading: *shading,
-                    simplify: *simplify,
+                    options: object.mesh_options().unwrap_or_default(),
                     own_materials: material.is_none() && materials.is_none(),
                 });
             }
@@ -245,7 +244,13 @@ impl LoadedScene {
     fn shape(&self, i: usize, object: &ObjectPart) -> (Shape, Placement) {
         let placement = Placement::from_part(object.transform());
         // Shapes with a position are stored relative to it, so that rotating the object keeps it in place.
-        let at = |point: DVec3| Placement { translation: placement.affine().transform_point3(point), ..placement };
+        // What has a point of its own turns about it.
+        let at = |point: DVec3| match point == DVec3::ZERO {
+            true => placement,
+            false => {
+                Placement { linear: placement.linear, ..Placement::at(placement.affine().transform_point3(point)) }
+            }
+        };
         match object {
             ObjectPart::Sphere { center, radius, .. } => (Shape::Sphere { radius: *radius }, at(*center)),
             ObjectPart::Plane { point, normal, .. } => (Shape::Plane { normal: unit(*normal) }, at(*point)),

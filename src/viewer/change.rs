@@ -96,7 +96,7 @@ fn difference(a: &Picture, b: &Picture) -> Option<Difference> {
 mod tests {
     use super::*;
     use crate::frame::{Command, Edit, MeshMeasure, Selection, SessionOptions, Target};
-    use crate::scene::{MeshShading, SceneSource};
+    use crate::scene::{MeshOptions, SceneSource};
     use std::time::{Duration, Instant};
 
     #[test]
@@ -141,7 +141,10 @@ mod tests {
         let entity = serpent.expect("the gallery has a serpent").entity;
         let coarse = |session: &mut Session, change: &mut PictureChange, ratio, is_whole| {
             change.begin(entity, is_whole, session);
-            let edit = Edit::Remesh { id: entity.to_bits(), shading: MeshShading::Auto, ratio };
+            let edit = Edit::Remesh {
+                id: entity.to_bits(),
+                options: MeshOptions { simplify: Some(ratio), ..Default::default() },
+            };
             session.send(Command::Edit(edit));
             settle(session, change);
             assert!(session.world().get::<MeshMeasure>(entity).is_some());

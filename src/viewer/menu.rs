@@ -74,7 +74,8 @@ fn built_in_mesh(ui: &mut Ui) -> Option<Action> {
 
 fn ready_material(ui: &mut Ui, thumbnails: &Thumbnails) -> Option<Action> {
     let mut chosen = None;
-    for (i, (name, _)) in library().iter().enumerate() {
+    for (i, ready) in library().iter().enumerate() {
+        let name = &ready.name;
         let sphere = thumbnails.material(ui.ctx(), i, SPHERE);
         if ui.add(Button::image_and_text(sphere, name)).clicked() {
             chosen = Some(dress(name));
@@ -241,7 +242,8 @@ pub fn all(input: &MenuInput) -> Vec<(String, String, String, Action)> {
         .map(|(name, about, _)| (format!("Scene: {name}"), (*about).to_owned(), String::new(), open(name)));
     let files =
         input.recent.names.iter().map(|name| (format!("Open: {name}"), String::new(), String::new(), open(name)));
-    let materials = library().iter().map(|(name, _)| {
+    let materials = library().iter().map(|ready| {
+        let name = &ready.name;
         (format!("Material: {name}"), "give it to the selection".to_owned(), String::new(), dress(name))
     });
     lines.chain(materials).chain(scenes).chain(files).collect()

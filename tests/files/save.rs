@@ -132,7 +132,7 @@ proptest! {
             Placement::at(moved),
         ));
         let linear = firstlight::scene::Linear::Turned { rotation_deg: turned, scale: DVec3::splat(radius + 1.0) };
-        let place = Placement { translation: moved, linear };
+        let place = Placement { linear, ..Placement::at(moved) };
         let (direction, irradiance) = (towards, Vec3::splat(intensity));
         let [inner_angle_deg, outer_angle_deg] = [0.4 * vfov, 0.5 * vfov];
         for placement in [place, Placement::at(eye)] {

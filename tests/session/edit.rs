@@ -11,8 +11,9 @@ use firstlight::frame::{
 use firstlight::render::{Environment, Inspection, Integrator, MaterialKind};
 use firstlight::scene::animation::LightProperty;
 use firstlight::scene::{
-    ColorParam, DirectionalLight, Inventory, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement,
-    PointLight, Rgb, SceneInputs, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
+    ColorParam, DirectionalLight, Inventory, LoadOptions, Material, MaterialSlots, MeshOptions, MeshOrigin,
+    MeshShading, MeshSource, Placement, PointLight, Rgb, SceneInputs, SceneSource, Shape, SpotLight, SurfaceMaterial,
+    TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
 
@@ -328,7 +329,7 @@ fn a_mesh_is_simplified_beside_the_picture() {
     let id = driver.named("serpent").to_bits();
     let whole: Shape = driver.get("serpent");
     let restarts = driver.session.status().restarts;
-    driver.edit([Edit::Remesh { id, shading: MeshShading::Auto, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, options: simplified(0.05) }]);
     assert!(!driver.session.is_idle() && driver.get::<Shape>("serpent") == whole, "the frame did not wait for it");
     driver.run_until(|session| session.status().restarts > restarts && session.is_idle());
     let (shape, measure): (Shape, MeshMeasure) = (driver.get("serpent"), driver.get("serpent"));
@@ -337,7 +338,7 @@ fn a_mesh_is_simplified_beside_the_picture() {
     assert!(measure.faces <= measure.whole_faces / 20 && measure.faces > measure.whole_faces / 25);
     let deviation = measure.deviation.unwrap();
     assert!(deviation.mean() > 0.0 && deviation.max() < 0.2, "{deviation:?}");
-    assert_eq!(driver.get::<MeshOrigin>("serpent").simplify, Some(0.05));
+    assert_eq!(driver.get::<MeshOrigin>("serpent").options.simplify, Some(0.05));
     driver.edit([Edit::Undo]);
     driver.run_until(Session::is_idle);
     assert_eq!(driver.get::<Shape>("serpent"), whole);
@@ -347,8 +348,13 @@ fn a_mesh_is_simplified_beside_the_picture() {
     driver.run_until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
 }
 
+fn simplified(ratio: f64) -> MeshOptions {
+    MeshOptions { simplify: Some(ratio), ..MeshOptions::default() }
+}
+
 #[test]
 fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
+    let flat = MeshOptions { shading: MeshShading::Flat, ..simplified(0.05) };
     let mut driver = Driver::builtin("gallery");
     let entity = driver.named("serpent");
     let id = entity.to_bits();
@@ -359,24 +365,24 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     let n_objects = count(&driver);
     // A slider that is dragged, and another control.
     for ratio in [0.9, 0.5, 0.2, 0.05] {
-        driver.edit([Edit::Remesh { id, shading: MeshShading::Auto, ratio }]);
-        assert_eq!(wanted(&driver), Some((MeshShading::Auto, ratio)));
+        driver.edit([Edit::Remesh { id, options: simplified(ratio) }]);
+        assert_eq!(wanted(&driver), Some(simplified(ratio)));
     }
-    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
-    assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
+    driver.edit([Edit::Remesh { id, options: flat }]);
+    assert_eq!(wanted(&driver), Some(flat));
     driver.edit([Edit::Undo]);
     driver.run_until(Session::is_idle);
     assert_eq!((wanted(&driver), count(&driver)), (before, n_objects), "the mesh was what came last, not the sphere");
     assert_eq!(driver.get::<Shape>("serpent"), whole);
     // What was done after it was asked for goes first.
-    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, options: flat }]);
     driver.edit([Edit::Add(NewThing::Sphere), Edit::Undo]);
     assert_eq!(count(&driver), n_objects);
     driver.run_until(Session::is_idle);
-    assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
+    assert_eq!(wanted(&driver), Some(flat));
     assert!(driver.get::<MeshMeasure>("serpent").faces <= driver.get::<MeshMeasure>("serpent").whole_faces / 20);
     // Nor does it begin again for what is so already.
-    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, options: flat }]);
     assert!(driver.session.status().loading.is_none());
     driver.edit([Edit::Undo]);
     driver.run_until(Session::is_idle);
@@ -579,21 +585,39 @@ fn colours_become_textures_and_textures_change() {
     assert!(text.contains("\"stripes.png\""), "{text}");
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
-    // A mesh without texture coordinates shows no image, which is told; the cube has some.
+    // A mesh without texture coordinates gets some, which is told; the cube has some.
     let told = |driver: &Driver| {
         let messages = driver.session.status().messages.iter();
         messages.filter(|message| message.text.contains("no texture coordinates")).count()
+    };
+    let mesh = |driver: &Driver, name: &str| match driver.get::<Shape>(name) {
+        Shape::Mesh(mesh) => mesh,
+        _ => panic!("{name}"),
     };
     for (name, expected) in [("cube", 0), ("icosphere", 1)] {
         driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Builtin(name.to_owned())))]);
         driver.run_until(|session| {
             session.is_idle() && session.inputs().objects.iter().any(|object| object.name.as_deref() == Some(name))
         });
-        let slots: MaterialSlots = driver.get(name);
+        let (slots, bare): (MaterialSlots, Shape) = (driver.get(name), driver.get(name));
         driver.edit([Edit::Paint { id: slots.0[0].to_bits(), part: checker(8.0) }]);
         driver.edit([Edit::Paint { id: slots.0[0].to_bits(), part: checker(4.0) }]);
         assert_eq!(told(&driver), expected, "{name}, once");
-        driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+        // A scene that is saved opens with the same mesh.
+        let projected = mesh(&driver, name);
+        assert_eq!(projected.uvs.len(), projected.positions.len());
+        let path = folder.path().join(format!("{name}.ron"));
+        driver.session.send(Command::SaveScene { path: path.clone() });
+        driver.run_until(|session| session.is_idle() && path.exists());
+        let opened = firstlight::scene::load(&SceneSource::of_scene(path), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        opened.spawn(&mut world);
+        let again = world.query::<(&Name, &Shape)>().iter(&world).find(|(of, _)| of.as_str() == name);
+        let Some((_, Shape::Mesh(again))) = again else { panic!("{name}") };
+        assert_eq!(**again, *projected, "{name}");
+        driver.edit([Edit::Undo, Edit::Undo]);
+        assert_eq!(driver.get::<Shape>(name), bare, "{name}: one step of undo for both");
+        driver.edit([Edit::Undo]);
     }
     // It can light the scene from all around, too.
     let light = |driver: &mut Driver| SceneInputs::of(driver.session.world_mut()).environment;

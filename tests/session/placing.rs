@@ -1,9 +1,11 @@
 //! Where things go that are added, and where the camera stops.
 
 use crate::driver::{Drive, Driver};
+use bevy_ecs::entity::Entity;
 use firstlight::format::property::SkyProperty;
 use firstlight::frame::{Command, Edit, Focus, FocusTarget, NewThing, Projector, Property, SessionOptions, Target};
 use firstlight::render::Environment;
+use firstlight::scene::animation::ObjectProperty;
 use firstlight::scene::{
     ColorParam, DirectionalLight, EnvironmentSource, GRADIENT, Material, MaterialSlots, Placement, PointLight, Rgb,
     SceneEnvironment, SceneSource, Shape, SpotLight, SurfaceMaterial, View,
@@ -218,6 +220,87 @@ fn a_copy_stands_beside_its_original() {
         assert!(wide > size && wide < 1.5 * size && step.length() == wide, "{step} at {size}");
         let at = |point: DVec3| place(&driver, point).expect("in front of the camera").x;
         assert!(at(before.translation + step) > at(before.translation), "to the right, as it is seen");
+    }
+}
+
+#[test]
+fn a_copy_that_the_right_hides_stands_where_it_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    driver.select("model");
+    let before: Placement = driver.get("model");
+    // Near the right edge of the image.
+    let View { eye, .. } = driver.session.status().rig.view;
+    let right = driver.session.status().rig.view.right();
+    let view = driver.session.status().rig.view;
+    driver.session.send(Command::SetView(View { eye: eye - 1.1 * right, ..view }));
+    driver.frame();
+    driver.edit([Edit::Duplicate]);
+    driver.settle();
+    let step = driver.get::<Placement>("model 2").translation - before.translation;
+    assert!(step.dot(right) < 0.0, "{step}");
+}
+
+#[test]
+fn numbers_turn_an_object_about_its_middle_as_handles_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let id = driver.select("model");
+    let middle = |driver: &mut Driver| driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
+    let before = middle(&mut driver);
+    let set = |property, value| Edit::Set { id, property: Property::Object(property), value };
+    driver.edit([set(ObjectProperty::Rotate, DVec3::new(0.0, 0.0, 90.0))]);
+    driver.edit([set(ObjectProperty::Scale, DVec3::splat(3.0))]);
+    driver.edit([Edit::Begin, Edit::Turn { axis: DVec3::X, angle_deg: 50.0 }]);
+    assert!(middle(&mut driver).abs_diff_eq(before, 1e-12));
+    // So the position is what it was, and a saved scene opens with the same placement.
+    let turned: Placement = driver.get("model");
+    assert!(
+        turned.translation.abs_diff_eq(DVec3::ZERO, 1e-12) && turned.pivot == DVec3::new(0.0, 0.5, 0.0),
+        "{turned:?}"
+    );
+    let path = folder.path().join("turned.ron");
+    driver.session.send(Command::SaveScene { path: path.clone() });
+    driver.run_until(|session| session.is_idle() && path.exists());
+    let target = Target { spp: Some(1), ..Target::default() };
+    let options = SessionOptions { width: 16, height: 16, target, ..SessionOptions::default() };
+    let mut again = Driver::new(options, SceneSource::Scene(path));
+    again.settle();
+    assert_eq!(again.get::<Placement>("model"), turned);
+}
+
+#[test]
+fn between_its_keys_an_object_turns_about_its_middle() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let id = driver.select("model");
+    let before = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
+    let key = Edit::SetKeys { camera: false };
+    let rotate = Property::Object(ObjectProperty::Rotate);
+    driver.edit([key.clone()]);
+    driver.session.send(Command::SetMoment { seconds: Some(2.0) });
+    driver.settle();
+    driver.edit([Edit::Set { id, property: rotate, value: DVec3::new(0.0, 0.0, 360.0) }, key]);
+    driver.session.send(Command::SetMoment { seconds: Some(1.0) });
+    driver.settle();
+    let half: Placement = driver.get("model");
+    assert!(half.affine().transform_vector3(DVec3::Y).abs_diff_eq(-DVec3::Y, 1e-9), "half a turn: {half:?}");
+    let middle = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
+    assert!(middle.abs_diff_eq(before, 1e-9), "{middle} was {before}");
+}
+
+#[test]
+fn a_framed_ball_is_in_the_middle() {
+    let mut driver = Driver::builtin("gi-ball");
+    driver.select("ball");
+    for (yaw_deg, pitch_deg) in [(0.0, 0.0), (40.0, -25.0), (100.0, -50.0)] {
+        driver.session.send(Command::Orbit { yaw_deg, pitch_deg });
+        driver.session.send(Command::FrameAll);
+        driver.frame();
+        let middle = driver.get::<Placement>("ball").translation;
+        let at = place(&driver, middle).expect("it is in front") - DVec2::new(240.0, 160.0);
+        // A sphere off the axis is seen as an ellipse, whose middle is not that of the sphere.
+        assert!(at.length() < 2.0, "{at}");
     }
 }
 

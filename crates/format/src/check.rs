@@ -13,7 +13,7 @@ use crate::parts::{InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, Trans
 use crate::placement::Placement;
 use crate::property::{PropertyInfo, SkyProperty};
 use crate::scene_file::SceneFile;
-use crate::sources::BUILTIN_NAMES;
+use crate::sources::{BUILTIN_IMAGE, BUILTIN_IMAGES, BUILTIN_NAMES};
 use crate::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::value::{ColorValue, Rgb, ScalarValue};
 use crate::view::unit_direction;
@@ -145,7 +145,13 @@ impl Check<'_> {
                 self.light(&format!("{path}/b"), *b);
                 (vec![("squares", *squares)], *offset, *rotate)
             }
-            TextureSource::Image { stretch, repeat, offset, rotate, tint, uv_set, relief, .. } => {
+            TextureSource::Image { file, stretch, repeat, offset, rotate, tint, uv_set, relief, .. } => {
+                if let Some(name) = file.strip_prefix(BUILTIN_IMAGE)
+                    && !BUILTIN_IMAGES.contains(&name)
+                {
+                    let what = format!("there is no built-in image `{name}`");
+                    self.misnamed(&format!("{path}/file"), what, name, BUILTIN_IMAGES.iter().copied());
+                }
                 if let Some(relief) = relief {
                     self.finite(&format!("{path}/relief"), f64::from(*relief));
                 }
@@ -442,10 +448,11 @@ impl Check<'_> {
 
     /// Converts a transform to a placement, if it is valid.
     fn transform(&mut self, path: &str, part: &TransformPart) -> Option<Placement> {
-        if part.matrix.is_some() && (part.translate.is_some() || part.rotate.is_some() || part.scale.is_some()) {
+        let is_described = part.translate.is_some() || part.rotate.is_some() || part.scale.is_some();
+        if part.matrix.is_some() && (is_described || part.pivot.is_some()) {
             self.wrong(
                 &format!("{path}/matrix"),
-                "`matrix` excludes `translate`, `rotate` and `scale`: use one or the others",
+                "`matrix` excludes `translate`, `rotate`, `scale` and `pivot`: use one or the others",
             );
             return None;
         }

@@ -45,6 +45,7 @@ impl FieldAt<'_> {
             "integrator" => ("path or phong", "path"),
             "tone_curve" => ("one of linear, neutral and filmic", "filmic"),
             "shading" => ("the shading of a mesh", "flat"),
+            "texture_coordinates" => ("file or box", "box"),
             "source" => ("a mesh with its kind", "obj(\"model.obj\")"),
             "environment" => {
                 let quoted = self.value.trim_end().strip_prefix('"').and_then(|value| value.strip_suffix('"'));

@@ -3,7 +3,7 @@
 use crate::bad_value::BadValue;
 use crate::bounds::check_stops;
 use crate::key::KeyValue;
-use crate::sources::{MeshShading, MeshSource};
+use crate::sources::{MeshOptions, MeshShading, MeshSource, TextureCoordinates};
 use crate::value::{ColorValue, Rgb, ScalarValue};
 use firstlight_render::{Display, Falloff, Material, Params, PixelFilter, ToneCurve};
 use glam::DVec3;
@@ -150,6 +150,9 @@ pub enum ObjectPart {
         /// How vertex normals are computed.
         #[serde(default, skip_serializing_if = "is_default")]
         shading: MeshShading,
+        /// Where its texture coordinates come from.
+        #[serde(default, skip_serializing_if = "is_default")]
+        texture_coordinates: TextureCoordinates,
         /// Share of the faces to keep, (0, 1].
         #[serde(default, skip_serializing_if = "Option::is_none")]
         simplify: Option<f64>,
@@ -199,6 +202,20 @@ pub enum ObjectPart {
 }
 
 impl ObjectPart {
+    /// A mesh as it is in its source.
+    ///
+    /// - `material`, `materials`: of all slots, or per slot; without either, those of the file.
+    pub fn mesh(
+        name: Option<String>,
+        source: MeshSource,
+        material: Option<String>,
+        materials: Option<Vec<String>>,
+        transform: TransformPart,
+    ) -> Self {
+        let MeshOptions { shading, texture_coordinates, simplify } = MeshOptions::default();
+        Self::Mesh { name, source, shading, texture_coordinates, simplify, material, materials, transform }
+    }
+
     /// Its name, if it has one.
     pub fn name(&self) -> Option<&str> {
         match self {
@@ -222,6 +239,16 @@ impl ObjectPart {
             | Self::BallGrid { material, .. }
             | Self::Spheres { material, .. } => Some(material),
             Self::Mesh { material, .. } => material.as_deref(),
+        }
+    }
+
+    /// What is done with the mesh after it is read; `None` if it is no mesh.
+    pub fn mesh_options(&self) -> Option<MeshOptions> {
+        match *self {
+            Self::Mesh { shading, texture_coordinates, simplify, .. } => {
+                Some(MeshOptions { shading, texture_coordinates, simplify })
+            }
+            _ => None,
         }
     }
 
@@ -278,6 +305,9 @@ pub struct TransformPart {
     /// Scale factors along the axes of the object; negative ones mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<ScalePart>,
+    /// The point of the object about which it is rotated and scaled; the origin when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pivot: Option<DVec3>,
     /// Three rows of four numbers; the last column is the translation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<[[f64; 4]; 3]>,

@@ -2,7 +2,7 @@
 
 use crate::parts::ObjectPart;
 use crate::scene_file::SceneFile;
-use crate::sources::{EnvironmentSource, TextureSource};
+use crate::sources::{BUILTIN_IMAGE, EnvironmentSource, TextureSource};
 use firstlight_files::relative::{absolute, relative_path, text_to_path};
 use std::path::Path;
 
@@ -29,7 +29,9 @@ pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
         }
     }
     for (_, texture) in &mut file.textures.0 {
-        if let TextureSource::Image { file, .. } = texture {
+        if let TextureSource::Image { file, .. } = texture
+            && !file.starts_with(BUILTIN_IMAGE)
+        {
             change(file);
         }
     }

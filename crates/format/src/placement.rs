@@ -4,7 +4,7 @@ use crate::bounds::{MAX_COORDINATE, MIN_SIZE};
 use crate::parts::{ScalePart, TransformPart};
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
-/// From object space to the world: `linear` is applied first, then `translation`.
+/// From object space to the world: `linear` is applied first, about `pivot`, then `translation`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "ecs", derive(bevy_ecs::component::Component))]
 pub struct Placement {
@@ -12,6 +12,8 @@ pub struct Placement {
     pub translation: DVec3,
     /// Rotation, scale and shear.
     pub linear: Linear,
+    /// The point of object space that only `translation` moves.
+    pub pivot: DVec3,
 }
 
 /// The linear part of a placement.
@@ -71,7 +73,7 @@ pub fn tidy_degrees(angle: f64) -> f64 {
 impl Placement {
     /// At a point, without rotation or scale.
     pub fn at(translation: DVec3) -> Self {
-        Self { translation, linear: Linear::default() }
+        Self { translation, ..Self::default() }
     }
 
     /// Checks whether a scene file may have it.
@@ -95,12 +97,13 @@ impl Placement {
         if let Some([x, y, z]) = part.matrix {
             let row = |row: [f64; 4]| DVec3::new(row[0], row[1], row[2]);
             let linear = DMat3::from_cols(row(x), row(y), row(z)).transpose();
-            return Self { translation: DVec3::new(x[3], y[3], z[3]), linear: Linear::Matrix(linear) };
+            return Self { linear: Linear::Matrix(linear), ..Self::at(DVec3::new(x[3], y[3], z[3])) };
         }
         let scale = part.scale.map_or(DVec3::ONE, |scale| scale.0);
         Self {
             translation: part.translate.unwrap_or(DVec3::ZERO),
             linear: Linear::Turned { rotation_deg: part.rotate.unwrap_or(DVec3::ZERO), scale },
+            pivot: part.pivot.unwrap_or(DVec3::ZERO),
         }
     }
 
@@ -112,13 +115,14 @@ impl Placement {
                 translate: differs(self.translation, DVec3::ZERO),
                 rotate: differs(rotation_deg, DVec3::ZERO),
                 scale: differs(scale, DVec3::ONE).map(ScalePart),
+                pivot: differs(self.pivot, DVec3::ZERO),
                 matrix: None,
             },
             Linear::Matrix(linear) => {
-                let rows = linear.transpose();
+                let (rows, translation) = (linear.transpose(), self.affine().translation);
                 let row = |i: usize| {
                     let DVec3 { x, y, z } = rows.col(i);
-                    [x, y, z, self.translation[i]]
+                    [x, y, z, translation[i]]
                 };
                 TransformPart { matrix: Some([row(0), row(1), row(2)]), ..TransformPart::default() }
             }
@@ -142,7 +146,19 @@ impl Placement {
 
     /// The whole transform.
     pub fn affine(&self) -> DAffine3 {
-        DAffine3 { matrix3: self.linear(), translation: self.translation }
+        let matrix3 = self.linear();
+        // Without a pivot, to the last bit.
+        let by_pivot = if self.pivot == DVec3::ZERO { DVec3::ZERO } else { self.pivot - matrix3 * self.pivot };
+        DAffine3 { matrix3, translation: self.translation + by_pivot }
+    }
+
+    /// The same placement with another pivot.
+    pub fn with_pivot(&self, pivot: DVec3) -> Self {
+        if pivot == self.pivot {
+            return *self;
+        }
+        let DAffine3 { matrix3, translation } = self.affine();
+        Self { translation: translation + matrix3 * pivot - pivot, pivot, ..*self }
     }
 
     /// The scale factor, if it is the same in all directions.
@@ -165,7 +181,7 @@ impl From<DAffine3> for Placement {
         // What only moves is described by its position in scene files.
         let is_moved = affine.matrix3 == DMat3::IDENTITY;
         let linear = if is_moved { Linear::default() } else { Linear::Matrix(affine.matrix3) };
-        Self { translation: affine.translation, linear }
+        Self { linear, ..Self::at(affine.translation) }
     }
 }
 
@@ -189,6 +205,7 @@ mod tests {
         let placement = Placement {
             translation: DVec3::new(10.0, 0.0, 0.0),
             linear: Linear::Turned { rotation_deg: DVec3::new(90.0, 90.0, 0.0), scale: DVec3::new(1.0, 2.0, 3.0) },
+            pivot: DVec3::ZERO,
         };
         // (0, 1, 0) → scaled (0, 2, 0) → about X (0, 0, 2) → about Y (2, 0, 0) → translated (12, 0, 0).
         let point = placement.affine().transform_point3(DVec3::Y);
@@ -202,8 +219,8 @@ mod tests {
         {
             let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
             let expected = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, z, y, x));
-            let placement =
-                Placement { translation: DVec3::ZERO, linear: Linear::Turned { rotation_deg, scale: DVec3::ONE } };
+            let linear = Linear::Turned { rotation_deg, scale: DVec3::ONE };
+            let placement = Placement { linear, ..Placement::default() };
             assert!(placement.linear().abs_diff_eq(expected, 1e-12), "{rotation_deg}");
         }
     }
@@ -213,10 +230,17 @@ mod tests {
         let turned = Placement {
             translation: DVec3::new(1.0, 2.0, 3.0),
             linear: Linear::Turned { rotation_deg: DVec3::new(10.0, 20.0, 30.0), scale: DVec3::splat(0.5) },
+            pivot: DVec3::new(0.5, -1.0, 2.0),
         };
         let matrix = Placement { linear: Linear::Matrix(turned.linear()), ..turned };
         assert_eq!(Placement::from_part(&matrix.to_part()).affine(), turned.affine());
         assert_eq!(Placement::from_part(&turned.to_part()), turned);
+        // Its pivot is only moved.
+        let at = turned.affine().transform_point3(turned.pivot);
+        assert!(at.abs_diff_eq(turned.translation + turned.pivot, 1e-12), "{at}");
+        let other = turned.with_pivot(DVec3::new(-3.0, 0.2, 1.0));
+        assert!(other.affine().abs_diff_eq(turned.affine(), 1e-12));
+        assert!(other.with_pivot(turned.pivot).translation.abs_diff_eq(turned.translation, 1e-12));
         assert!((turned.even_scale().unwrap() - 0.5).abs() < 1e-15);
     }
 
@@ -253,8 +277,8 @@ mod tests {
     #[test]
     fn stretched_or_sheared_is_not_even() {
         let stretched = Linear::Turned { rotation_deg: DVec3::splat(20.0), scale: DVec3::new(1.0, 1.0, 1.001) };
-        assert_eq!(Placement { translation: DVec3::ZERO, linear: stretched }.even_scale(), None);
+        assert_eq!(Placement { linear: stretched, ..Placement::default() }.even_scale(), None);
         let sheared = Linear::Matrix(DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0).normalize(), DVec3::Z));
-        assert_eq!(Placement { translation: DVec3::ZERO, linear: sheared }.even_scale(), None);
+        assert_eq!(Placement { linear: sheared, ..Placement::default() }.even_scale(), None);
     }
 }

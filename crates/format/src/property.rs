@@ -226,15 +226,15 @@ impl ObjectProperty {
     /// The placement with this value changed. A matrix with shear keeps its rotation and scale.
     #[must_use]
     pub fn set(self, placement: Placement, value: DVec3) -> Placement {
-        let Placement { translation, linear } = placement;
+        let Placement { linear, .. } = placement;
         let parts = linear.rotation_and_scale();
         match (self, parts) {
-            (Self::Translate, _) => Placement { translation: value, linear },
+            (Self::Translate, _) => Placement { translation: value, ..placement },
             (Self::Rotate, Some((_, scale))) => {
-                Placement { translation, linear: Linear::Turned { rotation_deg: value, scale } }
+                Placement { linear: Linear::Turned { rotation_deg: value, scale }, ..placement }
             }
             (Self::Scale, Some((rotation_deg, _))) => {
-                Placement { translation, linear: Linear::Turned { rotation_deg, scale: value } }
+                Placement { linear: Linear::Turned { rotation_deg, scale: value }, ..placement }
             }
             (Self::Rotate | Self::Scale, None) => placement,
         }

@@ -350,6 +350,36 @@ pub enum MeshShading {
     Flat,
 }
 
+/// Prefix of the names of images that need no file.
+pub const BUILTIN_IMAGE: &str = "builtin:";
+
+/// Names of the images that need no file, without [`BUILTIN_IMAGE`].
+pub const BUILTIN_IMAGES: [&str; 4] = ["oak", "marble", "concrete", "linen"];
+
+/// Where the first texture coordinates of a mesh come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureCoordinates {
+    /// From its source; without any there, each triangle shows the image.
+    #[default]
+    File,
+    /// Projection along the axis of the mesh that each triangle faces most: the image covers a square as wide as the
+    /// longest side of the mesh's bounding box.
+    Box,
+}
+
+/// What is done with a mesh after it is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshOptions {
+    /// How its normals are computed.
+    pub shading: MeshShading,
+    /// Where its texture coordinates come from.
+    pub texture_coordinates: TextureCoordinates,
+    /// Share of the faces to keep, (0, 1]; `None`: all.
+    pub simplify: Option<f64>,
+}
+
 fn white() -> Rgb {
     Rgb(Vec3::ONE)
 }

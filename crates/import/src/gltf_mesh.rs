@@ -10,7 +10,7 @@ use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
 use firstlight_format::material_textures::{rename_textures, texture_names};
 use firstlight_format::parts::MaterialPart;
-use firstlight_format::sources::{MeshShading, TextureSource};
+use firstlight_format::sources::{MeshOptions, MeshShading, TextureSource};
 use firstlight_mesh::Mesh;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -37,8 +37,7 @@ pub(crate) struct GltfMesh<'a> {
     pub key: Option<MeshKey>,
     /// Time in the animations, seconds; `None`: as stored.
     pub at: Option<f64>,
-    pub shading: MeshShading,
-    pub simplified: bool,
+    pub options: MeshOptions,
 }
 
 impl GltfMesh<'_> {
@@ -51,9 +50,9 @@ impl GltfMesh<'_> {
         let file = path_to_text(self.path);
         let surfaces = opened.surfaces(&file);
         let computed = ModelOptions::default().normals;
-        let normals = match self.shading {
+        let normals = match self.options.shading {
             MeshShading::Auto => computed,
-            MeshShading::Smooth if !self.simplified => ModelNormals::OfPositions,
+            MeshShading::Smooth if self.options.simplify.is_none() => ModelNormals::OfPositions,
             MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
         };
         let (mesh, slots, warnings) = match self.key {

@@ -21,7 +21,7 @@ use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::material_textures::texture_names;
 use firstlight_format::parts::{LightPart, ObjectPart};
 use firstlight_format::scene_file::SceneFile;
-use firstlight_format::sources::{MeshShading, MeshSource, Seconds, TextureSource};
+use firstlight_format::sources::{MeshSource, Seconds, TextureSource};
 use firstlight_format::value::Named;
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
@@ -133,20 +133,14 @@ impl Maker<'_> {
                 })
                 .collect();
             let is_one = names.iter().all(|name| *name == names[0]);
-            objects.push(ObjectPart::Mesh {
-                name: Some(name),
-                source: MeshSource::Gltf {
-                    file: self.wish.file.to_owned(),
-                    mesh: Some(placed.key.mesh),
-                    node: placed.key.node,
-                    at: at.map(Seconds),
-                },
-                shading: MeshShading::Auto,
-                simplify: None,
-                material: is_one.then(|| names[0].clone()),
-                materials: (!is_one).then_some(names),
-                transform: transform(&placed.world),
-            });
+            let source = MeshSource::Gltf {
+                file: self.wish.file.to_owned(),
+                mesh: Some(placed.key.mesh),
+                node: placed.key.node,
+                at: at.map(Seconds),
+            };
+            let (material, materials) = if is_one { (Some(names[0].clone()), None) } else { (None, Some(names)) };
+            objects.push(ObjectPart::mesh(Some(name), source, material, materials, transform(&placed.world)));
         }
         if objects.is_empty() {
             return Err(self.wrong(document.omissions.nothing_left()));

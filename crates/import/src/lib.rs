@@ -4,6 +4,7 @@
 //! file; `model` has what the readers share. Knows no world. Start reading at [`load_model`] and, for
 //! scenes of other renderers, at `read_scene`.
 
+pub mod builtin_images;
 pub mod documents;
 pub mod environment_image;
 pub(crate) mod error;

@@ -15,7 +15,7 @@ use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_format::parts::MaterialPart;
-use firstlight_format::sources::{MeshShading, MeshSource, TextureSource};
+use firstlight_format::sources::{MeshOptions, MeshShading, MeshSource, TextureCoordinates, TextureSource};
 use firstlight_mesh::{Mesh, NormalWeight, procedural, simplify};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,14 +60,13 @@ pub struct LoadedMesh {
     pub beside: Arc<[PathBuf]>,
 }
 
-/// Reads or generates a mesh, then simplifies and shades it.
+/// Reads or generates a mesh, then simplifies and shades it and projects its textures.
 ///
 /// # Errors
 /// If it cannot be read, or the meshes that `documents` counts are too large together.
 pub fn load_mesh(
     source: &MeshSource,
-    shading: MeshShading,
-    simplify: Option<f64>,
+    options: MeshOptions,
     folder: &Path,
     documents: &Documents,
 ) -> Result<LoadedMesh, SceneError> {
@@ -81,32 +80,26 @@ pub fn load_mesh(
         }
         MeshSource::Gltf { .. } | MeshSource::Part { .. } | MeshSource::Builtin(_) => 0,
     };
-    let loaded = load(source, shading, simplify, folder, documents)?;
+    let loaded = load(source, options, folder, documents)?;
     // Meshes that a scene of another renderer has as they are were counted with it.
-    if !matches!(source, MeshSource::Part { .. }) || !is_as_in_file(shading, simplify) {
+    if !matches!(source, MeshSource::Part { .. }) || options != MeshOptions::default() {
         budget.after(length, &loaded.mesh).map_err(too_large)?;
     }
     Ok(loaded)
 }
 
-/// Whether the mesh of a file is neither simplified nor shaded otherwise.
-fn is_as_in_file(shading: MeshShading, simplify: Option<f64>) -> bool {
-    shading == MeshShading::Auto && simplify.is_none()
-}
-
 fn load(
     source: &MeshSource,
-    shading: MeshShading,
-    simplify: Option<f64>,
+    options: MeshOptions,
     folder: &Path,
     documents: &Documents,
 ) -> Result<LoadedMesh, SceneError> {
     if let MeshSource::Gltf { file, mesh, node, at } = source {
         let path = folder.join(text_to_path(file));
         let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
-        let read = GltfMesh { path: &path, key, at: at.map(|at| at.0), shading, simplified: simplify.is_some() };
+        let read = GltfMesh { path: &path, key, at: at.map(|at| at.0), options };
         let base = read.base(documents).map_err(|error| SceneError::new(error.to_string()))?;
-        let mesh = Arc::new(finish(base.mesh, source, shading, simplify, Some(CREASE))?);
+        let mesh = Arc::new(finish(base.mesh, source, options, Some(CREASE))?);
         let (slots, textures, files) = (base.slots, base.textures, base.files);
         let (warnings, material_warnings) = (base.warnings, base.material_warnings);
         let beside = Arc::default();
@@ -116,10 +109,10 @@ fn load(
         let path = folder.join(text_to_path(file));
         let scene = documents.scene(&path, defines)?;
         let mesh = part_of(&scene, &path, *shape)?;
-        let mesh = if is_as_in_file(shading, simplify) {
+        let mesh = if options == MeshOptions::default() {
             mesh.clone()
         } else {
-            Arc::new(finish(part_base(mesh, shading), source, shading, simplify, Some(CREASE))?)
+            Arc::new(finish(part_base(mesh, options.shading), source, options, Some(CREASE))?)
         };
         let files = match scene.part_files.get(shape) {
             Some(own) => scene.files.iter().chain([own]).cloned().collect(),
@@ -130,10 +123,10 @@ fn load(
     match (source.file(), source.model_format()) {
         (Some(file), Some(format)) => {
             let path = folder.join(text_to_path(file));
-            read_file(source, format, &path, shading, simplify, documents.allow_outside())
+            read_file(source, format, &path, options, documents.allow_outside())
         }
         _ => {
-            let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
+            let mesh = MeshBase::read(source, options, folder)?.finish(options)?;
             Ok(LoadedMesh { mesh: Arc::new(mesh), ..LoadedMesh::empty(Arc::default()) })
         }
     }
@@ -158,9 +151,7 @@ fn part_base(mesh: &Mesh, shading: MeshShading) -> Mesh {
 #[derive(Clone, Debug)]
 pub struct MeshBase {
     source: MeshSource,
-    /// Determines whether the normals of the file are kept.
-    shading: MeshShading,
-    simplified: bool,
+    options: MeshOptions,
     folder: PathBuf,
     mesh: Mesh,
     /// Crease angle of automatic shading, radians; `None` smooths every edge.
@@ -172,31 +163,25 @@ impl MeshBase {
     ///
     /// # Errors
     /// If there is no such mesh, or its file cannot be read.
-    pub fn read(
-        source: &MeshSource,
-        shading: MeshShading,
-        simplify: Option<f64>,
-        folder: &Path,
-    ) -> Result<Self, SceneError> {
+    pub fn read(source: &MeshSource, options: MeshOptions, folder: &Path) -> Result<Self, SceneError> {
         let (mesh, crease) = match source {
             MeshSource::Gltf { file, mesh, node, at } => {
                 let path = folder.join(text_to_path(file));
                 let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
-                let at = at.map(|at| at.0);
-                let read = GltfMesh { path: &path, key, at, shading, simplified: simplify.is_some() };
+                let read = GltfMesh { path: &path, key, at: at.map(|at| at.0), options };
                 let base = read.base(&Documents::default()).map_err(|error| SceneError::new(error.to_string()))?;
                 (base.mesh, Some(CREASE))
             }
             MeshSource::Part { file, shape, defines } => {
                 let path = folder.join(text_to_path(file));
                 let scene = Documents::default().scene(&path, defines)?;
-                (part_base(part_of(&scene, &path, *shape)?, shading), Some(CREASE))
+                (part_base(part_of(&scene, &path, *shape)?, options.shading), Some(CREASE))
             }
             MeshSource::Obj(file) | MeshSource::Ply(file) | MeshSource::Stl(file) => {
                 let path = folder.join(text_to_path(file));
                 let format = source.model_format().expect("it is a model file");
                 // Materials, which may lie elsewhere, are not used here.
-                let (imported, crease) = read_base(&path, format, shading, simplify.is_some(), false)?;
+                let (imported, crease) = read_base(&path, format, options, false)?;
                 (imported.mesh, crease)
             }
             MeshSource::Builtin(name) => {
@@ -204,20 +189,21 @@ impl MeshBase {
             }
         };
         let (source, folder) = (source.clone(), folder.to_owned());
-        Ok(Self { source, shading, simplified: simplify.is_some(), folder, mesh, crease })
+        Ok(Self { source, options, folder, mesh, crease })
     }
 
     /// Whether [`Self::read`] would give the same for these arguments.
-    pub fn serves(&self, source: &MeshSource, shading: MeshShading, simplify: Option<f64>, folder: &Path) -> bool {
-        (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
+    pub fn serves(&self, source: &MeshSource, options: MeshOptions, folder: &Path) -> bool {
+        let normals = |options: MeshOptions| (options.shading, options.simplify.is_some());
+        (&self.source, normals(self.options), &*self.folder) == (source, normals(options), folder)
     }
 
-    /// Simplifies and shades the mesh: the last step of `load_mesh`.
+    /// Simplifies and shades the mesh and projects its textures: the last step of `load_mesh`.
     ///
     /// # Errors
     /// If it cannot be simplified by this ratio.
-    pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
-        finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
+    pub fn finish(&self, options: MeshOptions) -> Result<Mesh, SceneError> {
+        finish(self.mesh.clone(), &self.source, options, self.crease)
     }
 
     /// The mesh before [`Self::finish`].
@@ -226,11 +212,18 @@ impl MeshBase {
     }
 }
 
-fn finish(
+fn finish(mesh: Mesh, source: &MeshSource, options: MeshOptions, crease: Option<f32>) -> Result<Mesh, SceneError> {
+    let mesh = shaded_as_specified(mesh, source, options, crease)?;
+    Ok(match options.texture_coordinates {
+        TextureCoordinates::File => mesh,
+        TextureCoordinates::Box => mesh.with_box_coordinates(),
+    })
+}
+
+fn shaded_as_specified(
     mesh: Mesh,
     source: &MeshSource,
-    shading: MeshShading,
-    simplify: Option<f64>,
+    MeshOptions { shading, simplify, .. }: MeshOptions,
     crease: Option<f32>,
 ) -> Result<Mesh, SceneError> {
     let had_tangents = !mesh.tangents.is_empty();
@@ -249,14 +242,13 @@ fn read_file(
     source: &MeshSource,
     format: ModelFormat,
     path: &Path,
-    shading: MeshShading,
-    simplify: Option<f64>,
+    options: MeshOptions,
     allow_outside: bool,
 ) -> Result<LoadedMesh, SceneError> {
     // Taken before reading, so that a change in the meantime is noticed.
     let before = stamp(path);
-    let (mut imported, crease) = read_base(path, format, shading, simplify.is_some(), allow_outside)?;
-    imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
+    let (mut imported, crease) = read_base(path, format, options, allow_outside)?;
+    imported.mesh = finish(imported.mesh, source, options, crease)?;
     let mesh = Arc::new(imported.mesh);
     let files = std::iter::once((path.to_owned(), before))
         .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
@@ -279,8 +271,7 @@ fn read_file(
 fn read_base(
     path: &Path,
     format: ModelFormat,
-    shading: MeshShading,
-    simplify: bool,
+    MeshOptions { shading, simplify, .. }: MeshOptions,
     allow_outside: bool,
 ) -> Result<(ImportedModel, Option<f32>), SceneError> {
     let read = |normals| {
@@ -291,11 +282,11 @@ fn read_base(
     let ModelNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
     let mut imported = read(match shading {
         MeshShading::Auto => computed,
-        MeshShading::Smooth if !simplify => ModelNormals::OfPositions,
+        MeshShading::Smooth if simplify.is_none() => ModelNormals::OfPositions,
         MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
     })?;
     // Computed normals would prevent simplification at creases: they are computed afterwards.
-    if shading == MeshShading::Auto && simplify && !imported.normals_from_file {
+    if shading == MeshShading::Auto && simplify.is_some() && !imported.normals_from_file {
         imported.mesh = read(ModelNormals::Ignore)?.mesh;
     }
     Ok((imported, Some(crease_angle)))
@@ -350,7 +341,7 @@ mod tests {
     fn every_builtin_mesh_can_be_had() {
         for name in BUILTIN_NAMES {
             let source = MeshSource::Builtin((*name).to_owned());
-            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new(""), &Documents::default()).unwrap();
+            let loaded = load_mesh(&source, MeshOptions::default(), Path::new(""), &Documents::default()).unwrap();
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());

@@ -3,6 +3,7 @@
 //! A [`Mesh`] comes from [`Mesh::from_f64`] (an importer), from [`procedural`], or from another mesh; all of them
 //! produce only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
 
+mod box_coordinates;
 mod build;
 mod colors;
 mod deviation;
@@ -12,6 +13,7 @@ mod mikktspace;
 mod normals;
 pub mod procedural;
 pub mod simplify;
+mod split;
 mod tangents;
 mod topology;
 mod weld;

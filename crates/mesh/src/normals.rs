@@ -7,7 +7,6 @@ use super::topology::DisjointSets;
 use super::{Mesh, Welding};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// The weight of each triangle in the normal of a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,50 +83,18 @@ impl Mesh {
                         sums[groups[3 * t + k] as usize] += weight * unit;
                     }
                 }
-                self.split_by_groups(&groups, &sums, &face_normals);
+                self.normals.clear();
+                let normal = |group: &Option<u32>| {
+                    group.map_or(Vec3::Z, |group| {
+                        // A group has the number of its first corner.
+                        let fallback = unit_or(face_normals[group as usize / 3], DVec3::Z).as_dvec3();
+                        unit_or(sums[group as usize], fallback)
+                    })
+                };
+                self.normals = self.split_by(&groups).iter().map(normal).collect();
             }
         }
         self
-    }
-
-    /// Gives each (vertex, group) pair its own vertex, with the group's normal.
-    fn split_by_groups(&mut self, groups: &[u32], sums: &[DVec3], face_normals: &[DVec3]) {
-        const NONE: u32 = u32::MAX;
-        self.normals = vec![Vec3::Z; self.positions.len()];
-        // Most vertices have one group, stored here; only those on creases need the map.
-        let mut first_group = vec![NONE; self.positions.len()];
-        let mut copies: HashMap<(u32, u32), u32> = HashMap::new();
-        for t in 0..self.triangles.len() {
-            for k in 0..3 {
-                let (original, group) = (self.triangles[t][k], groups[3 * t + k]);
-                if first_group[original as usize] == group {
-                    continue;
-                }
-                let fallback = unit_or(face_normals[t], DVec3::Z).as_dvec3();
-                let normal = unit_or(sums[group as usize], fallback);
-                if first_group[original as usize] == NONE {
-                    first_group[original as usize] = group;
-                    self.normals[original as usize] = normal;
-                    continue;
-                }
-                self.triangles[t][k] = *copies.entry((original, group)).or_insert_with(|| {
-                    self.positions.push(self.positions[original as usize]);
-                    repeat(&mut self.uvs, original);
-                    repeat(&mut self.uvs2, original);
-                    repeat(&mut self.colors, original);
-                    repeat(&mut self.tangents, original);
-                    self.normals.push(normal);
-                    self.positions.len() as u32 - 1
-                });
-            }
-        }
-    }
-}
-
-/// Appends a copy of a vertex's attribute; does nothing if the mesh lacks the attribute.
-fn repeat<T: Copy>(attribute: &mut Vec<T>, vertex: u32) {
-    if let Some(&value) = attribute.get(vertex as usize) {
-        attribute.push(value);
     }
 }
 

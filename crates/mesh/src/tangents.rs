@@ -5,7 +5,6 @@
 use super::Mesh;
 use super::mikktspace::corner_tangents;
 use glam::{Vec3, Vec4};
-use std::collections::HashMap;
 
 impl Mesh {
     /// Adds tangents for the first texture coordinate; vertices whose corners differ in their tangent are split.
@@ -23,51 +22,13 @@ impl Mesh {
             let direction = direction.unwrap_or_else(|| along(&self.normals[vertex as usize]));
             *tangent = direction.extend(if tangent.w < 0.0 { -1.0 } else { 1.0 });
         }
-        let n = self.positions.len();
-        let mut of_vertex: Vec<Option<Vec4>> = vec![None; n];
-        // By vertex and tangent: the copy that has it.
-        let mut copies: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
-        let mut sources: Vec<u32> = Vec::new();
-        for (triangle, tangents) in self.triangles.iter_mut().zip(corners.chunks_exact(3)) {
-            for (vertex, &tangent) in triangle.iter_mut().zip(tangents) {
-                match of_vertex[*vertex as usize] {
-                    None => of_vertex[*vertex as usize] = Some(tangent),
-                    Some(known) if known == tangent => {}
-                    Some(_) => {
-                        let key = (*vertex, tangent.to_array().map(f32::to_bits));
-                        let next = (n + sources.len()) as u32;
-                        let copy = *copies.entry(key).or_insert(next);
-                        if copy == next {
-                            sources.push(*vertex);
-                        }
-                        *vertex = copy;
-                    }
-                }
-            }
-        }
-        let mut tangents: Vec<Vec4> = of_vertex
-            .iter()
-            .zip(&self.normals)
-            .map(|(known, normal)| known.unwrap_or_else(|| along(normal).extend(1.0)))
-            .collect();
-        tangents.resize(n + sources.len(), Vec4::X);
-        for ((_, bits), copy) in &copies {
-            tangents[*copy as usize] = Vec4::from(bits.map(f32::from_bits));
-        }
-        fn repeat<T: Copy>(list: &mut Vec<T>, sources: &[u32]) {
-            if !list.is_empty() {
-                list.reserve(sources.len());
-                for &source in sources {
-                    list.push(list[source as usize]);
-                }
-            }
-        }
-        repeat(&mut self.positions, &sources);
-        repeat(&mut self.normals, &sources);
-        repeat(&mut self.uvs, &sources);
-        repeat(&mut self.uvs2, &sources);
-        repeat(&mut self.colors, &sources);
-        self.tangents = tangents;
+        let keys: Vec<[u32; 4]> = corners.iter().map(|tangent| tangent.to_array().map(f32::to_bits)).collect();
+        self.tangents.clear();
+        let tangents = self.split_by(&keys);
+        let tangent = |(key, normal): (&Option<[u32; 4]>, &Vec3)| {
+            key.map_or_else(|| along(normal).extend(1.0), |bits| Vec4::from(bits.map(f32::from_bits)))
+        };
+        self.tangents = tangents.iter().zip(&self.normals).map(tangent).collect();
         self
     }
 }

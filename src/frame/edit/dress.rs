@@ -1,6 +1,7 @@
 //! Materials for the selection.
 
 use crate::frame::edit::new_entity::{new_material, plain_name};
+use crate::frame::edit::projection::project_bare;
 use crate::frame::state::selection::{ActivePart, Selection};
 use crate::scene::{MaterialSlots, SurfaceMaterial, library};
 use bevy_ecs::name::Name;
@@ -8,7 +9,8 @@ use bevy_ecs::prelude::{Entity, World};
 
 /// Gives the selected objects the material of this name of the library.
 pub fn dress(world: &mut World, name: &str) -> Result<(), String> {
-    let (_, material) = library().iter().find(|(known, _)| known == name).ok_or("there is no such ready material")?;
+    let ready = library().iter().find(|ready| ready.name == name).ok_or("there is no such ready material")?;
+    let material = ready.material();
     let selected = world.resource::<Selection>().0.clone();
     let objects: Vec<Entity> =
         selected.into_iter().filter(|&entity| world.get::<MaterialSlots>(entity).is_some()).collect();
@@ -34,6 +36,7 @@ pub fn give(world: &mut World, object: Entity, material: Entity) {
         Some(part) => slots.0[part] = material,
         None => slots.0 = vec![material],
     }
+    project_bare(world, material, &[object]);
 }
 
 #[cfg(test)]
@@ -51,7 +54,7 @@ mod tests {
         };
         let gold = dressed(&mut world, 0, "gold").unwrap();
         assert_eq!(dressed(&mut world, 1, "gold"), Ok(gold));
-        let glass = library().iter().find(|(name, _)| name == "glass").unwrap().1.clone();
+        let glass = library().iter().find(|ready| ready.name == "glass").unwrap().material().clone();
         world.entity_mut(gold).insert(glass);
         let other = dressed(&mut world, 2, "gold").unwrap();
         assert_ne!(other, gold);

@@ -4,6 +4,7 @@
 
 use crate::format::CameraPart;
 use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::place::about_middle;
 use crate::frame::edit::property::Property;
 use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, CurrentScene};
@@ -11,7 +12,7 @@ use crate::frame::state::selection::Selection;
 use crate::scene::animation::{
     Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, off_their_tracks, set_keys,
 };
-use crate::scene::{Animation, Description, LoadedScene, Moment, SceneInputs};
+use crate::scene::{Animation, Description, Linear, LoadedScene, Moment, Placement, SceneInputs};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use std::sync::Arc;
@@ -23,6 +24,9 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     check_pose(world)?;
     let (before, written) = before(world);
     let selected = world.resource::<Selection>().0.clone();
+    if !camera {
+        turn_about_middle(world, &selected);
+    }
     let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
     let earlier = world.get_resource::<Animation>().cloned();
     let channels = checked(world, |world| set_keys(world, &before, written.as_ref(), of))?;
@@ -35,6 +39,17 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     let text = format!("keys at {}: {}{single}{held}", moment(world), named(world, &channels));
     say(world, text);
     Ok(())
+}
+
+/// Between its keys, what has not been turned yet turns about its middle.
+fn turn_about_middle(world: &mut World, entities: &[Entity]) {
+    for &entity in entities {
+        let Some(&placement) = world.get::<Placement>(entity) else { continue };
+        let turned = about_middle(world, entity, &placement);
+        if placement.linear == Linear::default() && turned != placement {
+            world.entity_mut(entity).insert(turned);
+        }
+    }
 }
 
 /// Tells that a change is not kept at other times, unless a key keeps it.

@@ -11,6 +11,7 @@
 //! | `named` | the same by the names of scene files |
 //! | `sky` | colours, strength and rotation of the environment |
 //! | `texture` | textures in place of colours |
+//! | `projection` | texture coordinates for meshes without any |
 //! | `dress` | ready materials |
 //! | `place` | moving, rotating and scaling the selection |
 //! | `keys` | keys and settings of the animation |
@@ -23,6 +24,7 @@ mod keys;
 mod named;
 pub(crate) mod new_entity;
 mod place;
+mod projection;
 mod property;
 pub(crate) mod remesh;
 mod set;
@@ -43,7 +45,7 @@ use crate::frame::state::resources::{Clock, PictureSize, RenderState};
 use crate::frame::state::selection::{ActivePart, Selection, pick};
 use crate::render::MaterialKind;
 use crate::scene::animation::{Interpolation, off_their_tracks};
-use crate::scene::{MeshShading, TextureSource, users_of};
+use crate::scene::{MeshOptions, TextureSource, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
@@ -211,10 +213,8 @@ pub enum Edit {
     Remesh {
         /// The object.
         id: Id,
-        /// How its normals are computed.
-        shading: MeshShading,
-        /// Share of the faces to keep, (0, 1].
-        ratio: f64,
+        /// What is done with it.
+        options: MeshOptions,
     },
 }
 
@@ -349,9 +349,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::SetKeys { camera } => keys::set(world, camera)?,
         Edit::DeleteKeys => keys::delete(world)?,
         Edit::Interpolate { how } => keys::interpolate(world, how)?,
-        Edit::Remesh { id, shading, ratio } => {
-            crate::frame::edit::remesh::start(world, thing(world, id)?, shading, ratio)?
-        }
+        Edit::Remesh { id, options } => crate::frame::edit::remesh::start(world, thing(world, id)?, options)?,
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 use crate::format::placement::tidy_degrees;
 use crate::frame::state::history::History;
 use crate::frame::state::selection::{OwnBox, Selection, box_of};
-use crate::scene::{Linear, Placement, Shape};
+use crate::scene::{Animation, Linear, Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DQuat, DVec3, EulerRot};
 
@@ -39,9 +39,12 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
         })
         .collect();
     let Some(&(active, last)) = before.last() else { return };
+    let is_alone = before.len() == 1;
     let own_box = box_of(world, active).map(|own| OwnBox { world_from_box: last.affine(), ..own });
     let change = change(own_box.map_or(last.translation, |own| own.middle()));
     for (entity, placement) in before {
+        let turns = is_alone && !matches!(change, Change::Move(_));
+        let placement = if turns { about_middle(world, entity, &placement) } else { placement };
         let changed = changed(&placement, &change, evenly);
         // Compared first: a mutable borrow alone would mark a change. What no scene file could have stays as it was.
         if changed.check().is_ok() && world.get::<Placement>(entity) != Some(&changed) {
@@ -50,14 +53,28 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     }
 }
 
+/// The same placement, with the middle of the object as its pivot, unless keys have its position.
+pub fn about_middle(world: &mut World, entity: Entity, placement: &Placement) -> Placement {
+    let has_keys = |animation: &Animation| animation.tracks.iter().any(|track| track.channel.entity() == Some(entity));
+    let is_moved = world.get_resource::<Animation>().is_some_and(has_keys);
+    match box_of(world, entity) {
+        Some(own) if !is_moved && matches!(placement.linear, Linear::Turned { .. }) => {
+            placement.with_pivot(0.5 * own.min + 0.5 * own.max)
+        }
+        _ => *placement,
+    }
+}
+
 /// Returns the changed placement; with `evenly`, scales by the factor that differs most from 1.
 fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
-    let Placement { translation, linear } = *placement;
+    let Placement { translation, linear, pivot } = *placement;
+    // Where the pivot is in the world.
+    let at = translation + pivot;
     match *change {
-        Change::Move(by) => Placement { translation: translation + by, linear },
+        Change::Move(by) => Placement { translation: translation + by, ..*placement },
         Change::Turn { center, axis, angle_deg } => {
             let turn = DQuat::from_axis_angle(axis, angle_deg.to_radians());
-            Placement { translation: center + turn * (translation - center), linear: turned(&linear, turn) }
+            Placement { translation: center + turn * (at - center) - pivot, linear: turned(&linear, turn), pivot }
         }
         Change::Scale { center, factors } => {
             let most = |a: f64, b: f64| if b.ln().abs() > a.ln().abs() { b } else { a };
@@ -67,7 +84,7 @@ fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
                 Linear::Turned { rotation_deg, scale } => Linear::Turned { rotation_deg, scale: scale * factors },
                 Linear::Matrix(matrix) => Linear::Matrix(matrix * DMat3::from_diagonal(factors)),
             };
-            Placement { translation: center + factors * (translation - center), linear }
+            Placement { translation: center + factors * (at - center) - pivot, linear, pivot }
         }
     }
 }
@@ -93,6 +110,7 @@ mod tests {
         let placement = Placement {
             translation: DVec3::new(1.0, 2.0, 3.0),
             linear: Linear::Turned { rotation_deg: DVec3::new(20.0, -70.0, 130.0), scale: DVec3::new(1.0, 2.0, 0.5) },
+            pivot: DVec3::new(-0.3, 0.5, 0.1),
         };
         let (center, axis) = (DVec3::new(0.5, 0.0, -1.0), DVec3::new(1.0, 2.0, -0.5).normalize());
         let change = Change::Turn { center, axis, angle_deg: 77.0 };
@@ -100,6 +118,7 @@ mod tests {
         let result = changed(&placement, &change, false);
         assert!(result.linear().abs_diff_eq(expected * placement.linear(), 1e-10));
         let matrix = Placement { linear: Linear::Matrix(placement.linear()), ..placement };
+        assert!(placement.with_pivot(DVec3::ONE).affine().abs_diff_eq(placement.affine(), 1e-12));
         assert!(changed(&matrix, &change, false).affine().abs_diff_eq(result.affine(), 1e-10));
         let back = changed(&result, &Change::Turn { center, axis, angle_deg: -77.0 }, false);
         assert!(back.affine().abs_diff_eq(placement.affine(), 1e-9));

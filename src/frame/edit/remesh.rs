@@ -10,42 +10,42 @@ use crate::frame::state::history::History;
 use crate::frame::state::remake::{ForWhom, Remade, Remake};
 use crate::frame::state::resources::{Clock, CurrentScene, Renderer};
 use crate::frame::state::selection::Selection;
-use crate::scene::{Linear, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, Shape};
+use crate::scene::{Linear, MaterialSlots, MeshOptions, MeshOrigin, MeshSource, Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 
 /// Starts to make an object's mesh again. An unfinished request for the same object is dropped.
-pub fn start(world: &mut World, entity: Entity, shading: MeshShading, ratio: f64) -> Result<(), String> {
-    if !(ratio > 0.0 && ratio <= 1.0) {
+pub fn start(world: &mut World, entity: Entity, options: MeshOptions) -> Result<(), String> {
+    if let Some(ratio) = options.simplify.filter(|ratio| !(*ratio > 0.0 && *ratio <= 1.0)) {
         return Err(format!("the ratio of faces to keep is {ratio}, but must be above 0 and at most 1"));
     }
     let origin = world.get::<MeshOrigin>(entity).ok_or("the source of this mesh is unknown")?;
     let source = origin.source.clone();
     // A control that repeats the present or the pending value has no effect.
-    if wanted_mesh(world, entity) != Some((shading, ratio)) {
-        run(world, ForWhom::Object(entity), source, shading, ratio);
+    if wanted_mesh(world, entity) != Some(options) {
+        run(world, ForWhom::Object(entity), source, options);
     }
     Ok(())
 }
 
 /// Starts to load a mesh that will become a new object.
 pub fn start_new(world: &mut World, source: MeshSource, place: DVec3, size: f64) {
-    run(world, ForWhom::NewObject { place, size }, source, MeshShading::Auto, 1.0);
+    run(world, ForWhom::NewObject { place, size }, source, MeshOptions::default());
 }
 
-fn run(world: &mut World, for_whom: ForWhom, source: MeshSource, shading: MeshShading, ratio: f64) {
+fn run(world: &mut World, for_whom: ForWhom, source: MeshSource, options: MeshOptions) {
     let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
     let revision = History::revision(world);
-    let job = Remake { for_whom, source, shading, ratio, revision, folder };
+    let job = Remake { for_whom, source, options, revision, folder };
     let pool = world.resource::<Renderer>().0.pool();
     world.resource::<BackgroundTasks>().remake(job, pool);
 }
 
-/// The shading and the share of faces of an object's mesh, as present or pending; `None` if its source is unknown.
-pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShading, f64)> {
+/// What is done with an object's mesh, as present or pending; `None` if its source is unknown.
+pub fn wanted_mesh(world: &World, entity: Entity) -> Option<MeshOptions> {
     let origin = world.get::<MeshOrigin>(entity)?;
     let pending = world.resource::<BackgroundTasks>().wanted(entity);
-    Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
+    Some(pending.map_or(origin.options, |job| job.options))
 }
 
 /// Drops a pending mesh, if nothing was changed after its request: undo affects the newest change first.
@@ -70,11 +70,10 @@ pub fn take(world: &mut World, remade: Remade) {
             return;
         }
     };
-    let simplify = (job.ratio < 1.0).then_some(job.ratio);
     match job.for_whom {
         ForWhom::Object(entity) => {
             let Some(origin) = world.get::<MeshOrigin>(entity).cloned() else { return };
-            let origin = MeshOrigin { shading: job.shading, simplify, ..origin };
+            let origin = MeshOrigin { options: job.options, ..origin };
             world.entity_mut(entity).insert((Shape::Mesh(mesh), origin, measure));
         }
         ForWhom::NewObject { place, size } => {
@@ -85,9 +84,8 @@ pub fn take(world: &mut World, remade: Remade) {
             // Its lowest point is at the position.
             let foot = mesh.center + 0.5 * (bounds.min + bounds.max).as_dvec3().with_y(2.0 * f64::from(bounds.min.y));
             let linear = Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
-            let placement = Placement { translation: place - factor * foot, linear };
-            let origin =
-                MeshOrigin { source: job.source.clone(), shading: job.shading, simplify, own_materials: false };
+            let placement = Placement { linear, ..Placement::at(place - factor * foot) };
+            let origin = MeshOrigin { source: job.source.clone(), options: job.options, own_materials: false };
             let name = job.source.name();
             let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
             let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);

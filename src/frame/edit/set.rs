@@ -2,6 +2,7 @@
 //! [`crate::frame::edit::keys`].
 
 use crate::format::bounds::check_size;
+use crate::frame::edit::place::about_middle;
 use crate::frame::edit::property::Property;
 use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
@@ -32,6 +33,8 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             if property == ObjectProperty::Scale && !(value.min_element() > 0.0) {
                 return Err("scale factors must be above 0".to_owned());
             }
+            // As its handles do.
+            let old = if property == ObjectProperty::Translate { old } else { about_middle(world, entity, &old) };
             let placement = property.set(old, value);
             placement.check()?;
             set_if_different(world, entity, placement);

@@ -5,11 +5,12 @@
 //! sight, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
-use crate::frame::state::resources::{PictureSize, RenderState};
-use crate::frame::state::selection::{Selection, box_of, distance, pick};
+use crate::frame::navigation::Rig;
+use crate::frame::state::resources::{FreeShare, PictureSize, RenderState};
+use crate::frame::state::selection::{Projector, Selection, box_of, distance, pick};
 use crate::scene::{Extraction, Shape, View};
 use bevy_ecs::prelude::{Entity, World};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::TAU;
 
 /// A position for an object, with free space for a cube of side `2 * size` above it.
@@ -59,6 +60,21 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
         share *= 0.6;
     }
     Spot { foot: place, size: SHARE * distance }
+}
+
+/// Whether the middle of these points is in the part of the image that nothing covers.
+pub fn is_seen(world: &World, points: impl Iterator<Item = DVec3>) -> bool {
+    let shown = world.resource::<RenderState>();
+    let (Some(camera), Some((min, max))) =
+        (&shown.inputs.camera, points.map(|at| (at, at)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c))))
+    else {
+        return false;
+    };
+    let rig = Rig { view: camera.view, projection: camera.projection, lens: camera.lens };
+    let aspect = world.resource::<PictureSize>().aspect();
+    let free = 0.5 * world.get_resource::<FreeShare>().copied().unwrap_or_default().0;
+    let place = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(0.5 * (min + max));
+    place.is_some_and(|at| (at.x / aspect - 0.5).abs() < free && (0.0..1.0).contains(&at.y))
 }
 
 /// A position for a light, and what it is to light.

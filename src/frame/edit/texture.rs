@@ -1,13 +1,14 @@
 //! Textures in place of a material's colour: existing ones, a new checker, or an image file.
 
 use crate::frame::core::status::{MessageKind, Status};
+use crate::frame::edit::projection::project_bare;
 use crate::frame::edit::set::set_if_different;
 use crate::frame::edit::sky;
 use crate::frame::state::background::{BackgroundTasks, PicturePurpose};
 use crate::frame::state::resources::{Clock, CurrentScene, RenderState};
+use crate::import::builtin_images::builtin_image;
 use crate::render::{ImageTexture, TexturePattern};
-use crate::scene::{ColorParam, Material, Shape, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of, users_of};
-use bevy_ecs::name::Name;
+use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of, users_of};
 use bevy_ecs::prelude::{Entity, World};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -41,10 +42,12 @@ pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(
         return Err("this material has no colour".to_owned());
     }
     let known = match &part {
-        TextureSource::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
-            let TexturePattern::Image { image, .. } = &texture.texture.pattern else { return None };
-            let same = matches!(&texture.part, TextureSource::Image { file: other, .. } if other == file);
-            same.then(|| image.clone())
+        TextureSource::Image { file, .. } => builtin_image(file).or_else(|| {
+            textures(world).into_iter().find_map(|texture| {
+                let TexturePattern::Image { image, .. } = &texture.texture.pattern else { return None };
+                let same = matches!(&texture.part, TextureSource::Image { file: other, .. } if other == file);
+                same.then(|| image.clone())
+            })
         }),
         TextureSource::Checker { .. } | TextureSource::VertexColors { .. } => None,
     };
@@ -113,32 +116,14 @@ fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
     }
 }
 
-/// Says which object cannot show a texture as a whole.
-fn tell_what_has_no_coordinates(world: &mut World, material: Entity) {
-    let users = users_of(world, &world.resource::<RenderState>().inputs, material);
-    // All at one point, which some programs write instead of none, they show one texel everywhere.
-    let effect = |entity: Entity| match world.get(entity) {
-        Some(Shape::Mesh(mesh)) if mesh.uvs.is_empty() => Some((entity, "each of its triangles shows the image")),
-        Some(Shape::Mesh(mesh)) if mesh.uvs.iter().all(|uv| *uv == mesh.uvs[0]) => {
-            Some((entity, "all of it has one colour of the image"))
-        }
-        _ => None,
-    };
-    let Some((object, effect)) = users.into_iter().find_map(effect) else { return };
-    let name = world.get::<Name>(object).map_or("this mesh".to_owned(), |name| format!("`{name}`"));
-    let text = format!("{name} has no texture coordinates: {effect}; another program can unwrap it");
-    let now = world.resource::<Clock>().0;
-    world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
-}
-
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
     let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or("not a material")?;
     let is_new = !matches!(material.0.color(), Some(ColorParam::Texture(_)));
-    let needs_coordinates = !matches!(texture.part, TextureSource::VertexColors { .. });
     *material.0.color_mut().ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
-    if is_new && needs_coordinates {
-        tell_what_has_no_coordinates(world, entity);
+    if is_new {
+        let users = users_of(world, &world.resource::<RenderState>().inputs, entity);
+        project_bare(world, entity, &users);
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Requests for meshes, and their results.
 
 use crate::mesh::{Deviation, Mesh};
-use crate::scene::{MeshBase, MeshShading, MeshSource, SceneError};
+use crate::scene::{MeshBase, MeshOptions, MeshSource, SceneError};
 use bevy_ecs::prelude::{Component, Entity};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -26,8 +26,7 @@ const SAMPLES: usize = 20_000;
 pub struct Remake {
     pub for_whom: ForWhom,
     pub source: MeshSource,
-    pub shading: MeshShading,
-    pub ratio: f64,
+    pub options: MeshOptions,
     /// Revision of the history at the time of the request.
     pub revision: u64,
     pub folder: PathBuf,
@@ -52,15 +51,14 @@ pub struct Remade {
 impl Remake {
     /// Makes the mesh; `base` caches the full mesh from one request to the next.
     pub fn run(&self, base: &mut Option<MeshBase>) -> Result<(Arc<Mesh>, MeshMeasure), SceneError> {
-        let simplify = (self.ratio < 1.0).then_some(self.ratio);
-        let known = base.take().filter(|base| base.serves(&self.source, self.shading, simplify, &self.folder));
+        let known = base.take().filter(|base| base.serves(&self.source, self.options, &self.folder));
         let whole = match known {
             Some(base) => base,
-            None => MeshBase::read(&self.source, self.shading, simplify, &self.folder)?,
+            None => MeshBase::read(&self.source, self.options, &self.folder)?,
         };
-        let mesh = whole.finish(self.shading, simplify);
+        let mesh = whole.finish(self.options);
         let measured = mesh.map(|mesh| {
-            let deviation = simplify.map(|_| Deviation::between(whole.mesh(), &mesh, SAMPLES));
+            let deviation = self.options.simplify.map(|_| Deviation::between(whole.mesh(), &mesh, SAMPLES));
             let (whole_faces, faces) = (whole.mesh().triangles.len(), mesh.triangles.len());
             (Arc::new(mesh), MeshMeasure { whole_faces, faces, deviation })
         });

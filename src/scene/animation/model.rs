@@ -4,7 +4,7 @@ use crate::format::animation::ModelMotionPart;
 use crate::format::camera::CameraPart;
 use crate::format::light::LightKind;
 use crate::format::placement::Placement;
-use crate::format::sources::{MeshSource, Seconds};
+use crate::format::sources::{MeshOptions, MeshSource, Seconds};
 use crate::import::gltf_motion::GltfMotion;
 use crate::scene::world::components::put;
 use crate::scene::world::components::{MeshOrigin, Shape};
@@ -154,9 +154,8 @@ impl ModelMotion {
         }
         for (i, mesh) in self.motion.meshes_at(seconds).iter() {
             let Some(&entity) = self.objects.get(*i) else { continue };
-            // A simplified mesh, or one that is shaded in another way, is not that of the file.
-            let origin =
-                world.get::<MeshOrigin>(entity).filter(|it| it.simplify.is_none() && it.shading == Default::default());
+            // A mesh that was changed is not that of the file.
+            let origin = world.get::<MeshOrigin>(entity).filter(|origin| origin.options == MeshOptions::default());
             let (Some(origin), Some(Shape::Mesh(_))) = (origin, world.get::<Shape>(entity)) else { continue };
             if let MeshSource::Gltf { file, mesh: index, node, at } = &origin.source
                 && *at != Some(Seconds(seconds))

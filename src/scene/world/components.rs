@@ -10,7 +10,7 @@
 //! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the renderer follows.
 
 use crate::format::placement::Placement;
-use crate::format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::format::sources::{EnvironmentSource, MeshOptions, MeshSource, TextureSource};
 use crate::mesh::Mesh;
 use crate::render::{self, Display, Param, Params, RenderSettings};
 use bevy_ecs::component::Mutable;
@@ -214,10 +214,8 @@ impl PartialEq for SurfaceTexture {
 pub struct MeshOrigin {
     /// The file or the built-in mesh.
     pub source: MeshSource,
-    /// How its normals are computed.
-    pub shading: MeshShading,
-    /// Fraction of the faces that was kept, 0..1; `None`: not simplified.
-    pub simplify: Option<f64>,
+    /// What was done with it.
+    pub options: MeshOptions,
     /// Whether the materials come from the file of the mesh.
     pub own_materials: bool,
 }

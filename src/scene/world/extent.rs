@@ -1,8 +1,10 @@
 //! Size of a scene: what "frame all" frames, and the scale of the flying speed.
 
+use crate::mesh::procedural::icosphere;
 use crate::scene::world::components::{Material, Shape};
 use crate::scene::world::inputs::{ObjectInput, SceneInputs};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
 /// A sphere around the finite objects of a scene.
@@ -38,6 +40,13 @@ impl ExtentCache {
     /// Corners of the world-space box of one object; empty for infinite and invalid ones.
     pub fn corners_of(&mut self, object: &ObjectInput) -> Vec<DVec3> {
         self.world_box(object).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default()
+    }
+
+    /// Points of an object in the world between which it is seen from any side; empty for infinite and invalid ones.
+    pub fn outermost_of(&self, object: &ObjectInput) -> Vec<DVec3> {
+        let world = object.placement.affine();
+        let points = outermost(&object.shape).into_iter().map(|point| world.transform_point3(point));
+        points.filter(|point| point.is_finite()).collect()
     }
 
     fn near_boxes(&mut self, inputs: &SceneInputs) -> Vec<(DVec3, DVec3)> {
@@ -103,6 +112,29 @@ fn leave_out_far(boxes: &mut Vec<(DVec3, DVec3)>) {
     let reach = |(min, max): &(DVec3, DVec3)| (0.5 * (*min + *max) - middle).length() + 0.5 * (*max - *min).length();
     let limit = 2.0 * median(boxes.iter().map(reach).collect());
     boxes.retain(|bounds| reach(bounds) <= limit);
+}
+
+/// Outermost points of a shape in many directions, in object space.
+fn outermost(shape: &Shape) -> Vec<DVec3> {
+    /// Edges per edge of the icosahedron that has these directions: every 8° for spheres, every 32° for meshes.
+    const OF_SPHERES: u32 = 8;
+    const OF_MESHES: u32 = 2;
+    let directions = |frequency: u32| icosphere(frequency).positions;
+    match shape {
+        Shape::Plane { .. } => Vec::new(),
+        Shape::Sphere { radius } => {
+            directions(OF_SPHERES).iter().map(|way| *radius * way.as_dvec3().normalize()).collect()
+        }
+        Shape::Quad { edge_u, edge_v } => vec![DVec3::ZERO, *edge_u, *edge_v, *edge_u + *edge_v],
+        Shape::Triangle { vertices } => vertices.to_vec(),
+        Shape::Mesh(mesh) => {
+            let used = || mesh.triangles.iter().flatten().filter_map(|&vertex| mesh.positions.get(vertex as usize));
+            let farthest = |way: &Vec3| used().copied().max_by(|a, b| a.dot(*way).total_cmp(&b.dot(*way)));
+            let points: Vec<Vec3> = directions(OF_MESHES).par_iter().filter_map(farthest).collect();
+            points.into_iter().map(|point| mesh.center + point.as_dvec3()).collect()
+        }
+        Shape::Spheres(_) => own_box(shape).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default(),
+    }
 }
 
 fn key(shape: &Shape) -> Option<usize> {

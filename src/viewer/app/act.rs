@@ -21,6 +21,8 @@ use winit::window::{CursorGrabMode, Fullscreen};
 
 /// Begins what is said about focus while depth of field is off.
 pub(super) const FOCUS_IS_UNSEEN: &str = "focus is set, but everything is sharp";
+/// The built-in scene without anything in it.
+const EMPTY_SCENE: &str = "studio";
 /// Says that a scene was left at another view.
 pub(super) const LEFT: &str = "another view was left here last time";
 
@@ -236,6 +238,7 @@ impl App {
                 });
             }
             Action::OpenDialog => self.ask_for_file(DialogPurpose::Open, now),
+            Action::NewScene => self.open(Command::Open { path: EMPTY_SCENE.into() }, now),
             Action::AddDialog => self.ask_for_file(DialogPurpose::AddMesh, now),
             Action::EnvironmentDialog => self.ask_for_file(DialogPurpose::Environment, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,

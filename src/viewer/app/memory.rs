@@ -2,11 +2,11 @@
 
 use crate::format::DisplayPart;
 use crate::frame::{
-    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, LeftView, Navigation, Picture, Recovery,
+    Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, LeftView, Navigation, Picture, Recovery, SavedAs,
     SceneBookmarks, Session, SettingsStore, ViewMode, scene_name,
 };
 use crate::render::Display;
-use crate::scene::{Animation, SceneSource, builtin_text, text_to_path};
+use crate::scene::{Animation, Fingerprint, SceneSource, builtin_text, text_to_path};
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
 use crate::viewer::thumbnails::Thumbnails;
@@ -27,7 +27,9 @@ pub struct Memory {
     is_opened: bool,
     /// The view at which the scene was left last time, as it is in the store.
     left: Option<LeftView>,
-    /// Whether that has been offered.
+    /// Contents of the last save of the open scene.
+    saved: Option<Fingerprint>,
+    /// Whether that view has been offered.
     has_offered: bool,
     recent: Vec<String>,
     thumbnails: Thumbnails,
@@ -54,6 +56,7 @@ impl Memory {
             views: None,
             is_opened: false,
             left: None,
+            saved: None,
             has_offered: true,
             recent,
             thumbnails,
@@ -123,9 +126,15 @@ impl Memory {
             }
             return troubles;
         }
-        // A camera on tracks is where its time says.
-        if session.world().get_resource::<Animation>().is_none_or(|animation| !animation.moves_camera()) {
-            let view = seen(session);
+        let view = seen(session);
+        let content = session.world().resource::<SavedAs>().content;
+        let is_saved = content.is_some() && content != self.saved;
+        self.saved = content;
+        if is_saved {
+            // The file has the view now.
+            (self.left, self.views) = (None, Some([view, view]));
+        }
+        if !is_on_tracks(session) {
             self.views = Some([self.views.map_or(view, |[first, _]| first), view]);
         }
         let look = session.world().resource::<ViewMode>().0;
@@ -142,7 +151,7 @@ impl Memory {
             (self.scene, self.is_pictured) = (Some(saved), false);
         }
         if let Some(source) = &self.scene
-            && (bookmarks != self.bookmarks || is_renamed)
+            && (bookmarks != self.bookmarks || is_renamed || is_saved)
         {
             troubles.extend(self.keep_views(source, &bookmarks));
             self.bookmarks = bookmarks;
@@ -177,7 +186,7 @@ impl Memory {
         if std::mem::replace(&mut self.has_offered, true) {
             return None;
         }
-        self.left.filter(|left| *left != seen(session)).map(Box::new)
+        self.left.filter(|left| *left != seen(session) && !is_on_tracks(session)).map(Box::new)
     }
 
     fn open(&mut self, source: SceneSource, session: &mut Session) -> Vec<String> {
@@ -187,7 +196,7 @@ impl Memory {
             bookmarks.set(slot, rig);
         }
         (self.bookmarks, self.left) = (bookmarks, kept.left);
-        (self.views, self.has_offered) = (None, false);
+        (self.views, self.has_offered, self.saved) = (None, false, None);
         // A command, so that a recording of the session contains them too.
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
@@ -258,6 +267,11 @@ impl Memory {
     }
 }
 
+/// Whether the camera is where the time of an animation says.
+fn is_on_tracks(session: &Session) -> bool {
+    session.world().get_resource::<Animation>().is_some_and(Animation::moves_camera)
+}
+
 /// What is on the screen.
 fn seen(session: &Session) -> LeftView {
     let status = session.status();
@@ -313,6 +327,22 @@ mod tests {
         }
         let kept = memory().store.bookmarks(&SceneSource::Builtin("cornell".to_owned())).0;
         assert_eq!((kept.left, kept.views.get(&2)), (Some(left), Some(&left.rig)));
+        // The file of a saved scene has its view.
+        let path = folder.path().join("room.ron");
+        let mut next = memory();
+        let mut session = begin(&mut next);
+        session.send(Command::SaveScene { path: path.clone() });
+        for _ in 0..2000 {
+            session.update(Duration::ZERO);
+            assert_eq!(next.follow(&mut session), Vec::<String>::new());
+            if session.scene_file().is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(next.leave(), None);
+        let kept = memory().store.bookmarks(&SceneSource::Scene(path)).0;
+        assert_eq!((kept.left, kept.views.get(&2)), (None, Some(&left.rig)));
     }
 
     #[test]

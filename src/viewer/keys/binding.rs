@@ -156,6 +156,8 @@ pub enum Action {
     FocusFollows,
     /// Shows a dialog to choose a file to open.
     OpenDialog,
+    /// Opens an empty scene.
+    NewScene,
     /// Shows a dialog to choose a model to add.
     AddDialog,
     /// Shows a dialog to choose an environment image.

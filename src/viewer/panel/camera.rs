@@ -3,7 +3,7 @@
 use crate::files::printable;
 use crate::frame::{
     Aperture, Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals,
-    radius_of_f_stop, sharp_zone,
+    focal_length, radius_of_f_stop, sharp_zone, vfov_of_focal_length,
 };
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::keys::Action;
@@ -40,11 +40,24 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             })
         });
         match rig.projection.orthographic_height {
-            None => row(ui, "field of view", |ui| {
-                if let Some(vfov_deg) = slider(ui, rig.projection.vfov_deg, 5.0..=120.0, false) {
+            None => {
+                let set = |asked: &mut Asked, vfov_deg: f64| {
                     asked.send(Command::SetProjection(Projection { vfov_deg, ..rig.projection }));
-                }
-            }),
+                };
+                row(ui, "field of view", |ui| {
+                    if let Some(vfov_deg) = slider(ui, rig.projection.vfov_deg, 5.0..=120.0, false) {
+                        set(asked, vfov_deg);
+                    }
+                });
+                let metres = focal_length(&rig.projection);
+                row(ui, "focal length", |ui| {
+                    if let Some(metres) = length(ui, metres, 0.01 * metres, "of the lens, for a sensor 24 mm high")
+                        && metres > 0.0
+                    {
+                        set(asked, vfov_of_focal_length(metres));
+                    }
+                })
+            }
             Some(height) => row_with_hint(ui, "height", "of what the image shows, at any distance", |ui| {
                 if let Some(height) = number(ui, height, proportional(height), 1e-6..=1e9, " m") {
                     let orthographic_height = Some(height);

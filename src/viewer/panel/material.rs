@@ -215,6 +215,10 @@ fn domain_slider(ui: &mut Ui, domain: Domain, value: f64) -> Option<f64> {
     ui.spacing_mut().slider_width = SLIDER_WIDTH;
     match domain {
         // People know the root of the lobe's width as roughness.
+        // 0 is a mirror, or the other width.
+        Domain::Width if value == 0.0 => {
+            slider(ui, 0.0, 0.0..=*range.end(), false).map(|roughness| roughness * roughness)
+        }
         Domain::Width => slider(ui, value.sqrt(), range, false).map(|roughness| roughness * roughness),
         _ => slider(ui, value, range, domain.is_logarithmic()),
     }

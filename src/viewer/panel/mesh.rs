@@ -2,7 +2,7 @@
 
 use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
 use crate::scene::thousands;
-use crate::scene::{MeshOrigin, MeshShading, Shape};
+use crate::scene::{MeshOptions, MeshOrigin, MeshShading, Shape, TextureCoordinates};
 use crate::viewer::change::Difference;
 use crate::viewer::panel::state::{Asked, PanelState};
 use crate::viewer::panel::widgets::{row, rows};
@@ -19,29 +19,42 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
     let id = entity.to_bits();
     rows(ui, "mesh", |ui| {
         row(ui, "faces", |ui| drop(ui.label(thousands(mesh.triangles.len()))));
-        let Some((wanted, ratio)) = wanted_mesh(session.world(), entity) else { return };
+        let Some(wanted) = wanted_mesh(session.world(), entity) else { return };
+        let mut choice = |ui: &mut Ui, label: &str, options: MeshOptions| {
+            if ui.selectable_label(wanted == options, label).clicked() && wanted != options {
+                asked.edit(Edit::Remesh { id, options });
+            }
+        };
         row(ui, "normals", |ui| {
             ui.horizontal(|ui| {
                 let kinds = [(MeshShading::Auto, "auto"), (MeshShading::Smooth, "smooth"), (MeshShading::Flat, "flat")];
                 for (shading, label) in kinds {
-                    if ui.selectable_label(wanted == shading, label).clicked() && wanted != shading {
-                        asked.edit(Edit::Remesh { id, shading, ratio });
-                    }
+                    choice(ui, label, MeshOptions { shading, ..wanted });
+                }
+            })
+        });
+        row(ui, "coordinates", |ui| {
+            ui.horizontal(|ui| {
+                for (texture_coordinates, label) in
+                    [(TextureCoordinates::File, "file"), (TextureCoordinates::Box, "box")]
+                {
+                    choice(ui, label, MeshOptions { texture_coordinates, ..wanted });
                 }
             })
         });
         row(ui, "simplify", |ui| {
+            let ratio = wanted.simplify.unwrap_or(1.0);
             let mut percent = 100.0 * ratio;
             let scale = egui::Slider::new(&mut percent, 1.0..=100.0).logarithmic(true).suffix(" %").max_decimals(1);
             let response = ui.add(scale.update_while_editing(false));
             // The slider rounds to the displayed value, which is not an edit.
             let is_another = (10.0 * percent).round() != (1000.0 * ratio).round();
             if response.changed() && is_another {
-                let ratio = (percent / 100.0).clamp(0.01, 1.0);
+                let simplify = Some((percent / 100.0).clamp(0.01, 1.0)).filter(|ratio| *ratio < 1.0);
                 let is_whole =
-                    session.world().get::<MeshOrigin>(entity).is_some_and(|origin| origin.simplify.is_none());
+                    session.world().get::<MeshOrigin>(entity).is_some_and(|origin| origin.options.simplify.is_none());
                 state.change.begin(entity, is_whole, session);
-                asked.edit(Edit::Remesh { id, shading: wanted, ratio });
+                asked.edit(Edit::Remesh { id, options: MeshOptions { simplify, ..wanted } });
             }
         });
         if let Some(measure) = session.world().get::<MeshMeasure>(entity).filter(|m| m.faces == mesh.triangles.len()) {

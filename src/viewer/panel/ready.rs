@@ -12,7 +12,8 @@ const SIDE: f32 = 42.0;
 pub fn library_of_materials(ui: &mut Ui, thumbnails: &Thumbnails, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(1.0, 4.0);
-        for (i, (name, _)) in library().iter().enumerate() {
+        for (i, ready) in library().iter().enumerate() {
+            let name = &ready.name;
             // All of one size, however long the name is.
             ui.allocate_ui_with_layout(vec2(SIDE + 14.0, SIDE + 16.0), Layout::top_down(Align::Center), |ui| {
                 ui.set_min_width(SIDE + 14.0);

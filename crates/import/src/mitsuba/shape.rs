@@ -17,7 +17,7 @@ use firstlight_format::error::SceneError;
 use firstlight_format::material_textures::texture_names;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
-use firstlight_format::sources::{MeshShading, MeshSource};
+use firstlight_format::sources::MeshSource;
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::{MAX_LOBES, Material};
 use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, Vec3};
@@ -198,8 +198,7 @@ impl Converter<'_> {
         }
         let source = MeshSource::Part { file: self.file_name.clone(), shape, defines: self.defines.to_vec() };
         let material = Some(material.name);
-        let (shading, simplify, materials) = (MeshShading::Auto, None, None);
-        self.file.objects.push(ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform });
+        self.file.objects.push(ObjectPart::mesh(name, source, material, None, transform));
         Ok(())
     }
 

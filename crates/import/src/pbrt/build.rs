@@ -18,7 +18,7 @@ use firstlight_files::warnings::Warnings;
 use firstlight_format::error::SceneError;
 use firstlight_format::names::Names;
 use firstlight_format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
-use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureCoordinates, TextureSource};
 use firstlight_format::value::{Rgb, ScalarValue};
 use firstlight_mesh::Mesh;
 use glam::{DAffine3, DMat3, Vec3};
@@ -306,6 +306,7 @@ impl<'a> Builder<'a> {
             name: name.clone(),
             source,
             shading,
+            texture_coordinates: TextureCoordinates::File,
             simplify: None,
             material: Some(material.clone()),
             materials: None,

@@ -9,7 +9,7 @@ use firstlight_files::printable;
 use firstlight_files::relative::{path_to_text, text_to_path};
 use firstlight_format::material_textures::texture_names;
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
-use firstlight_format::sources::{MeshShading, MeshSource};
+use firstlight_format::sources::MeshSource;
 use firstlight_format::value::ColorValue;
 use firstlight_mesh::Mesh;
 use firstlight_render::Material;
@@ -146,9 +146,7 @@ impl<'a> Converter<'a> {
                     shape: mesh.number,
                     defines: self.defines.to_vec(),
                 };
-                let (shading, simplify) = (MeshShading::Auto, None);
-                let transform = placing::transform(&world);
-                ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform }
+                ObjectPart::mesh(name, source, material, materials, placing::transform(&world))
             }
             _ => return,
         };

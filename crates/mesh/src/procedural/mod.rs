@@ -4,7 +4,7 @@
 //! [`displaced_sphere`] are meant as main subjects of images; the others are plain shapes and kernel benchmarks.
 
 mod bench;
-mod noise;
+pub mod noise;
 mod serpent;
 mod shapes;
 mod spheres;

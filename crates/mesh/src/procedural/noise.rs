@@ -1,17 +1,22 @@
 //! Gradient noise in space, and sums of it.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Smooth noise with one feature per unit length, within about ±1; zero at every lattice point.
 ///
 /// Perlin 2002, "Improving Noise", with hashed gradients instead of a table, so that it does not repeat.
 pub fn gradient_noise(point: DVec3, seed: u32) -> f64 {
+    noise_of_lattice(point, seed, |corner| corner)
+}
+
+/// - `lattice`: the corner of which the gradient is taken.
+fn noise_of_lattice(point: DVec3, seed: u32, lattice: impl Fn([u32; 3]) -> [u32; 3]) -> f64 {
     let cell = point.floor();
     let inside = point - cell;
     let fade = inside * inside * inside * (inside * (inside * 6.0 - 15.0) + 10.0);
     let [x, y, z] = cell.to_array().map(|v| v as i64 as u32);
     let corner = |dx: u32, dy: u32, dz: u32| {
-        let h = hash([x.wrapping_add(dx), y.wrapping_add(dy), z.wrapping_add(dz)], seed);
+        let h = hash(lattice([x.wrapping_add(dx), y.wrapping_add(dy), z.wrapping_add(dz)]), seed);
         let [px, py, pz] = (inside - DVec3::new(f64::from(dx), f64::from(dy), f64::from(dz))).to_array();
         // The twelve directions to the edges of a cube, four of them twice.
         let (u, v) = match h & 15 {
@@ -35,6 +40,20 @@ pub fn fractal_noise(point: DVec3, octaves: u32, seed: u32) -> f64 {
         .map(|octave| {
             let scale = f64::from(1_u32 << octave);
             gradient_noise(point * scale, seed.wrapping_add(octave)) / scale
+        })
+        .sum()
+}
+
+/// Like [`fractal_noise`] in a plane, repeated in squares of 1 × 1.
+///
+/// - `cells`: features of the first octave along x and y of a square.
+pub fn tiled_noise(place: DVec2, cells: [u32; 2], octaves: u32, seed: u32) -> f64 {
+    (0..octaves)
+        .map(|octave| {
+            let [nx, ny] = cells.map(|n| n << octave);
+            let point = (place * DVec2::new(f64::from(nx), f64::from(ny))).extend(0.5);
+            let tiled = |[x, y, z]: [u32; 3]| [x % nx, y % ny, z];
+            noise_of_lattice(point, seed.wrapping_add(octave), tiled) / f64::from(1_u32 << octave)
         })
         .sum()
 }
@@ -96,6 +115,18 @@ mod tests {
         assert!(squares / f64::from(count) > 0.02, "flat");
         assert!(gradient_noise(DVec3::new(5.0, -7.0, 9.0), 1).abs() < 1e-12);
         assert_ne!(gradient_noise(DVec3::splat(0.4), 1), gradient_noise(DVec3::splat(0.4), 2));
+    }
+
+    #[test]
+    fn tiles_join_without_a_seam() {
+        for i in 0..200 {
+            let t = f64::from(i) / 200.0;
+            for (a, b) in [(DVec2::new(0.0, t), DVec2::new(1.0, t)), (DVec2::new(t, 0.0), DVec2::new(t, 1.0))] {
+                let [a, b] = [a, b].map(|place| tiled_noise(place, [3, 7], 4, 5));
+                assert!((a - b).abs() < 1e-9, "{a} and {b}");
+            }
+        }
+        assert_ne!(tiled_noise(DVec2::new(0.1, 0.3), [3, 7], 4, 5), tiled_noise(DVec2::new(0.6, 0.3), [3, 7], 4, 5));
     }
 
     #[test]
