@@ -129,12 +129,11 @@ impl CommandParams<'_, '_> {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
                     let framed = navigation::frame_rig(&rig, self.free.aspect(*self.size), &points);
-                    // A focus that is seen stays where it was set.
-                    let lens = match rig.lens.enabled {
-                        true => rig.lens,
-                        false => navigation::focus_at(&rig.lens, framed.view.pivot_distance),
-                    };
+                    let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
                     self.set_rig(Rig { lens, ..framed });
+                    if lens.enabled && lens != rig.lens {
+                        self.note("focus on what is framed".to_owned());
+                    }
                 }
             }
             Command::SetMoment { seconds } => *self.moment = WantedMoment { at: Some(seconds), advance: 0.0 },

@@ -1,13 +1,15 @@
 //! The open scene at any moment of its animation, in a world of its own: frames are rendered while the session goes on.
 
-use crate::frame::core::rig::Rig;
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::navigation::orbit;
 use crate::frame::session::Session;
 use crate::frame::state::resources::{CurrentScene, RenderState};
 use crate::scene::{
     Animation, Description, DisplaySettings, Extraction, LoadedScene, MetadataDraft, Rendering, SceneInputs, Trees,
     show_moment,
 };
-use bevy_ecs::prelude::World;
+use bevy_ecs::prelude::{Entity, World};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// What frames are made of: the scene as it is now. Taken at once, and opened on another thread.
@@ -19,6 +21,7 @@ pub struct Reel {
     display: DisplaySettings,
     rig: Rig,
     fps: f64,
+    is_turntable: bool,
 }
 
 /// A reel that frames can be taken from.
@@ -26,6 +29,8 @@ pub struct OpenReel {
     current: Arc<LoadedScene>,
     trees: Trees,
     world: World,
+    /// The camera, and its rig before it goes around.
+    turns: Option<(Entity, Rig)>,
 }
 
 impl Reel {
@@ -34,11 +39,22 @@ impl Reel {
         let world = session.world();
         let animation = world.get_resource::<Animation>().filter(|animation| animation.moves())?;
         let fps = animation.fps;
+        Self::with(session, fps, false)
+    }
+
+    /// One turn of the camera around its pivot, in a scene in which nothing moves: `n` frames, of 1 / `n` of a second
+    /// each. `None` without a scene.
+    pub fn turntable_of(session: &mut Session, n: u32) -> Option<Self> {
+        Self::with(session, f64::from(n), true)
+    }
+
+    fn with(session: &mut Session, fps: f64, is_turntable: bool) -> Option<Self> {
+        let world = session.world();
         let current = world.get_resource::<CurrentScene>()?.0.clone();
         let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
         let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
         let description = session.describe();
-        Some(Self { current, description, trees, rendering, display, rig, fps })
+        Some(Self { current, description, trees, rendering, display, rig, fps, is_turntable })
     }
 
     /// Frames per second: frame i is at i / fps.
@@ -51,24 +67,32 @@ impl Reel {
     /// # Errors
     /// If a file of the scene is gone.
     pub fn open(self) -> Result<OpenReel, String> {
-        let Self { current, description, trees, rendering, display, rig, .. } = self;
+        let Self { current, description, trees, rendering, display, rig, is_turntable, .. } = self;
         let mut world = World::new();
         let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
         scene.spawn(&mut world);
         world.insert_resource(rendering);
         world.insert_resource(display);
         // Where no track moves the camera, it stays where it was flown to.
-        if let Some(camera) = SceneInputs::of(&mut world).camera {
-            world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
+        let camera = SceneInputs::of(&mut world).camera.map(|camera| camera.entity);
+        if let Some(camera) = camera {
+            world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }
-        Ok(OpenReel { current, trees, world })
+        let turns = camera.filter(|_| is_turntable).map(|camera| (camera, rig));
+        Ok(OpenReel { current, trees, world, turns })
     }
 }
 
 impl OpenReel {
     /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
     pub fn at(&mut self, seconds: f64) -> (Extraction, MetadataDraft) {
-        scene_at(&mut self.world, &self.current, &mut self.trees, seconds)
+        let Some((camera, rig)) = self.turns else {
+            return scene_at(&mut self.world, &self.current, &mut self.trees, seconds);
+        };
+        // Even a rotation by zero would round.
+        let view = if seconds == 0.0 { rig.view } else { orbit(&rig.view, TAU * seconds, 0.0, Turning::Turntable) };
+        self.world.entity_mut(camera).insert(view);
+        scene_at(&mut self.world, &self.current, &mut self.trees, 0.0)
     }
 }
 

@@ -370,6 +370,12 @@ impl Session {
         self.world.resource_mut::<Status>().say(now, MessageKind::Saved, text);
     }
 
+    /// Whether the camera is outside of all that has an end: in front of things, not in a room.
+    pub fn is_outside(&self) -> bool {
+        let SceneBounds { extent, .. } = *self.world.resource::<SceneBounds>();
+        (self.status().rig.view.eye - extent.center).length() > extent.radius
+    }
+
     /// The box around an object or a light, along its own axes.
     pub fn box_of(&mut self, entity: Entity) -> Option<OwnBox> {
         crate::frame::state::selection::box_of(&mut self.world, entity)

@@ -9,7 +9,7 @@ const CHOICES: [(Navigation, &str, &str); 3] = [
     (
         Navigation::Firstlight,
         "Neither",
-        "Drag orbits a model, and looks around in a scene. Right drag pans. W, A, S, D fly.",
+        "Drag orbits things, and looks around in a room. Right drag pans. W, A, S, D fly.",
     ),
 ];
 

@@ -5,12 +5,11 @@
 use crate::files::printable;
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session, active_part};
 use crate::render::Integrator;
-use crate::scene::{Animation, BUILTIN_MESHES, BUILTIN_SCENES, MaterialSlots, MeshSource, Rendering, library};
+use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MaterialSlots, MeshSource, Rendering, library};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::submenu::{part, scrolled};
 use crate::viewer::thumbnails::Thumbnails;
-use crate::viewer::time_line::NOTHING_MOVES;
 use bevy_ecs::name::Name;
 use egui::{Button, Context, Id, LayerId, Popup, PopupAnchor, PopupKind, Pos2, RichText, SetOpenCommand, Ui};
 
@@ -99,7 +98,6 @@ fn line(ui: &mut Ui, input: &MenuInput, item: &Item) -> Option<Action> {
     let line = ui.add_enabled(is_possible(input.session, &item.action), button);
     let effect = effect_of(&item.action);
     let why_not = match &item.action {
-        action if is_about_frames(action) => NOTHING_MOVES,
         Action::Explain => "Phong follows no light paths: choose the integrator path",
         _ => effect,
     };
@@ -133,11 +131,6 @@ pub fn hint(input: &MenuInput, action: &Action) -> String {
     format!("{name}{key}: {}", binding.effect)
 }
 
-/// Whether a command is about the frames of an animation.
-fn is_about_frames(action: &Action) -> bool {
-    matches!(action, Action::RenderTo { frames: true })
-}
-
 /// Whether a command would do anything now.
 pub fn is_possible(session: &Session, action: &Action) -> bool {
     let history = session.world().resource::<History>();
@@ -151,7 +144,6 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
             !session.world().resource::<Selection>().0.is_empty()
         }
         Action::Explain => session.world().resource::<Rendering>().0.integrator != Integrator::Phong,
-        action if is_about_frames(action) => session.world().get_resource::<Animation>().is_some_and(Animation::moves),
         _ => true,
     }
 }

@@ -6,7 +6,7 @@ use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
 use crate::viewer::saver::{file_stem, new_file};
-use crate::viewer::time_line::{NOTHING_MOVES, Strip};
+use crate::viewer::time_line::Strip;
 use egui::{
     Align2, Button, ComboBox, Context, DragValue, Grid, Key, Modifiers, RichText, TextureHandle, Ui, Vec2, Window,
 };
@@ -81,6 +81,9 @@ pub enum Wish {
     Choose(DialogPurpose),
 }
 
+/// Frames of a turntable, unless another number is chosen: five seconds of 24.
+const TURN: u32 = 120;
+
 /// The form; it remembers what was chosen last.
 pub struct OrderForm {
     is_open: bool,
@@ -99,6 +102,8 @@ pub struct OrderForm {
     folder: PathBuf,
     /// First and last frame; `None` for a single image.
     frames: Option<(u32, u32)>,
+    /// The frames are those of a turn around a scene in which nothing moves.
+    is_turntable: bool,
     problem: Option<String>,
 }
 
@@ -118,6 +123,7 @@ impl Default for OrderForm {
             file: PathBuf::new(),
             folder: PathBuf::new(),
             frames: None,
+            is_turntable: false,
             problem: None,
         }
     }
@@ -135,11 +141,9 @@ impl OrderForm {
 
     /// Opens the form for the scene of the session.
     ///
-    /// - `frames`: what plays of its animation rather than one image; `folder`: of files that are not chosen yet.
-    ///
-    /// # Errors
-    /// If there are to be frames and nothing moves.
-    pub fn open(&mut self, session: &Session, frames: bool, folder: &Path) -> Result<(), &'static str> {
+    /// - `frames`: what plays of its animation, or a turn around it if nothing moves, rather than one image; `folder`: of
+    ///   files that are not chosen yet.
+    pub fn open(&mut self, session: &Session, frames: bool, folder: &Path) {
         let world = session.world();
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let look = world.resource::<ViewMode>().0;
@@ -156,8 +160,9 @@ impl OrderForm {
             false => None,
             true => {
                 let moves = world.get_resource::<Animation>().is_some_and(Animation::moves);
-                let [first, last] = Strip::of(session).filter(|_| moves).ok_or(NOTHING_MOVES)?.plays;
-                Some((first, last))
+                self.is_turntable = !moves;
+                let plays = Strip::of(session).filter(|_| moves).map(|strip| strip.plays);
+                Some(plays.map_or((0, TURN - 1), |[first, last]| (first, last)))
             }
         };
         // A saved image is no worse than what is seen, unless that has been chosen.
@@ -169,7 +174,6 @@ impl OrderForm {
         // Each time another one, so that nothing is replaced by a second click.
         self.file = new_file(folder, scene, self.format.extension());
         (self.is_open, self.problem) = (true, None);
-        Ok(())
     }
 
     /// Takes over the place that was chosen; a name with the extension of a format chooses that too.
@@ -221,7 +225,11 @@ impl OrderForm {
         let is_typed = context.wants_keyboard_input() || egui::Popup::is_any_open(context);
         let pressed = |key| !is_typed && context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let (is_entered, is_left) = (pressed(Key::Enter), pressed(Key::Escape));
-        let title = if self.frames.is_some() { "Render frames" } else { "Save image" };
+        let title = match self.frames {
+            Some(_) if self.is_turntable => "Render a turntable",
+            Some(_) => "Render frames",
+            None => "Save image",
+        };
         let width = WIDTH.min(context.content_rect().width() - 40.0).max(80.0);
         Window::new(title)
             .open(&mut open)
@@ -310,6 +318,12 @@ impl OrderForm {
         if let Some((first, last)) = &mut self.frames {
             ui.label("frames");
             ui.horizontal(|ui| {
+                if self.is_turntable {
+                    let mut n = *last - *first + 1;
+                    ui.add(DragValue::new(&mut n).range(1..=100_000).speed(0.5).update_while_editing(false));
+                    (*first, *last) = (0, n - 1);
+                    return drop(ui.label("of one turn of the camera around what it looks at"));
+                }
                 ui.add(DragValue::new(first).speed(0.2).update_while_editing(false));
                 ui.label("to");
                 ui.add(DragValue::new(last).speed(0.2).update_while_editing(false));

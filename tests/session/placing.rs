@@ -3,7 +3,9 @@
 use crate::driver::{Drive, Driver};
 use bevy_ecs::entity::Entity;
 use firstlight::format::property::SkyProperty;
-use firstlight::frame::{Command, Edit, Focus, FocusTarget, NewThing, Projector, Property, SessionOptions, Target};
+use firstlight::frame::{
+    Command, Edit, Focus, FocusTarget, NewThing, OpenReel, Projector, Property, Reel, SessionOptions, Target,
+};
 use firstlight::render::Environment;
 use firstlight::scene::animation::ObjectProperty;
 use firstlight::scene::{
@@ -276,7 +278,9 @@ fn between_its_keys_an_object_turns_about_its_middle() {
     let id = driver.select("model");
     let before = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
     let key = Edit::SetKeys { camera: false };
-    let rotate = Property::Object(ObjectProperty::Rotate);
+    let [rotate, scale] = [ObjectProperty::Rotate, ObjectProperty::Scale].map(Property::Object);
+    driver.edit([Edit::Set { id, property: scale, value: DVec3::splat(0.5) }]);
+    assert_eq!(driver.session.box_of(Entity::from_bits(id)).unwrap().middle(), before);
     driver.edit([key.clone()]);
     driver.session.send(Command::SetMoment { seconds: Some(2.0) });
     driver.settle();
@@ -284,7 +288,7 @@ fn between_its_keys_an_object_turns_about_its_middle() {
     driver.session.send(Command::SetMoment { seconds: Some(1.0) });
     driver.settle();
     let half: Placement = driver.get("model");
-    assert!(half.affine().transform_vector3(DVec3::Y).abs_diff_eq(-DVec3::Y, 1e-9), "half a turn: {half:?}");
+    assert!(half.affine().transform_vector3(DVec3::Y).abs_diff_eq(-0.5 * DVec3::Y, 1e-9), "half a turn: {half:?}");
     let middle = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
     assert!(middle.abs_diff_eq(before, 1e-9), "{middle} was {before}");
 }
@@ -316,4 +320,20 @@ fn any_environment_becomes_a_gradient_again() {
         let part = EnvironmentSource::Gradient { zenith: Rgb(zenith), horizon: Rgb(horizon), ground: Rgb(ground) };
         assert_eq!(sky(&driver).part, part);
     }
+}
+
+#[test]
+fn a_scene_in_which_nothing_moves_is_turned_around() {
+    let mut driver = Driver::builtin("studio");
+    assert!(Reel::of(&mut driver.session).is_none());
+    let start = driver.session.status().rig.view;
+    let mut reel = Reel::turntable_of(&mut driver.session, 8).unwrap().open().unwrap();
+    let eye = |seconds: f64, reel: &mut OpenReel| {
+        let scene = reel.at(seconds).0;
+        scene.origin + scene.prepared.camera.eye.as_dvec3()
+    };
+    let (first, half) = (eye(0.0, &mut reel), eye(0.5, &mut reel));
+    assert!(first.abs_diff_eq(start.eye, 1e-5), "{first}");
+    let across = 0.5 * (first + half) - start.pivot();
+    assert!(across.with_y(0.0).length() < 1e-5 && (half.y - first.y).abs() < 1e-5, "{half} across {first}");
 }

@@ -12,7 +12,7 @@ use crate::frame::state::selection::Selection;
 use crate::scene::animation::{
     Channel, Interpolation, KeysOf, Shutter, animation_or_new, delete_keys, follow_tracks, off_their_tracks, set_keys,
 };
-use crate::scene::{Animation, Description, Linear, LoadedScene, Moment, Placement, SceneInputs};
+use crate::scene::{Animation, Description, LoadedScene, Moment, Placement, SceneInputs};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use std::sync::Arc;
@@ -22,10 +22,10 @@ use std::sync::Arc;
 /// - `camera`: of the camera only; otherwise of what has been changed, of the selection, or else of the camera.
 pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     check_pose(world)?;
-    let (before, written) = before(world);
+    let (mut before, written) = before(world);
     let selected = world.resource::<Selection>().0.clone();
     if !camera {
-        turn_about_middle(world, &selected);
+        turn_about_middle(world, &mut before, &selected);
     }
     let of = if camera { KeysOf::Camera } else { KeysOf::Changes(&selected) };
     let earlier = world.get_resource::<Animation>().cloned();
@@ -41,13 +41,17 @@ pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// Between its keys, what has not been turned yet turns about its middle.
-fn turn_about_middle(world: &mut World, entities: &[Entity]) {
+/// Between its keys, what has none yet turns about its middle.
+///
+/// - `before`: the scene when its time was set; its placements get the same pivot, which is no change.
+fn turn_about_middle(world: &mut World, before: &mut SceneInputs, entities: &[Entity]) {
     for &entity in entities {
         let Some(&placement) = world.get::<Placement>(entity) else { continue };
         let turned = about_middle(world, entity, &placement);
-        if placement.linear == Linear::default() && turned != placement {
+        if turned != placement {
             world.entity_mut(entity).insert(turned);
+            let object = before.objects.iter_mut().find(|object| object.entity == entity);
+            object.into_iter().for_each(|object| object.placement = object.placement.with_pivot(turned.pivot));
         }
     }
 }

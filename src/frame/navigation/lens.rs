@@ -3,7 +3,7 @@
 use crate::scene::Lens;
 
 /// Aperture radius of a lens that had none, relative to the focus distance: a visible but moderate blur.
-const FIRST_APERTURE: f64 = 0.01;
+const FIRST_APERTURE: f64 = 0.005;
 
 /// Sets the focus distance in metres, if it is positive.
 pub fn focus_at(lens: &Lens, distance: f64) -> Lens {
@@ -39,7 +39,7 @@ pub fn set_aperture(lens: &Lens, radius: f64) -> Lens {
 
 /// Switches depth of field off, or on with its last aperture.
 ///
-/// A lens without an aperture gets a radius of 1 % of the focus distance, or 1 cm for a focus at infinity.
+/// A lens without an aperture gets a radius of 0.5 % of the focus distance, or 5 mm for a focus at infinity.
 pub fn toggle_depth_of_field(lens: &Lens) -> Lens {
     if lens.enabled { Lens { enabled: false, ..*lens } } else { with_aperture(lens) }
 }
@@ -49,7 +49,7 @@ fn with_aperture(lens: &Lens) -> Lens {
     let radius = match (lens.radius > 0.0, lens.focus_distance.is_finite()) {
         (true, _) => lens.radius,
         (false, true) => FIRST_APERTURE * lens.focus_distance,
-        // No reference length: 1 cm.
+        // No reference length: 5 mm.
         (false, false) => FIRST_APERTURE,
     };
     Lens { radius, enabled: true, ..*lens }

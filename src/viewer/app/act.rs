@@ -158,7 +158,7 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
-            Action::RenderTo { frames } => self.open_form(frames, now),
+            Action::RenderTo { frames } => self.open_form(frames),
             Action::SaveScene { new: false } => self.save_scene(),
             Action::SaveScene { new: true } => self.choose_place(DialogPurpose::SaveScene, &self.scene_path(true)),
             Action::CopyView => {
@@ -318,6 +318,9 @@ impl App {
 
     fn toggle_drag(&mut self, now: Instant) {
         let orbits = self.input.toggle_orbits();
+        if let Some(trouble) = self.memory.keep_drag(orbits) {
+            self.toasts.add(Tone::Problem, trouble, now);
+        }
         self.toasts.add(Tone::News, if orbits { "drag: orbit" } else { "drag: look around" }, now);
     }
 

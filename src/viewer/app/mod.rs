@@ -214,6 +214,8 @@ impl App {
             crate::console::remark(format_args!("warning: {trouble}"));
             toasts.add(Tone::Problem, trouble, start);
         }
+        let mut input = Input::new(options.width, options.height, memory.navigation());
+        input.set_orbits(memory.drag());
         Ok(Self {
             start,
             steered_at: start,
@@ -225,7 +227,7 @@ impl App {
             saver: Saver::new(&options.folder, waker.clone()),
             dialog: Dialog::new(waker.clone()),
             browser: Browser::default(),
-            input: Input::new(options.width, options.height, memory.navigation()),
+            input,
             toasts,
             last_saved: None,
             help: Help::default(),

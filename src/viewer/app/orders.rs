@@ -16,10 +16,8 @@ use std::time::{Duration, Instant};
 const SETTLED: Duration = Duration::from_millis(300);
 
 impl App {
-    pub(super) fn open_form(&mut self, frames: bool, now: Instant) {
-        if let Err(reason) = self.form.open(&self.session, frames, &self.options.folder) {
-            self.toasts.add(Tone::News, reason, now);
-        }
+    pub(super) fn open_form(&mut self, frames: bool) {
+        self.form.open(&self.session, frames, &self.options.folder);
     }
 
     /// Does what the form asks for.
@@ -49,7 +47,11 @@ impl App {
                 let draft = self.session.shot_draft();
                 Source::Still(Box::new(Subject { scene, settings, draft }))
             }
-            Some(_) => Source::Frames(Box::new(Reel::of(&mut self.session).ok_or_else(missing)?), settings),
+            Some(ref frames) => {
+                let of_animation = Reel::of(&mut self.session);
+                let reel = of_animation.or_else(|| Reel::turntable_of(&mut self.session, *frames.end() + 1));
+                Source::Frames(Box::new(reel.ok_or_else(missing)?), settings)
+            }
         };
         self.renders.begin(order, source, stem, threads)
     }

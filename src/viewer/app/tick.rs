@@ -1,7 +1,6 @@
 //! A tick: passes input to the session, advances it, and checks for anything new to show.
 
-use crate::frame::{Command, CurrentScene, MessageKind, Selection};
-use crate::scene::SceneSource;
+use crate::frame::{Command, MessageKind, Selection};
 use crate::viewer::app::act::{FOCUS_IS_UNSEEN, LEFT};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
@@ -37,12 +36,11 @@ impl App {
         // It is about the scene before.
         if self.memory.take_opened() {
             self.toasts.end(LEFT);
+            self.input.set_outside(self.session.is_outside());
         }
         if let Some(left) = self.memory.take_left(&self.session) {
             self.toasts.add_offer(LEFT.to_owned(), "Go back to it", Action::ReturnTo(left), now);
         }
-        let scene = self.session.world().get_resource::<CurrentScene>();
-        self.input.set_model(scene.is_some_and(|scene| matches!(scene.0.source, SceneSource::Model(_))));
         let status = self.session.status();
         match (status.opening, self.opening_since) {
             // A scene that is there at once would only flash.

@@ -63,7 +63,7 @@ pub struct Input {
     /// Whether a drag with the left button orbits the pivot instead of turning the camera, if the user has chosen that.
     orbits: Option<bool>,
     /// What is looked at is a model alone, which is seen from outside.
-    is_model: bool,
+    is_outside: bool,
     /// Whether the mouse moves the view without a button.
     captured: bool,
     /// Whether focus follows the mouse.
@@ -118,7 +118,7 @@ impl Input {
             spin: None,
             play: None,
             orbits: None,
-            is_model: false,
+            is_outside: false,
             captured: false,
             focuses: false,
             sum: Sum::default(),
@@ -199,14 +199,19 @@ impl Input {
         orbits
     }
 
-    /// Whether a plain drag orbits the pivot: as the user has chosen, else about a model.
+    /// Whether a plain drag orbits the pivot: as the user has chosen, else if the camera began outside of what it shows.
     pub fn orbits(&self) -> bool {
-        self.orbits.unwrap_or(self.is_model)
+        self.orbits.unwrap_or(self.is_outside)
     }
 
-    /// Tells whether what is looked at is a model alone.
-    pub fn set_model(&mut self, is_model: bool) {
-        self.is_model = is_model;
+    /// Tells whether the camera begins outside of what it shows, and not in a room.
+    pub fn set_outside(&mut self, is_outside: bool) {
+        self.is_outside = is_outside;
+    }
+
+    /// Sets what the user has chosen for a plain drag.
+    pub fn set_orbits(&mut self, orbits: Option<bool>) {
+        self.orbits = orbits;
     }
 
     /// Ends a drag of which another use is made.

@@ -32,7 +32,7 @@ pub const FLY: KeyGroup = KeyGroup {
         row!("fly up, down", hold(KeyCode::KeyE, Motion::Up), hold(KeyCode::KeyQ, Motion::Down)),
         row!("fly four times as fast, while held", Trigger::Mouse("Shift")),
         row!("change the flying speed", Trigger::Mouse("Ctrl+wheel"), Trigger::Mouse("wheel while flying")),
-        row!("look around; about a model that was opened alone, orbit", Trigger::Mouse("Drag")),
+        row!("orbit; look around where the camera begins in a room", Trigger::Mouse("Drag")),
         row!(
             "play or pause what moves; where nothing does, switch the drag between look around and orbit",
             named(NamedKey::Space, Action::PlayOrDrag),
