@@ -16,6 +16,7 @@ use crate::denoise::limit::limit;
 use crate::denoise::moments::{Blocks, N_FEATURES, Samples};
 use crate::denoise::noise::{FilteredNoise, Noise};
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
+use crate::denoise::soften::soften;
 use bytemuck::Zeroable;
 use glam::Vec3;
 
@@ -132,7 +133,7 @@ impl RegressionStart {
 
 /// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and −1/2
 /// at infinity. `None` if `stop` returned true.
-fn nearness(depth: &[f32], stop: Stop) -> Option<Vec<f32>> {
+pub(super) fn nearness(depth: &[f32], stop: Stop) -> Option<Vec<f32>> {
     let mut finite: Vec<f32> = depth.iter().copied().filter(|depth| depth.is_finite() && *depth > 0.0).collect();
     let middle = finite.len() / 2;
     let typical = if finite.is_empty() { 1.0 } else { *finite.select_nth_unstable_by(middle, f32::total_cmp).1 };
@@ -262,8 +263,13 @@ pub(super) fn pick(
         picked = each(n, stop, |i| smaller(i).mixed(&picked[i], share[i]))?;
     }
     let albedo = &input.guides.albedo;
+    let mut color: Vec<Vec3> = each(n, stop, |i| picked[i].color)?;
+    if input.half_steps.is_some() {
+        let own: Vec<f32> = each(n, stop, |i| picked[i].own)?;
+        color = soften(input, of_raw, &pooled, color, &own, stop)?;
+    }
     Some(FilteredNoise {
-        color: each(n, stop, |i| picked[i].color)?,
+        color,
         covariance: each(n, stop, |i| picked[i].own * of_raw.usual(i))?,
         misfit: each(n, stop, |i| picked[i].misfit / 3.0 * albedo[i] * albedo[i])?,
     })

@@ -1,0 +1,91 @@
+//! Soft edges for what few bright samples show.
+//!
+//! Windows of the regression that have no bright sample at random seem to have neither noise nor misfit, and their
+//! prediction outweighs all others. That is right for single fireflies; but where bright samples carry most of the
+//! light, around the focus of a caustic say, the edges of such windows are steps in the image, and the small ones are
+//! dark squares. There the noise of a window is not known, which shows in the variances of the pixels around: the mean
+//! of their squares is far above the square of their mean, in most narrow neighbourhoods. As far as that is so, and as
+//! steps are within what the noise of the filtered image allows, it is blurred within surfaces.
+
+use crate::denoise::blur::{Pooled, blur};
+use crate::denoise::input::DenoiseInput;
+use crate::denoise::noise::Noise;
+use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
+use crate::denoise::regression::nearness;
+use glam::{Vec2, Vec3};
+
+/// Reach of the blur in pixels: the side of the smallest window, whose steps vanish in it.
+const RADIUS: usize = 6;
+/// Mean square of variances over the square of their mean, in narrow neighbourhoods, from which on the noise of a
+/// window is not known. For normal noise it is 3 or less, and with one bright sample in a neighbourhood some 50.
+const UNKNOWN: f32 = 12.0;
+/// How much blur may change, squared, relative to the variance of the filtered light: more is a step that the samples
+/// show.
+const LARGEST_CHANGE: f32 = 1.0;
+/// Share of the blur below which a pixel stays as it is.
+const LEAST_SHARE: f32 = 1e-3;
+/// Squared difference of normals that counts as another surface.
+const OTHER_NORMAL: f32 = 0.02;
+/// Difference of nearness that counts as another surface.
+const OTHER_NEARNESS: f32 = 0.02;
+
+/// Returns the filtered image with such blur; `None` if `stop` returned true.
+///
+/// - `color`: the filtered image; `own`: weight of each pixel's own value in it.
+pub(super) fn soften(
+    input: &DenoiseInput,
+    noise: &Noise,
+    pooled: &Pooled,
+    color: Vec<Vec3>,
+    own: &[f32],
+    stop: Stop,
+) -> Option<Vec<Vec3>> {
+    let guides = &input.guides;
+    let (n, width, height) = (input.n_pixels(), input.width, input.height);
+    let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
+    let light: Vec<Vec3> = each(n, stop, |i| (color[i] - guides.emitted[i]) / albedo[i])?;
+    let variance: Vec<f32> = each(n, stop, |i| (noise.usual(i) / (albedo[i] * albedo[i])).element_sum())?;
+    let mean = pooled.narrow(&|i| variance[i], stop)?;
+    let squares = pooled.narrow(&|i| variance[i] * variance[i], stop)?;
+    let scatter = pooled.wide(&|i| squares[i].max(0.0) / (mean[i] * mean[i]).max(1e-30), stop)?;
+    let unknown: Vec<f32> = each(n, stop, |i| {
+        let ratio = (scatter[i] / UNKNOWN).clamp(0.0, 1e6);
+        if noise.at_emitters[i] { 0.0 } else { 1.0 - 1.0 / (1.0 + ratio.powi(4)) }
+    })?;
+    if unknown.iter().all(|share| *share < LEAST_SHARE) {
+        return Some(color);
+    }
+    let near = nearness(guides.depth, stop)?;
+    let around = |at: usize, n: usize| at.saturating_sub(RADIUS)..(at + RADIUS + 1).min(n);
+    let blurred: Vec<Vec3> = each(n, stop, |i| {
+        if unknown[i] < LEAST_SHARE {
+            return light[i];
+        }
+        let (x, y) = (i % width, i / width);
+        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+        for (row, column) in around(y, height).flat_map(|row| around(x, width).map(move |column| (row, column))) {
+            let other = row * width + column;
+            if noise.at_emitters[other] {
+                continue;
+            }
+            let off = Vec2::new(column as f32 - x as f32, row as f32 - y as f32) / (RADIUS + 1) as f32;
+            let close = (1.0 - off.length_squared()).max(0.0);
+            let normals = (guides.normal[i] - guides.normal[other]).length_squared() / OTHER_NORMAL;
+            let depths = ((near[i] - near[other]) / OTHER_NEARNESS).powi(2);
+            // One for the same surface, and vanishing with the distance of others.
+            let alike = (1.0 + normals + depths).powi(4).recip();
+            let weight = close * close * alike;
+            sum += weight * light[other];
+            total += weight;
+        }
+        sum / total
+    })?;
+    let change = pooled.narrow(&|i| (blurred[i] - light[i]).length_squared(), stop)?;
+    let allowed = pooled.wide(&|i| own[i] * variance[i], stop)?;
+    let share: Vec<f32> = each(n, stop, |i| {
+        let ratio = change[i].max(0.0) / (LARGEST_CHANGE * allowed[i]).max(1e-30);
+        unknown[i] / (1.0 + ratio.min(1e9).powi(2))
+    })?;
+    let share = blur(&share, width, height, 1, stop)?;
+    each(n, stop, |i| color[i] + share[i] * (blurred[i] - light[i]) * albedo[i])
+}
