@@ -37,9 +37,9 @@ pub fn main(ui: &mut Ui, input: &MenuInput) -> Option<Action> {
     let mut chosen = None;
     let mut choose = |action: Option<Action>| chosen = chosen.take().or(action);
     scrolled(ui, |ui| {
-        for (i, item) in menu(Menu::File).enumerate() {
+        for item in menu(Menu::File) {
             choose(line(ui, input, item));
-            if i == 0 {
+            if item.action == Action::OpenDialog {
                 part(ui, "Open recent", |ui| {
                     choose(openable::recent(ui, input.session, input.recent).map(Action::Send));
                 });

@@ -100,7 +100,7 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
     // Gold, the first of the ready materials: their menu ends beside its line.
     open(&program, 3, ball, frame);
     open(&program, 1, place(material), (620, 128));
-    choose(&program, (555, 83), frame);
+    choose(&program, (555, 100), frame);
     title_is(&program, "*room.ron");
     here(focus);
     let file = saved(&program, &path);

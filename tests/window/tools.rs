@@ -52,7 +52,8 @@ fn the_mouse_looks_orbits_or_is_captured_and_flies_as_fast_as_what_is_under_it_i
         program.key("Home");
         camera_when(&program, "the view home", |now| *now == home)
     };
-    // First person: the camera stays. In orbit: what is looked at stays.
+    // First person: the camera stays. In orbit, as at first in front of things: what is looked at stays.
+    program.key("space");
     program.drag(1, (300, 200), (50, 0));
     let looked = camera_when(&program, "the view to turn", |now| target(now) != target(&home));
     assert_eq!(looked.eye, home.eye);

@@ -63,6 +63,7 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     assert!((target(&flown) - flown.eye).normalize().dot(ahead) > 1.0 - 1e-9);
 
     // Look about: the camera stays.
+    program.key("space");
     program.drag(1, (300, 200), (60, 0));
     let looked = camera_when(&program, "the view to turn", |now| target(now) != target(&flown));
     assert_eq!(looked.eye, flown.eye);

@@ -1,5 +1,6 @@
 //! Input of the denoiser.
 
+use crate::denoise::parallel::{Stop, each};
 use crate::film::halves::HalfSteps;
 use glam::Vec3;
 
@@ -31,6 +32,19 @@ pub struct DenoiseInput<'a> {
     pub half_steps: Option<&'a HalfSteps>,
     /// Properties of the visible surfaces.
     pub guides: Guides<'a>,
+}
+
+impl Guides<'_> {
+    /// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and
+    /// −1/2 at infinity. `None` if `stop` returned true.
+    pub(super) fn nearness(&self, stop: Stop) -> Option<Vec<f32>> {
+        let is_seen = |depth: f32| depth.is_finite() && depth > 0.0;
+        let mut seen: Vec<f32> = self.depth.iter().copied().filter(|depth| is_seen(*depth)).collect();
+        let middle = seen.len() / 2;
+        let typical = if seen.is_empty() { 1.0 } else { *seen.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        let of = |depth: f32| if is_seen(depth) { typical / (typical + depth) - 0.5 } else { -0.5 };
+        each(self.depth.len(), stop, |i| of(self.depth[i]))
+    }
 }
 
 impl DenoiseInput<'_> {

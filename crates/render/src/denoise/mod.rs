@@ -340,15 +340,15 @@ mod tests {
     /// bright as the light there. Windows without any of them seem to have no noise.
     #[test]
     fn bright_samples_around_a_caustic_leave_no_steps() {
-        let chance = |pixel: usize| {
+        let probability = |pixel: usize| {
             let off = Vec2::new((pixel % WIDTH) as f32 - 40.0, (pixel / WIDTH) as f32 - 30.0);
             0.05 * (-off.length() / 5.0).exp()
         };
-        let scene = Scene::of(|x, y| (0.5, Vec3::splat(0.5 + 90.0 * chance(y * WIDTH + x))));
+        let scene = Scene::of(|x, y| (0.5, Vec3::splat(0.5 + 90.0 * probability(y * WIDTH + x))));
         let sample = |pixel: usize, k: u32| {
             let hash = hash_combine(hash_u32(pixel as u32), k);
             let diffuse = 0.5 + 0.2 * ((hash & 255) as f32 / 255.0 - 0.5);
-            let is_bright = (hash as f32) < chance(pixel) * 2.0_f32.powi(32);
+            let is_bright = (hash as f32) < probability(pixel) * 2.0_f32.powi(32);
             let brightness = 30.0 / ((hash_u32(hash) >> 16) as f32 / 65536.0 + 0.05);
             0.5 * (diffuse + if is_bright { brightness } else { 0.0 })
         };

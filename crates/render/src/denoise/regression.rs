@@ -131,20 +131,10 @@ impl RegressionStart {
     }
 }
 
-/// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and −1/2
-/// at infinity. `None` if `stop` returned true.
-pub(super) fn nearness(depth: &[f32], stop: Stop) -> Option<Vec<f32>> {
-    let mut finite: Vec<f32> = depth.iter().copied().filter(|depth| depth.is_finite() && *depth > 0.0).collect();
-    let middle = finite.len() / 2;
-    let typical = if finite.is_empty() { 1.0 } else { *finite.select_nth_unstable_by(middle, f32::total_cmp).1 };
-    let of = |depth: f32| if depth.is_finite() && depth > 0.0 { typical / (typical + depth) - 0.5 } else { -0.5 };
-    each(depth.len(), stop, |i| of(depth[i]))
-}
-
 fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool], stop: Stop) -> Option<Samples> {
     let guides = &input.guides;
     let n = input.n_pixels();
-    let near = nearness(guides.depth, stop)?;
+    let near = guides.nearness(stop)?;
     let features = |i: usize| {
         let normal = guides.normal[i];
         [normal.x, normal.y, normal.z, near[i], 0.0, 0.0, guides.albedo[i].element_sum() / 3.0]

@@ -11,7 +11,6 @@ use crate::denoise::blur::{Pooled, blur};
 use crate::denoise::input::DenoiseInput;
 use crate::denoise::noise::Noise;
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
-use crate::denoise::regression::nearness;
 use glam::{Vec2, Vec3};
 
 /// Reach of the blur in pixels: the side of the smallest window, whose steps vanish in it.
@@ -55,7 +54,7 @@ pub(super) fn soften(
     if unknown.iter().all(|share| *share < LEAST_SHARE) {
         return Some(color);
     }
-    let near = nearness(guides.depth, stop)?;
+    let near = guides.nearness(stop)?;
     let around = |at: usize, n: usize| at.saturating_sub(RADIUS)..(at + RADIUS + 1).min(n);
     let blurred: Vec<Vec3> = each(n, stop, |i| {
         if unknown[i] < LEAST_SHARE {
