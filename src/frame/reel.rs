@@ -5,8 +5,8 @@ use crate::frame::navigation::orbit;
 use crate::frame::session::Session;
 use crate::frame::state::resources::{CurrentScene, RenderState};
 use crate::scene::{
-    Animation, Description, DisplaySettings, Extraction, LoadedScene, MetadataDraft, Rendering, SceneInputs, Trees,
-    show_moment,
+    Animation, Description, DisplaySettings, Extraction, LoadedScene, MetadataDraft, Moment, Rendering, SceneInputs,
+    Trees, View, show_moment,
 };
 use bevy_ecs::prelude::{Entity, World};
 use std::f64::consts::TAU;
@@ -22,6 +22,7 @@ pub struct Reel {
     rig: Rig,
     fps: f64,
     is_turntable: bool,
+    moment: f64,
 }
 
 /// A reel that frames can be taken from.
@@ -29,8 +30,8 @@ pub struct OpenReel {
     current: Arc<LoadedScene>,
     trees: Trees,
     world: World,
-    /// The camera, and its rig before it goes around.
-    turns: Option<(Entity, Rig)>,
+    /// The camera, its rig before it goes around, and the moment that is shown meanwhile, seconds.
+    turns: Option<(Entity, Rig, f64)>,
 }
 
 impl Reel {
@@ -42,7 +43,7 @@ impl Reel {
         Self::with(session, fps, false)
     }
 
-    /// One turn of the camera around its pivot, in a scene in which nothing moves: `n` frames, of 1 / `n` of a second
+    /// One turn of the camera around its pivot, at the moment that is shown: `n` frames, of 1 / `n` of a second
     /// each. `None` without a scene.
     pub fn turntable_of(session: &mut Session, n: u32) -> Option<Self> {
         Self::with(session, f64::from(n), true)
@@ -50,11 +51,12 @@ impl Reel {
 
     fn with(session: &mut Session, fps: f64, is_turntable: bool) -> Option<Self> {
         let world = session.world();
+        let moment = world.get_resource::<Moment>().map_or(0.0, |moment| moment.0);
         let current = world.get_resource::<CurrentScene>()?.0.clone();
         let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
         let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
         let description = session.describe();
-        Some(Self { current, description, trees, rendering, display, rig, fps, is_turntable })
+        Some(Self { current, description, trees, rendering, display, rig, fps, is_turntable, moment })
     }
 
     /// Frames per second: frame i is at i / fps.
@@ -67,7 +69,7 @@ impl Reel {
     /// # Errors
     /// If a file of the scene is gone.
     pub fn open(self) -> Result<OpenReel, String> {
-        let Self { current, description, trees, rendering, display, rig, is_turntable, .. } = self;
+        let Self { current, description, trees, rendering, display, rig, is_turntable, moment, .. } = self;
         let mut world = World::new();
         let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
         scene.spawn(&mut world);
@@ -78,7 +80,7 @@ impl Reel {
         if let Some(camera) = camera {
             world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }
-        let turns = camera.filter(|_| is_turntable).map(|camera| (camera, rig));
+        let turns = camera.filter(|_| is_turntable).map(|camera| (camera, rig, moment));
         Ok(OpenReel { current, trees, world, turns })
     }
 }
@@ -86,13 +88,20 @@ impl Reel {
 impl OpenReel {
     /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
     pub fn at(&mut self, seconds: f64) -> (Extraction, MetadataDraft) {
-        let Some((camera, rig)) = self.turns else {
+        let Some((camera, rig, moment)) = self.turns else {
             return scene_at(&mut self.world, &self.current, &mut self.trees, seconds);
         };
         // Even a rotation by zero would round.
         let view = if seconds == 0.0 { rig.view } else { orbit(&rig.view, TAU * seconds, 0.0, Turning::Turntable) };
-        self.world.entity_mut(camera).insert(view);
-        scene_at(&mut self.world, &self.current, &mut self.trees, 0.0)
+        let shown = scene_at(&mut self.world, &self.current, &mut self.trees, moment);
+        if self.world.get::<View>(camera) == Some(&view) {
+            return shown;
+        }
+        // Keys of the camera may have moved it.
+        self.world.entity_mut(camera).insert((view, rig.projection, rig.lens));
+        let inputs = SceneInputs::of(&mut self.world);
+        let extraction = Extraction::of_world(&mut self.world, &inputs, &mut self.trees);
+        (extraction, MetadataDraft::of(&mut self.world, Some(&self.current)))
     }
 }
 

@@ -140,9 +140,9 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         Action::Gizmo(Some(_))
         | Action::Grab(_)
         | Action::GrabCopy
-        | Action::Send(Command::Edit(Edit::Delete | Edit::Duplicate | Edit::SelectNone)) => {
-            !session.world().resource::<Selection>().0.is_empty()
-        }
+        | Action::Send(Command::Edit(
+            Edit::Delete | Edit::Duplicate | Edit::SelectNone | Edit::StandOnGround | Edit::TurnUpright,
+        )) => !session.world().resource::<Selection>().0.is_empty(),
         Action::Explain => session.world().resource::<Rendering>().0.integrator != Integrator::Phong,
         _ => true,
     }

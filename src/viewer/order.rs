@@ -30,6 +30,8 @@ pub struct Order {
     pub path: PathBuf,
     /// The frames of the animation; `None` for the image as it is seen now.
     pub frames: Option<RangeInclusive<u32>>,
+    /// They are those of a turn of the camera.
+    pub is_turntable: bool,
 }
 
 /// The scene of one image.
@@ -232,7 +234,15 @@ mod tests {
 
     fn order(folder: &Path, target: Target) -> Order {
         let path = folder.join("a.png");
-        Order { size: (24, 18), target, denoiser: None, format: PictureFormat::Png, path, frames: None }
+        Order {
+            size: (24, 18),
+            target,
+            denoiser: None,
+            format: PictureFormat::Png,
+            path,
+            frames: None,
+            is_turntable: false,
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::scene::{Animation, FilmSize};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
-use crate::viewer::saver::{file_stem, new_file};
+use crate::viewer::saver::{new_file, new_folder};
 use crate::viewer::time_line::Strip;
 use egui::{
     Align2, Button, ComboBox, Context, DragValue, Grid, Key, Modifiers, RichText, TextureHandle, Ui, Vec2, Window,
@@ -143,7 +143,8 @@ impl OrderForm {
     ///
     /// - `frames`: what plays of its animation, or a turn around it if nothing moves, rather than one image; `folder`: of
     ///   files that are not chosen yet.
-    pub fn open(&mut self, session: &Session, frames: bool, folder: &Path) {
+    /// - `turns`: the view is turning around, which frames are to show too.
+    pub fn open(&mut self, session: &Session, frames: bool, turns: bool, folder: &Path) {
         let world = session.world();
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let look = world.resource::<ViewMode>().0;
@@ -153,15 +154,19 @@ impl OrderForm {
             let picture = session.picture();
             let size = larger(self.of_scene, (picture.width, picture.height));
             (self.scene, self.size, self.frames) = (scene.clone(), size, None);
+            self.folder = PathBuf::new();
             self.denoised = look.denoising != Denoising::Raw;
-            self.folder = folder.join(format!("{}-frames", file_stem(scene)));
+        }
+        // Frames of before are not mixed with new ones.
+        if self.folder.as_os_str().is_empty() || self.folder.exists() {
+            self.folder = new_folder(folder, scene);
         }
         self.frames = match frames {
             false => None,
             true => {
                 let moves = world.get_resource::<Animation>().is_some_and(Animation::moves);
-                self.is_turntable = !moves;
-                let plays = Strip::of(session).filter(|_| moves).map(|strip| strip.plays);
+                self.is_turntable = !moves || turns;
+                let plays = Strip::of(session).filter(|_| !self.is_turntable).map(|strip| strip.plays);
                 Some(plays.map_or((0, TURN - 1), |[first, last]| (first, last)))
             }
         };
@@ -210,6 +215,7 @@ impl OrderForm {
             format: self.format,
             path: self.path().to_owned(),
             frames: self.frames.map(|(first, last)| first..=last),
+            is_turntable: self.is_turntable,
         }
     }
 

@@ -361,6 +361,7 @@ mod tests {
             format: PictureFormat::Png,
             path: folder.path().join("new"),
             frames: Some(3..=5),
+            is_turntable: false,
         };
         let reel = Reel::of(&mut session).unwrap();
         let frames = Source::Frames(Box::new(reel), settings);

@@ -220,6 +220,14 @@ pub fn new_file(folder: &Path, scene: &str, extension: &str) -> PathBuf {
     free.next().unwrap_or_else(|| folder.join(format!("{stem}.{extension}")))
 }
 
+/// Returns an unused folder in `folder` for frames of the open scene: `NAME-frames`, `NAME-frames-2`.
+pub fn new_folder(folder: &Path, scene: &str) -> PathBuf {
+    let name = format!("{}-frames", file_stem(scene));
+    let numbered = (2..=u32::MAX).map(|number| folder.join(format!("{name}-{number}")));
+    let mut names = std::iter::once(folder.join(&name)).chain(numbered);
+    names.find(|path| !path.exists()).unwrap_or_else(|| folder.join(&name))
+}
+
 /// File stem for images of this scene: its own name without folder, extension, and the number of a file that was saved
 /// here before.
 pub fn file_stem(scene: &str) -> String {

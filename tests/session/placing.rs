@@ -294,6 +294,24 @@ fn between_its_keys_an_object_turns_about_its_middle() {
 }
 
 #[test]
+fn what_lies_is_turned_upright_and_stands_on_the_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let id = driver.select("model");
+    let ground = driver.get::<Placement>("ground").translation.y;
+    let corners = |driver: &mut Driver| driver.session.box_of(Entity::from_bits(id)).unwrap().corners();
+    let lowest = |driver: &mut Driver| corners(driver).iter().map(|corner| corner.y).fold(f64::INFINITY, f64::min);
+    driver.edit([Edit::Move { by: DVec3::new(0.5, 3.0, 0.0) }, Edit::StandOnGround]);
+    assert!((lowest(&mut driver) - ground).abs() < 1e-9);
+    driver.edit([Edit::TurnUpright]);
+    assert!((lowest(&mut driver) - ground).abs() < 1e-9);
+    let turned = driver.get::<Placement>("model").affine();
+    assert!(turned.transform_vector3(DVec3::Z).abs_diff_eq(DVec3::Y, 1e-12), "Z is up now");
+    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+    assert_eq!(driver.get::<Placement>("model"), Placement::default());
+}
+
+#[test]
 fn a_framed_ball_is_in_the_middle() {
     let mut driver = Driver::builtin("gi-ball");
     driver.select("ball");

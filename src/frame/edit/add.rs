@@ -14,7 +14,7 @@ use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
 use crate::scene::{
     DirectionalLight, DisplaySettings, GREY, Material, MaterialSlots, MeshOptions, MeshOrigin, MeshShading, MeshSource,
-    Placement, PointLight, Shape, SpotLight, SurfaceMaterial, View,
+    Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -196,50 +196,6 @@ fn lowest(world: &mut World) -> Option<f64> {
     let objects: Vec<Entity> = world.resource::<RenderState>().inputs.objects.iter().map(|it| it.entity).collect();
     let boxes = objects.into_iter().filter_map(|entity| box_of(world, entity)).filter(|own| own.min != own.max);
     boxes.flat_map(|own| own.corners()).map(|corner| corner.y).min_by(f64::total_cmp)
-}
-
-/// The way from the selection to a copy: along a horizontal axis of the world, by a little more than its width; to its
-/// right as it is seen, or to where the copy is seen and touches nothing else.
-pub fn step_aside(world: &mut World) -> DVec3 {
-    /// A tenth of the width stays free.
-    const GAP: f64 = 1.1;
-    let selected = world.resource::<Selection>().0.clone();
-    let view = world.resource::<RenderState>().inputs.camera.map_or_else(View::default, |camera| camera.view);
-    let right = view.right();
-    let axis = if right.x.abs() >= right.z.abs() { DVec3::X * right.x.signum() } else { DVec3::Z * right.z.signum() };
-    let boxes = selected.iter().filter_map(|&entity| box_of(world, entity)).flat_map(|own| own.corners());
-    let corners: Vec<DVec3> = boxes.collect();
-    let least_size = 2.0 * spot::find(world, spot::MIDDLE).size;
-    let step = |axis: DVec3| {
-        let along = corners.iter().map(|corner| corner.dot(axis));
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        // What has no width, such as a plane or a point of light, is moved as far as a new object is wide.
-        axis * if high > low { GAP * (high - low) } else { least_size }
-    };
-    let back = if axis.x == 0.0 { DVec3::X } else { DVec3::Z };
-    let towards = if back.dot(view.forward) > 0.0 { -back } else { back };
-    let steps = [axis, -axis, -towards, towards].map(step);
-    // The third of a copy that is nearest to its original.
-    let is_seen = |step: &DVec3| spot::is_seen(world, corners.iter().map(|corner| *corner + 0.65 * *step));
-    let seen: Vec<DVec3> = steps.into_iter().filter(is_seen).collect();
-    let around =
-        |step: DVec3| corners.iter().map(|&at| (at + step, at + step)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
-    let objects: Vec<Entity> = world.resource::<RenderState>().inputs.objects.iter().map(|it| it.entity).collect();
-    let others = objects.into_iter().filter(|entity| !selected.contains(entity));
-    let radius = corners.iter().map(|corner| (*corner - corners[0]).length()).fold(0.0, f64::max);
-    let others: Vec<[DVec3; 8]> = others
-        .filter_map(|entity| box_of(world, entity).filter(|own| own.min != own.max && !own.is_backdrop(radius)))
-        .map(|own| own.corners())
-        .collect();
-    let is_free = |step: &&DVec3| {
-        let Some((min, max)) = around(**step) else { return true };
-        others.iter().all(|other| {
-            let low = other.iter().copied().reduce(DVec3::min).expect("eight corners");
-            let high = other.iter().copied().reduce(DVec3::max).expect("eight corners");
-            high.cmplt(min).any() || low.cmpgt(max).any()
-        })
-    };
-    seen.iter().find(is_free).or(seen.first()).copied().unwrap_or(steps[0])
 }
 
 /// Gives `object` its own copy of its first material, or of that of the clicked part; plain grey if it has none.

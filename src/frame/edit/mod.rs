@@ -14,11 +14,13 @@
 //! | `projection` | texture coordinates for meshes without any |
 //! | `dress` | ready materials |
 //! | `place` | moving, rotating and scaling the selection |
+//! | `standing` | the selection upright, and on the ground |
 //! | `keys` | keys and settings of the animation |
-//! | `add`, `new_entity`, `spot` | new objects, their names and positions, copies, removal |
+//! | `add`, `new_entity`, `spot`, `aside` | new objects, their names and positions, copies, removal |
 //! | `remesh` | meshes made again in the background |
 
 mod add;
+mod aside;
 mod dress;
 mod keys;
 mod named;
@@ -30,6 +32,7 @@ pub(crate) mod remesh;
 mod set;
 mod sky;
 mod spot;
+mod standing;
 mod texture;
 
 pub use add::NewThing;
@@ -117,6 +120,10 @@ pub enum Edit {
         /// Translation in world space.
         by: DVec3,
     },
+    /// Put the selection on the ground.
+    StandOnGround,
+    /// Turn each selected object by a quarter about X, from Z upwards to Y upwards, and put it on the ground.
+    TurnUpright,
     /// Rotate the selection about the centre of the active entity; `axis` in world space.
     Turn {
         /// Any length except 0.
@@ -304,8 +311,10 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             label.into_iter().for_each(|text| keys::say(world, text));
         }
         Edit::Delete => add::delete(world),
+        Edit::StandOnGround => standing::stand_on_ground(world),
+        Edit::TurnUpright => standing::turn_upright(world),
         Edit::Duplicate => {
-            let aside = add::step_aside(world);
+            let aside = aside::step_aside(world);
             add::duplicate(world, aside);
         }
         Edit::DuplicateInPlace => add::duplicate(world, DVec3::ZERO),

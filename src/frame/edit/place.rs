@@ -66,7 +66,7 @@ pub fn about_middle(world: &mut World, entity: Entity, placement: &Placement) ->
 }
 
 /// Returns the changed placement; with `evenly`, scales by the factor that differs most from 1.
-fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
+pub fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
     let Placement { translation, linear, pivot } = *placement;
     // Where the pivot is in the world.
     let at = translation + pivot;

@@ -62,18 +62,13 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
     Spot { foot: place, size: SHARE * distance }
 }
 
-/// Whether the middle of these points is in the part of the image that nothing covers.
-pub fn is_seen(world: &World, points: impl Iterator<Item = DVec3>) -> bool {
-    let shown = world.resource::<RenderState>();
-    let (Some(camera), Some((min, max))) =
-        (&shown.inputs.camera, points.map(|at| (at, at)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c))))
-    else {
-        return false;
-    };
+/// Whether a point is in the part of the image that nothing covers.
+pub fn is_seen(world: &World, point: DVec3) -> bool {
+    let Some(camera) = &world.resource::<RenderState>().inputs.camera else { return false };
     let rig = Rig { view: camera.view, projection: camera.projection, lens: camera.lens };
     let aspect = world.resource::<PictureSize>().aspect();
     let free = 0.5 * world.get_resource::<FreeShare>().copied().unwrap_or_default().0;
-    let place = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(0.5 * (min + max));
+    let place = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(point);
     place.is_some_and(|at| (at.x / aspect - 0.5).abs() < free && (0.0..1.0).contains(&at.y))
 }
 

@@ -158,7 +158,7 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
-            Action::RenderTo { frames } => self.open_form(frames),
+            Action::RenderTo { frames } => self.open_form(frames, now),
             Action::SaveScene { new: false } => self.save_scene(),
             Action::SaveScene { new: true } => self.choose_place(DialogPurpose::SaveScene, &self.scene_path(true)),
             Action::CopyView => {

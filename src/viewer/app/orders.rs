@@ -16,8 +16,13 @@ use std::time::{Duration, Instant};
 const SETTLED: Duration = Duration::from_millis(300);
 
 impl App {
-    pub(super) fn open_form(&mut self, frames: bool) {
-        self.form.open(&self.session, frames, &self.options.folder);
+    pub(super) fn open_form(&mut self, frames: bool, now: Instant) {
+        let turns = self.input.is_spinning();
+        if frames && turns {
+            // Its image needs a view that rests.
+            self.input.toggle_spin(now);
+        }
+        self.form.open(&self.session, frames, turns, &self.options.folder);
     }
 
     /// Does what the form asks for.
@@ -48,8 +53,10 @@ impl App {
                 Source::Still(Box::new(Subject { scene, settings, draft }))
             }
             Some(ref frames) => {
-                let of_animation = Reel::of(&mut self.session);
-                let reel = of_animation.or_else(|| Reel::turntable_of(&mut self.session, *frames.end() + 1));
+                let reel = match order.is_turntable {
+                    true => Reel::turntable_of(&mut self.session, *frames.end() + 1),
+                    false => Reel::of(&mut self.session),
+                };
                 Source::Frames(Box::new(reel.ok_or_else(missing)?), settings)
             }
         };

@@ -46,6 +46,11 @@ pub const EDIT: KeyGroup = KeyGroup {
             named(NamedKey::Delete, Action::Send(Command::Edit(Edit::Delete))),
             edit_item("Delete", &[Menu::Edit, Menu::Here], Edit::Delete)
         ),
+        row!("put the selection on the ground", edit_item("Stand on the ground", &[Menu::Edit], Edit::StandOnGround)),
+        row!(
+            "turn the selection upright, if its up is Z, and put it on the ground",
+            edit_item("Turn upright", &[Menu::Edit], Edit::TurnUpright)
+        ),
         row!(
             "set keys at the shown time: of what was changed, else of the selection, else of the camera",
             edit("k", Some(false), Edit::SetKeys { camera: false }),
