@@ -100,7 +100,7 @@ impl OpenReel {
         // Keys of the camera may have moved it.
         self.world.entity_mut(camera).insert((view, rig.projection, rig.lens));
         let inputs = SceneInputs::of(&mut self.world);
-        let extraction = Extraction::of_world(&mut self.world, &inputs, &mut self.trees);
+        let extraction = Extraction::of_world(&mut self.world, &inputs, &self.trees);
         (extraction, MetadataDraft::of(&mut self.world, Some(&self.current)))
     }
 }
