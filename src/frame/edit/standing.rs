@@ -7,6 +7,9 @@ use crate::scene::{Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 
+/// Between object and ground, of the diagonal of the object: too small to be seen. Faces in one plane would mix.
+const GAP: f64 = 1.0 / 4096.0;
+
 /// Turns each selected object by a quarter about X, as what has Z upwards needs it, and puts it on the ground.
 pub fn turn_upright(world: &mut World) {
     for entity in world.resource::<Selection>().0.clone() {
@@ -28,7 +31,8 @@ pub fn stand_on_ground(world: &mut World) {
 
 fn put_on_ground(world: &mut World, entity: Entity, placement: Placement, corners: [DVec3; 8]) {
     let lowest = corners.iter().map(|corner| corner.y).fold(f64::INFINITY, f64::min);
-    let up = DVec3::Y * (ground(world, entity) - lowest);
+    let gap = GAP * (corners[7] - corners[0]).length();
+    let up = DVec3::Y * (ground(world, entity) + gap - lowest);
     let placed = Placement { translation: placement.translation + up, ..placement };
     if placed.check().is_ok() && world.get::<Placement>(entity) != Some(&placed) {
         world.entity_mut(entity).insert(placed);
