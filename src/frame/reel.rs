@@ -1,15 +1,14 @@
 //! The open scene at any moment of its animation, in a world of its own: frames are rendered while the session goes on.
 
-use crate::frame::core::rig::{Rig, Turning};
-use crate::frame::navigation::orbit;
+use crate::frame::camera_path::turntable;
+use crate::frame::core::rig::Rig;
 use crate::frame::session::Session;
 use crate::frame::state::resources::{CurrentScene, RenderState};
 use crate::scene::{
     Animation, Description, DisplaySettings, Extraction, LoadedScene, MetadataDraft, Moment, Rendering, SceneInputs,
-    Trees, View, show_moment,
+    Trees, show_moment,
 };
 use bevy_ecs::prelude::{Entity, World};
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// What frames are made of: the scene as it is now. Taken at once, and opened on another thread.
@@ -21,8 +20,8 @@ pub struct Reel {
     display: DisplaySettings,
     rig: Rig,
     fps: f64,
-    is_turntable: bool,
-    moment: f64,
+    /// The rigs of a turntable, and the moment that is shown meanwhile, seconds; `None` for the frames of an animation.
+    turns: Option<(Vec<Rig>, Option<f64>)>,
 }
 
 /// A reel that frames can be taken from.
@@ -30,8 +29,9 @@ pub struct OpenReel {
     current: Arc<LoadedScene>,
     trees: Trees,
     world: World,
-    /// The camera, its rig before it goes around, and the moment that is shown meanwhile, seconds.
-    turns: Option<(Entity, Rig, f64)>,
+    camera: Option<Entity>,
+    turns: Option<(Vec<Rig>, Option<f64>)>,
+    fps: f64,
 }
 
 impl Reel {
@@ -40,23 +40,24 @@ impl Reel {
         let world = session.world();
         let animation = world.get_resource::<Animation>().filter(|animation| animation.moves())?;
         let fps = animation.fps;
-        Self::with(session, fps, false)
+        Self::with(session, fps, None)
     }
 
     /// One turn of the camera around its pivot, at the moment that is shown: `n` frames, of 1 / `n` of a second
     /// each. `None` without a scene.
     pub fn turntable_of(session: &mut Session, n: u32) -> Option<Self> {
-        Self::with(session, f64::from(n), true)
+        let moment = session.world().get_resource::<Moment>().map(|moment| moment.0);
+        let rigs = turntable(&session.status().rig, n);
+        Self::with(session, f64::from(n), Some((rigs, moment)))
     }
 
-    fn with(session: &mut Session, fps: f64, is_turntable: bool) -> Option<Self> {
+    fn with(session: &mut Session, fps: f64, turns: Option<(Vec<Rig>, Option<f64>)>) -> Option<Self> {
         let world = session.world();
-        let moment = world.get_resource::<Moment>().map_or(0.0, |moment| moment.0);
         let current = world.get_resource::<CurrentScene>()?.0.clone();
         let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
         let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
         let description = session.describe();
-        Some(Self { current, description, trees, rendering, display, rig, fps, is_turntable, moment })
+        Some(Self { current, description, trees, rendering, display, rig, fps, turns })
     }
 
     /// Frames per second: frame i is at i / fps.
@@ -69,7 +70,7 @@ impl Reel {
     /// # Errors
     /// If a file of the scene is gone.
     pub fn open(self) -> Result<OpenReel, String> {
-        let Self { current, description, trees, rendering, display, rig, is_turntable, moment, .. } = self;
+        let Self { current, description, trees, rendering, display, rig, fps, turns } = self;
         let mut world = World::new();
         let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
         scene.spawn(&mut world);
@@ -80,28 +81,23 @@ impl Reel {
         if let Some(camera) = camera {
             world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }
-        let turns = camera.filter(|_| is_turntable).map(|camera| (camera, rig, moment));
-        Ok(OpenReel { current, trees, world, turns })
+        Ok(OpenReel { current, trees, world, camera, turns, fps })
     }
 }
 
 impl OpenReel {
     /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
     pub fn at(&mut self, seconds: f64) -> (Extraction, MetadataDraft) {
-        let Some((camera, rig, moment)) = self.turns else {
+        let Some((rigs, moment)) = &self.turns else {
             return scene_at(&mut self.world, &self.current, &mut self.trees, seconds);
         };
-        // Even a rotation by zero would round.
-        let view = if seconds == 0.0 { rig.view } else { orbit(&rig.view, TAU * seconds, 0.0, Turning::Turntable) };
-        let shown = scene_at(&mut self.world, &self.current, &mut self.trees, moment);
-        if self.world.get::<View>(camera) == Some(&view) {
-            return shown;
+        moment.iter().for_each(|moment| show_moment(&mut self.world, *moment));
+        let frame = (seconds * self.fps).round() as usize;
+        if let (Some(camera), Some(rig)) = (self.camera, rigs.get(frame)) {
+            // Its keys may have moved it elsewhere.
+            self.world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }
-        // Keys of the camera may have moved it.
-        self.world.entity_mut(camera).insert((view, rig.projection, rig.lens));
-        let inputs = SceneInputs::of(&mut self.world);
-        let extraction = Extraction::of_world(&mut self.world, &inputs, &self.trees);
-        (extraction, MetadataDraft::of(&mut self.world, Some(&self.current)))
+        shown(&mut self.world, &self.current, &mut self.trees)
     }
 }
 
@@ -115,6 +111,11 @@ pub fn scene_at(
     seconds: f64,
 ) -> (Extraction, MetadataDraft) {
     show_moment(world, seconds);
+    shown(world, loaded, trees)
+}
+
+/// The snapshot of what a world shows.
+fn shown(world: &mut World, loaded: &LoadedScene, trees: &mut Trees) -> (Extraction, MetadataDraft) {
     let inputs = SceneInputs::of(world);
     // Skins and morph targets have other meshes at each moment.
     trees.keep_used(&inputs);

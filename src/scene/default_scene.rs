@@ -22,7 +22,7 @@ const GROUND: &str = "ground";
 const INNER_LIGHT: &str = "inner light";
 
 /// Between model and ground, of the diagonal of the model: too small to be seen.
-const GAP: f64 = 1.0 / 4096.0;
+pub const GAP: f64 = 1.0 / 4096.0;
 
 /// Radiance of the environment that a model gets: at the zenith, at the horizon, and below.
 pub const SKY: [Vec3; 3] = [Vec3::new(0.35, 0.5, 0.8), Vec3::new(0.85, 0.9, 0.95), Vec3::splat(0.3)];

@@ -102,7 +102,7 @@ pub struct OrderForm {
     folder: PathBuf,
     /// First and last frame; `None` for a single image.
     frames: Option<(u32, u32)>,
-    /// The frames are those of a turn around a scene in which nothing moves.
+    /// The frames are those of a turn of the camera.
     is_turntable: bool,
     problem: Option<String>,
 }
@@ -162,7 +162,10 @@ impl OrderForm {
             self.folder = new_folder(folder, scene);
         }
         self.frames = match frames {
-            false => None,
+            false => {
+                self.is_turntable = false;
+                None
+            }
             true => {
                 let moves = world.get_resource::<Animation>().is_some_and(Animation::moves);
                 self.is_turntable = !moves || turns;
@@ -385,6 +388,9 @@ fn larger(scene: (u32, u32), window: (u32, u32)) -> (u32, u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::SessionOptions;
+    use crate::scene::{LoadOptions, SceneSource, load};
+    use std::time::Duration;
 
     #[test]
     fn an_image_is_not_coarser_than_the_window() {
@@ -406,6 +412,26 @@ mod tests {
             assert_eq!(sizes.len(), n, "{sizes:?}");
             assert!((0..n).all(|i| !sizes[..i].iter().any(|(_, size)| *size == sizes[i].1)), "{sizes:?}");
         }
+    }
+
+    #[test]
+    fn frames_never_go_where_there_are_some() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut session = Session::new(SessionOptions { width: 16, height: 16, ..SessionOptions::default() }).unwrap();
+        session.adopt(load(&SceneSource::Builtin("studio".to_owned()), &LoadOptions::default()).unwrap());
+        session.update(Duration::from_millis(1));
+        let mut form = OrderForm::default();
+        let mut proposed = || {
+            form.open(&session, true, false, folder.path());
+            assert!(form.is_turntable && form.order().frames == Some(0..=TURN - 1), "nothing moves");
+            form.path().to_owned()
+        };
+        let first = proposed();
+        assert_eq!((&first, proposed()), (&folder.path().join("studio-frames"), first.clone()));
+        std::fs::create_dir(&first).unwrap();
+        assert_eq!(proposed(), folder.path().join("studio-frames-2"));
+        form.open(&session, false, true, folder.path());
+        assert!(!form.order().is_turntable, "an image");
     }
 
     #[test]

@@ -299,16 +299,41 @@ fn what_lies_is_turned_upright_and_stands_on_the_ground() {
     let mut driver = model(folder.path(), 1.0);
     let id = driver.select("model");
     let ground = driver.get::<Placement>("ground").translation.y;
-    let corners = |driver: &mut Driver| driver.session.box_of(Entity::from_bits(id)).unwrap().corners();
-    let lowest = |driver: &mut Driver| corners(driver).iter().map(|corner| corner.y).fold(f64::INFINITY, f64::min);
+    let lowest = |driver: &Driver| {
+        let Shape::Mesh(mesh) = driver.get::<Shape>("model") else { panic!("a mesh") };
+        let world = driver.get::<Placement>("model").affine();
+        let points = mesh.positions.iter().map(|point| world.transform_point3(mesh.center + point.as_dvec3()).y);
+        points.fold(f64::INFINITY, f64::min) - ground
+    };
+    let before: Placement = driver.get("model");
     driver.edit([Edit::Move { by: DVec3::new(0.5, 3.0, 0.0) }, Edit::StandOnGround]);
-    assert!((0.0..1e-3).contains(&(lowest(&mut driver) - ground)));
+    assert!(lowest(&driver) > 0.0 && lowest(&driver) < 1e-3, "{}", lowest(&driver));
     driver.edit([Edit::TurnUpright]);
-    assert!((0.0..1e-3).contains(&(lowest(&mut driver) - ground)));
+    assert!(lowest(&driver) > 0.0 && lowest(&driver) < 1e-3, "{}", lowest(&driver));
     let turned = driver.get::<Placement>("model").affine();
     assert!(turned.transform_vector3(DVec3::Z).abs_diff_eq(DVec3::Y, 1e-12), "Z is up now");
-    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
-    assert_eq!(driver.get::<Placement>("model"), Placement::default());
+    // Not the corner of its box, where it leans.
+    let rotate = Property::Object(ObjectProperty::Rotate);
+    driver.edit([Edit::Set { id, property: rotate, value: DVec3::new(20.0, 30.0, 40.0) }, Edit::StandOnGround]);
+    assert!(lowest(&driver) > 0.0 && lowest(&driver) < 1e-3, "{}", lowest(&driver));
+    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo, Edit::Undo, Edit::Undo]);
+    assert_eq!(driver.get::<Placement>("model"), before);
+    // What has no end, and what is no object, stays.
+    let plane: Placement = driver.get("ground");
+    driver.select("ground");
+    driver.edit([Edit::StandOnGround]);
+    assert_eq!(driver.get::<Placement>("ground"), plane);
+}
+
+#[test]
+fn the_camera_is_outside_of_things_or_in_a_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    assert!(driver.session.is_outside());
+    let view = driver.session.status().rig.view;
+    driver.session.send(Command::SetView(View { eye: DVec3::new(0.0, 0.5, 0.0), ..view }));
+    driver.frame();
+    assert!(!driver.session.is_outside());
 }
 
 #[test]
@@ -354,4 +379,22 @@ fn a_scene_in_which_nothing_moves_is_turned_around() {
     assert!(first.abs_diff_eq(start.eye, 1e-5), "{first}");
     let across = 0.5 * (first + half) - start.pivot();
     assert!(across.with_y(0.0).length() < 1e-5 && (half.y - first.y).abs() < 1e-5, "{half} across {first}");
+}
+
+#[test]
+fn a_turntable_of_an_animation_stands_at_its_moment_and_leaves_the_tracks_of_the_camera() {
+    let mut driver = Driver::builtin("carousel");
+    driver.session.send(Command::SetMoment { seconds: Some(1.0) });
+    driver.settle();
+    let placed = |driver: &Driver| driver.session.inputs().objects.iter().map(|it| it.placement).collect::<Vec<_>>();
+    let (rig, before) = (driver.session.status().rig, placed(&driver));
+    let at_moment = Reel::of(&mut driver.session).unwrap().open().unwrap().at(1.0).0;
+    let mut reel = Reel::turntable_of(&mut driver.session, 4).unwrap().open().unwrap();
+    for (frame, expected) in firstlight::frame::turntable(&rig, 4).iter().enumerate() {
+        let scene = reel.at(frame as f64 / 4.0).0;
+        let eye = scene.origin + scene.prepared.camera.eye.as_dvec3();
+        assert!(eye.abs_diff_eq(expected.view.eye, 1e-5), "frame {frame}: {eye}");
+        assert_eq!(scene.entities.len(), at_moment.entities.len());
+    }
+    assert_eq!(placed(&driver), before, "the session goes on");
 }

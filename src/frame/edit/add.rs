@@ -6,9 +6,9 @@
 use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
+use crate::frame::edit::standing::lowest;
 use crate::frame::state::history::History;
-use crate::frame::state::resources::RenderState;
-use crate::frame::state::selection::{ActivePart, Selection, box_of};
+use crate::frame::state::selection::{ActivePart, Selection};
 use crate::mesh::procedural;
 use crate::scene::light_of;
 use crate::scene::world::entity_state::EntityState;
@@ -132,7 +132,7 @@ fn add_object(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity>
         }
         NewThing::Plane => {
             // It has no end: in the middle of things it would hide half of them.
-            let place = place.with_y(lowest(world).unwrap_or(place.y));
+            let place = place.with_y(lowest(world, None).unwrap_or(place.y));
             let material = new_material(world, "ground", Material::diffuse(Vec3::splat(0.5)));
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
@@ -189,13 +189,6 @@ pub fn duplicate(world: &mut World, step: DVec3) {
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;
-}
-
-/// Height of the lowest point of all objects that have an end, metres.
-fn lowest(world: &mut World) -> Option<f64> {
-    let objects: Vec<Entity> = world.resource::<RenderState>().inputs.objects.iter().map(|it| it.entity).collect();
-    let boxes = objects.into_iter().filter_map(|entity| box_of(world, entity)).filter(|own| own.min != own.max);
-    boxes.flat_map(|own| own.corners()).map(|corner| corner.y).min_by(f64::total_cmp)
 }
 
 /// Gives `object` its own copy of its first material, or of that of the clicked part; plain grey if it has none.

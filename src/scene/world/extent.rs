@@ -1,5 +1,6 @@
 //! Size of a scene: what "frame all" frames, and the scale of the flying speed.
 
+use crate::format::placement::Placement;
 use crate::mesh::procedural::icosphere;
 use crate::scene::world::components::{Material, Shape};
 use crate::scene::world::inputs::{ObjectInput, SceneInputs};
@@ -128,12 +129,54 @@ fn outermost(shape: &Shape) -> Vec<DVec3> {
         Shape::Quad { edge_u, edge_v } => vec![DVec3::ZERO, *edge_u, *edge_v, *edge_u + *edge_v],
         Shape::Triangle { vertices } => vertices.to_vec(),
         Shape::Mesh(mesh) => {
-            let used = || mesh.triangles.iter().flatten().filter_map(|&vertex| mesh.positions.get(vertex as usize));
-            let farthest = |way: &Vec3| used().copied().max_by(|a, b| a.dot(*way).total_cmp(&b.dot(*way)));
-            let points: Vec<Vec3> = directions(OF_MESHES).par_iter().filter_map(farthest).collect();
-            points.into_iter().map(|point| mesh.center + point.as_dvec3()).collect()
+            let ways = directions(OF_MESHES);
+            // Vertices of no triangle may lie anywhere.
+            let mut is_used = vec![false; mesh.positions.len()];
+            for &vertex in mesh.triangles.as_flattened() {
+                is_used.get_mut(vertex as usize).into_iter().for_each(|used| *used = true);
+            }
+            let farthest = |mut best: Vec<(f32, Vec3)>, (point, is_used): (&Vec3, &bool)| {
+                if *is_used {
+                    for (best, way) in best.iter_mut().zip(&ways) {
+                        let along = point.dot(*way);
+                        *best = if along > best.0 { (along, *point) } else { *best };
+                    }
+                }
+                best
+            };
+            let none = || vec![(f32::NEG_INFINITY, Vec3::ZERO); ways.len()];
+            let better = |(a, b): ((f32, Vec3), (f32, Vec3))| if b.0 > a.0 { b } else { a };
+            let both = |a: Vec<_>, b: Vec<_>| a.into_iter().zip(b).map(better).collect();
+            let vertices = mesh.positions.par_iter().zip(&is_used).with_min_len(1 << 12);
+            let found = vertices.fold(none, farthest).reduce(none, both);
+            found.into_iter().map(|(_, point)| mesh.center + point.as_dvec3()).collect()
         }
         Shape::Spheres(_) => own_box(shape).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default(),
+    }
+}
+
+/// Height of the lowest point of a shape in the world, metres; `None` for an infinite or empty one.
+pub fn lowest_point(shape: &Shape, placement: &Placement) -> Option<f64> {
+    let world = placement.affine();
+    let height = |point: DVec3| world.transform_point3(point).y;
+    let lowest = |points: &mut dyn Iterator<Item = DVec3>| points.map(height).min_by(f64::total_cmp);
+    // A sphere reaches as far down as the row of its heights is long.
+    let reach = world.matrix3.row(1).length();
+    match shape {
+        Shape::Plane { .. } => None,
+        Shape::Sphere { radius } => Some(height(DVec3::ZERO) - radius * reach),
+        Shape::Quad { edge_u, edge_v } => lowest(&mut [DVec3::ZERO, *edge_u, *edge_v, *edge_u + *edge_v].into_iter()),
+        Shape::Triangle { vertices } => lowest(&mut vertices.iter().copied()),
+        Shape::Mesh(mesh) => {
+            let used = mesh.triangles.iter().flatten().filter_map(|&vertex| mesh.positions.get(vertex as usize));
+            lowest(&mut used.map(|position| mesh.center + position.as_dvec3()))
+        }
+        Shape::Spheres(balls) => {
+            let each = balls.centers.iter().zip(&balls.radii);
+            let lows =
+                each.map(|(center, radius)| height(balls.center + center.as_dvec3()) - f64::from(*radius) * reach);
+            lows.min_by(f64::total_cmp)
+        }
     }
 }
 
