@@ -4,8 +4,8 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, CausticPlan, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, Prepared,
-    RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
+    Camera, CausticPlan, ColorInput, Environment, Film, Geometry, ImageTexture, Material, Object, PixelFilter,
+    Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::sync::Arc;
@@ -30,6 +30,10 @@ fn settings(seed: u32, caustics: bool) -> RenderSettings {
 
 /// A room with a light, a floor and something smooth.
 fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
+    room_under(Environment::Black, smooth, lamp, camera)
+}
+
+fn room_under(sky: Environment, smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
     let mut shapes = vec![
         (plane(Vec3::ZERO, Vec3::Y), 0),
         (quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 3.0), 0),
@@ -37,7 +41,16 @@ fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
     ];
     shapes.extend(smooth);
     let materials = vec![diffuse(0.6), emissive(20.0), GLASS, mirror(0.9), blend(0, 3, 0.4)];
-    scene(shapes, materials, Environment::Black, camera)
+    scene(shapes, materials, sky, camera)
+}
+
+/// An image of a sky with a sun of 11°, wide enough for camera paths to find.
+fn sun_and_sky() -> Environment {
+    let (width, height) = (64, 32);
+    let is_sun = |i: u32| (20..22).contains(&(i % width)) && (9..11).contains(&(i / width));
+    let texel = |i| if is_sun(i) { Vec3::new(60.0, 50.0, 40.0) } else { Vec3::new(0.2, 0.3, 0.5) };
+    let image = Arc::new(ImageTexture::from_linear(width, height, (0..width * height).map(texel).collect()));
+    Environment::Image { image, scale: Vec3::splat(1.5), rotation: 2.4 }
 }
 
 fn eye() -> Camera {
@@ -74,7 +87,13 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
             ),
         ),
     ];
-    for (name, scene) in &cases {
+    let ball = || vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2), (sphere(Vec3::new(1.0, 0.3, 0.4), 0.3), 3)];
+    let (under, above) = (quad(-10.0 * Vec3::Y, Vec3::X, Vec3::Z), quad(Vec3::new(1.0, 2.5, 1.0), Vec3::X, Vec3::Z));
+    let cases = cases.into_iter().chain([
+        ("balls under a sun", room_under(sun_and_sky(), ball(), under, eye())),
+        ("balls under a sun and a light, behind a lens", room_under(sun_and_sky(), ball(), above, lens)),
+    ]);
+    for (name, scene) in &cases.collect::<Vec<_>>() {
         assert!(scene.features().caustics);
         let (expected, error) = mean_of_renders(scene, settings(100, false), (24, 18), 1024, 10);
         let (found, other) = mean_of_renders(scene, settings(1, true), (24, 18), 128, 10);

@@ -99,6 +99,7 @@ pub(crate) fn sky_gradient<R: Real>([zenith, horizon, ground]: [Vector3<R>; 3], 
 pub(crate) struct EnvironmentSampler {
     distribution: PictureDistribution,
     rotation: f32,
+    integral: f64,
 }
 
 impl EnvironmentSampler {
@@ -112,7 +113,14 @@ impl EnvironmentSampler {
             })
             .collect();
         let distribution = PictureDistribution::new(width, height, &weights)?;
-        Some(Self { distribution, rotation: *rotation })
+        let sum: f64 = weights.iter().map(|&weight| f64::from(weight)).sum();
+        let integral = sum * f64::from(TAU * PI) / (width * height) as f64;
+        Some(Self { distribution, rotation: *rotation, integral })
+    }
+
+    /// Integral of the luminance over all directions, W·m⁻².
+    pub fn integral(&self) -> f64 {
+        self.integral
     }
 
     /// Samples a unit direction; returns it with its pdf per steradian.
@@ -217,6 +225,7 @@ mod tests {
             sum += f64::from(luminance(environment.radiance(dir)) / pdf) / f64::from(samples);
         }
         assert!((sum / integral - 1.0).abs() < 0.02, "{sum} for {integral}");
+        assert!((sampler.integral() / integral - 1.0).abs() < 0.02, "{} for {integral}", sampler.integral());
     }
 
     #[inline(always)]

@@ -13,11 +13,13 @@ use crate::core::material::Material;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::bodies::Bodies;
-use crate::prepare::delta_lines::{self, DeltaLine, OutsideSample};
+use crate::prepare::delta_lines::{self, DeltaLine};
+use crate::prepare::environment_lines::{EnvironmentLine, EnvironmentLines};
 use crate::prepare::guide::Guide;
 use crate::prepare::light::LightTable;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
+use crate::prepare::outside::Outside;
 use crate::prepare::plan_cache::PlanCache;
 use crate::sampling::{AliasTable, Sampler, cosine_hemisphere, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
@@ -45,8 +47,10 @@ pub(crate) struct CasterTable {
     casters: Vec<Caster>,
     /// Per object: the first of its casters, and whether each of its primitives is a caster.
     by_object: Vec<(u32, bool)>,
+    /// The environment is the light after all others.
     pairs: Pairs,
-    outside: OutsideSample,
+    environment: Option<EnvironmentLines>,
+    outside: Outside,
     /// Media that contain each delta light, indexed like all lights; see [`crate::prepare::bodies::Bodies::around`].
     /// Empty if there are none.
     media: Vec<Vec<u32>>,
@@ -90,8 +94,15 @@ pub(crate) struct LightLine {
 }
 
 impl CasterTable {
-    /// Returns `None` if no light from a finite light can reach a specular surface.
-    pub fn build(geometry: &Geometry, materials: &[Material], lights: &LightTable) -> Option<Self> {
+    /// Returns `None` if no light that lines start from can reach a specular surface.
+    ///
+    /// - `environment`: `None` if camera paths find it well enough.
+    pub fn build(
+        geometry: &Geometry,
+        materials: &[Material],
+        lights: &LightTable,
+        environment: Option<EnvironmentLines>,
+    ) -> Option<Self> {
         let mut casters = Vec::new();
         let is_specular: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
         let by_object = geometry
@@ -119,15 +130,16 @@ impl CasterTable {
                 }
             })
             .collect();
-        if casters.is_empty() || lights.is_empty() {
+        if casters.is_empty() {
             return None;
         }
-        let pairs = Pairs::new(&casters, lights)?;
-        let outside = OutsideSample::of(&geometry.tree);
+        let pairs = Pairs::new(&casters, lights, environment.as_ref())?;
+        let outside = Outside::of(&geometry.tree);
         Some(Self {
             casters,
             by_object,
             pairs,
+            environment,
             outside,
             media: Vec::new(),
             guide: OnceLock::new(),
@@ -146,6 +158,11 @@ impl CasterTable {
         self
     }
 
+    /// Whether lines start at the environment too.
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
     /// Rows of the bodies that contain a delta light; empty for all other lights.
     pub fn media_of(&self, light: u32) -> &[u32] {
         self.media.get(light as usize).map_or(&[], Vec::as_slice)
@@ -162,9 +179,26 @@ impl CasterTable {
 
     /// Samples a line from some light towards some caster; `None` if it points into the light.
     pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
-        let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
-        let light = lights.light(light_id);
+        let (light_id, caster, pmf) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
         let Caster { center, radius } = self.casters[caster as usize];
+        if light_id as usize == lights.len() {
+            let (of_direction, of_origin) = (sampler.pair(DIM_DIRECTION), sampler.pair(DIM_POINT));
+            let environment = self.environment.as_ref()?;
+            let line = environment.sample(&self.outside, (center, radius), of_direction, of_origin)?;
+            let EnvironmentLine { ray, density, radiance } = line;
+            let density = pmf * density;
+            let is_real = density > 0.0 && density.is_finite();
+            return is_real.then_some(LightLine {
+                ray,
+                caster,
+                density,
+                radiance,
+                light: light_id,
+                is_delta: false,
+                is_far: true,
+            });
+        }
+        let light = lights.light(light_id);
         if light.shape.delta().is_some() {
             let u = sampler.pair(DIM_DIRECTION);
             let line = delta_lines::sample(light, textures, &self.outside, (center, radius), u)?;
@@ -210,6 +244,16 @@ impl CasterTable {
         let origin = robust::offset_ray_origin(point.position, point.error, point.normal, dir);
         let ray = Ray::new(origin, dir);
         Some(LightLine { ray, caster, density, radiance, light: light_id, is_delta: false, is_far: false })
+    }
+
+    /// Pdf of [`Self::sample`] for a line from the environment whose first hit is `caster`; per unit of étendue. `None`
+    /// if there are no such lines.
+    ///
+    /// - `to_light`: unit.
+    pub(crate) fn environment_density(&self, lights: &LightTable, caster: u32, to_light: Vec3) -> Option<f32> {
+        let environment = self.environment.as_ref()?;
+        let pmf = self.pairs.pmf(self.casters.len(), lights.len() as u32, caster);
+        Some(if pmf > 0.0 { pmf * environment.density(self.casters[caster as usize].radius, to_light) } else { 0.0 })
     }
 
     /// Pdf of [`Self::sample`] for a line from `position` on a light, with cosine `cos` to its normal, whose first hit
@@ -292,21 +336,18 @@ impl Caster {
 }
 
 impl Pairs {
-    fn new(casters: &[Caster], lights: &LightTable) -> Option<Self> {
+    fn new(casters: &[Caster], lights: &LightTable, environment: Option<&EnvironmentLines>) -> Option<Self> {
         let lights: Vec<_> = (0..lights.len() as u32).map(|id| lights.light(id)).collect();
-        if lights.len() * casters.len() <= MAX_PAIRS {
+        if (lights.len() + 1) * casters.len() <= MAX_PAIRS {
             let flux = lights.iter().flat_map(|light| {
                 casters.iter().map(|caster| f64::from(light.mean_radiance) * caster.coupling(&light.shape))
             });
-            let flux: Vec<f64> = flux.collect();
+            let of_environment = casters.iter().filter_map(|caster| Some(environment?.flux(caster.radius)));
+            let flux: Vec<f64> = flux.chain(of_environment).collect();
             return flux.iter().any(|&flux| flux > 0.0).then(|| Self::Joint(AliasTable::new(&flux)));
         }
-        let powers: Vec<f64> =
+        let mut powers: Vec<f64> =
             lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
-        let total: f64 = powers.iter().sum();
-        if !(total > 0.0) {
-            return None;
-        }
         let is_far = |light: &Light| matches!(light.shape, LightShape::Directional { .. });
         let near = lights.iter().zip(&powers).filter(|(light, _)| !is_far(light));
         let near_total: f64 = near.clone().map(|(_, &power)| power).sum();
@@ -320,7 +361,16 @@ impl Pairs {
                 1.0
             })
         };
-        let casters = AliasTable::new(&casters.iter().map(share).collect::<Vec<_>>());
+        let shares: Vec<f64> = casters.iter().map(share).collect();
+        if let Some(environment) = environment {
+            // The flux of a light is estimated as π times its power times all shares.
+            let flux: f64 = casters.iter().map(|caster| environment.flux(caster.radius)).sum();
+            powers.push(flux / (f64::from(PI) * shares.iter().sum::<f64>()));
+        }
+        if !(powers.iter().sum::<f64>() > 0.0) {
+            return None;
+        }
+        let casters = AliasTable::new(&shares);
         Some(Self::Apart { lights: AliasTable::new(&powers), casters })
     }
 

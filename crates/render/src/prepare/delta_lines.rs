@@ -7,21 +7,11 @@
 use crate::core::texture::Texture;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
-use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_disc};
+use crate::prepare::outside::Outside;
+use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
-use firstlight_kdtree::{SceneTree, Shape};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
-
-/// Obstacles of directional light on its way to a caster.
-#[derive(Debug)]
-pub(crate) struct OutsideSample {
-    /// Bounding sphere of all finite objects.
-    center: Vec3,
-    radius: f32,
-    /// A point and the normal of each infinite plane.
-    planes: Vec<(Vec3, Vec3)>,
-}
 
 /// A line and its strength.
 pub(crate) struct DeltaLine {
@@ -41,7 +31,7 @@ pub(crate) struct DeltaLine {
 pub(crate) fn sample(
     light: &Light,
     textures: &[Texture],
-    outside: &OutsideSample,
+    outside: &Outside,
     (center, radius): (Vec3, f32),
     u: Vec2,
 ) -> Option<DeltaLine> {
@@ -69,14 +59,9 @@ pub(crate) fn sample(
             Some(DeltaLine { ray: Ray::new(origin, dir), density, strength, is_far: false })
         }
         LightShape::Directional { to_light, .. } if radius.is_finite() => {
-            let Vec2 { x, y } = radius * uniform_disc(u);
-            let way = outside.radius + outside.center.distance(center) + radius;
-            let origin = center + Frame::around(to_light).to_world(Vec3::new(x, y, way));
-            if outside.is_shaded(origin, to_light) {
-                return None;
-            }
+            let ray = outside.ray_from(to_light, (center, radius), u)?;
             let density = FRAC_1_PI / (radius * radius);
-            Some(DeltaLine { ray: Ray::new(origin, -to_light), density, strength: strength(-to_light), is_far: true })
+            Some(DeltaLine { ray, density, strength: strength(-to_light), is_far: true })
         }
         _ => None,
     }
@@ -102,31 +87,5 @@ pub(crate) fn coupling(shape: &LightShape, center: Vec3, radius: f32) -> f64 {
         }
         LightShape::Directional { .. } if radius.is_finite() => f64::from(PI * radius * radius),
         _ => 0.0,
-    }
-}
-
-impl OutsideSample {
-    pub fn of(tree: &SceneTree) -> Self {
-        let bounds = tree.bounds();
-        let (center, radius) = (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).length());
-        let planes = tree.shapes().iter().filter_map(|shape| match shape {
-            Shape::Plane { point, normal } => Some((*point, *normal)),
-            _ => None,
-        });
-        let planes = planes.collect();
-        let is_finite = radius.is_finite() && center.is_finite();
-        Self {
-            center: if is_finite { center } else { Vec3::ZERO },
-            radius: if is_finite { radius } else { 0.0 },
-            planes,
-        }
-    }
-
-    /// Whether some plane occludes light to `position`, outside of all finite objects.
-    fn is_shaded(&self, position: Vec3, to_light: Vec3) -> bool {
-        self.planes.iter().any(|(point, normal)| {
-            let (height, slope) = ((*point - position).dot(*normal), to_light.dot(*normal));
-            height / slope > 0.0
-        })
     }
 }

@@ -12,6 +12,7 @@ use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
 use crate::prepare::coat_table::CoatTable;
 use crate::prepare::contacts::{ContactScene, Contacts, ContactsBefore};
+use crate::prepare::environment_lines::EnvironmentLines;
 use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
@@ -291,7 +292,8 @@ impl Tables {
         };
         let bodies = Bodies::build(geometry, materials);
         let contacts = Contacts::build(geometry, materials, contacts_before);
-        let mut casters = CasterTable::build(geometry, materials, &lights);
+        let environment_lines = EnvironmentLines::of(environment, environment_sampler.as_ref());
+        let mut casters = CasterTable::build(geometry, materials, &lights, environment_lines);
         if !delta_lights.is_empty() {
             casters = casters.map(|casters| casters.with_media(geometry, &bodies, &lights));
         }

@@ -72,7 +72,7 @@ impl CausticPass<'_> {
             }
             (None, true) => {
                 let ratio = track.ratio / etendue_gain_at(vertex, wi, vertex.wo);
-                MisState { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
+                MisState { ratio, caster: self.caster_of(bounce.hit), ..track }
             }
         }
     }
@@ -103,12 +103,23 @@ impl CausticPass<'_> {
     /// MIS weight of a light that a camera path hits; `None` if light paths cannot find it.
     #[inline]
     pub fn camera_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
-        if track.caster == NO_CASTER || track.ratio.is_nan() || media.of_all_channels() != MediumId::OUTSIDE {
+        if !track.is_gathered() || media.of_all_channels() != MediumId::OUTSIDE {
             return None;
         }
         let light = self.scene.tables.lights.light_of(hit.object, hit.prim, vertex.front)?;
         let cos = vertex.wo.dot(vertex.geometric_normal);
         let density = self.casters.density(&self.scene.tables.lights, light, track.caster, vertex.position, cos);
+        Some(self.weight_against(track.ratio * density))
+    }
+
+    /// MIS weight of the environment in the direction `dir` of a camera path that leaves the scene; `None` if light paths
+    /// cannot find it.
+    #[inline]
+    pub fn environment_weight(&self, track: &MisState, media: MediumId, dir: Vec3) -> Option<f32> {
+        if !track.is_gathered() || media.of_all_channels() != MediumId::OUTSIDE {
+            return None;
+        }
+        let density = self.casters.environment_density(&self.scene.tables.lights, track.caster, dir)?;
         Some(self.weight_against(track.ratio * density))
     }
 

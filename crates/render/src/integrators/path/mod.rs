@@ -19,6 +19,7 @@ use crate::integrators::common::record::Record;
 use crate::integrators::common::survival::Survival;
 use crate::integrators::common::work::Work;
 use crate::integrators::path::first_surfaces::FirstSurfaces;
+use crate::integrators::simd::misses::Misses;
 use crate::integrators::simd::shade::KindHits;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::simd::{emitters, misses, shade};
@@ -216,9 +217,11 @@ impl PathWave {
             };
             match (settings.simd, kind) {
                 (Some(set), MISSES) => {
-                    misses::shade_misses(set, scene, &settings.techniques, &self.paths, &self.sets, order, radiance);
+                    let KindHits { scene, techniques, caustics, paths, order, sets, radiance, .. } = group;
+                    let misses = Misses { scene, techniques, caustics, paths, sets, order, radiance };
+                    misses::shade_misses(set, misses);
                 }
-                (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
+                (_, MISSES) => self.shade_misses(scene, &settings.techniques, caustics, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group),
                 // Hits that do not emit and end their path contribute nothing.
                 (Some(_), _) if shade::knows(kind - 1) && is_last && kind - 1 <= COATED => {}
@@ -228,7 +231,13 @@ impl PathWave {
         }
     }
 
-    fn shade_misses(&mut self, scene: &Prepared, techniques: &Techniques, radiance: &mut [Vec3]) {
+    fn shade_misses(
+        &mut self,
+        scene: &Prepared,
+        techniques: &Techniques,
+        caustics: Option<&CausticPass>,
+        radiance: &mut [Vec3],
+    ) {
         if !scene.tables.features.environment {
             return;
         }
@@ -240,6 +249,8 @@ impl PathWave {
                 throughput *= self.sets.environment_scale(self.paths.media_of(i));
             }
             let path = self.paths.get(i);
+            let weight = caustics.and_then(|pass| pass.environment_weight(&path.track, path.media, dir));
+            throughput *= weight.unwrap_or(1.0);
             radiance[path.slot as usize] += throughput * environment_light(scene, techniques, &path, dir);
         }
     }

@@ -24,7 +24,7 @@ use crate::integrators::phong::classic::ClassicGroup;
 use crate::integrators::phong::finish::{Finish, Shiny};
 use crate::integrators::phong::lobe::*;
 use crate::integrators::phong::shadow::Shadows;
-use crate::integrators::simd::misses;
+use crate::integrators::simd::misses::{self, Misses};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::prepared::Prepared;
 use crate::shading::dielectric::{fresnel, refract};
@@ -123,7 +123,9 @@ impl PhongWave {
                 continue;
             }
             if kind == MISSES && tables.environment_sampler.is_none() {
-                misses::shade_misses(set, scene, &settings.techniques, &self.paths, &self.sets, order, radiance);
+                let (techniques, paths, sets) = (&settings.techniques, &self.paths, &self.sets);
+                let misses = Misses { scene, techniques, caustics: None, paths, sets, order, radiance };
+                misses::shade_misses(set, misses);
                 continue;
             }
             if kind > MISSES && classic::knows_classic(scene, kind as u32 - 1) {

@@ -1,6 +1,7 @@
 //! Rays that leave the scene, sixteen at a time.
 
 use crate::core::techniques::Techniques;
+use crate::integrators::common::caustics_pass::CausticPass;
 use crate::prepare::prepared::Prepared;
 use crate::shading::environment_sampling::EnvironmentSampling;
 use crate::shading::lights::bounce_weight;
@@ -11,32 +12,27 @@ use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
-/// Adds the radiance of the environment along the rays of `order`, with the MIS weight against light sampling.
-pub(crate) fn shade_misses(
-    set: InstructionSet,
-    scene: &Prepared,
-    techniques: &Techniques,
-    paths: &PathBatch,
-    sets: &MediumSets,
-    order: &[u32],
-    radiance: &mut [Vec3],
-) {
-    dispatch!(
-        set,
-        misses(scene: &Prepared, techniques: &Techniques, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3])
-    );
+/// Rays that leave the scene.
+pub(crate) struct Misses<'a> {
+    pub scene: &'a Prepared,
+    pub techniques: &'a Techniques,
+    pub caustics: Option<&'a CausticPass<'a>>,
+    pub paths: &'a PathBatch,
+    pub sets: &'a MediumSets,
+    /// Indices of the rays.
+    pub order: &'a [u32],
+    /// By slot.
+    pub radiance: &'a mut [Vec3],
+}
+
+/// Adds the radiance of the environment along the rays, with the MIS weights against light sampling and light paths.
+pub(crate) fn shade_misses(set: InstructionSet, misses: Misses) {
+    dispatch!(set, shade(misses: Misses));
 }
 
 #[inline(always)]
-fn misses<S: Simd>(
-    s: S,
-    scene: &Prepared,
-    techniques: &Techniques,
-    paths: &PathBatch,
-    sets: &MediumSets,
-    order: &[u32],
-    radiance: &mut [Vec3],
-) {
+fn shade<S: Simd>(s: S, misses: Misses) {
+    let Misses { scene, techniques, caustics, paths, sets, order, radiance } = misses;
     if !scene.tables.features.environment {
         return;
     }
@@ -66,10 +62,30 @@ fn misses<S: Simd>(
             let ior = iors(s, scene, sets, mask, &chunk.media(scene, paths));
             throughput = throughput * (ior * ior);
         }
+        if let Some(pass) = caustics
+            && pass.casters.has_environment()
+        {
+            arriving = arriving * light_path_weights(s, pass, paths, &chunk);
+        }
         let light = throughput.times(arriving).to_arrays();
         for lane in lanes_of(mask) {
             let slot = paths.slot[indices[lane] as usize];
             radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
         }
     }
+}
+
+/// MIS weights against light paths, one at a time; 1 where no light path can be the path.
+#[inline(always)]
+fn light_path_weights<S: Simd>(s: S, pass: &CausticPass, paths: &PathBatch, chunk: &LaneGroup) -> Float<S> {
+    let mut weights = [1.0; LANES];
+    for lane in lanes_of(chunk.mask) {
+        let i = chunk.indices[lane] as usize;
+        let track = paths.track_of(i);
+        if track.is_gathered() {
+            let weight = pass.environment_weight(&track, paths.media_of(i), paths.rays.get(i).dir);
+            weights[lane] = weight.unwrap_or(1.0);
+        }
+    }
+    Float::load(s, &weights)
 }
