@@ -10,7 +10,7 @@ use crate::import::framing::Framing;
 use crate::import::meshes::LoadedMesh;
 use crate::import::model::placing::corners_of;
 use crate::import::orientation::faces_away;
-use crate::import::up_axis::{guess_up, guess_up_of_obj};
+use crate::import::up_axis::guess_up;
 use crate::scene::inner_light::RoomInside;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
@@ -125,10 +125,7 @@ pub fn around(
     up: Option<UpAxis>,
     aspect: f64,
 ) -> (SceneFile, Framing, DVec3) {
-    let up = up.unwrap_or_else(|| match source {
-        MeshSource::Obj(_) => guess_up_of_obj(&loaded.mesh),
-        _ => guess_up(&loaded.mesh),
-    });
+    let up = up.unwrap_or_else(|| guess_up(source, &loaded.mesh));
     let (transform, world) = match up {
         UpAxis::Y => (TransformPart::default(), DAffine3::IDENTITY),
         UpAxis::Z => {

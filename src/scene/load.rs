@@ -149,14 +149,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let emits = mesh.slots.iter().any(|(_, part)| emits(part));
             let bounds = framing.bounds();
             model = Some(Model { bounds, side, emits, has_camera: false });
-            let mut scene = LoadedScene::empty(source, file, folder);
-            scene.meshes = scene.file.objects.iter().map(|_| None).collect();
-            scene.balls = scene.file.objects.iter().map(|_| None).collect();
-            scene.warnings.append(&mesh.warnings);
-            scene.warnings.append(&mesh.material_warnings);
-            let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
-            scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
-            scene.add_mesh_pictures(options, &documents);
+            let mut scene = around_mesh(source, file, folder, mesh, options, &documents);
             scene.up = options.up;
             if let Some(environment) = options.environment {
                 scene.light_by(environment, options)?;
@@ -185,6 +178,26 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
         }
     }
     Ok(scene)
+}
+
+/// The scene that was made around a mesh.
+pub(super) fn around_mesh(
+    source: &SceneSource,
+    file: SceneFile,
+    folder: PathBuf,
+    mesh: LoadedMesh,
+    options: &LoadOptions,
+    documents: &Documents,
+) -> LoadedScene {
+    let mut scene = LoadedScene::empty(source, file, folder);
+    scene.meshes = scene.file.objects.iter().map(|_| None).collect();
+    scene.balls = scene.file.objects.iter().map(|_| None).collect();
+    scene.warnings.append(&mesh.warnings);
+    scene.warnings.append(&mesh.material_warnings);
+    let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
+    scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
+    scene.add_mesh_pictures(options, documents);
+    scene
 }
 
 /// Like [`load`], for the text of a scene file; its trees are not built. Paths in it are relative to the working

@@ -18,6 +18,7 @@ mod known_meshes;
 mod library;
 mod load;
 mod load_meshes;
+mod load_model;
 mod load_pictures;
 mod load_stage;
 mod loaded;
@@ -93,6 +94,7 @@ pub use image_metadata::{ImageMetadata, ImageSamples, ImageScene, MetadataError}
 pub(crate) use library::library_stage;
 pub use library::{LIBRARY_IMAGE, library};
 pub use load::{LoadOptions, load, load_text};
+pub use load_model::load_model;
 pub use load_stage::LoadStage;
 pub use loaded::LoadedScene;
 pub use metadata_draft::MetadataDraft;

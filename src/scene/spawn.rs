@@ -27,7 +27,7 @@ use crate::scene::world::lights::{LightTexture, WithLight, put_light};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// The entities of parts that were added to a scene, in the order of their file.
@@ -64,11 +64,27 @@ impl LoadedScene {
             .iter(world)
             .map(|(entity, name)| (name.as_str().to_owned(), entity))
             .collect();
+        let names = self.file.materials.names();
+        let known = names.filter_map(|name| Some((name, *known.get(name)?))).collect();
+        self.add(world, known)
+    }
+
+    /// Like [`Self::add_to`], with materials of its own, whatever their names: those of its meshes are among them.
+    pub fn add_anew(&self, world: &mut World) -> AddedParts {
+        let mut added = self.add(world, HashMap::new());
+        for &object in &added.objects {
+            let slots = world.get::<MaterialSlots>(object).map(|slots| slots.0.clone()).unwrap_or_default();
+            added.materials.extend(slots);
+        }
+        let mut seen = HashSet::new();
+        added.materials.retain(|material| seen.insert(*material));
+        added
+    }
+
+    fn add<'a>(&'a self, world: &mut World, known: HashMap<&'a str, Entity>) -> AddedParts {
         let last = world.query::<&Ordinal>().iter(world).max().map_or(0, |Ordinal(last)| last + 1);
         let mut ordinals = (last..).map(Ordinal);
         let mut next = move || ordinals.next().expect("fewer entities than numbers");
-        let names = self.file.materials.names();
-        let known = names.filter_map(|name| Some((name, *known.get(name)?))).collect();
         let (entities, objects) = self.spawn_parts(world, known, &mut next);
         let materials = self.file.materials.names().map(|name| entities.materials[name]).collect();
         AddedParts { materials, objects, lights: entities.all_lights }

@@ -1,5 +1,6 @@
 //! A session without a window: commands in, pictures and changes out.
 
+mod added_models;
 mod driver;
 mod edit;
 mod framing;

@@ -1,33 +1,43 @@
 //! Guesses the up axis of a model if the file does not say: the one on which the model would stand.
 
 use firstlight_format::choice::UpAxis;
+use firstlight_format::sources::MeshSource;
 use firstlight_mesh::Mesh;
 use glam::{DVec2, DVec3};
+
+/// The up axis of a model that was loaded from `source`.
+pub fn guess_up(source: &MeshSource, mesh: &Mesh) -> UpAxis {
+    match source {
+        MeshSource::Obj(_) => guess_up_of_obj(mesh),
+        MeshSource::Ply(_) | MeshSource::Stl(_) => guess_up_of_either(mesh),
+        MeshSource::Gltf { .. } | MeshSource::Part { .. } | MeshSource::Builtin(_) => UpAxis::Y,
+    }
+}
 
 /// For formats of either axis (PLY, STL): Y, unless the model would tip over that way and stands on its lower Z side.
 ///
 /// A model stands if the centroid of its surface is above the convex hull of its lowest 2 %. For Z, this hull must also
 /// have more than twice the relative area of that of Y.
-pub fn guess_up(mesh: &Mesh) -> UpAxis {
+fn guess_up_of_either(mesh: &Mesh) -> UpAxis {
     let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
     let (on_y, on_z) = (model.stand(1, Side::Lower), model.stand(2, Side::Lower));
     if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
 }
 
-/// For OBJ, a format of Y up: Z only for a tall model with a broad base, such as a bust, that would tip over on all other
-/// sides along Y and Z.
-pub fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
+/// For OBJ, a format of Y up: Z only for a model with a broad base that would tip over on all other sides along Y and Z,
+/// and is too high to be a relief with a flat back.
+fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
     const BROAD: f64 = 0.25;
-    const POINTED: f64 = 0.02;
+    const HIGH: f64 = 0.5;
     let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
     let size = model.max - model.min;
-    let has_no_base = |stand: Stand| !stand.stable && stand.support < POINTED;
-    let has_base = |stand: Stand| stand.stable && stand.support >= BROAD;
-    let is_sure = size.z >= size.x.max(size.y)
-        && has_base(model.stand(2, Side::Lower))
+    let base = model.stand(2, Side::Lower);
+    let is_sure = size.z >= HIGH * size.x.max(size.y)
+        && base.stable
+        && base.support >= BROAD
         && !model.stand(2, Side::Upper).stable
-        && has_no_base(model.stand(1, Side::Lower))
-        && has_no_base(model.stand(1, Side::Upper));
+        && !model.stand(1, Side::Lower).stable
+        && !model.stand(1, Side::Upper).stable;
     if is_sure { UpAxis::Z } else { UpAxis::Y }
 }
 
@@ -154,8 +164,8 @@ mod tests {
 
     #[test]
     fn a_table_stands_on_its_legs() {
-        assert_eq!(guess_up(&table(UpAxis::Y)), UpAxis::Y);
-        assert_eq!(guess_up(&table(UpAxis::Z)), UpAxis::Z);
+        assert_eq!(guess_up_of_either(&table(UpAxis::Y)), UpAxis::Y);
+        assert_eq!(guess_up_of_either(&table(UpAxis::Z)), UpAxis::Z);
     }
 
     /// A cone on a base along +Z, with a tip that leans towards +Y.
@@ -178,8 +188,8 @@ mod tests {
 
     #[test]
     fn what_stands_either_way_is_y_up() {
-        assert_eq!(guess_up(&firstlight_mesh::procedural::cuboid(DVec3::ONE)), UpAxis::Y);
-        assert_eq!(guess_up(&firstlight_mesh::procedural::icosphere(8)), UpAxis::Y);
+        assert_eq!(guess_up_of_either(&firstlight_mesh::procedural::cuboid(DVec3::ONE)), UpAxis::Y);
+        assert_eq!(guess_up_of_either(&firstlight_mesh::procedural::icosphere(8)), UpAxis::Y);
     }
 
     #[test]

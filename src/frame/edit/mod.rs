@@ -17,9 +17,11 @@
 //! | `standing` | the selection upright, and on the ground |
 //! | `keys` | keys and settings of the animation |
 //! | `add`, `new_entity`, `spot`, `aside` | new objects, their names and positions, copies, removal |
-//! | `remesh` | meshes made again in the background |
+//! | `add_model` | the objects and materials of a model |
+//! | `remesh` | meshes made again, and models read, in the background |
 
 mod add;
+mod add_model;
 mod aside;
 mod dress;
 mod keys;

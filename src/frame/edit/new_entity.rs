@@ -3,7 +3,7 @@
 use crate::scene::{Material, Ordinal, Placement, SurfaceMaterial};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Scales a placement uniformly.
 pub fn sized(placement: Placement, factor: f64) -> Placement {
@@ -53,12 +53,6 @@ pub fn plain_name(name: &str) -> &str {
         Some((plain, number)) if !plain.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()) => plain,
         _ => name,
     }
-}
-
-/// Creates a material for objects that come without one.
-pub fn clay(world: &mut World) -> Entity {
-    let clay = Material::diffuse(Vec3::new(0.72, 0.56, 0.45));
-    new_material(world, "clay", clay)
 }
 
 #[cfg(test)]

@@ -1,16 +1,15 @@
-//! Makes meshes in the background: simplified, with other normals, or loaded for the first time.
+//! Makes meshes in the background, simplified or with other normals, and loads models.
 //!
 //! The new mesh is made from its source by the same code that opens a scene, so that a saved scene opens with the same
 //! triangles.
 
 use crate::frame::core::status::{MessageKind, Status};
-use crate::frame::edit::new_entity::{clay, spawn};
+use crate::frame::edit::add_model::add_model;
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::history::History;
-use crate::frame::state::remake::{ForWhom, Remade, Remake};
+use crate::frame::state::remake::{ForWhom, Made, Remade, Remake};
 use crate::frame::state::resources::{Clock, CurrentScene, Renderer};
-use crate::frame::state::selection::Selection;
-use crate::scene::{Linear, MaterialSlots, MeshOptions, MeshOrigin, MeshSource, Placement, Shape};
+use crate::scene::{MeshOptions, MeshOrigin, MeshSource, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 
@@ -28,7 +27,7 @@ pub fn start(world: &mut World, entity: Entity, options: MeshOptions) -> Result<
     Ok(())
 }
 
-/// Starts to load a mesh that will become a new object.
+/// Starts to load a model that will become new objects.
 pub fn start_new(world: &mut World, source: MeshSource, place: DVec3, size: f64) {
     run(world, ForWhom::NewObject { place, size }, source, MeshOptions::default());
 }
@@ -57,40 +56,22 @@ pub fn take_back(world: &mut World) -> Option<()> {
     Some(())
 }
 
-/// Puts a finished mesh into the world.
+/// Puts a finished mesh or model into the world.
 pub fn take(world: &mut World, remade: Remade) {
     let Remade { job, result } = remade;
-    let (mesh, measure) = match result {
-        Ok(made) => made,
-        Err(error) => {
+    match (result, job.for_whom) {
+        (Err(error), _) => {
             let now = world.resource::<Clock>().0;
             for problem in &error.problems {
                 world.resource_mut::<Status>().say(now, MessageKind::Error, problem.to_string());
             }
-            return;
         }
-    };
-    match job.for_whom {
-        ForWhom::Object(entity) => {
+        (Ok(Made::Mesh(mesh, measure)), ForWhom::Object(entity)) => {
             let Some(origin) = world.get::<MeshOrigin>(entity).cloned() else { return };
             let origin = MeshOrigin { options: job.options, ..origin };
             world.entity_mut(entity).insert((Shape::Mesh(mesh), origin, measure));
         }
-        ForWhom::NewObject { place, size } => {
-            let material = clay(world);
-            let bounds = mesh.bounds();
-            let extent = f64::from((bounds.max - bounds.min).max_element()).max(f64::MIN_POSITIVE);
-            let factor = 2.0 * size / extent;
-            // Its lowest point is at the position.
-            let foot = mesh.center + 0.5 * (bounds.min + bounds.max).as_dvec3().with_y(2.0 * f64::from(bounds.min.y));
-            let linear = Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
-            let placement = Placement { linear, ..Placement::at(place - factor * foot) };
-            let origin = MeshOrigin { source: job.source.clone(), options: job.options, own_materials: false };
-            let name = job.source.name();
-            let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-            let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);
-            let entity = spawn(world, &stem.unwrap_or_else(|| name.to_owned()), bundle);
-            world.resource_mut::<Selection>().choose(entity, false);
-        }
+        (Ok(Made::Model(model)), ForWhom::NewObject { place, size }) => add_model(world, &model, place, size),
+        (Ok(_), _) => unreachable!("objects get meshes, new objects come from models"),
     }
 }

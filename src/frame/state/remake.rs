@@ -1,7 +1,7 @@
-//! Requests for meshes, and their results.
+//! Requests for meshes and models, and their results.
 
 use crate::mesh::{Deviation, Mesh};
-use crate::scene::{MeshBase, MeshOptions, MeshSource, SceneError};
+use crate::scene::{LoadedScene, MeshBase, MeshOptions, MeshSource, SceneError, load_model};
 use bevy_ecs::prelude::{Component, Entity};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -45,12 +45,26 @@ pub enum ForWhom {
 /// A finished request.
 pub struct Remade {
     pub job: Remake,
-    pub result: Result<(Arc<Mesh>, MeshMeasure), SceneError>,
+    pub result: Result<Made, SceneError>,
+}
+
+/// What was made.
+pub enum Made {
+    Mesh(Arc<Mesh>, MeshMeasure),
+    /// A model for new objects.
+    Model(Box<LoadedScene>),
 }
 
 impl Remake {
-    /// Makes the mesh; `base` caches the full mesh from one request to the next.
-    pub fn run(&self, base: &mut Option<MeshBase>) -> Result<(Arc<Mesh>, MeshMeasure), SceneError> {
+    /// Makes what is wanted; `base` caches the full mesh from one request to the next.
+    pub fn run(&self, base: &mut Option<MeshBase>) -> Result<Made, SceneError> {
+        match self.for_whom {
+            ForWhom::Object(_) => self.mesh(base),
+            ForWhom::NewObject { .. } => Ok(Made::Model(Box::new(load_model(&self.source, &self.folder)?))),
+        }
+    }
+
+    fn mesh(&self, base: &mut Option<MeshBase>) -> Result<Made, SceneError> {
         let known = base.take().filter(|base| base.serves(&self.source, self.options, &self.folder));
         let whole = match known {
             Some(base) => base,
@@ -60,7 +74,7 @@ impl Remake {
         let measured = mesh.map(|mesh| {
             let deviation = self.options.simplify.map(|_| Deviation::between(whole.mesh(), &mesh, SAMPLES));
             let (whole_faces, faces) = (whole.mesh().triangles.len(), mesh.triangles.len());
-            (Arc::new(mesh), MeshMeasure { whole_faces, faces, deviation })
+            Made::Mesh(Arc::new(mesh), MeshMeasure { whole_faces, faces, deviation })
         });
         *base = Some(whole);
         measured
