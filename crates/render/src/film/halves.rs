@@ -80,6 +80,9 @@ impl Film {
                 return None;
             }
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
+            // Blocks may have more samples or fewer than the image has in the mean, for which there are light paths.
+            let light_share =
+                (self.light.as_ref()).map_or(1.0, |light| tile.light.mean_of as f32 / light.spp.max(1) as f32);
             for block in tile.blocks_in_row(y - tile.origin.y) {
                 let share = block.mean_of as f32 / block.spp.max(1) as f32;
                 for x in block.start.x..block.start.x + block.size.x {
@@ -98,7 +101,8 @@ impl Film {
                     let now = tile.mean_of(local, block.spp) + traced;
                     (steps[at], late[at]) = (step, (now - tile.shown_before(local)).as_vec3());
                     doubled[at] = share;
-                    sum += f64::from(share * tile.last_step_in(local, block.steps));
+                    let [of_camera, of_light] = tile.last_steps(local, block.steps);
+                    sum += f64::from(share * of_camera + light_share * of_light);
                 }
             }
         }

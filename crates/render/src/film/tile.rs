@@ -161,15 +161,17 @@ impl FilmTile {
 
     /// Returns the change of a pixel by its last doubling: the squared relative difference, mean over channels.
     pub fn last_step(&self, local: usize) -> f32 {
-        self.last_step_in(local, self.block_of(local).steps)
+        self.last_steps(local, self.block_of(local).steps).into_iter().sum()
     }
 
+    /// The same of camera paths and of light paths.
+    ///
     /// - `steps`: of its block.
-    pub fn last_step_in(&self, local: usize, steps: Steps) -> f32 {
+    pub fn last_steps(&self, local: usize, steps: Steps) -> [f32; 2] {
         let of = |steps: Steps, last: &[f32]| {
             if steps.at > 0 { last.get(local).copied().unwrap_or(0.0) } else { 0.0 }
         };
-        of(steps, &self.last) + of(self.light.steps, &self.light.last)
+        [of(steps, &self.last), of(self.light.steps, &self.light.last)]
     }
 
     /// Adds one sample of every pixel of a block, row by row; `sample` is its number, which must be the next one.
