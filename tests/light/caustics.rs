@@ -4,13 +4,21 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, CausticPlan, ColorInput, Environment, Film, Geometry, ImageTexture, Material, Object, PixelFilter,
-    Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
+    Camera, CausticPlan, ColorInput, Environment, Film, Geometry, ImageTexture, Material, MaterialKind, Object,
+    PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::sync::Arc;
 
 const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.0 };
+
+/// Glass by layers, as in glTF.
+pub fn layered_glass() -> Material {
+    let mut material = Material::of_kind(MaterialKind::Principled, ColorInput::Constant(Vec3::ONE)).unwrap();
+    let Material::Principled { transmission, roughness, .. } = &mut material else { panic!() };
+    (*transmission, *roughness) = (1.0.into(), 0.0.into());
+    material
+}
 
 fn mirror(reflectance: f32) -> Material {
     Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(reflectance)) }
@@ -40,7 +48,7 @@ fn room_under(sky: Environment, smooth: Vec<(Shape, u32)>, lamp: Shape, camera: 
         (lamp, 1),
     ];
     shapes.extend(smooth);
-    let materials = vec![diffuse(0.6), emissive(20.0), GLASS, mirror(0.9), blend(0, 3, 0.4)];
+    let materials = vec![diffuse(0.6), emissive(20.0), GLASS, mirror(0.9), blend(0, 3, 0.4), layered_glass()];
     scene(shapes, materials, sky, camera)
 }
 
@@ -68,6 +76,7 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
     let mirror_quad = quad(Vec3::new(-1.8, 0.0, 1.0), Vec3::new(0.2, 0.0, -2.0), Vec3::new(-0.3, 1.5, 0.0));
     let cases = [
         ("a glass ball", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), eye())),
+        ("by layers", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 5)], quad_light(), eye())),
         ("through a lens", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), lens)),
         (
             "a mirror ball under a ball lamp",

@@ -6,6 +6,7 @@ mod common;
 mod adaptive;
 mod caustic_choice;
 mod caustics;
+mod chains;
 mod delta_lights;
 mod denoise;
 mod determinism;

@@ -161,9 +161,17 @@ impl Material {
         }
     }
 
-    /// Whether transmitted light takes one of several paths, so that only BSDF sampling finds it.
+    /// Whether transmitted light takes one of several paths, so that only BSDF sampling finds it. Layers of smooth glass
+    /// alone have one.
     pub(crate) fn is_blended(&self) -> bool {
-        matches!(self, Self::Blend { .. } | Self::Principled { .. })
+        match self {
+            Self::Principled { roughness, clearcoat, sheen_color, .. } => {
+                let is_smooth = matches!(roughness, ScalarInput::Constant(r) if r * r < SMALLEST_ALPHA);
+                !is_smooth || can_be_above_zero(clearcoat) || *sheen_color != ColorInput::Constant(Vec3::ZERO)
+            }
+            Self::Blend { .. } => true,
+            _ => false,
+        }
     }
 
     /// Whether it has normal maps or anisotropy, and so needs tangents.

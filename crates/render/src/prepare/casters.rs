@@ -177,9 +177,21 @@ impl CasterTable {
         }
     }
 
+    /// Chooses a light and a caster by the flux between them; returns them with the probability. The light after all
+    /// others is the environment.
+    pub(crate) fn choose(&self, u: f32) -> (u32, u32, f32) {
+        self.pairs.sample(self.casters.len(), u)
+    }
+
+    /// Center and radius of the bounding sphere of a caster, metres; the radius of a plane is infinite.
+    pub(crate) fn bounds(&self, caster: u32) -> (Vec3, f32) {
+        let Caster { center, radius } = self.casters[caster as usize];
+        (center, radius)
+    }
+
     /// Samples a line from some light towards some caster; `None` if it points into the light.
     pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
-        let (light_id, caster, pmf) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
+        let (light_id, caster, pmf) = self.choose(sampler.single(DIM_PAIR));
         let Caster { center, radius } = self.casters[caster as usize];
         if light_id as usize == lights.len() {
             let (of_direction, of_origin) = (sampler.pair(DIM_DIRECTION), sampler.pair(DIM_POINT));

@@ -35,7 +35,6 @@ pub(crate) fn sample(
     (center, radius): (Vec3, f32),
     u: Vec2,
 ) -> Option<DeltaLine> {
-    let strength = |dir| light.radiance(textures, dir, Vec2::ZERO);
     match light.shape {
         LightShape::Point { position, cone } => {
             let (mut axis, mut one_minus_cos_max) = (Vec3::Z, 2.0);
@@ -52,7 +51,7 @@ pub(crate) fn sample(
             }
             let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
             let dir = Frame::around(axis).to_world(local).normalize();
-            let strength = cone.map_or(1.0, |cone| cone.falloff(dir)) * strength(dir);
+            let strength = strength_towards(light, textures, dir);
             // There may be a surface at the position of the light.
             let origin = robust::offset_ray_origin(position, robust::gamma(6) * position.abs(), dir, dir);
             let density = cone_pdf(one_minus_cos_max);
@@ -61,10 +60,19 @@ pub(crate) fn sample(
         LightShape::Directional { to_light, .. } if radius.is_finite() => {
             let ray = outside.ray_from(to_light, (center, radius), u)?;
             let density = FRAC_1_PI / (radius * radius);
-            Some(DeltaLine { ray, density, strength: strength(-to_light), is_far: true })
+            Some(DeltaLine { ray, density, strength: strength_towards(light, textures, -to_light), is_far: true })
         }
         _ => None,
     }
+}
+
+/// Strength of a delta light in a unit direction away from it: W·sr⁻¹, or W·m⁻² if it is far away.
+pub(crate) fn strength_towards(light: &Light, textures: &[Texture], dir: Vec3) -> Vec3 {
+    let share = match light.shape {
+        LightShape::Point { cone: Some(cone), .. } => cone.falloff(dir),
+        _ => 1.0,
+    };
+    share * light.radiance(textures, dir, Vec2::ZERO)
 }
 
 /// Estimates flux over strength of the light, zero only if none of it reaches the sphere; 0 for lights that are not

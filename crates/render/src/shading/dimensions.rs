@@ -13,10 +13,11 @@ pub(crate) const DIM_ROULETTE: u32 = 4;
 /// Dimension of the channel to which dispersion limits a path, beyond those of all vertices.
 pub(crate) const DIM_CHANNEL: u32 = u32::MAX - 1;
 
-/// Dimensions of the choice among light samples and of the roulette of shadow rays, one each per vertex, beyond those of
-/// all vertices.
+/// Dimensions of the choice among light samples, of the roulette of shadow rays and of chains, one each per vertex, beyond
+/// those of all vertices.
 const FIRST_OF_RESAMPLING: u32 = 1 << 30;
 const FIRST_OF_SHADOW_ROULETTE: u32 = FIRST_OF_RESAMPLING + (1 << 29);
+const FIRST_OF_CHAINS: u32 = FIRST_OF_SHADOW_ROULETTE + (1 << 28);
 
 /// Returns the dimension that chooses among light samples at the end of segment `depth`.
 pub(crate) fn resampling_dimension(depth: u32) -> u32 {
@@ -26,6 +27,11 @@ pub(crate) fn resampling_dimension(depth: u32) -> u32 {
 /// Returns the dimension of the roulette of the shadow ray from the end of segment `depth`.
 pub(crate) fn shadow_roulette_dimension(depth: u32) -> u32 {
     FIRST_OF_SHADOW_ROULETTE + depth
+}
+
+/// Returns the dimension of the search for chains from the end of segment `depth`.
+pub(crate) fn chain_dimension(depth: u32) -> u32 {
+    FIRST_OF_CHAINS + depth
 }
 
 /// Returns the first dimension of the vertex at the end of segment `depth`.

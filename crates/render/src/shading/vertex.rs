@@ -243,6 +243,12 @@ impl Vertex {
         wi.dot(self.reach_normal()) > 0.0
     }
 
+    /// Whether a sampled direction leads to the intended side of the true surface.
+    #[inline]
+    pub fn leads_on(&self, wi: Vec3, passes: bool) -> bool {
+        if passes { wi.dot(self.geometric_normal) < 0.0 } else { self.is_reached_from(wi) }
+    }
+
     /// The normal of the side from which light must come, see [`Self::is_reached_from`].
     #[inline]
     pub fn reach_normal(&self) -> Vec3 {

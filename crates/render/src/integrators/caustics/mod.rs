@@ -8,8 +8,8 @@
 //! heuristic ([`weight`]), so the expectation of the image is unchanged. Light seen in a mirror or through glass cannot
 //! be connected to the lens: there, camera paths are guided ([`crate::prepare::guide`]).
 //!
-//! Scenes without specular surfaces or without finite lights have no [`crate::prepare::casters::CasterTable`], and no
-//! cost. Start reading at [`pass::CausticPass`].
+//! Scenes without specular surfaces, or without lights and images of an environment, have no
+//! [`crate::prepare::casters::CasterTable`], and no cost. Start reading at [`pass::CausticPass`].
 
 pub(crate) mod dimensions;
 pub(crate) mod lens_connections;

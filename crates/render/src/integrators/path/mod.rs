@@ -7,6 +7,7 @@
 //! materials are shaded sixteen hits at a time (`simd/`), all others one at a time (`path/scalar.rs`).
 //! Start reading at [`PathWave::trace`].
 
+mod chains;
 pub(crate) mod first_surfaces;
 mod scalar;
 
@@ -154,6 +155,9 @@ impl PathWave {
                 if depth > 1 && caustics.is_some_and(|pass| pass.guide().is_some()) {
                     work.add_told(scene, &self.paths, &self.hits);
                 }
+            }
+            if let Some(pass) = caustics.filter(|pass| depth > 1 && pass.has_chains()) {
+                self.add_chains(pass, settings, depth, radiance);
             }
             self.shade(scene, depth, settings, caustics, radiance);
             if let Some(record) = &mut self.record {

@@ -9,6 +9,7 @@ use crate::integrators::common::emission::emitted_light;
 use crate::integrators::common::resampling::{CANDIDATES, is_resampled, worth};
 use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
 use crate::integrators::path::PathWave;
+use crate::integrators::path::chains::{self, Lit};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{
@@ -25,7 +26,7 @@ use crate::shading::sides::Sides;
 use crate::shading::simd::lights::choose_light_points;
 use crate::shading::surface::blend::Blend;
 use crate::shading::surface::{blend_at, lobe_at};
-use crate::shading::vertex::{Vertex, mesh_texture_point};
+use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
 use firstlight_kdtree::Hit;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_simd::LANES;
@@ -122,38 +123,82 @@ impl PathWave {
         radiance: &mut [Vec3],
     ) -> Option<PathSurface<'a>> {
         let techniques = &settings.techniques;
-        let mut path = self.paths.get(i);
-        let ray = self.paths.rays.get(i);
         let hit = self.hits.get(i)?;
-        if scene.tables.features.media {
-            path.throughput *= self.sets.transmittance(path.media, hit.t);
-        }
         let material = self.sorted.materials[i];
-        let vertex = Vertex::new(scene, &ray, &hit, material);
+        let (mut path, ray, vertex) = self.vertex_at(scene, &hit, material, i);
         if let Some(emission) = &scene.tables.emission[material as usize] {
             radiance[path.slot as usize] += emitted_light(scene, techniques, caustics, &path, &hit, &vertex, emission);
         }
         if depth == settings.max_depth {
             return None;
         }
+        let bsdf = self.bsdf_at(scene, &mut path, &ray, &vertex, &hit, material)?;
+        Some(PathSurface { path, vertex, hit, material, bsdf })
+    }
+
+    /// Returns a path with its throughput at a hit, its ray, and the vertex.
+    fn vertex_at(&self, scene: &Prepared, hit: &Hit, material: MaterialId, i: usize) -> (Path, Ray, Vertex) {
+        let (mut path, ray) = (self.paths.get(i), self.paths.rays.get(i));
+        if scene.tables.features.media {
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
+        }
+        (path, ray, Vertex::new(scene, &ray, hit, material))
+    }
+
+    /// Returns how a hit scatters, `None` if it does not. A path that is dispersed there is limited to a channel.
+    fn bsdf_at<'a>(
+        &mut self,
+        scene: &'a Prepared,
+        path: &mut Path,
+        ray: &Ray,
+        vertex: &Vertex,
+        hit: &Hit,
+        material: MaterialId,
+    ) -> Option<Bsdf<'a>> {
         let mut sides = (scene.tables.features.glass)
-            .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
+            .then(|| Sides::new(scene, &mut self.sets, path.media, ray, hit, material, vertex.front));
         if let Some(sides) = &mut sides
             && let Some(factor) = sides.disperse(scene, material, &path.sampler)
         {
             path.throughput *= factor;
             path.media = sides.here;
         }
-        let bsdf = match &scene.shading.materials[material as usize] {
+        Some(match &scene.shading.materials[material as usize] {
             Material::Principled { .. } => {
-                Bsdf::Layers(principled_at(scene, material, &vertex, &mut sides.as_mut(), 0, true)?)
+                Bsdf::Layers(principled_at(scene, material, vertex, &mut sides.as_mut(), 0, true)?)
             }
             Material::Blend { .. } | Material::Phong { .. } => {
-                Bsdf::Blend(blend_at(scene, material, &vertex, sides.as_mut())?)
+                Bsdf::Blend(blend_at(scene, material, vertex, sides.as_mut())?)
             }
-            _ => Bsdf::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?),
-        };
-        Some(PathSurface { path, vertex, hit, material, bsdf })
+            _ => Bsdf::Lobe(lobe_at(scene, material, vertex, sides.as_mut())?),
+        })
+    }
+
+    /// Adds the light of delta lights that chains of specular surfaces bring to the hits; see [`chains`].
+    pub(super) fn add_chains(
+        &mut self,
+        pass: &CausticPass,
+        settings: &RenderSettings,
+        depth: u32,
+        radiance: &mut [Vec3],
+    ) {
+        let scene = pass.scene;
+        for i in 0..self.paths.len() {
+            let Some(hit) = self.hits.get(i) else { continue };
+            if !chains::is_chosen(&self.paths.get(i), depth) {
+                continue;
+            }
+            let material = material_of(scene, &hit);
+            let (mut path, ray, vertex) = self.vertex_at(scene, &hit, material, i);
+            let Some(bsdf) = self.bsdf_at(scene, &mut path, &ray, &vertex, &hit, material) else { continue };
+            let lit = Lit { pass, settings, path: &path, vertex: &vertex, depth };
+            let light = match &bsdf {
+                Bsdf::Lobe(lobe) => lit.light(lobe, &mut self.sets),
+                Bsdf::Blend(blend) => lit.light(blend, &mut self.sets),
+                Bsdf::Layers(layers) => lit.light(&layers.seen_along(vertex.wo, vertex.normal), &mut self.sets),
+            };
+            radiance[path.slot as usize] += light;
+        }
     }
 
     /// Scatters with guiding distributions, if there are any.
@@ -219,7 +264,7 @@ impl PathWave {
         let u = sampler.pair(dimension + DIM_DIRECTION);
         let u_lobe = || sampler.single(dimension + DIM_LOBE);
         let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
-        if !leads_on(vertex, sample.wi, sample.through.is_some()) {
+        if !vertex.leads_on(sample.wi, sample.through.is_some()) {
             return;
         }
         path.throughput *= sample.weight;
@@ -277,12 +322,6 @@ impl PathWave {
 #[inline]
 fn lit_side(vertex: &Vertex, bsdf: &impl Scatter) -> Vec3 {
     if bsdf.through().is_some() { Vec3::ZERO } else { vertex.normal }
-}
-
-/// Whether a direction leads to the intended side of the true surface.
-#[inline]
-fn leads_on(vertex: &Vertex, wi: Vec3, passes: bool) -> bool {
-    if passes { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) }
 }
 
 /// One vertex of one path.
@@ -344,7 +383,7 @@ impl PathStep<'_> {
         let &Self { techniques, path, vertex, .. } = self;
         let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
         let passes = bsdf.through().is_some() && sample.wi.dot(vertex.normal) < 0.0;
-        if pdf <= 0.0 || !leads_on(vertex, sample.wi, passes) {
+        if pdf <= 0.0 || !vertex.leads_on(sample.wi, passes) {
             return None;
         }
         let weight = light_weight(techniques, n * sample.pdf, pdf) / sample.pdf;
