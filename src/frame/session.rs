@@ -22,6 +22,7 @@ use crate::frame::state::resources::{
     Clock, CurrentScene, FrameChanges, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
     RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
+use crate::frame::state::seen_lights::{axis_of, light_at};
 use crate::frame::state::selection::{ActivePart, OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
 use crate::frame::views::{Bookmarks, ViewTrail};
@@ -383,9 +384,14 @@ impl Session {
 
     /// The object or light at this position in the image, fractions from the upper left corner.
     pub fn entity_at(&self, x: f64, y: f64) -> Option<Entity> {
-        let aspect = self.world.resource::<PictureSize>().aspect();
-        let scene = self.world.resource::<RenderState>().extraction.as_ref()?;
-        crate::frame::state::selection::pick(scene, x, y, aspect).map(|picked| picked.entity)
+        let (aspect, shown) = (self.world.resource::<PictureSize>().aspect(), self.world.resource::<RenderState>());
+        let picked = || crate::frame::state::selection::pick(shown.extraction.as_ref()?, x, y, aspect);
+        light_at(shown, [x, y], aspect).or_else(|| picked().map(|picked| picked.entity))
+    }
+
+    /// The axis of a spot light, from the light to what it hits, in the world; `None` for others.
+    pub fn axis_of(&self, light: Entity) -> Option<[glam::DVec3; 2]> {
+        axis_of(self.world.resource::<RenderState>(), light)
     }
 
     /// What a map of the objects of each pixel is made of.

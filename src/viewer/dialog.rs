@@ -16,10 +16,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// The purpose of the chosen file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DialogPurpose {
     Open,
-    AddMesh,
+    /// At a place of the image, fractions; `None`: in the middle.
+    AddMesh {
+        at: Option<[f64; 2]>,
+    },
     /// The file that the scene is saved to.
     SaveScene,
     /// The file of an image that is to be rendered.
@@ -38,7 +41,7 @@ impl DialogPurpose {
     pub fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a scene, a model or an image",
-            Self::AddMesh => "Add a model",
+            Self::AddMesh { .. } => "Add a model",
             Self::SaveScene => "Save the scene as",
             Self::SaveImage => "Save the image as",
             Self::SaveFrames => "The folder of the frames",
@@ -59,7 +62,7 @@ impl DialogPurpose {
                 kind("Models", &ModelFormat::patterns()),
                 kind("Images", "*.png *.exr *.hdr"),
             ],
-            Self::AddMesh => vec![kind("Models", &self.patterns())],
+            Self::AddMesh { .. } => vec![kind("Models", &self.patterns())],
             Self::SaveScene => vec![kind("Scene files", &self.patterns())],
             Self::SaveFrames => vec![kind("Folders", &self.patterns())],
             Self::SaveImage | Self::Environment | Self::Texture { .. } => vec![kind("Images", &self.patterns())],
@@ -70,11 +73,16 @@ impl DialogPurpose {
     fn patterns(self) -> String {
         match self {
             Self::Open => format!("{} {} *.png *.exr *.hdr", SceneFormat::patterns(), ModelFormat::patterns()),
-            Self::AddMesh => ModelFormat::patterns(),
+            Self::AddMesh { .. } => ModelFormat::patterns(),
             Self::SaveScene => "*.ron".to_owned(),
             Self::SaveImage | Self::SaveFrames => "*.png *.jpg *.jpeg *.exr".to_owned(),
             Self::Environment | Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }
+    }
+
+    /// Whether the file becomes a part of the open scene.
+    fn adds(self) -> bool {
+        !self.saves() && self != Self::Open
     }
 
     /// Whether something is to be written there.
@@ -100,9 +108,12 @@ impl DialogPurpose {
                 Command::SaveScene { path: name.into() }
             }
             Self::Environment => Command::Edit(Edit::LightFrom { file: crate::scene::path_to_text(&path) }),
-            Self::AddMesh => {
-                let path = crate::scene::path_to_text(&path);
-                Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path))))
+            Self::AddMesh { at } => {
+                let thing = NewThing::Mesh(MeshSource::of_file(crate::scene::path_to_text(&path)));
+                Command::Edit(match at {
+                    Some([x, y]) => Edit::AddAt { thing, x, y },
+                    None => Edit::Add(thing),
+                })
             }
             Self::Texture { id } => {
                 let part = TextureSource::image(crate::scene::path_to_text(&path));
@@ -120,13 +131,27 @@ pub struct Dialog {
     open: Arc<AtomicBool>,
     sender: Sender<DialogAnswer>,
     receiver: Receiver<DialogAnswer>,
+    /// The folder of what was added to a scene last.
+    added_from: Option<PathBuf>,
 }
 
 impl Dialog {
     /// Creates the dialogs; `waker` is called when there is an answer.
     pub fn new(waker: Waker) -> Self {
         let (sender, receiver) = channel();
-        Self { waker, open: Arc::default(), sender, receiver }
+        Self { waker, open: Arc::default(), sender, receiver, added_from: None }
+    }
+
+    /// A file was chosen: what is added next probably lies beside it.
+    pub fn remember(&mut self, purpose: DialogPurpose, path: &Path) {
+        if purpose.adds() {
+            self.added_from = path.parent().map(Path::to_path_buf);
+        }
+    }
+
+    /// The folder of what was added to a scene last, for files that become a part of it.
+    pub fn added_from(&self, purpose: DialogPurpose) -> Option<PathBuf> {
+        self.added_from.clone().filter(|_| purpose.adds())
     }
 
     /// Shows a dialog that starts in `folder`; returns false if this system has none.
@@ -221,7 +246,7 @@ mod tests {
         assert!(zenity.contains(&"--filename=/home/somebody/".to_owned()), "{zenity:?}");
         assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
         assert_eq!(
-            words(DialogKind::Kdialog, DialogPurpose::AddMesh),
+            words(DialogKind::Kdialog, DialogPurpose::AddMesh { at: None }),
             ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl *.glb *.gltf"]
         );
     }

@@ -12,6 +12,7 @@ const SELECTED: Color32 = Color32::from_rgb(255, 178, 70);
 const OTHERS: Color32 = Color32::from_rgba_premultiplied(170, 118, 46, 170);
 pub const AXES: [Color32; 3] =
     [Color32::from_rgb(235, 85, 85), Color32::from_rgb(125, 205, 85), Color32::from_rgb(85, 140, 245)];
+const LIGHT: Color32 = Color32::from_rgb(255, 240, 200);
 const MIDDLE: Color32 = Color32::from_gray(235);
 /// Points that a pressed mouse may move without moving anything.
 const CLICK_TOLERANCE: f64 = 4.0;
@@ -24,6 +25,10 @@ pub struct Handles {
     boxes: Vec<(Entity, OwnBox, bool)>,
     /// What of it a drag moves; not floors and walls, on which a drag is meant for the view.
     bodies: Vec<Entity>,
+    /// Lights without a surface that are not selected.
+    lights: Vec<DVec3>,
+    /// Axes of selected spot lights, from the light to what they hit.
+    axes: Vec<[DVec3; 2]>,
     gizmo: Option<(Gizmo, Projector)>,
     projector: Option<Projector>,
     hovered: Option<Handle>,
@@ -62,6 +67,10 @@ impl Handles {
                 self.boxes.push((entity, own, is_point));
             }
         }
+        let lights = session.inputs().lights.iter().filter(|light| light.light.has_position());
+        let others = lights.filter(|light| !selected.contains(&light.entity));
+        self.lights = others.map(|light| light.placement.translation).collect();
+        self.axes = selected.iter().filter_map(|light| session.axis_of(*light)).collect();
         self.projector = Some(projector);
         self.gizmo = mode.and_then(|mode| self.gizmo_of(session, mode));
         self.out_of_view = match (self.boxes.last(), selected.last()) {
@@ -191,9 +200,16 @@ impl Handles {
     }
 
     /// - `outlined`: what needs no box.
-    pub fn draw(&self, context: &Context, outlined: impl Fn(Entity) -> bool) {
+    pub fn draw(&self, context: &Context, outlined: impl Fn(Entity) -> bool, marks_lights: bool) {
         let Some(projector) = &self.projector else { return };
         let painter = context.layer_painter(egui::LayerId::background());
+        let lights = self.lights.iter().filter(|_| marks_lights).filter_map(|light| projector.place(*light));
+        lights.for_each(|place| draw_light(&painter, pos(place)));
+        for [from, to] in self.axes.iter().filter_map(|[from, to]| projector.segment(*from, *to)) {
+            painter.line_segment([pos(from), pos(to)], Stroke::new(3.0, Color32::from_black_alpha(110)));
+            painter.line_segment([pos(from), pos(to)], Stroke::new(1.5, SELECTED));
+            painter.circle_filled(pos(to), 3.0, SELECTED);
+        }
         for (i, (entity, own, is_point)) in self.boxes.iter().enumerate() {
             if outlined(*entity) || own.min == own.max && !is_point {
                 continue;
@@ -290,6 +306,17 @@ fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color:
                 painter.line_segment([pos(a), pos(b)], Stroke::new(3.0, Color32::from_black_alpha(110)));
                 painter.line_segment([pos(a), pos(b)], Stroke::new(1.5, color));
             }
+        }
+    }
+}
+
+/// A small sun.
+fn draw_light(painter: &egui::Painter, at: Pos2) {
+    for (width, color) in [(3.0, Color32::from_black_alpha(110)), (1.5, LIGHT)] {
+        painter.circle_stroke(at, 3.5, Stroke::new(width, color));
+        for i in 0..8 {
+            let way = egui::Vec2::angled(std::f32::consts::TAU * i as f32 / 8.0);
+            painter.line_segment([at + 6.0 * way, at + 9.0 * way], Stroke::new(width, color));
         }
     }
 }

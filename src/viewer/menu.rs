@@ -5,7 +5,9 @@
 use crate::files::printable;
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session, active_part};
 use crate::render::Integrator;
-use crate::scene::{BUILTIN_MESHES, BUILTIN_SCENES, MaterialSlots, MeshSource, Rendering, library};
+use crate::scene::{
+    BUILTIN_MESHES, BUILTIN_SCENES, LightInput, LightKind, MaterialSlots, MeshSource, Rendering, library,
+};
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::submenu::{part, scrolled};
@@ -157,6 +159,15 @@ fn material_title(session: &Session) -> String {
     name.map_or("Material".to_owned(), |name| format!("Material of {}", printable::name(name)))
 }
 
+/// The spot lights of the scene and their names.
+fn spot_lights(session: &Session) -> Vec<(u64, String)> {
+    let lights = session.inputs().lights.iter().filter(|light| matches!(light.light, LightKind::Spot(_)));
+    let name = |light: &LightInput| {
+        light.name.as_deref().map_or_else(|| "spot light".to_owned(), |name| printable::name(name).into_owned())
+    };
+    lights.map(|light| (light.entity.to_bits(), name(light))).collect()
+}
+
 /// The menu of the image at the place of a right click.
 #[derive(Default)]
 pub struct HereMenu {
@@ -191,6 +202,16 @@ impl HereMenu {
                 for item in menu(Menu::Here) {
                     chosen = chosen.take().or(line(ui, input, item));
                 }
+                let spots = spot_lights(input.session);
+                if !spots.is_empty() {
+                    part(ui, "Aim a spot light here", |ui| {
+                        for (id, name) in &spots {
+                            let [x, y] = place;
+                            let aim = Action::Send(Command::Edit(Edit::AimAt { id: *id, x, y }));
+                            chosen = chosen.take().or(ui.button(name).clicked().then_some(aim));
+                        }
+                    });
+                }
                 part(ui, &material_title(input.session), |ui| {
                     chosen = chosen.take().or(ready_material(ui, input.recent.thumbnails))
                 });
@@ -216,6 +237,7 @@ impl HereMenu {
 pub fn at(action: Action, [x, y]: [f64; 2]) -> Action {
     match action {
         Action::Send(Command::Edit(Edit::Add(thing))) => Action::Send(Command::Edit(Edit::AddAt { thing, x, y })),
+        Action::AddDialog(_) => Action::AddDialog(Some([x, y])),
         other => other,
     }
 }

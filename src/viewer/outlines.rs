@@ -80,6 +80,11 @@ impl Outlines {
         self.hovered
     }
 
+    /// Whether the mouse has moved over the image just now.
+    pub fn is_looked_for(&self) -> bool {
+        self.hover_until.is_some()
+    }
+
     /// When to [`follow`](Self::follow) again even if nothing happens.
     pub fn wake_at(&self) -> Option<Instant> {
         self.hover_until.into_iter().chain(self.trace_at).min()

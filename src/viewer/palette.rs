@@ -13,6 +13,8 @@ type Line = (String, String, String, Action);
 pub struct Palette {
     pub open: bool,
     is_new: bool,
+    /// What the key that opened the list types, which is no part of the search.
+    opened_by: Option<String>,
     search: String,
     /// The line that Enter runs.
     chosen: usize,
@@ -22,6 +24,13 @@ impl Palette {
     /// - `search`: what is searched for at first.
     pub fn open(&mut self, search: &str) {
         *self = Self { open: true, is_new: true, search: search.to_owned(), ..Self::default() };
+    }
+
+    /// The key that has just been pressed types this: it may be the one that has opened the list.
+    pub fn pressed(&mut self, text: Option<&str>) {
+        if self.is_new {
+            self.opened_by = text.map(str::to_owned);
+        }
     }
 
     /// Draws the list of all commands; returns the one to run.
@@ -92,11 +101,10 @@ impl Palette {
         TextEditState::default().store(context, field);
         let events = context.input_mut(|input| std::mem::take(&mut input.events));
         let mut rest = Vec::new();
-        let mut is_first = true;
+        let mut opened_by = self.opened_by.take();
         for event in events {
             match event {
-                // The key that opened the list is no part of the search.
-                Event::Text(letter) if letter == "/" && std::mem::take(&mut is_first) => {}
+                Event::Text(letter) if opened_by.as_ref() == Some(&letter) => opened_by = None,
                 Event::Text(letter) => self.search.push_str(&letter),
                 other => rest.push(other),
             }
@@ -127,6 +135,7 @@ mod tests {
         };
         let (context, mut palette) = (Context::default(), Palette::default());
         palette.open("");
+        palette.pressed(Some("/"));
         let enter = Event::Key {
             key: Key::Enter,
             physical_key: None,
@@ -139,6 +148,21 @@ mod tests {
         let mut run = None;
         let _ = context.run(input, |context| run = palette.show(context, lines));
         assert_eq!(run, Some(Action::Brush));
+    }
+
+    #[test]
+    fn the_key_that_opens_the_list_is_no_part_of_the_search() {
+        for (key, typed, expected) in [("A", &["A"][..], "add"), ("A", &["A", "A"], "addA"), ("/", &["x", "/"], "addx")]
+        {
+            let (context, mut palette) = (Context::default(), Palette::default());
+            palette.open("add");
+            palette.pressed(Some(key));
+            let events = typed.iter().map(|letter| Event::Text((*letter).to_owned())).collect();
+            let _ = context.run(RawInput { events, ..RawInput::default() }, |context| {
+                palette.show(context, Vec::new);
+            });
+            assert_eq!(palette.search, expected);
+        }
     }
 
     #[test]

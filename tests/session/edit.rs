@@ -4,6 +4,7 @@ use crate::driver::{Drive, Driver, of_material};
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::name::Name;
+use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
     Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
     Selection, Session, SessionOptions, Target, wanted_mesh,
@@ -679,4 +680,39 @@ fn a_material_is_for_the_part_that_was_clicked() {
     driver.select("wall");
     driver.edit([dress("glass")]);
     assert_eq!(names(&driver), ["glass"]);
+}
+
+#[test]
+fn a_spot_light_is_picked_at_its_mark_and_aimed_at_what_is_seen() {
+    let mut driver = Driver::builtin("gallery");
+    driver.edit([Edit::Add(NewThing::SpotLight)]);
+    let light = driver.named("spot light");
+    let inputs = driver.session.inputs();
+    let camera = inputs.camera.unwrap();
+    let rig = Rig { view: camera.view, projection: camera.projection, lens: camera.lens };
+    let position = driver.get::<Placement>("spot light").translation;
+    let place = Projector::new(&rig, DVec2::new(1.5, 1.0)).place(position).unwrap() / DVec2::new(1.5, 1.0);
+    driver.edit([Edit::SelectNone]);
+    assert_eq!(driver.session.entity_at(place.x, place.y), Some(light));
+    driver.edit([Edit::PickAt { x: place.x, y: place.y, add: false }]);
+    assert_eq!(driver.selected().0, [light]);
+    assert_ne!(driver.session.entity_at(place.x, place.y + 0.1), Some(light), "beside its mark");
+
+    for at in [[0.4, 0.7], [0.6, 0.8]] {
+        let before = driver.get::<SpotLight>("spot light");
+        driver.edit([Edit::AimAt { id: light.to_bits(), x: at[0], y: at[1] }]);
+        let [from, to] = driver.session.axis_of(light).unwrap();
+        assert_eq!(from, position);
+        // Something else may be in the way.
+        let along = |i: u32| from + (to - from) * (f64::from(i) / 100.0);
+        let seen = |point| Projector::new(&rig, DVec2::new(1.5, 1.0)).place(point).map(|at| at / DVec2::new(1.5, 1.0));
+        let off = (1..400).filter_map(|i| seen(along(i))).map(|place| place.distance(at.into()));
+        let least = off.min_by(f64::total_cmp).unwrap();
+        assert!(least < 0.01, "{least} from {at:?}");
+        driver.edit([Edit::Undo]);
+        assert_eq!(driver.get::<SpotLight>("spot light"), before);
+    }
+    let object = driver.named("serpent").to_bits();
+    driver.edit([Edit::AimAt { id: object, x: 0.5, y: 0.5 }]);
+    assert!(driver.session.status().messages.iter().any(|message| message.text.contains("only spot lights")));
 }

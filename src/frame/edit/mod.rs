@@ -14,6 +14,7 @@
 //! | `projection` | texture coordinates for meshes without any |
 //! | `dress` | ready materials |
 //! | `place` | moving, rotating and scaling the selection |
+//! | `aim` | spot lights aimed at a place of the image |
 //! | `standing` | the selection upright, and on the ground |
 //! | `keys` | keys and settings of the animation |
 //! | `add`, `new_entity`, `spot`, `aside` | new objects, their names and positions, copies, removal |
@@ -22,6 +23,7 @@
 
 mod add;
 mod add_model;
+mod aim;
 mod aside;
 mod dress;
 mod keys;
@@ -47,6 +49,7 @@ pub use texture::textures;
 use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, PictureSize, RenderState};
+use crate::frame::state::seen_lights::light_at;
 use crate::frame::state::selection::{ActivePart, Selection, pick};
 use crate::render::MaterialKind;
 use crate::scene::animation::{Interpolation, off_their_tracks};
@@ -106,6 +109,15 @@ pub enum Edit {
     Duplicate,
     /// Copy it where it is, for copies that are moved next.
     DuplicateInPlace,
+    /// Aim a spot light at what is seen at a position in the image, 0..1 from its upper left corner.
+    AimAt {
+        /// The light.
+        id: Id,
+        /// Fraction of the width.
+        x: f64,
+        /// Fraction of the height.
+        y: f64,
+    },
     /// Add an object or a light in the middle of the image, and select it.
     Add(NewThing),
     /// The same at a position in the image, 0..1 from the upper left corner; a light goes beside what is selected.
@@ -263,8 +275,13 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
     match edit {
         Edit::PickAt { x, y, add } => {
             let aspect = world.resource::<PictureSize>().aspect();
-            let picked =
-                world.resource::<RenderState>().extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
+            let shown = world.resource::<RenderState>();
+            if let Some(light) = light_at(shown, [x, y], aspect) {
+                world.resource_mut::<Selection>().choose(light, add);
+                world.resource_mut::<ActivePart>().0 = None;
+                return Ok(());
+            }
+            let picked = shown.extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
             world.resource_mut::<ActivePart>().0 = picked.map(|picked| (picked.entity, picked.part));
             let mut selection = world.resource_mut::<Selection>();
             match picked {
@@ -313,6 +330,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             label.into_iter().for_each(|text| keys::say(world, text));
         }
         Edit::Delete => add::delete(world),
+        Edit::AimAt { id, x, y } => aim::aim(world, existing(world, id)?, [x, y])?,
         Edit::StandOnGround => standing::stand_on_ground(world),
         Edit::TurnUpright => standing::turn_upright(world),
         Edit::Duplicate => {

@@ -59,7 +59,9 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
         }
         share *= 0.6;
     }
-    Spot { foot: place, size: SHARE * distance }
+    // On what is below, even if it is in the way there.
+    let below = self::distance(scene, place, -DVec3::Y).filter(|below| *below < distance);
+    Spot { foot: place - below.unwrap_or(0.0) * DVec3::Y, size: SHARE * distance }
 }
 
 /// Whether a point is in the part of the image that nothing covers.
@@ -153,6 +155,12 @@ fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
 }
 
 /// The point at a place of the image and its object: a point as far as the pivot where nothing near is seen.
+/// The surface that is seen at a place of the image; `None` if there is none.
+pub fn surface_at(world: &World, [x, y]: [f64; 2]) -> Option<DVec3> {
+    let scene = world.resource::<RenderState>().extraction.as_ref()?;
+    pick(scene, x, y, world.resource::<PictureSize>().aspect()).map(|hit| hit.point)
+}
+
 fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>) {
     let aspect = world.resource::<PictureSize>().aspect();
     let projection = world.resource::<RenderState>().inputs.camera.map(|camera| camera.projection).unwrap_or_default();
@@ -174,7 +182,7 @@ fn stand(scene: &Extraction, view: &View, place: DVec3, size: f64) -> Option<DVe
         return None;
     }
     // Without a ground, or far above it, the object floats.
-    let fall = distance(scene, middle, -DVec3::Y).filter(|fall| *fall < 0.4 * away).unwrap_or(size);
+    let fall = distance(scene, middle, -DVec3::Y).filter(|fall| *fall < away).unwrap_or(size);
     let middle = middle + DVec3::Y * (size - fall);
     let is_free = |direction: DVec3| {
         // Distance to the surface of a cube of side 2 · `size`.

@@ -5,4 +5,5 @@ pub(crate) mod explain;
 pub(crate) mod history;
 pub(crate) mod remake;
 pub(crate) mod resources;
+pub(crate) mod seen_lights;
 pub(crate) mod selection;

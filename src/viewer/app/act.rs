@@ -239,7 +239,7 @@ impl App {
             }
             Action::OpenDialog => self.ask_for_file(DialogPurpose::Open, now),
             Action::NewScene => self.open(Command::Open { path: EMPTY_SCENE.into() }, now),
-            Action::AddDialog => self.ask_for_file(DialogPurpose::AddMesh, now),
+            Action::AddDialog(at) => self.ask_for_file(DialogPurpose::AddMesh { at }, now),
             Action::EnvironmentDialog => self.ask_for_file(DialogPurpose::Environment, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,
             Action::Section(title) => {
@@ -348,7 +348,8 @@ impl App {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
         // A file name alone is in the folder in which the program runs.
         let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.or_else(|| self.memory.last_folder()).unwrap_or_else(|| self.options.folder.clone());
+        let folder = self.dialog.added_from(purpose).or(folder).or_else(|| self.memory.last_folder());
+        let folder = folder.unwrap_or_else(|| self.options.folder.clone());
         match self.dialog.ask(purpose, &folder) {
             Ok(true) => {}
             Ok(false) => {
@@ -362,6 +363,7 @@ impl App {
 
     /// Does what a file was chosen for.
     pub(super) fn take_file(&mut self, purpose: DialogPurpose, path: PathBuf, now: Instant) {
+        self.dialog.remember(purpose, &path);
         match purpose.command(path.clone()) {
             Some(command) => self.open(command, now),
             None => self.form.place(purpose, path),

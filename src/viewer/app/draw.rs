@@ -121,7 +121,7 @@ impl App {
                 if let Some(cursor) = handles.cursor(is_over_body) {
                     context.set_cursor_icon(cursor);
                 }
-                handles.draw(context, |entity| outlines.has(entity));
+                handles.draw(context, |entity| outlines.has(entity), outlines.is_looked_for());
                 if let Some(grab) = grab {
                     grab.draw(context);
                 }

@@ -110,6 +110,7 @@ impl ApplicationHandler<Wake> for App {
                 if let Some(action) = self.input.key(event.physical_key, &event.logical_key, pressed, event.repeat, now)
                 {
                     self.act(action);
+                    self.palette.pressed(event.text.as_deref());
                 }
             }
             WindowEvent::CursorMoved { position, .. } => {

@@ -159,7 +159,8 @@ pub enum Action {
     /// Opens an empty scene.
     NewScene,
     /// Shows a dialog to choose a model to add.
-    AddDialog,
+    /// At a place of the image, fractions; `None`: in the middle.
+    AddDialog(Option<[f64; 2]>),
     /// Shows a dialog to choose an environment image.
     EnvironmentDialog,
     TogglePanel,

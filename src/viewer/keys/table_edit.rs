@@ -46,7 +46,10 @@ pub const EDIT: KeyGroup = KeyGroup {
             named(NamedKey::Delete, Action::Send(Command::Edit(Edit::Delete))),
             edit_item("Delete", &[Menu::Edit, Menu::Here], Edit::Delete)
         ),
-        row!("put the selection on the ground", edit_item("Stand on the ground", &[Menu::Edit], Edit::StandOnGround)),
+        row!(
+            "put the selection on the ground: drop it, or lift it, to the floor",
+            edit_item("Stand on the ground", &[Menu::Edit, Menu::Here], Edit::StandOnGround)
+        ),
         row!(
             "turn the selection upright, if its up is Z, and put it on the ground",
             edit_item("Turn upright", &[Menu::Edit], Edit::TurnUpright)
@@ -84,7 +87,7 @@ pub const EDIT: KeyGroup = KeyGroup {
             add_item("Point light", NewThing::PointLight),
             add_item("Spot light", NewThing::SpotLight),
             add_item("Directional light", NewThing::DirectionalLight),
-            item("Model …", &[Menu::Add], Action::AddDialog)
+            item("Model …", &[Menu::Add], Action::AddDialog(None))
         ),
     ],
 };

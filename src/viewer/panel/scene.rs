@@ -60,7 +60,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
         let field = ui.add(egui::TextEdit::singleline(path).hint_text("model.obj").desired_width(72.0));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if ui.button("…").on_hover_text("choose a file").clicked() {
-            asked.dialog = Some(DialogPurpose::AddMesh);
+            asked.dialog = Some(DialogPurpose::AddMesh { at: None });
         }
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
             asked.edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path.trim().to_owned()))));
