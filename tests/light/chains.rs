@@ -6,10 +6,10 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, HitSpace, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, ColorInput, Cone, DeltaLight, Environment, Falloff, Geometry, Material, Object, Prepared, RenderSettings,
-    Shading, Snapshot, Techniques,
+    Camera, ColorInput, Cone, DeltaLight, Environment, Falloff, Geometry, LightSource, Material, Object, Prepared,
+    RenderSettings, Shading, Snapshot, Techniques, explain,
 };
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, UVec2, Vec3};
 use std::sync::Arc;
 
 const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::new(0.4, 0.2, 0.1), dispersion: 0.0 };
@@ -89,5 +89,24 @@ fn a_mirror_shows_what_delta_lights_gather() {
             assert!(noise < 0.01 * expected, "{name}: too noisy to tell: {noise}");
             assert!((found - expected).abs() < 4.5 * noise, "{name}: {found} ± {other} for {expected} ± {error}");
         }
+    }
+}
+
+#[test]
+fn what_a_chain_brings_is_said_to_be_of_its_light() {
+    let at = Vec3::new(-1.2, 3.2, 0.9);
+    let target = BALL + BALL.y * (BALL - at) / (at.y - BALL.y);
+    let lights = [
+        DeltaLight::Point { position: at, intensity: Vec3::splat(4.0) },
+        DeltaLight::Directional { direction: (BALL - at).normalize(), irradiance: Vec3::ONE },
+    ];
+    for light in lights {
+        let [_, mirrored] = views(ball(), GLASS, light, target);
+        let settings = RenderSettings { max_depth: 5, ..RenderSettings::default() };
+        let explanation = explain(&mirrored, &settings, UVec2::splat(8), UVec2::splat(4), 0..2048).unwrap();
+        let parts = explanation.contributions();
+        let [part] = &parts[..] else { panic!("{parts:?}") };
+        assert_eq!((part.source, part.bounces), (LightSource::Delta(0), 4));
+        assert!(part.radiance.min_element() > 0.0 && (part.radiance - explanation.mean()).length() < 1e-12);
     }
 }

@@ -97,8 +97,9 @@ impl Explanation {
                     Place::Sky { .. } => LightSource::Sky,
                 };
                 *sums.entry((source, bounces, FoundBy::Itself)).or_default() += vertex.radiance;
-                if let Some(asked) = &vertex.asked {
-                    *sums.entry((asked.source, bounces + 1, FoundBy::Asking)).or_default() += asked.radiance;
+                for asked in vertex.asked.iter().chain(&vertex.chain) {
+                    *sums.entry((asked.source, bounces + 1 + asked.between, FoundBy::Asking)).or_default() +=
+                        asked.radiance;
                 }
             }
         }

@@ -65,6 +65,8 @@ pub struct Asked {
     pub source: LightSource,
     /// The sampled point or direction.
     pub place: Place,
+    /// Number of specular surfaces between the vertex and the light; panes do not count.
+    pub between: u32,
     /// Contribution to the pixel in this sample, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
 }
@@ -80,6 +82,8 @@ pub struct PathVertex {
     pub radiance: DVec3,
     /// The light sample at this vertex; `None` if there is none or it contributes nothing.
     pub asked: Option<Asked>,
+    /// Light of a delta light that mirrors and glass bring to this vertex; likewise.
+    pub chain: Option<Asked>,
 }
 
 /// The path of one sample.
@@ -124,8 +128,23 @@ impl Record {
                 None => Place::Sky { direction: ray.dir.normalize() },
             };
             let throughput = batch.throughput_of(i);
-            path.vertices.push(PathVertex { place, throughput, radiance: DVec3::ZERO, asked: None });
+            path.vertices.push(PathVertex { place, throughput, radiance: DVec3::ZERO, asked: None, chain: None });
         }
+    }
+
+    /// Records the light that a chain of specular surfaces has brought to the last vertex of a path: a change of the slot
+    /// comes from it.
+    ///
+    /// - `ray`: from the last of these surfaces to the light; `between`: their number.
+    pub fn see_chain(&mut self, scene: &Prepared, slot: u32, (ray, between): (&Ray, u32), radiance: &[Vec3]) {
+        let gained = self.gained(slot as usize, radiance);
+        let Some(light) = delta_light_of(scene, ray) else { return };
+        let place = match ray.t_max.is_finite() {
+            true => Place::Light { position: ray.at(ray.t_max), light },
+            false => Place::Sky { direction: ray.dir },
+        };
+        let vertex = self.paths[slot as usize].vertices.last_mut().expect("its hit has been seen");
+        vertex.chain = Some(Asked { source: LightSource::Delta(light), place, between, radiance: gained });
     }
 
     /// Records emission after shading: a change of the slot comes from the path's last vertex.
@@ -161,7 +180,7 @@ impl Record {
                 (source, Place::Surface { position: ray.at(ray.t_max), object })
             };
             let vertex = self.paths[slot].vertices.last_mut().expect("its hit has been seen");
-            vertex.asked = Some(Asked { source, place, radiance: gained });
+            vertex.asked = Some(Asked { source, place, between: 0, radiance: gained });
         }
     }
 

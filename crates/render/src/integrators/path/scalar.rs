@@ -9,7 +9,7 @@ use crate::integrators::common::emission::emitted_light;
 use crate::integrators::common::resampling::{CANDIDATES, is_resampled, worth};
 use crate::integrators::common::survival::{ROULETTE_GRACE, Survival};
 use crate::integrators::path::PathWave;
-use crate::integrators::path::chains::{self, Lit};
+use crate::integrators::path::chains::{self, FoundChain, Lit};
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{
@@ -192,12 +192,17 @@ impl PathWave {
             let (mut path, ray, vertex) = self.vertex_at(scene, &hit, material, i);
             let Some(bsdf) = self.bsdf_at(scene, &mut path, &ray, &vertex, &hit, material) else { continue };
             let lit = Lit { pass, settings, path: &path, vertex: &vertex, depth };
-            let light = match &bsdf {
-                Bsdf::Lobe(lobe) => lit.light(lobe, &mut self.sets),
-                Bsdf::Blend(blend) => lit.light(blend, &mut self.sets),
-                Bsdf::Layers(layers) => lit.light(&layers.seen_along(vertex.wo, vertex.normal), &mut self.sets),
+            let found = match &bsdf {
+                Bsdf::Lobe(lobe) => lit.find(lobe, &mut self.sets),
+                Bsdf::Blend(blend) => lit.find(blend, &mut self.sets),
+                Bsdf::Layers(layers) => lit.find(&layers.seen_along(vertex.wo, vertex.normal), &mut self.sets),
             };
-            radiance[path.slot as usize] += light;
+            if let Some(FoundChain { light, ray, n_surfaces }) = found {
+                radiance[path.slot as usize] += light;
+                if let Some(record) = &mut self.record {
+                    record.see_chain(scene, path.slot, (&ray, n_surfaces), radiance);
+                }
+            }
         }
     }
 

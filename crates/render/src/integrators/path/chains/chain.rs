@@ -189,8 +189,10 @@ impl<'a, 'b> ChainTracer<'a, 'b> {
             _ => specular(&lobe_at(scene, material, &vertex, sides.as_mut())?, &vertex, wanted),
         }?;
         let passes = sample.through.is_some();
-        // Blends pass light as if they were specular, also where they are not.
-        if passes && scene.shading.materials[material as usize].is_blended() || !vertex.leads_on(sample.wi, passes) {
+        // Blends pass light as if they were specular, also where they are not; light sampling finds what panes let pass.
+        let is_left_out =
+            scene.shading.materials[material as usize].is_blended() || scene.tables.panes[material as usize];
+        if passes && is_left_out || !vertex.leads_on(sample.wi, passes) {
             return None;
         }
         if let Some(through) = sample.through {

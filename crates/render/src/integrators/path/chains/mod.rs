@@ -19,6 +19,8 @@ use crate::integrators::common::caustics_pass::CausticPass;
 use crate::integrators::path::chains::chain::{ChainTracer, Target};
 use crate::integrators::path::chains::walk::{Solution, Walk};
 use crate::prepare::delta_lines::strength_towards;
+use crate::prepare::light::delta::DeltaSample;
+use crate::prepare::light::emitter::Light;
 use crate::sampling::{Sampler, one_minus_cos_from_sin2, uniform_cone};
 use crate::shading::dimensions::chain_dimension;
 use crate::shading::medium::MediumSets;
@@ -63,21 +65,21 @@ pub(super) fn is_chosen(path: &Path, depth: u32) -> bool {
 }
 
 impl Lit<'_> {
-    /// Returns the light of a chain to a random delta light by way of a random caster, over its probability.
-    pub fn light(&self, bsdf: &impl Scatter, sets: &mut MediumSets) -> Vec3 {
+    /// Searches for a chain to a random delta light by way of a random caster.
+    pub fn find(&self, bsdf: &impl Scatter, sets: &mut MediumSets) -> Option<FoundChain> {
         if !bsdf.has_non_specular() {
-            return Vec3::ZERO;
+            return None;
         }
         let &Self { pass, path, vertex, depth, settings } = self;
         let scene = pass.scene;
         let choice = random(path, depth, 0);
         let (light, caster, pmf) = pass.casters.choose(choice.single(1));
         if light as usize >= scene.tables.lights.len() {
-            return Vec3::ZERO;
+            return None;
         }
         let light_media = sets.within(scene, pass.casters.media_of(light)).of_all_channels();
         let light = scene.tables.lights.light(light);
-        let Some(target) = Target::of(light) else { return Vec3::ZERO };
+        let target = Target::of(light)?;
         let most_events = settings.max_depth.saturating_sub(depth + 1).min(chain::MOST_EVENTS as u32) as usize;
         let through = bsdf.through();
         let start = |dir: Vec3| {
@@ -97,52 +99,54 @@ impl Lit<'_> {
             let chain = tracer.find(ray, media, light_media, &random)?;
             walk.run(tracer, dir, &chain, light_media, &start)
         };
-        let Some(solution) = found(&mut tracer, 1) else { return Vec3::ZERO };
+        let solution = found(&mut tracer, 1)?;
         let (value, _) = bsdf.eval(vertex.wo, solution.dir, vertex.normal);
-        let Some(arriving) = self.arriving(tracer.sets(), &target, &solution) else { return Vec3::ZERO };
-        let strength = strength_towards(light, &scene.shading.textures, arriving.from_light);
-        let light_here = path.throughput * value * solution.weight * arriving.share * strength;
+        let (ray, share) = self.last_segment(tracer.sets(), light, &solution)?;
+        let strength = strength_towards(light, &scene.shading.textures, -ray.dir.normalize());
+        let light_here = path.throughput * value * solution.weight * share * strength;
         if light_here == Vec3::ZERO {
-            return Vec3::ZERO;
+            return None;
         }
         let is_again = |other: &Solution| other.is_same(&solution, SAME * walk.angle);
         let n_starts = (1..MOST_STARTS).find(|i| found(&mut tracer, i + 1).is_some_and(|other| is_again(&other)));
         let n_starts = n_starts.unwrap_or(MOST_STARTS) as f32;
-        light_here * (n_starts / (SHARE * pmf * solution.spread))
+        let light = light_here * (n_starts / (SHARE * pmf * solution.spread));
+        Some(FoundChain { light, ray, n_surfaces: solution.chain.len() as u32 })
     }
 
-    /// What arrives from a light at the end of a chain; `None` if something is in the way.
-    fn arriving(&self, sets: &MediumSets, target: &Target, solution: &Solution) -> Option<Arriving> {
-        let (scene, end) = (self.pass.scene, &solution.end);
-        let (ray, distance) = match *target {
-            Target::Point(position) => {
-                let way = position - end.origin;
-                // A little before the light, at which there may be a surface.
-                (Ray { dir: way, t_max: 1.0 - 1e-5, ..*end }, way.length())
-            }
-            Target::Far(to_light) => (Ray::new(end.origin, to_light), 0.0),
+    /// The ray from the end of a chain to a light, and the share of its light that arrives; `None` if something is in
+    /// the way.
+    fn last_segment(&self, sets: &MediumSets, light: &Light, solution: &Solution) -> Option<(Ray, Vec3)> {
+        let (scene, origin) = (self.pass.scene, solution.end.origin);
+        let source = light.shape.delta()?;
+        let DeltaSample { found, target, .. } = source.seen_from(true, origin.into());
+        let target = Vec3::from(target);
+        let (ray, distance) = match source.is_far {
+            true => (Ray::new(origin, target), 0.0),
+            false => (Ray { origin, dir: target - origin, t_max: 1.0 }, target.distance(origin)),
         };
         let mut rays = RayBatch::default();
         rays.push(&ray);
         let mut occluded = Vec::new();
         let passed = scene.shadows(&rays, RayClass::Incoherent, &mut occluded);
-        if occluded[0] {
+        if !found || occluded[0] {
             return None;
         }
         let mut share = passed.iter().fold(Vec3::ONE, |share, (_, passed)| share * *passed);
         if scene.tables.features.media {
             share *= sets.transmittance(solution.media, distance);
         }
-        Some(Arriving { share, from_light: -ray.dir.normalize() })
+        Some((ray, share))
     }
 }
 
-/// Light at the end of a chain.
-struct Arriving {
-    /// Of the light that gets there.
-    share: Vec3,
-    /// Unit.
-    from_light: Vec3,
+/// A chain that brings light.
+pub(super) struct FoundChain {
+    /// Its light in the pixel, over its probability.
+    pub light: Vec3,
+    /// From its end to the light.
+    pub ray: Ray,
+    pub n_surfaces: u32,
 }
 
 /// Random numbers of a start; 0 for what all starts share.
