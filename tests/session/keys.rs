@@ -334,3 +334,20 @@ fn frames_of_a_scene_without_one_of_its_meshes_have_the_rest() {
         assert_eq!(reel.at(seconds).0.entities.len(), 1, "the ball");
     }
 }
+
+/// What was changed long before the first key is not what is meant by it.
+#[test]
+fn the_first_keys_are_of_what_is_selected() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open(folder.path(), "still.ron", STILL);
+    let sun = driver.inputs().lights[0].entity.to_bits();
+    let strength = Property::Light(LightProperty::Irradiance);
+    driver.edit([Edit::Set { id: sun, property: strength, value: DVec3::splat(3.0) }]);
+    let id = driver.id;
+    driver.edit([Edit::Select { id, add: false }, Edit::SetKeys { camera: false }]);
+    let of: Vec<_> = driver.tracks().into_iter().map(|(property, ..)| property).collect();
+    assert_eq!(of, ["translate", "rotate", "scale"]);
+    driver.edit([Edit::Undo, Edit::SelectNone, Edit::SetKeys { camera: false }]);
+    let of: Vec<_> = driver.tracks().into_iter().map(|(property, ..)| property).collect();
+    assert_eq!(of, ["irradiance"], "nothing is selected");
+}

@@ -8,11 +8,12 @@ use crate::format::material_property::MaterialProperty;
 use crate::format::property::{CameraProperty, LightProperty, ObjectProperty};
 use crate::scene::animation::moment::{Moment, place, rest_camera};
 use crate::scene::animation::{Animation, Channel, Shutter, Track};
+use crate::scene::world::components::MaterialSlots;
 use crate::scene::world::inputs::{CameraInput, SceneInputs};
 use crate::scene::world::material_value::material_value;
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Keys this near to each other are one, seconds: frames are at least 1e-4 s apart.
 const SAME_TIME: f64 = 1e-6;
@@ -100,6 +101,11 @@ pub fn set_keys(
     let mut new = Vec::new();
     if let KeysOf::Changes(selected) = of {
         new = changes(&animation, [&animation.inputs_at(before, 0.0), &expected], &now);
+        if animation.tracks.is_empty() && !selected.is_empty() {
+            // Until something moves, a change may be as old as the scene: what is selected is meant.
+            let with_materials = with_materials(world, selected);
+            new.retain(|key| key.channel.entity().is_some_and(|entity| with_materials.contains(&entity)));
+        }
         if new.is_empty() {
             new = transforms(&animation, &now, selected);
         }
@@ -113,6 +119,12 @@ pub fn set_keys(
     }
     world.insert_resource(animation);
     Ok(new.into_iter().map(|key| key.channel).collect())
+}
+
+/// Entities, and the materials of those that are objects.
+fn with_materials(world: &World, entities: &[Entity]) -> HashSet<Entity> {
+    let slots = entities.iter().filter_map(|entity| world.get::<MaterialSlots>(*entity));
+    entities.iter().chain(slots.flat_map(|slots| &slots.0)).copied().collect()
 }
 
 /// Deletes the keys at the current time: of these objects and lights, or of everything if there are none. A track

@@ -68,6 +68,13 @@ impl ApplicationHandler<Wake> for App {
         if at_mouse.is_some() {
             response.consumed = self.over_widgets || presenter.egui_context().is_using_pointer();
         }
+        // A click beside the list of commands closes it, and does what it does.
+        if let WindowEvent::MouseInput { state, .. } = &event
+            && state.is_pressed()
+            && !response.consumed
+        {
+            self.palette.open = false;
+        }
         if response.repaint && (was_over_widgets || self.has_widgets()) && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }

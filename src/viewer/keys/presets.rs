@@ -4,7 +4,7 @@
 use crate::frame::navigation::Side;
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use crate::viewer::keys::binding::{Action, Binding, KeyGroup, Trigger, Typed};
-use crate::viewer::keys::build::{UNDO, alt, ctrl_pad, edit, named, pad, row, send, shifted, side, text};
+use crate::viewer::keys::build::{REDO, UNDO, alt, ctrl_pad, edit, named, pad, row, send, shifted, side, text};
 use crate::viewer::keys::table::BINDINGS;
 use winit::keyboard::{KeyCode, NamedKey};
 
@@ -85,7 +85,7 @@ static BLENDER: &[KeyGroup] = &[
             row!("delete the selection", text("x", DELETE), named(NamedKey::Delete, DELETE)),
             row!("select everything", shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))),
             row!("select nothing", alt("a", Action::Send(Command::Edit(Edit::SelectNone)))),
-            row!("find what can be added", shifted(Typed::Text("a"), true, Action::PaletteOf("add"))),
+            row!("find what can be added", shifted(Typed::Text("a"), true, Action::PaletteOf("add "))),
             row!("set keys", text("i", Action::Send(Command::Edit(Edit::SetKeys { camera: false })))),
             row!(
                 "duplicate the selection, and move the copy with the mouse",
@@ -127,7 +127,8 @@ static MAYA: &[KeyGroup] = &[
             row!("handles: rotate", text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))),
             row!("handles: scale", text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))),
             row!("frame the selection, or the whole scene", send("a", Command::FrameAll)),
-            row!("undo", text("z", UNDO)),
+            row!("undo", shifted(Typed::Text("z"), false, UNDO)),
+            row!("redo", shifted(Typed::Text("z"), true, REDO)),
             row!(
                 "set keys",
                 shifted(Typed::Text("s"), false, Action::Send(Command::Edit(Edit::SetKeys { camera: false })))
