@@ -95,7 +95,7 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
         open(&program, 3, ball, frame);
         choose(&program, place(line), frame);
     };
-    let [focus, copy, delete, material] = [1, 5, 6, 11];
+    let [focus, copy, delete, material] = [1, 5, 6, 12];
     let undo = || click(&program, 1, (75, HEIGHT - 13));
     // Gold, the first of the ready materials: their menu ends beside its line.
     open(&program, 3, ball, frame);
