@@ -199,7 +199,7 @@ impl Handles {
         painter.galley(rect.min, galley, Color32::WHITE);
     }
 
-    /// - `outlined`: what needs no box.
+    /// - `outlined`: what needs no box; `marks_lights`: lights that are not selected are marked too.
     pub fn draw(&self, context: &Context, outlined: impl Fn(Entity) -> bool, marks_lights: bool) {
         let Some(projector) = &self.projector else { return };
         let painter = context.layer_painter(egui::LayerId::background());

@@ -72,10 +72,12 @@ fn a_mirror_shows_what_delta_lights_gather() {
     let far = DeltaLight::Directional { direction: (BALL - at).normalize(), irradiance: Vec3::ONE };
     // The middle of the shadow.
     let target = BALL + BALL.y * (BALL - at) / (at.y - BALL.y);
+    let dispersive = Material::Glass { ior: 1.5, absorption: Vec3::ZERO, dispersion: 0.5 };
     let cases = [
         ("sphere, point", ball(), GLASS, point),
         ("sphere, spot", ball(), GLASS, spot),
         ("sphere, from infinity", ball(), GLASS, far),
+        ("sphere that disperses, point", ball(), dispersive, point),
         ("sphere by layers, point", ball(), layered_glass(), point),
         ("mesh, point", smooth_body(), GLASS, point),
     ];

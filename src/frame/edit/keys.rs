@@ -19,7 +19,8 @@ use std::sync::Arc;
 
 /// Sets keys at the current time.
 ///
-/// - `camera`: of the camera only; otherwise of what has been changed, of the selection, or else of the camera.
+/// - `camera`: of the camera only; otherwise of what has been changed, of the selection, or else of the camera; until
+///   something has keys, changes of what is not selected do not count beside a selection.
 pub fn set(world: &mut World, camera: bool) -> Result<(), String> {
     check_pose(world)?;
     let (mut before, written) = before(world);

@@ -154,13 +154,13 @@ fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
     (min != max).then_some((0.5 * (min + max), 0.5 * (max - min).length()))
 }
 
-/// The point at a place of the image and its object: a point as far as the pivot where nothing near is seen.
 /// The surface that is seen at a place of the image; `None` if there is none.
 pub fn surface_at(world: &World, [x, y]: [f64; 2]) -> Option<DVec3> {
     let scene = world.resource::<RenderState>().extraction.as_ref()?;
     pick(scene, x, y, world.resource::<PictureSize>().aspect()).map(|hit| hit.point)
 }
 
+/// The point at a place of the image and its object: a point as far as the pivot where nothing near is seen.
 fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>) {
     let aspect = world.resource::<PictureSize>().aspect();
     let projection = world.resource::<RenderState>().inputs.camera.map(|camera| camera.projection).unwrap_or_default();

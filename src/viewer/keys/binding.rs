@@ -158,8 +158,7 @@ pub enum Action {
     OpenDialog,
     /// Opens an empty scene.
     NewScene,
-    /// Shows a dialog to choose a model to add.
-    /// At a place of the image, fractions; `None`: in the middle.
+    /// Shows a dialog to choose a model to add at a place of the image, fractions; `None`: in the middle.
     AddDialog(Option<[f64; 2]>),
     /// Shows a dialog to choose an environment image.
     EnvironmentDialog,

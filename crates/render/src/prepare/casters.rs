@@ -192,41 +192,33 @@ impl CasterTable {
     /// Samples a line from some light towards some caster; `None` if it points into the light.
     pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
         let (light_id, caster, pmf) = self.choose(sampler.single(DIM_PAIR));
-        let Caster { center, radius } = self.casters[caster as usize];
-        if light_id as usize == lights.len() {
+        let line = if light_id as usize == lights.len() {
             let (of_direction, of_origin) = (sampler.pair(DIM_DIRECTION), sampler.pair(DIM_POINT));
-            let environment = self.environment.as_ref()?;
-            let line = environment.sample(&self.outside, (center, radius), of_direction, of_origin)?;
+            let line =
+                self.environment.as_ref()?.sample(&self.outside, self.bounds(caster), of_direction, of_origin)?;
             let EnvironmentLine { ray, density, radiance } = line;
-            let density = pmf * density;
-            let is_real = density > 0.0 && density.is_finite();
-            return is_real.then_some(LightLine {
-                ray,
-                caster,
-                density,
-                radiance,
-                light: light_id,
-                is_delta: false,
-                is_far: true,
-            });
-        }
-        let light = lights.light(light_id);
-        if light.shape.delta().is_some() {
+            LightLine { ray, caster, density: pmf * density, radiance, light: light_id, is_delta: false, is_far: true }
+        } else if lights.light(light_id).shape.delta().is_some() {
             let u = sampler.pair(DIM_DIRECTION);
-            let line = delta_lines::sample(light, textures, &self.outside, (center, radius), u)?;
+            let line = delta_lines::sample(lights.light(light_id), textures, &self.outside, self.bounds(caster), u)?;
             let DeltaLine { ray, density, strength: radiance, is_far } = line;
-            let density = density * self.pairs.pmf(self.casters.len(), light_id, caster);
-            let is_real = density > 0.0 && density.is_finite();
-            return is_real.then_some(LightLine {
-                ray,
-                caster,
-                density,
-                radiance,
-                light: light_id,
-                is_delta: true,
-                is_far,
-            });
-        }
+            LightLine { ray, caster, density: pmf * density, radiance, light: light_id, is_delta: true, is_far }
+        } else {
+            self.line_from_surface(lights, textures, sampler, (light_id, caster))?
+        };
+        (line.density > 0.0 && line.density.is_finite()).then_some(line)
+    }
+
+    /// Samples a line from a light with a surface towards a caster.
+    fn line_from_surface(
+        &self,
+        lights: &LightTable,
+        textures: &[Texture],
+        sampler: &Sampler,
+        (light_id, caster): (u32, u32),
+    ) -> Option<LightLine> {
+        let light = lights.light(light_id);
+        let Caster { center, radius } = self.casters[caster as usize];
         let u = sampler.pair(DIM_POINT);
         let point = match light.shape {
             LightShape::Sphere { center: light_center, radius: light_radius } => {
@@ -249,7 +241,7 @@ impl CasterTable {
         .normalize();
         let cos = dir.dot(point.normal);
         let density = self.density(lights, light_id, caster, point.position, cos);
-        if !(cos > 0.0 && density > 0.0 && density.is_finite()) {
+        if !(cos > 0.0) {
             return None;
         }
         let radiance = light.radiance(textures, point.normal, point.uv);

@@ -37,20 +37,13 @@ pub(crate) fn sample(
 ) -> Option<DeltaLine> {
     match light.shape {
         LightShape::Point { position, cone } => {
-            let (mut axis, mut one_minus_cos_max) = (Vec3::Z, 2.0);
-            let to_center = center - position;
-            let distance2 = to_center.length_squared();
-            if distance2 > radius * radius {
-                axis = to_center / distance2.sqrt();
-                one_minus_cos_max = one_minus_cos_from_sin2(radius * radius / distance2);
-            }
+            let (mut axis, mut one_minus_cos_max) = cone_around(position, (center, radius));
             if let Some(cone) = cone
                 && cone.outer < one_minus_cos_max
             {
                 (axis, one_minus_cos_max) = (cone.axis, cone.outer);
             }
-            let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
-            let dir = Frame::around(axis).to_world(local).normalize();
+            let dir = sample_cone((axis, one_minus_cos_max), u);
             let strength = strength_towards(light, textures, dir);
             // There may be a surface at the position of the light.
             let origin = robust::offset_ray_origin(position, robust::gamma(6) * position.abs(), dir, dir);
@@ -64,6 +57,26 @@ pub(crate) fn sample(
         }
         _ => None,
     }
+}
+
+/// The cone of directions from a point towards a sphere, all from inside of it: its axis, unit, and 1 − cos of its half
+/// angle.
+///
+/// - `center`, `radius`: metres.
+pub(crate) fn cone_around(position: Vec3, (center, radius): (Vec3, f32)) -> (Vec3, f32) {
+    let to_center = center - position;
+    let distance2 = to_center.length_squared();
+    if distance2 > radius * radius {
+        (to_center / distance2.sqrt(), one_minus_cos_from_sin2(radius * radius / distance2))
+    } else {
+        (Vec3::Z, 2.0)
+    }
+}
+
+/// Samples a unit direction uniformly over the solid angle of a cone, as of [`cone_around`].
+pub(crate) fn sample_cone((axis, one_minus_cos_max): (Vec3, f32), u: Vec2) -> Vec3 {
+    let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
+    Frame::around(axis).to_world(local).normalize()
 }
 
 /// Strength of a delta light in a unit direction away from it: W·sr⁻¹, or W·m⁻² if it is far away.

@@ -1,7 +1,7 @@
 //! Records a wave of paths from outside: tracing does not know about it.
 //!
-//! A wave adds radiance to a slot at three moments per depth: where a path leaves the scene, where it hits an emitter,
-//! and where a shadow ray is unoccluded. With one path per slot, the change of a slot between two observations is the
+//! A wave adds radiance to a slot at four moments per depth: where a chain of specular surfaces brings light, where a
+//! path leaves the scene, where it hits an emitter, and where a shadow ray is unoccluded. With one path per slot, the change of a slot between two observations is the
 //! contribution of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
 
 use crate::core::delta_light::{DeltaLight, Origin};
@@ -30,7 +30,7 @@ pub enum LightSource {
 pub enum FoundBy {
     /// BSDF sampling: the path hit the light.
     Itself,
-    /// Light sampling at a vertex.
+    /// Light sampling at a vertex, also by a chain of specular surfaces.
     Asking,
 }
 

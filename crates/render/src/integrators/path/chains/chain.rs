@@ -2,8 +2,6 @@
 
 use crate::core::material::Material;
 use crate::integrators::common::caustics_pass::CausticPass;
-use crate::prepare::light::emitter::Light;
-use crate::prepare::light::shape::LightShape;
 use crate::sampling::Sampler;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
@@ -25,25 +23,6 @@ pub(super) const RAYS: usize = 5;
 
 /// First dimension of the events of a start, after its direction.
 const DIM_EVENTS: u32 = 1;
-
-/// Where chains lead.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Target {
-    Point(Vec3),
-    /// To the light, unit.
-    Far(Vec3),
-}
-
-impl Target {
-    /// `None` for lights with a size.
-    pub fn of(light: &Light) -> Option<Self> {
-        match light.shape {
-            LightShape::Point { position, .. } => Some(Self::Point(position)),
-            LightShape::Directional { to_light, .. } => Some(Self::Far(to_light)),
-            _ => None,
-        }
-    }
-}
 
 /// What a surface of a chain does.
 #[derive(Clone, Copy, Debug)]
@@ -160,7 +139,6 @@ impl<'a, 'b> ChainTracer<'a, 'b> {
     }
 
     /// Returns the ray after a specular surface, and whether it has passed it; `None` if the surface does not do this.
-    ///
     fn bent(&mut self, at: &ChainEnd, hit: &Hit, wanted: Wanted) -> Option<(ChainEnd, bool)> {
         let scene = self.pass.scene;
         let (ray, mut media) = (&at.ray, at.media);

@@ -16,18 +16,17 @@ mod walk;
 
 use crate::core::settings::RenderSettings;
 use crate::integrators::common::caustics_pass::CausticPass;
-use crate::integrators::path::chains::chain::{ChainTracer, Target};
+use crate::integrators::path::chains::chain::ChainTracer;
 use crate::integrators::path::chains::walk::{Solution, Walk};
-use crate::prepare::delta_lines::strength_towards;
-use crate::prepare::light::delta::DeltaSample;
-use crate::prepare::light::emitter::Light;
-use crate::sampling::{Sampler, one_minus_cos_from_sin2, uniform_cone};
+use crate::prepare::delta_lines::{cone_around, sample_cone, strength_towards};
+use crate::prepare::light::delta::{DeltaSample, DeltaSource};
+use crate::sampling::Sampler;
 use crate::shading::dimensions::chain_dimension;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::Path;
 use crate::shading::scatter::Scatter;
 use crate::shading::vertex::Vertex;
-use firstlight_kdtree::geometry::{Frame, Ray};
+use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{RayBatch, RayClass};
 use glam::Vec3;
 
@@ -79,7 +78,7 @@ impl Lit<'_> {
         }
         let light_media = sets.within(scene, pass.casters.media_of(light)).of_all_channels();
         let light = scene.tables.lights.light(light);
-        let target = Target::of(light)?;
+        let source = light.shape.delta()?;
         let most_events = settings.max_depth.saturating_sub(depth + 1).min(chain::MOST_EVENTS as u32) as usize;
         let through = bsdf.through();
         let start = |dir: Vec3| {
@@ -88,20 +87,19 @@ impl Lit<'_> {
             let origin = if passes { vertex.passing(dir) } else { vertex.leaving(dir) };
             vertex.leads_on(dir, passes).then(|| (Ray::new(origin, dir), media))
         };
-        let (center, radius) = pass.casters.bounds(caster);
-        let cone = Cone::around(vertex.position, center, radius);
+        let cone = cone_around(vertex.position, pass.casters.bounds(caster));
         let mut tracer = ChainTracer::new(pass, sets, path.sampler, caster, most_events);
-        let walk = Walk { target, angle: cone.angle() };
+        let walk = Walk { light: source, angle: angle_of(cone) };
         let found = |tracer: &mut ChainTracer, number: u32| -> Option<Solution> {
             let random = random(path, depth, number);
-            let dir = cone.sample(&random);
+            let dir = sample_cone(cone, random.pair(0));
             let (ray, media) = start(dir)?;
             let chain = tracer.find(ray, media, light_media, &random)?;
             walk.run(tracer, dir, &chain, light_media, &start)
         };
         let solution = found(&mut tracer, 1)?;
         let (value, _) = bsdf.eval(vertex.wo, solution.dir, vertex.normal);
-        let (ray, share) = self.last_segment(tracer.sets(), light, &solution)?;
+        let (ray, share) = self.last_segment(tracer.sets(), &source, &solution)?;
         let strength = strength_towards(light, &scene.shading.textures, -ray.dir.normalize());
         let light_here = path.throughput * value * solution.weight * share * strength;
         if light_here == Vec3::ZERO {
@@ -116,12 +114,11 @@ impl Lit<'_> {
 
     /// The ray from the end of a chain to a light, and the share of its light that arrives; `None` if something is in
     /// the way.
-    fn last_segment(&self, sets: &MediumSets, light: &Light, solution: &Solution) -> Option<(Ray, Vec3)> {
+    fn last_segment(&self, sets: &MediumSets, light: &DeltaSource<f32>, solution: &Solution) -> Option<(Ray, Vec3)> {
         let (scene, origin) = (self.pass.scene, solution.end.origin);
-        let source = light.shape.delta()?;
-        let DeltaSample { found, target, .. } = source.seen_from(true, origin.into());
+        let DeltaSample { found, target, .. } = light.seen_from(true, origin.into());
         let target = Vec3::from(target);
-        let (ray, distance) = match source.is_far {
+        let (ray, distance) = match light.is_far {
             true => (Ray::new(origin, target), 0.0),
             false => (Ray { origin, dir: target - origin, t_max: 1.0 }, target.distance(origin)),
         };
@@ -155,30 +152,7 @@ fn random(path: &Path, depth: u32, number: u32) -> Sampler {
     Sampler::independent(own, path.sampler.parts()[0], number, 0)
 }
 
-/// Directions from a point towards a sphere; all, from inside.
-struct Cone {
-    axis: Vec3,
-    one_minus_cos_max: f32,
-}
-
-impl Cone {
-    fn around(position: Vec3, center: Vec3, radius: f32) -> Self {
-        let to_center = center - position;
-        let distance2 = to_center.length_squared();
-        if distance2 > radius * radius {
-            let one_minus_cos_max = one_minus_cos_from_sin2(radius * radius / distance2);
-            return Self { axis: to_center / distance2.sqrt(), one_minus_cos_max };
-        }
-        Self { axis: Vec3::Y, one_minus_cos_max: 2.0 }
-    }
-
-    /// Approximately, radians, at most 1.
-    fn angle(&self) -> f32 {
-        (2.0 * self.one_minus_cos_max).sqrt().min(1.0)
-    }
-
-    fn sample(&self, random: &Sampler) -> Vec3 {
-        let local = uniform_cone(random.pair(0).to_array(), self.one_minus_cos_max).0.into();
-        Frame::around(self.axis).to_world(local).normalize()
-    }
+/// The angle that a cone fills, approximately, radians, at most 1.
+fn angle_of((_, one_minus_cos_max): (Vec3, f32)) -> f32 {
+    (2.0 * one_minus_cos_max).sqrt().min(1.0)
 }

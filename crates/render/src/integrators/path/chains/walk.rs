@@ -3,11 +3,11 @@
 //! The unknowns are the two coordinates of the direction, whatever the number of surfaces. The residual is the offset of
 //! the last ray from the light, across it; the derivatives are differences of rays on either side.
 
-use crate::integrators::path::chains::chain::{ChainEnd, ChainTracer, Events, Target};
+use crate::integrators::path::chains::chain::{ChainEnd, ChainTracer, Events};
+use crate::prepare::light::delta::DeltaSource;
 use crate::shading::interface::MediumId;
 use firstlight_kdtree::geometry::{Frame, Ray};
 use glam::{Mat2, Vec2, Vec3};
-use smallvec::SmallVec;
 
 /// Distance of the rays for differences, as a fraction of the angle that the caster fills: its square is the relative
 /// error of the derivatives, and the rounding of directions over it another one.
@@ -22,7 +22,7 @@ const MOST_HALVINGS: u32 = 5;
 
 /// The search for one light.
 pub(super) struct Walk {
-    pub target: Target,
+    pub light: DeltaSource<f32>,
     /// The angle that the caster fills, radians.
     pub angle: f32,
 }
@@ -43,8 +43,8 @@ pub(super) struct Solution {
 impl Solution {
     /// - `within`: radians.
     pub fn is_same(&self, other: &Self, within: f32) -> bool {
-        let does = |solution: &Self| solution.chain.iter().map(|event| event.passes).collect::<SmallVec<[bool; 4]>>();
-        does(self) == does(other) && self.dir.distance(other.dir) < within
+        let passes = self.chain.iter().map(|event| event.passes);
+        passes.eq(other.chain.iter().map(|event| event.passes)) && self.dir.distance(other.dir) < within
     }
 }
 
@@ -120,12 +120,12 @@ impl Walk {
     /// Offset of a ray from the light across the middle ray, metres; radians for a light at infinity. `None` if it leads
     /// away from the light.
     fn offset(&self, middle: &Ray, ray: &Ray, across: &Frame) -> Option<Vec2> {
-        let (offset, ahead) = match self.target {
-            Target::Point(position) => {
-                let t = (position - ray.origin).dot(middle.dir) / ray.dir.dot(middle.dir);
-                (ray.origin - position + t * ray.dir, t)
-            }
-            Target::Far(to_light) => (ray.dir - to_light, ray.dir.dot(to_light)),
+        let to = Vec3::from(self.light.origin);
+        let (offset, ahead) = if self.light.is_far {
+            (ray.dir - to, ray.dir.dot(to))
+        } else {
+            let t = (to - ray.origin).dot(middle.dir) / ray.dir.dot(middle.dir);
+            (ray.origin - to + t * ray.dir, t)
         };
         (ahead > 0.0).then(|| Vec2::new(offset.dot(across.x), offset.dot(across.y)))
     }
