@@ -110,6 +110,11 @@ struct SceneReport<'a> {
 }
 
 impl SceneReport<'_> {
+    fn n_hidden(&self) -> usize {
+        let hidden = &self.inputs.hidden;
+        hidden.objects.len() + hidden.lights.len()
+    }
+
     /// As text.
     fn text(&self) -> Vec<String> {
         let Self { scene, extraction, film, .. } = self;
@@ -133,6 +138,10 @@ impl SceneReport<'_> {
             }
         }
         row("lights", lights);
+        let hidden = self.n_hidden();
+        if hidden > 0 {
+            row("hidden", format!("{hidden} more, which the image leaves out"));
+        }
         row("environment", environment(&self.inputs.environment));
         let lens = if self.lens().enabled { self.aperture() } else { "pinhole".to_owned() };
         row("camera", format!("{lens}, {}", self.projection()));
@@ -204,6 +213,7 @@ impl SceneReport<'_> {
             "materials": self.materials(),
             "textures": shading.textures.len(),
             "emissive_objects": self.emitters(),
+            "hidden": self.n_hidden(),
             "environment": environment(&self.inputs.environment),
             "lens_radius": if lens.enabled { lens.radius } else { 0.0 },
             "width": film.width,

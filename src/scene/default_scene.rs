@@ -45,6 +45,7 @@ fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
     let center = 0.5 * (min + max);
     ObjectPart::Plane {
         name: Some(GROUND.to_owned()),
+        hidden: false,
         // Below what lies on it, or has a floor of its own.
         point: within(DVec3::new(center.x, min.y - GAP * (max - min).length(), center.z)),
         normal: DVec3::Y,
@@ -64,6 +65,7 @@ fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> Objec
     let radius = (0.5 * (max - min).length()).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE);
     ObjectPart::Sphere {
         name: Some(KEY_LIGHT.to_owned()),
+        hidden: false,
         center: within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()),
         radius,
         material,
@@ -92,7 +94,13 @@ pub fn light_inside(file: &mut SceneFile, &RoomInside { position, distance }: &R
     const RADIANCE: f64 = 0.3;
     let intensity = Rgb(Vec3::splat((RADIANCE * PI * distance * distance) as f32));
     let position = within(position);
-    file.lights.push(LightPart::Point { name: Some(INNER_LIGHT.to_owned()), position, intensity, radius: 0.0 });
+    file.lights.push(LightPart::Point {
+        name: Some(INNER_LIGHT.to_owned()),
+        hidden: false,
+        position,
+        intensity,
+        radius: 0.0,
+    });
 }
 
 /// Whether it is the material of the light of [`light`].

@@ -28,7 +28,7 @@ use crate::scene::animation::moment::Moment;
 use crate::scene::loaded::LoadedScene;
 use crate::scene::texture_names::ByTextureName;
 use crate::scene::world::components::{
-    Balls, ColorParam, DisplaySettings, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    Balls, ColorParam, DisplaySettings, GREY, Hidden, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use crate::scene::world::inputs::SceneInputs;
@@ -67,7 +67,7 @@ impl Description {
         loaded: Option<&LoadedScene>,
         names_all: bool,
     ) -> (Self, Vec<(Arc<SurfaceTexture>, String)>) {
-        let inputs = SceneInputs::of(world);
+        let inputs = SceneInputs::of(world).with_hidden();
         let mut writer = Writer { names_all, ..Writer::new(loaded) };
         let animation = world.get_resource::<Animation>().cloned();
         let moved = Moved::of(animation.as_ref(), &inputs);
@@ -90,7 +90,7 @@ impl Description {
         let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default().0;
         let lights = inputs.lights.iter().map(|light| {
             let name = moved.name(light.entity).cloned().or_else(|| light.name.clone());
-            let mut part = light.light.to_part(name, &light.placement);
+            let mut part = light.light.to_part(name, is_hidden(world, light.entity), &light.placement);
             if let (LightPart::Spot { texture, .. }, Some(LightTexture(image))) = (&mut part, &light.texture) {
                 *texture = Some(writer.texture_name(image));
             }
@@ -131,6 +131,7 @@ impl Description {
 /// An object with its components.
 struct DescribedItem {
     name: Option<String>,
+    hidden: bool,
     shape: Shape,
     placement: Placement,
     slots: Vec<Entity>,
@@ -188,6 +189,7 @@ impl<'a> Writer<'a> {
                 && self.has_own_materials(world, &object.shape, &object.slots);
             DescribedItem {
                 name: moved.name(object.entity).or(object.name.as_ref()).filter(|name| !name.is_empty()).cloned(),
+                hidden: is_hidden(world, object.entity),
                 shape: object.shape.clone(),
                 placement: object.placement,
                 slots: object.slots.clone(),
@@ -353,7 +355,7 @@ impl<'a> Writer<'a> {
     fn object(&mut self, item: &DescribedItem) -> ObjectPart {
         let index = self.n_objects;
         self.n_objects += 1;
-        let name = item.name.clone();
+        let (name, hidden) = (item.name.clone(), item.hidden);
         // Shapes with a position of their own need no transform if they are neither rotated nor scaled.
         let plain = item.placement == Placement::at(item.placement.translation);
         let (point, transform) = match plain {
@@ -364,24 +366,24 @@ impl<'a> Writer<'a> {
         match &item.shape {
             Shape::Sphere { radius } => {
                 let material = self.material_name(item.slots.first().copied());
-                ObjectPart::Sphere { name, center: point, radius: *radius, material, transform }
+                ObjectPart::Sphere { name, hidden, center: point, radius: *radius, material, transform }
             }
             Shape::Plane { normal } => {
                 let material = self.material_name(item.slots.first().copied());
-                ObjectPart::Plane { name, point, normal: *normal, material, transform }
+                ObjectPart::Plane { name, hidden, point, normal: *normal, material, transform }
             }
             Shape::Quad { edge_u, edge_v } => {
                 let material = self.material_name(item.slots.first().copied());
-                ObjectPart::Quad { name, corner: point, edge_u: *edge_u, edge_v: *edge_v, material, transform }
+                ObjectPart::Quad { name, hidden, corner: point, edge_u: *edge_u, edge_v: *edge_v, material, transform }
             }
             // Its vertices are relative to the first, so that a transform moves it without rounding.
             Shape::Triangle { vertices } => {
                 let material = self.material_name(item.slots.first().copied());
-                ObjectPart::Triangle { name, vertices: *vertices, material, transform: whole }
+                ObjectPart::Triangle { name, hidden, vertices: *vertices, material, transform: whole }
             }
             Shape::Spheres(balls) => {
                 let material = self.material_name(item.slots.first().copied());
-                self.cloud(name, balls, material, whole)
+                self.cloud((name, hidden), balls, material, whole)
             }
             Shape::Mesh(mesh) => self.mesh(index, item, mesh),
         }
@@ -389,7 +391,7 @@ impl<'a> Writer<'a> {
 
     fn cloud(
         &self,
-        name: Option<String>,
+        (name, hidden): (Option<String>, bool),
         balls: &Arc<Balls>,
         material: String,
         transform: TransformPart,
@@ -397,16 +399,16 @@ impl<'a> Writer<'a> {
         match self.loaded_balls.get(&address(balls)) {
             Some(ObjectPart::BallGrid { first, steps, radius, .. }) => {
                 let (first, steps, radius) = (*first, steps.clone(), *radius);
-                ObjectPart::BallGrid { name, first, steps, radius, material, transform }
+                ObjectPart::BallGrid { name, hidden, first, steps, radius, material, transform }
             }
             Some(ObjectPart::Spheres { centers, radii, .. }) => {
                 let (centers, radii) = (centers.clone(), radii.clone());
-                ObjectPart::Spheres { name, centers, radii, material, transform }
+                ObjectPart::Spheres { name, hidden, centers, radii, material, transform }
             }
             _ => {
                 let centers = balls.centers.iter().map(|center| center.as_dvec3() + balls.center).collect();
                 let radii = RadiiPart::Each(balls.radii.iter().map(|&radius| f64::from(radius)).collect());
-                ObjectPart::Spheres { name, centers, radii, material, transform }
+                ObjectPart::Spheres { name, hidden, centers, radii, material, transform }
             }
         }
     }
@@ -427,9 +429,19 @@ impl<'a> Writer<'a> {
                 (MeshSource::Obj(String::new()), MeshOptions::default())
             }
         };
-        let (name, transform) = (item.name.clone(), item.placement.to_part());
+        let (name, hidden, transform) = (item.name.clone(), item.hidden, item.placement.to_part());
         let MeshOptions { shading, texture_coordinates, simplify } = options;
-        ObjectPart::Mesh { name, source, shading, texture_coordinates, simplify, material, materials, transform }
+        ObjectPart::Mesh {
+            name,
+            hidden,
+            source,
+            shading,
+            texture_coordinates,
+            simplify,
+            material,
+            materials,
+            transform,
+        }
     }
 }
 
@@ -451,6 +463,10 @@ impl MapParams<InWorld, InFile> for Writer<'_> {
     fn material(&mut self, material: &Entity) -> String {
         self.material_name(Some(*material))
     }
+}
+
+fn is_hidden(world: &World, entity: Entity) -> bool {
+    world.get::<Hidden>(entity).is_some()
 }
 
 fn address<T>(shared: &Arc<T>) -> usize {

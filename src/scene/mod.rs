@@ -74,12 +74,14 @@ pub(crate) use crate::import::picture::{decode_picture, picture_reader};
 pub(crate) use crate::scene::default_scene::GAP as GAP_TO_GROUND;
 pub use crate::scene::default_scene::SKY as GRADIENT;
 pub use crate::scene::world::components::{
-    Balls, ColorParam, DisplaySettings, GREY, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal, Rendering,
+    Balls, ColorParam, DisplaySettings, GREY, Hidden, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal, Rendering,
     ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture, textures_of,
 };
 pub(crate) use crate::scene::world::extent::lowest_point;
 pub use crate::scene::world::extent::{Extent, ExtentCache};
-pub use crate::scene::world::inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
+pub use crate::scene::world::inputs::{
+    CameraInput, HiddenInputs, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries,
+};
 pub use crate::scene::world::inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
 pub use crate::scene::world::lights::{LightTexture, WithLight, light_of, put_light};
 pub use crate::scene::world::material_value::material_value;

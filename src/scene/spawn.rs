@@ -19,8 +19,8 @@ use crate::scene::animation::moment::{Moment, show_first};
 use crate::scene::animation::written::{Entities, model_of, of_part};
 use crate::scene::loaded::LoadedScene;
 use crate::scene::world::components::{
-    ColorParam, DisplaySettings, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam, SceneEnvironment,
-    Shape, SurfaceMaterial, SurfaceTexture,
+    ColorParam, DisplaySettings, Hidden, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::{LightTexture, WithLight, put_light};
@@ -148,6 +148,9 @@ impl LoadedScene {
             let (shape, placement) = self.shape(i, object);
             let mut entity = world.spawn((shape, placement, MaterialSlots(slots), next()));
             all_objects.push(entity.id());
+            if object.is_hidden() {
+                entity.insert(Hidden);
+            }
             if let Some(name) = object.name() {
                 entity.insert(Name::new(name.to_owned()));
                 objects.insert(name, entity.id());
@@ -167,6 +170,9 @@ impl LoadedScene {
         for part in &self.file.lights {
             let (light, placement) = LightKind::from_part(part);
             let mut entity = world.spawn((placement, next()));
+            if part.is_hidden() {
+                entity.insert(Hidden);
+            }
             if let Some(name) = part.name() {
                 entity.insert(Name::new(name.to_owned()));
             }

@@ -21,6 +21,13 @@ pub fn whole_scene(world: &mut World, loaded: &LoadedScene) -> WholeScene {
         losses.push("the animation is left out: the scene shows one moment of it");
     }
     let inputs = SceneInputs::of(world);
+    let n_all = file.objects.len() + file.lights.len();
+    file.objects.retain(|object| !object.is_hidden());
+    file.lights.retain(|light| !light.is_hidden());
+    let n_hidden = n_all - file.objects.len() - file.lights.len();
+    if n_hidden > 0 {
+        losses.push(format!("what is hidden is left out: {n_hidden} of {n_all} objects and lights"));
+    }
     file.animation = AnimationPart::default();
     if let Some(camera) = inputs.camera {
         file.camera = camera_part(&camera.view, &camera.projection, &camera.lens, None);

@@ -6,7 +6,7 @@ use crate::files::printable;
 use crate::frame::{Command, Edit, History, Navigation, NewThing, Selection, Session, active_part};
 use crate::render::Integrator;
 use crate::scene::{
-    BUILTIN_MESHES, BUILTIN_SCENES, LightInput, LightKind, MaterialSlots, MeshSource, Rendering, library,
+    BUILTIN_MESHES, BUILTIN_SCENES, HiddenInputs, LightInput, LightKind, MaterialSlots, MeshSource, Rendering, library,
 };
 use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
 use crate::viewer::openable::{self, Recent};
@@ -143,8 +143,14 @@ pub fn is_possible(session: &Session, action: &Action) -> bool {
         | Action::Grab(_)
         | Action::GrabCopy
         | Action::Send(Command::Edit(
-            Edit::Delete | Edit::Duplicate | Edit::SelectNone | Edit::StandOnGround | Edit::TurnUpright,
+            Edit::Delete
+            | Edit::Duplicate
+            | Edit::Hide { .. }
+            | Edit::SelectNone
+            | Edit::StandOnGround
+            | Edit::TurnUpright,
         )) => !session.world().resource::<Selection>().0.is_empty(),
+        Action::Send(Command::Edit(Edit::ShowAll)) => session.inputs().hidden != HiddenInputs::default(),
         Action::Explain => session.world().resource::<Rendering>().0.integrator != Integrator::Phong,
         _ => true,
     }

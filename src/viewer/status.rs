@@ -43,10 +43,12 @@ pub fn line(status: &Status, target: Target, is_slow: bool) -> String {
         (Some(raw), Some(denoised)) if status.denoising == Denoising::Split => {
             format!("noise {raw} | denoised{by}: {denoised}")
         }
-        // What falls meanwhile.
-        (Some(raw), Some(_)) if status.known_denoised_error().is_none() => {
-            format!("denoised{by}, noise {raw} without it{place}")
-        }
+        (Some(_), Some(_)) if status.known_denoised_error().is_none() => match status.estimated_error {
+            Some(error) if error <= 1.0 => {
+                format!("denoised{by}, from an image with {raw} of noise{place}", raw = percent(error))
+            }
+            _ => format!("denoised{by}, few samples yet{place}"),
+        },
         (_, Some(denoised)) => format!("noise {denoised}{place}, denoised{by}"),
         (Some(raw), None) => format!("noise {raw}{place}"),
         // While it moves, and until there are samples to compare.
@@ -208,7 +210,7 @@ mod tests {
         status.estimated_error = Some(1.4);
         assert_eq!(line(&status), "noise over 100 % | denoised: not known yet");
         status.denoising = Denoising::Denoised;
-        assert_eq!(line(&status), "denoised, noise over 100 % without it");
+        assert_eq!(line(&status), "denoised, few samples yet");
         (status.estimated_error, status.denoising) = (Some(0.01), Denoising::Split);
         // A denoised image that is there but not shown does not matter.
         status.denoising = Denoising::Raw;

@@ -8,7 +8,7 @@ use firstlight::frame::{Target, render_offline};
 use firstlight::render::{Film, Material};
 use firstlight::scene::file::{MaterialPart, SceneFile};
 use firstlight::scene::{
-    BUILTIN_SCENES, Extraction, LoadOptions, LoadedScene, Rendering, SceneInputs, SceneSource, load, whole_scene,
+    BUILTIN_SCENES, Extraction, LoadOptions, LoadedScene, Rendering, SceneInputs, SceneSource, Shape, load, whole_scene,
 };
 use glam::Vec3;
 use std::path::Path;
@@ -328,6 +328,22 @@ fn what_firstlight_leaves_out_of_its_own_files_is_told() {
         let from = written(folder.path(), &text);
         let (_, _, told) = there_and_back(from, ExportFormat::Mitsuba, folder.path());
         assert!(told.len() == 1 && told[0].contains(expected), "{material}: {told:?}");
+    }
+}
+
+#[test]
+fn what_is_hidden_is_not_written() {
+    let text = "(camera: (eye: (0, 1, 5), look_at: (0, 1, 0)), materials: {\"m\": diffuse(albedo: 0.5)}, objects: [\
+                mesh(source: builtin(\"torus\"), hidden: true, material: \"m\"), mesh(name: \"seen\", source: \
+                builtin(\"cube\"), material: \"m\")], lights: [point(hidden: true, position: (0, 3, 0), \
+                intensity: 5, radius: 0), point(name: \"on\", position: (0, 3, 0), intensity: 5, radius: 0)])";
+    for format in [ExportFormat::Mitsuba, ExportFormat::Pbrt] {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut world, _, told) = there_and_back(written(folder.path(), text), format, folder.path());
+        let inputs = SceneInputs::of(&mut world);
+        let Shape::Mesh(mesh) = &inputs.objects[0].shape else { panic!("{:?}", inputs.objects[0].shape.kind()) };
+        assert_eq!((inputs.objects.len(), inputs.lights.len(), mesh.triangles.len()), (1, 1, 12), "{format:?}");
+        assert!(told[0].contains("2 of 4 objects and lights"), "{told:?}");
     }
 }
 

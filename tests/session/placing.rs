@@ -326,6 +326,42 @@ fn what_lies_is_turned_upright_and_stands_on_the_ground() {
 }
 
 #[test]
+fn things_stand_on_a_table_and_the_parts_of_a_thing_stay_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("table.ron");
+    let text = r#"(
+        camera: (eye: (0, 4, 20), look_at: (0, 3, 0)),
+        environment: constant(1),
+        materials: { "grey": diffuse(albedo: 0.5) },
+        objects: [
+            plane(name: "floor", material: "grey"),
+            quad(name: "table", corner: (-2, 2, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0), material: "grey"),
+            sphere(name: "cup", center: (0.5, 6, 0), radius: 0.5, material: "grey"),
+            sphere(name: "cherry", center: (0.5, 7, 0), radius: 0.25, material: "grey"),
+            sphere(name: "sunk", center: (-1, 2.1, 0), radius: 0.5, material: "grey"),
+            sphere(name: "beside", center: (8, 6, 0), radius: 0.5, material: "grey"),
+        ],
+    )"#;
+    std::fs::write(&path, text).unwrap();
+    let target = Target { spp: Some(1), ..Target::default() };
+    let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
+    let mut driver = Driver::new(options, SceneSource::Scene(path));
+    driver.settle();
+    let height = |driver: &Driver, name: &str| driver.get::<Placement>(name).translation.y;
+    for (name, expected) in [("cup", 2.5), ("sunk", 2.5), ("beside", 0.5)] {
+        driver.select(name);
+        driver.edit([Edit::StandOnGround]);
+        let found = height(&driver, name);
+        assert!(found > expected && found < expected + 1e-3, "{name}: {found} is not {expected}");
+    }
+    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+    let ids = ["cup", "cherry"].map(|name| driver.named(name).to_bits());
+    driver.edit([Edit::Select { id: ids[0], add: false }, Edit::Select { id: ids[1], add: true }, Edit::StandOnGround]);
+    let [cup, cherry] = ["cup", "cherry"].map(|name| height(&driver, name));
+    assert!((cup - 2.5).abs() < 1e-3 && (cherry - cup - 1.0).abs() < 1e-9, "{cup} {cherry}");
+}
+
+#[test]
 fn the_camera_is_outside_of_things_or_in_a_room() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = model(folder.path(), 1.0);

@@ -121,7 +121,7 @@ impl Driver {
         let properties = ["albedo", "reflectance", "alpha", "ior", "weight", "absorption"].map(of_material);
         let of_sky = [Property::Zenith, Property::Horizon, Property::Ground, Property::SkyStrength];
         let share = 0.5 + 0.5 * three;
-        match random.below(36) {
+        match random.below(39) {
             0 => vec![Command::Turn { yaw_deg: 60.0 * a, pitch_deg: 40.0 * b }],
             1 => vec![Command::Orbit { yaw_deg: 90.0 * a, pitch_deg: 60.0 * b }],
             2 => vec![Command::Fly { right: a, up: 0.3 * b, forward: a * b }],
@@ -161,6 +161,8 @@ impl Driver {
                 vec![Command::Edit(Edit::Paint { id: material, part })]
             }
             34 => vec![Command::Edit(Edit::Undo); 1 + random.below(4)],
+            35 | 36 => edit(Edit::Hide { others: a > 0.8 }),
+            37 => vec![Command::Edit(Edit::ShowAll)],
             _ => vec![Command::Edit(Edit::Undo), Command::Edit(Edit::Undo), Command::Edit(Edit::Redo)],
         }
     }

@@ -95,12 +95,12 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
         open(&program, 3, ball, frame);
         choose(&program, place(line), frame);
     };
-    let [focus, copy, delete, material] = [1, 5, 6, 12];
+    let [focus, copy, delete, material] = [1, 5, 6, 13];
     let undo = || click(&program, 1, (75, HEIGHT - 13));
     // Gold, the first of the ready materials: their menu ends beside its line.
     open(&program, 3, ball, frame);
     open(&program, 1, place(material), (620, 128));
-    choose(&program, (555, 100), frame);
+    choose(&program, (555, 32), frame);
     title_is(&program, "*room.ron");
     here(focus);
     let file = saved(&program, &path);

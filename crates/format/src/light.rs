@@ -272,7 +272,7 @@ impl LightKind {
     }
 
     /// The light as in a scene file, without its texture.
-    pub fn to_part(self, name: Option<String>, placement: &Placement) -> LightPart {
+    pub fn to_part(self, name: Option<String>, hidden: bool, placement: &Placement) -> LightPart {
         // Lights with a position need no transform if they are not rotated.
         let (position, transform) = match *placement == Placement::at(placement.translation) {
             true => (placement.translation, TransformPart::default()),
@@ -280,11 +280,12 @@ impl LightKind {
         };
         match self {
             Self::Point(PointLight { intensity, radius }) => {
-                LightPart::Point { name, position: placement.translation, intensity: Rgb(intensity), radius }
+                LightPart::Point { name, hidden, position: placement.translation, intensity: Rgb(intensity), radius }
             }
             Self::Spot(SpotLight { intensity, direction, inner_angle_deg, outer_angle_deg, falloff, image }) => {
                 LightPart::Spot {
                     name,
+                    hidden,
                     position,
                     direction,
                     intensity: Rgb(intensity),
@@ -299,9 +300,13 @@ impl LightKind {
                     transform,
                 }
             }
-            Self::Directional(DirectionalLight { irradiance, direction }) => {
-                LightPart::Directional { name, direction, irradiance: Rgb(irradiance), transform: placement.to_part() }
-            }
+            Self::Directional(DirectionalLight { irradiance, direction }) => LightPart::Directional {
+                name,
+                hidden,
+                direction,
+                irradiance: Rgb(irradiance),
+                transform: placement.to_part(),
+            },
         }
     }
 }

@@ -81,6 +81,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Centre; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         center: DVec3,
@@ -97,6 +100,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// A point of the plane; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         point: DVec3,
@@ -114,6 +120,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// The corner at `u = v = 0`; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         corner: DVec3,
@@ -132,6 +141,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// The vertices.
         vertices: [DVec3; 3],
         /// Its material, by name.
@@ -145,6 +157,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Source of the triangles.
         source: MeshSource,
         /// How vertex normals are computed.
@@ -171,6 +186,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Centre of the first sphere; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         first: DVec3,
@@ -189,6 +207,9 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Centre of each sphere.
         centers: Vec<DVec3>,
         /// Radius of the spheres.
@@ -213,7 +234,8 @@ impl ObjectPart {
         transform: TransformPart,
     ) -> Self {
         let MeshOptions { shading, texture_coordinates, simplify } = MeshOptions::default();
-        Self::Mesh { name, source, shading, texture_coordinates, simplify, material, materials, transform }
+        let hidden = false;
+        Self::Mesh { name, hidden, source, shading, texture_coordinates, simplify, material, materials, transform }
     }
 
     /// Its name, if it has one.
@@ -226,6 +248,19 @@ impl ObjectPart {
             | Self::Mesh { name, .. }
             | Self::BallGrid { name, .. }
             | Self::Spheres { name, .. } => name.as_deref(),
+        }
+    }
+
+    /// Whether it is left out of the image.
+    pub fn is_hidden(&self) -> bool {
+        match self {
+            Self::Sphere { hidden, .. }
+            | Self::Plane { hidden, .. }
+            | Self::Quad { hidden, .. }
+            | Self::Triangle { hidden, .. }
+            | Self::Mesh { hidden, .. }
+            | Self::BallGrid { hidden, .. }
+            | Self::Spheres { hidden, .. } => *hidden,
         }
     }
 
@@ -326,6 +361,9 @@ pub enum LightPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Centre of the light, metres.
         position: DVec3,
         /// Radiant intensity, W·sr⁻¹.
@@ -339,6 +377,9 @@ pub enum LightPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// The tip of the cone; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         position: DVec3,
@@ -380,6 +421,9 @@ pub enum LightPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whether it is left out of the image: not seen, and without light.
+        #[serde(default, skip_serializing_if = "is_default")]
+        hidden: bool,
         /// Direction in which the light travels; any length except 0.
         direction: DVec3,
         /// Irradiance on a surface that faces the light, W·m⁻².
@@ -395,6 +439,13 @@ impl LightPart {
     pub fn name(&self) -> Option<&str> {
         match self {
             Self::Point { name, .. } | Self::Spot { name, .. } | Self::Directional { name, .. } => name.as_deref(),
+        }
+    }
+
+    /// Whether it is left out of the image.
+    pub fn is_hidden(&self) -> bool {
+        match self {
+            Self::Point { hidden, .. } | Self::Spot { hidden, .. } | Self::Directional { hidden, .. } => *hidden,
         }
     }
 }

@@ -40,9 +40,10 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
     let direction = placed.world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
     let intensity = Rgb(placed.light.intensity);
     match placed.light.kind {
-        GltfLightKind::Point => LightPart::Point { name, position, intensity, radius: 0.0 },
+        GltfLightKind::Point => LightPart::Point { name, hidden: false, position, intensity, radius: 0.0 },
         GltfLightKind::Spot { inner, outer } => LightPart::Spot {
             name,
+            hidden: false,
             position,
             direction,
             intensity,
@@ -56,9 +57,13 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
             even: false,
             transform: TransformPart::default(),
         },
-        GltfLightKind::Directional => {
-            LightPart::Directional { name, direction, irradiance: intensity, transform: TransformPart::default() }
-        }
+        GltfLightKind::Directional => LightPart::Directional {
+            name,
+            hidden: false,
+            direction,
+            irradiance: intensity,
+            transform: TransformPart::default(),
+        },
     }
 }
 

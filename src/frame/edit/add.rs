@@ -132,7 +132,7 @@ fn add_object(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity>
         }
         NewThing::Plane => {
             // It has no end: in the middle of things it would hide half of them.
-            let place = place.with_y(lowest(world, None).unwrap_or(place.y));
+            let place = place.with_y(lowest(world, &[]).unwrap_or(place.y));
             let material = new_material(world, "ground", Material::diffuse(Vec3::splat(0.5)));
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))

@@ -15,7 +15,8 @@
 //! | `dress` | ready materials |
 //! | `place` | moving, rotating and scaling the selection |
 //! | `aim` | spot lights aimed at a place of the image |
-//! | `standing` | the selection upright, and on the ground |
+//! | `standing` | the selection upright, and on what is below it |
+//! | `visibility` | hiding, and showing again |
 //! | `keys` | keys and settings of the animation |
 //! | `add`, `new_entity`, `spot`, `aside` | new objects, their names and positions, copies, removal |
 //! | `add_model` | the objects and materials of a model |
@@ -38,6 +39,7 @@ mod sky;
 mod spot;
 mod standing;
 mod texture;
+mod visibility;
 
 pub use add::NewThing;
 pub use named::{PropertyError, set_by_name};
@@ -105,6 +107,20 @@ pub enum Edit {
     Redo,
     /// Remove the selection.
     Delete,
+    /// Leave the selection out of the image: it is not seen and gives no light.
+    Hide {
+        /// Everything but the selection instead.
+        others: bool,
+    },
+    /// Show all that is hidden, and select it.
+    ShowAll,
+    /// Hide an object or a light, or show it.
+    SetHidden {
+        /// The object or light.
+        id: Id,
+        /// Whether it is left out of the image.
+        hidden: bool,
+    },
     /// Copy the selection to its right, and select the copies.
     Duplicate,
     /// Copy it where it is, for copies that are moved next.
@@ -134,9 +150,9 @@ pub enum Edit {
         /// Translation in world space.
         by: DVec3,
     },
-    /// Put the selection on the ground.
+    /// Put the selection, as one, on what is below its middle.
     StandOnGround,
-    /// Turn each selected object by a quarter about X, from Z upwards to Y upwards, and put it on the ground.
+    /// Turn the selected objects by a quarter about X, from Z upwards to Y upwards, and put them on what is below.
     TurnUpright,
     /// Rotate the selection about the centre of the active entity; `axis` in world space.
     Turn {
@@ -252,7 +268,12 @@ pub fn edit_scene(world: &mut World) {
     for edit in edits {
         // With nothing to do it on, an edit does no harm.
         let kind = match edit {
-            Edit::Undo | Edit::Redo | Edit::SelectUsers { .. } | Edit::Dress { .. } => MessageKind::Note,
+            Edit::Undo
+            | Edit::Redo
+            | Edit::SelectUsers { .. }
+            | Edit::Dress { .. }
+            | Edit::Hide { .. }
+            | Edit::ShowAll => MessageKind::Note,
             _ => MessageKind::Warning,
         };
         if let Err(problem) = carry_out(world, edit) {
@@ -330,6 +351,12 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             label.into_iter().for_each(|text| keys::say(world, text));
         }
         Edit::Delete => add::delete(world),
+        Edit::Hide { others } => visibility::hide(world, others)?,
+        Edit::ShowAll => visibility::show_all(world)?,
+        Edit::SetHidden { id, hidden } => {
+            let entity = thing(world, id)?;
+            visibility::set_hidden(world, entity, hidden);
+        }
         Edit::AimAt { id, x, y } => aim::aim(world, existing(world, id)?, [x, y])?,
         Edit::StandOnGround => standing::stand_on_ground(world),
         Edit::TurnUpright => standing::turn_upright(world),

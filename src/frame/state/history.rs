@@ -8,6 +8,7 @@
 //! States share equal entities, and meshes and images are shared anyway.
 
 use crate::frame::core::rig::Rig;
+use crate::frame::state::resources::Clock;
 use crate::frame::state::selection::Selection;
 use crate::scene::world::entity_state::{EntityState, SceneChanges, put};
 use crate::scene::{
@@ -17,6 +18,7 @@ use crate::scene::{
 use bevy_ecs::prelude::{DetectChanges, Entity, Local, Mut, Or, Res, ResMut, Resource, With, World};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Everything that can be undone.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,6 +78,8 @@ struct UndoStep {
     label: String,
     /// Consecutive steps with the same key are merged.
     merge: Option<String>,
+    /// When it was last added to.
+    last: Duration,
     /// The state at which the time of the animation had been set.
     at_moment: State,
 }
@@ -119,6 +123,8 @@ pub struct History {
 
 impl History {
     const MAX_STEPS: usize = 500;
+    /// After a longer pause, what goes on is a step of its own.
+    const PAUSE: Duration = Duration::from_secs(2);
 
     /// Label of the next undo.
     pub fn undo_label(&self) -> Option<&str> {
@@ -276,7 +282,8 @@ impl History {
         Some(())
     }
 
-    fn record(&mut self, new: State) {
+    /// - `time`: since the session began.
+    fn record(&mut self, new: State, time: Duration) {
         let Some(old) = self.now.take() else {
             self.at_moment = new.clone();
             self.now = Some(new);
@@ -289,13 +296,16 @@ impl History {
         self.revision += 1;
         let (label, merge) = what_changed(&old, &new);
         // Merging after an undo would lose the step that can be redone.
+        let is_same = |step: &UndoStep| step.merge == merge && time.saturating_sub(step.last) < Self::PAUSE;
         let goes_on = match &mut self.begun {
             Some((_, has_step)) => std::mem::replace(has_step, true),
-            None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(|last| last.merge == merge),
+            None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(is_same),
         };
-        if !goes_on {
+        if let Some(step) = self.undo.last_mut().filter(|_| goes_on) {
+            step.last = time;
+        } else if !goes_on {
             let (selected, at_moment) = (self.selected.clone(), self.at_moment.clone());
-            self.undo.push(UndoStep { before: old.clone(), selected, label, merge, at_moment });
+            self.undo.push(UndoStep { before: old.clone(), selected, label, merge, last: time, at_moment });
             if self.undo.len() > Self::MAX_STEPS {
                 self.undo.remove(0);
             }
@@ -350,7 +360,8 @@ pub fn remember(world: &mut World) {
     let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default();
     let moment = world.get_resource::<Moment>().copied();
     let state = State { entities, environment, camera, display, moment, animation };
-    world.resource_mut::<History>().record(state);
+    let now = world.get_resource::<Clock>().map_or(Duration::ZERO, |clock| clock.0);
+    world.resource_mut::<History>().record(state, now);
     remember_selection(world);
 }
 
@@ -419,12 +430,14 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     }
 }
 
-/// Selects entities that were added, as after their first addition. If entities were only removed, restores the
-/// selection `selected`.
+/// Selects entities that were added or shown, as after their first addition. If entities were only removed or hidden,
+/// restores the selection `selected`.
 fn select_what_came(world: &mut World, now: &State, wanted: &State, selected: &[Entity]) {
-    let is_thing = |state: &State, entity: &Entity| state.entities.get(entity).is_some_and(|state| state.is_thing());
+    let is_there = |state: &State, entity: &Entity| {
+        state.entities.get(entity).is_some_and(|state| state.is_thing() && state.hidden.is_none())
+    };
     let missing = |of: &State, other: &State| -> Vec<Entity> {
-        of.entities.keys().copied().filter(|entity| is_thing(of, entity) && !is_thing(other, entity)).collect()
+        of.entities.keys().copied().filter(|entity| is_there(of, entity) && !is_there(other, entity)).collect()
     };
     let came = missing(wanted, now);
     if !came.is_empty() {
@@ -492,6 +505,8 @@ fn what_changed_in_entities(
                 if a.shape != b.shape && matches!(b.shape, Some(Shape::Mesh(_))) {
                     merge = Some(format!("mesh {entity}"));
                     format!("mesh of {label}")
+                } else if a.hidden != b.hidden {
+                    format!("{} {label}", if b.hidden.is_some() { "hide" } else { "show" })
                 } else if a.placement != b.placement {
                     format!("{} {label}", verb(a.placement, b.placement))
                 } else if a.material != b.material {

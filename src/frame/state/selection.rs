@@ -108,6 +108,24 @@ pub fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64
     scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
 }
 
+/// Like [`distance`], through some objects.
+///
+/// - `skin`: what is nearer than this behind one of them is not found, metres.
+pub fn distance_past(scene: &Extraction, from: DVec3, direction: DVec3, objects: &[Entity], skin: f64) -> Option<f64> {
+    /// Of surfaces of the objects themselves.
+    const MOST: u32 = 1000;
+    let (mut ray, mut passed) = (Ray::new((from - scene.origin).as_vec3(), direction.as_vec3()), 0.0);
+    for _ in 0..MOST {
+        let hit = scene.prepared.geometry.tree.closest_hit(&ray)?;
+        if !objects.contains(scene.entities.get(hit.object as usize)?) {
+            return Some(passed + f64::from(hit.t));
+        }
+        passed += f64::from(hit.t) + skin;
+        ray.origin = (from + passed * direction - scene.origin).as_vec3();
+    }
+    None
+}
+
 fn middle_ray(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Ray> {
     // A film of height 1.
     let size = Vec2::new(aspect as f32, 1.0);

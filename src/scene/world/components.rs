@@ -7,7 +7,7 @@
 //! | light | [`PointLight`], [`SpotLight`] or [`DirectionalLight`], [`Placement`] |
 //! | camera | [`View`](crate::format::view::View), [`Projection`](crate::format::view::Projection), [`Lens`](crate::format::view::Lens) |
 //!
-//! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the renderer follows.
+//! Any of them may have a `Name`, objects and lights [`Hidden`]. Spawn, change and remove them with ordinary bevy_ecs calls: the renderer follows.
 
 use crate::format::placement::Placement;
 use crate::format::sources::{EnvironmentSource, MeshOptions, MeshSource, TextureSource};
@@ -219,6 +219,10 @@ pub struct MeshOrigin {
     /// Whether the materials come from the file of the mesh.
     pub own_materials: bool,
 }
+
+/// An object or a light that is left out of the image: it is not seen and gives no light.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hidden;
 
 /// Position of an entity in its scene file. Entities without one come after all others, ordered by `Entity`.
 ///

@@ -6,7 +6,7 @@
 use crate::format::light::{DirectionalLight, LightKind, PointLight, SpotLight};
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
-use crate::scene::world::components::{MaterialSlots, MeshOrigin, Ordinal, Shape, SurfaceMaterial};
+use crate::scene::world::components::{Hidden, MaterialSlots, MeshOrigin, Ordinal, Shape, SurfaceMaterial};
 use crate::scene::world::lights::LightTexture;
 use bevy_ecs::component::Mutable;
 use bevy_ecs::name::Name;
@@ -107,6 +107,8 @@ components! {
     directional_light: DirectionalLight,
     /// The image that a light projects.
     light_texture: LightTexture,
+    /// Whether it is left out of the image.
+    hidden: Hidden,
     /// Where its mesh is from.
     origin: MeshOrigin,
     /// Its rank in the scene file.

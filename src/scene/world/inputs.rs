@@ -4,26 +4,39 @@ use crate::format::bad_value::BadValue;
 use crate::format::light::LightKind;
 use crate::format::placement::Placement;
 use crate::format::view::{Lens, Projection, View};
-use crate::scene::world::components::{Material, MaterialSlots, Ordinal, SceneEnvironment, Shape, SurfaceMaterial};
+use crate::scene::world::components::{
+    Hidden, Material, MaterialSlots, Ordinal, SceneEnvironment, Shape, SurfaceMaterial,
+};
 use crate::scene::world::lights::{LightParts, LightTexture, WithLight};
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Entity, Query, Res, World};
+use bevy_ecs::prelude::{Entity, Has, Query, Res, World};
 use bevy_ecs::system::{SystemParam, SystemState};
 use std::collections::HashSet;
 
 /// All inputs of a snapshot. Cheap to clone: meshes, groups of spheres and images are shared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneInputs {
-    /// All objects.
+    /// All objects that are not hidden.
     pub objects: Vec<ObjectInput>,
-    /// The materials that the objects use, directly or in a blend.
+    /// The materials that objects use, directly or in a blend; also those of hidden ones.
     pub materials: Vec<MaterialInput>,
-    /// All lights that are not objects.
+    /// All lights that are not objects and not hidden.
     pub lights: Vec<LightInput>,
+    /// What is left out of the image.
+    pub hidden: HiddenInputs,
     /// The first camera.
     pub camera: Option<CameraInput>,
     /// The environment and the absorption of the air.
     pub environment: SceneEnvironment,
+}
+
+/// Objects and lights that are [`Hidden`], each with its rank among all of its kind.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HiddenInputs {
+    /// Objects, in order.
+    pub objects: Vec<(usize, ObjectInput)>,
+    /// Lights that are not objects, in order.
+    pub lights: Vec<(usize, LightInput)>,
 }
 
 /// The data of an object that the image depends on.
@@ -98,14 +111,16 @@ impl CameraInput {
     }
 }
 
-type LightOfInput = (LightParts, Option<&'static LightTexture>, &'static Placement);
+type LightOfInput = (LightParts, Option<&'static LightTexture>, &'static Placement, Has<Hidden>);
 
 type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
+
+type ObjectParts = (&'static Shape, &'static Placement, &'static MaterialSlots, Has<Hidden>);
 
 /// Read access to all data that the image depends on.
 #[derive(SystemParam)]
 pub struct SceneQueries<'w, 's> {
-    objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
+    objects: Query<'w, 's, Ranked<'static, ObjectParts>>,
     materials: Query<'w, 's, Ranked<'static, &'static SurfaceMaterial>>,
     lights: Query<'w, 's, Ranked<'static, LightOfInput>, WithLight>,
     cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
@@ -116,14 +131,18 @@ impl SceneQueries<'_, '_> {
     /// Copies all data that the image depends on, in the order of the scene file.
     pub fn collect(&self) -> SceneInputs {
         let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
-        let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
-            entity,
-            name: text(name),
-            shape: shape.clone(),
-            placement: *placement,
-            slots: slots.0.clone(),
+        let all = in_order(self.objects.iter(), |entity, name, (shape, placement, slots, is_hidden)| {
+            let (name, shape, slots) = (text(name), shape.clone(), slots.0.clone());
+            (is_hidden, ObjectInput { entity, name, shape, placement: *placement, slots })
         });
-        let used = self.used_materials(&objects);
+        let used = self.used_materials(all.iter().map(|(_, object)| object));
+        let (objects, hidden_objects) = apart(all);
+        let (lights, hidden_lights) =
+            apart(in_order(self.lights.iter(), |entity, name, (parts, texture, placement, is_hidden)| {
+                let light = LightKind::first(parts).expect("the query asks for one of them");
+                let (name, texture) = (text(name), texture.cloned());
+                (is_hidden, LightInput { entity, name, light, texture, placement: *placement })
+            }));
         let materials = self.materials.iter().filter(|(entity, ..)| used.contains(entity));
         SceneInputs {
             materials: in_order(materials, |entity, name, material| MaterialInput {
@@ -132,13 +151,8 @@ impl SceneQueries<'_, '_> {
                 material: material.0.clone(),
             }),
             objects,
-            lights: in_order(self.lights.iter(), |entity, name, (parts, texture, placement)| LightInput {
-                entity,
-                name: text(name),
-                light: LightKind::first(parts).expect("the query asks for one of them"),
-                texture: texture.cloned(),
-                placement: *placement,
-            }),
+            lights,
+            hidden: HiddenInputs { objects: hidden_objects, lights: hidden_lights },
             camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(
                 |(entity, _, _, (view, projection, lens))| CameraInput {
                     entity,
@@ -157,9 +171,9 @@ impl SceneQueries<'_, '_> {
     }
 
     /// The materials of the objects, and the parts of their blends.
-    fn used_materials(&self, objects: &[ObjectInput]) -> HashSet<Entity> {
+    fn used_materials<'a>(&self, objects: impl Iterator<Item = &'a ObjectInput>) -> HashSet<Entity> {
         let mut used = HashSet::new();
-        let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
+        let mut open: Vec<Entity> = objects.flat_map(|object| object.slots.iter().copied()).collect();
         while let Some(entity) = open.pop() {
             if used.insert(entity)
                 && let Ok((.., SurfaceMaterial(Material::Blend { a, b, .. }))) = self.materials.get(entity)
@@ -179,6 +193,37 @@ impl SceneInputs {
             .expect("queries of optional things are always valid")
             .collect()
     }
+
+    /// The same with all that is hidden at its place among the others.
+    pub fn with_hidden(&self) -> Self {
+        Self {
+            objects: together(&self.objects, &self.hidden.objects),
+            lights: together(&self.lights, &self.hidden.lights),
+            hidden: HiddenInputs::default(),
+            ..self.clone()
+        }
+    }
+}
+
+/// What is shown, and what is hidden with its rank among all.
+fn apart<T>(all: Vec<(bool, T)>) -> (Vec<T>, Vec<(usize, T)>) {
+    let (mut shown, mut hidden) = (Vec::new(), Vec::new());
+    for (rank, (is_hidden, item)) in all.into_iter().enumerate() {
+        if is_hidden { hidden.push((rank, item)) } else { shown.push(item) }
+    }
+    (shown, hidden)
+}
+
+/// The inverse of [`apart`].
+fn together<T: Clone>(shown: &[T], hidden: &[(usize, T)]) -> Vec<T> {
+    let mut shown = shown.iter().cloned();
+    let mut all = Vec::new();
+    for (rank, item) in hidden {
+        all.extend(shown.by_ref().take(rank - all.len()));
+        all.push(item.clone());
+    }
+    all.extend(shown);
+    all
 }
 
 /// By the order in the file, then by entity: deterministic across processes.

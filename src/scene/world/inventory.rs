@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// All lists, in the order of the scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inventory {
-    /// Objects, and lights that are not objects.
+    /// Objects, and lights that are not objects, hidden ones too.
     pub objects: Vec<ObjectEntry>,
     /// All materials, used or not.
     pub materials: Vec<MaterialEntry>,
@@ -66,6 +66,7 @@ impl Inventory {
         let mut users: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
         let mut parts: BTreeMap<Entity, BTreeSet<Entity>> = BTreeMap::new();
         let (mut objects, mut lights) = (Vec::new(), Vec::new());
+        let inputs = &inputs.with_hidden();
         for (i, object) in inputs.objects.iter().enumerate() {
             let kind = object.shape.kind();
             let label = shown(&object.name).unwrap_or_else(|| format!("{kind} {i}"));

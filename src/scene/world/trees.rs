@@ -173,7 +173,8 @@ impl Trees {
 
     /// Removes the trees of shapes that no object uses.
     pub fn keep_used(&mut self, inputs: &SceneInputs) {
-        let used: HashSet<usize> = inputs.objects.iter().filter_map(|o| shared(&o.shape)).collect();
+        let hidden = inputs.hidden.objects.iter().map(|(_, object)| object);
+        let used: HashSet<usize> = inputs.objects.iter().chain(hidden).filter_map(|o| shared(&o.shape)).collect();
         self.meshes.retain(|key, _| used.contains(key));
         self.balls.retain(|key, _| used.contains(key));
         self.unfit.retain(|key, _| used.contains(key));

@@ -7,6 +7,7 @@ use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
 use crate::viewer::bar::Figures;
 use crate::viewer::keys::{self, Action};
 use crate::viewer::menu::{self, MenuInput};
+use crate::viewer::panel::select_number;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::time_line::Strip;
 use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story, time_line};
@@ -165,6 +166,7 @@ impl App {
                 answer = question.show(context);
             }
             *free_now = context.available_rect();
+            select_number(context);
         })?;
         if !presented.again {
             let picture = self.session.picture();

@@ -46,7 +46,8 @@ impl Memory {
 
     fn of(store: SettingsStore) -> Self {
         let settings = store.settings().0;
-        let (recent, noise) = (settings.recent, (settings.denoising, settings.denoiser));
+        let (mut recent, noise) = (settings.recent, (settings.denoising, settings.denoiser));
+        recent.retain(|name| builtin_text(name).is_some() || text_to_path(name).exists());
         let thumbnails = Thumbnails::beside(store.folder());
         Self {
             store,

@@ -19,6 +19,8 @@ const fn orbit(yaw_deg: f64, pitch_deg: f64) -> Action {
 }
 
 const DELETE: Action = Action::Send(Command::Edit(Edit::Delete));
+const HIDE: Action = Action::Send(Command::Edit(Edit::Hide { others: false }));
+const HIDE_OTHERS: Action = Action::Send(Command::Edit(Edit::Hide { others: true }));
 
 static BLENDER: &[KeyGroup] = &[
     KeyGroup {
@@ -83,6 +85,10 @@ static BLENDER: &[KeyGroup] = &[
             ),
             row!("keep, restore", Trigger::Mouse("Enter or click"), Trigger::Mouse("Esc or right click")),
             row!("delete the selection", text("x", DELETE), named(NamedKey::Delete, DELETE)),
+            row!("hide the selection", shifted(Typed::Text("h"), false, HIDE)),
+            row!("hide everything but the selection", shifted(Typed::Text("h"), true, HIDE_OTHERS)),
+            row!("show all that is hidden", alt("h", Action::Send(Command::Edit(Edit::ShowAll)))),
+            row!("show or hide this list of keys; / searches it", named(NamedKey::F1, Action::ToggleHelp)),
             row!("select everything", shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))),
             row!("select nothing", alt("a", Action::Send(Command::Edit(Edit::SelectNone)))),
             row!("find what can be added", shifted(Typed::Text("a"), true, Action::PaletteOf("add "))),

@@ -2,7 +2,7 @@
 
 use crate::frame::{Command, Edit, NewThing, gizmo};
 use crate::viewer::keys::binding::{Action, KeyGroup, Menu, PlayEnd, Trigger};
-use crate::viewer::keys::build::{REDO, UNDO, add_item, edit, edit_item, item, named, row, text};
+use crate::viewer::keys::build::{REDO, UNDO, add_item, alt, edit, edit_item, item, named, row, text};
 use winit::keyboard::NamedKey;
 
 const HANDLES: &[Menu] = &[Menu::Edit, Menu::Here];
@@ -47,11 +47,26 @@ pub const EDIT: KeyGroup = KeyGroup {
             edit_item("Delete", &[Menu::Edit, Menu::Here], Edit::Delete)
         ),
         row!(
-            "put the selection on the ground: drop it, or lift it, to the floor",
+            "hide the selection: it is not seen and gives no light; the list of objects shows it again",
+            edit("h", Some(false), Edit::Hide { others: false }),
+            edit_item("Hide", &[Menu::Edit, Menu::Here], Edit::Hide { others: false })
+        ),
+        row!(
+            "hide everything but the selection",
+            alt("h", Action::Send(Command::Edit(Edit::Hide { others: true }))),
+            edit_item("Hide all others", &[Menu::Edit], Edit::Hide { others: true })
+        ),
+        row!(
+            "show all that is hidden",
+            edit("h", Some(true), Edit::ShowAll),
+            edit_item("Show all that is hidden", &[Menu::Edit], Edit::ShowAll)
+        ),
+        row!(
+            "put the selection on what is below its middle: a table, or the floor",
             edit_item("Stand on the ground", &[Menu::Edit, Menu::Here], Edit::StandOnGround)
         ),
         row!(
-            "turn the selection upright, if its up is Z, and put it on the ground",
+            "turn the selection upright, if its up is Z, and put it on what is below",
             edit_item("Turn upright", &[Menu::Edit], Edit::TurnUpright)
         ),
         row!(

@@ -31,7 +31,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
     let which = Which { id: "lights", revision: session.revision(), chosen: selection.active(), height: 0.0 };
     list(ui, &mut state.light_list, &which, &inventory.lights, |ui, entry| {
         emission(ui, session, entry, asked);
-        selectable(ui, entry, selection, asked);
+        selectable(ui, entry, session.world(), asked);
     });
     let environment = &session.inputs().environment;
     let light = &environment.light;

@@ -41,6 +41,7 @@ mod widgets;
 pub use sections::SECTIONS;
 pub use selected::NOTHING_SELECTED;
 pub use state::{Around, Asked, DroppedMaterial, PanelState};
+pub use widgets::select_number;
 
 use crate::frame::{Command, Edit, Session};
 use egui::{Context, RichText, Ui};

@@ -21,7 +21,7 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
     let selection = session.world().resource::<Selection>();
     let which = Which { id: "objects", revision: session.revision(), chosen: selection.active(), height: 0.0 };
     list(ui, &mut state.object_list, &which, &inventory.objects, |ui, entry| {
-        selectable(ui, entry, selection, asked);
+        selectable(ui, entry, session.world(), asked);
     });
 }
 

@@ -7,6 +7,7 @@ use crate::viewer::panel::material;
 use crate::viewer::panel::ready::library_of_materials;
 use crate::viewer::panel::state::{Around, Asked, PanelState};
 use crate::viewer::panel::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
+use bevy_ecs::name::Name;
 use egui::Ui;
 use glam::DVec3;
 
@@ -23,7 +24,7 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: 
     let object = inputs.objects.iter().find(|object| object.entity == active);
     let light = inputs.lights.iter().find(|light| light.entity == active);
     let id = active.to_bits();
-    let name = object.and_then(|object| object.name.as_deref()).or(light.and_then(|light| light.name.as_deref()));
+    let name = session.world().get::<Name>(active).map(|name| name.as_str());
     ui.horizontal(|ui| {
         name_field(ui, id, name, asked);
         if selection.0.len() > 1 {
@@ -43,6 +44,10 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: 
         }
         if ui.button("Delete").clicked() {
             asked.edit(Edit::Delete);
+        }
+        let hidden = object.is_none() && light.is_none();
+        if ui.button(if hidden { "Show" } else { "Hide" }).clicked() {
+            asked.edit(if hidden { Edit::SetHidden { id, hidden: false } } else { Edit::Hide { others: false } });
         }
     });
     if let Some(object) = object {

@@ -5,10 +5,14 @@
 
 use crate::files::printable;
 use crate::frame::{Edit, Selection};
+use crate::scene::Hidden;
 use crate::viewer::panel::hints::hint_of;
 use crate::viewer::panel::list::Listed;
 use crate::viewer::panel::state::Asked;
 use crate::viewer::status;
+use bevy_ecs::prelude::World;
+use egui::text::{CCursor, CCursorRange};
+use egui::text_edit::TextEditState;
 use egui::{Color32, RichText, Ui};
 use glam::{DVec3, Vec3};
 
@@ -52,9 +56,9 @@ pub fn name_field(ui: &mut Ui, id: u64, name: Option<&str>, asked: &mut Asked) {
 }
 
 /// A selectable row of a list, truncated to the available width.
-pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
+pub fn choice(ui: &mut Ui, is_chosen: bool, text: impl Into<egui::WidgetText>) -> egui::Response {
     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-        ui.add(egui::Button::selectable(is_chosen, text).truncate())
+        ui.add(egui::Button::selectable(is_chosen, text.into()).truncate())
     })
     .inner
 }
@@ -230,12 +234,22 @@ fn of_hex(text: &str) -> Option<DVec3> {
     Some(DVec3::new(linear.r().into(), linear.g().into(), linear.b().into()))
 }
 
-/// The rest of the row of an object or a light: a click selects it, or with a modifier adds it to the selection.
-pub fn selectable<T: Listed>(ui: &mut Ui, item: &T, selection: &Selection, asked: &mut Asked) {
+/// The rest of the row of an object or a light: a click selects it, or with a modifier adds it to the selection; the
+/// button hides it, or shows it again.
+pub fn selectable<T: Listed>(ui: &mut Ui, item: &T, world: &World, asked: &mut Asked) {
     let (entity, label, kind) = item.listed();
+    let selection = world.resource::<Selection>();
+    let hidden = world.get::<Hidden>(entity).is_some();
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        let symbol = RichText::new("👁").size(11.0);
+        let symbol = if hidden { symbol.weak().strikethrough() } else { symbol };
+        let hint = if hidden { "hidden: click to show it" } else { "click to hide it" };
+        if ui.add(egui::Button::new(symbol).frame(false)).on_hover_text(hint).clicked() {
+            asked.edit(Edit::SetHidden { id: entity.to_bits(), hidden: !hidden });
+        }
         ui.label(RichText::new(kind).size(11.0).weak());
-        if choice(ui, selection.0.contains(&entity), label).clicked() {
+        let text = if hidden { RichText::new(label).weak() } else { RichText::new(label) };
+        if choice(ui, selection.0.contains(&entity), text).on_hover_text(label).clicked() {
             let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
             asked.edit(Edit::Select { id: entity.to_bits(), add });
         }
@@ -253,6 +267,23 @@ pub fn strength_drag(ui: &mut Ui, value: f64, unit: &str) -> Option<f64> {
         drag = drag.on_hover_text(format!("strength, in {}: drag it, or click it and type", unit.trim()));
     }
     drag.changed().then_some(new)
+}
+
+/// After a double click in a field of a number, selects all of it: a word would be the digits on one side of the point.
+/// To be called when everything is drawn.
+pub fn select_number(context: &egui::Context) {
+    let Some(id) = context.memory(|memory| memory.focused()) else { return };
+    let is_double = context.input(|input| input.pointer.button_double_clicked(egui::PointerButton::Primary));
+    // Only fields of numbers keep their text under their own id.
+    if is_double
+        && let Some(text) = context.data(|data| data.get_temp::<String>(id))
+        && let Some(mut state) = TextEditState::load(context, id)
+    {
+        let end = CCursor::new(text.chars().count());
+        state.cursor.set_char_range(Some(CCursorRange::two(CCursor::default(), end)));
+        state.store(context, id);
+        context.request_repaint();
+    }
 }
 
 /// Drag speed per pixel, proportional to the value: doubling takes about 140 pixels at any magnitude. Starts slowly
@@ -289,6 +320,34 @@ mod tests {
     #[test]
     fn numbers_have_about_four_digits() {
         assert_eq!([32.9123, 6.2776, 0.134, 1234.5, 120.0, -45.25].map(decimals), [2, 3, 4, 0, 1, 2]);
+    }
+
+    #[test]
+    fn a_double_click_takes_a_number_as_a_whole() {
+        let context = egui::Context::default();
+        let (mut value, mut at) = (0.1, egui::Pos2::ZERO);
+        let mut frame = |time: f64, events: Vec<egui::Event>| {
+            let input = egui::RawInput { events, time: Some(time), ..egui::RawInput::default() };
+            let _ = context.run(input, |context| {
+                egui::CentralPanel::default().show(context, |ui| {
+                    value = number(ui, value, 0.01, 0.0..=1.0, "").unwrap_or(value);
+                    at = ui.min_rect().min + egui::vec2(8.0, 8.0);
+                });
+                select_number(context);
+            });
+            (value, at)
+        };
+        let at = frame(0.0, Vec::new()).1;
+        for (time, pressed) in [(0.1, true), (0.15, false), (0.2, true), (0.25, false)] {
+            let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+            let click = egui::Event::PointerButton { pos: at, button, pressed, modifiers };
+            frame(time, vec![egui::Event::PointerMoved(at), click]);
+        }
+        frame(0.4, vec![egui::Event::Text("0.35".to_owned())]);
+        let (key, modifiers) = (egui::Key::Enter, egui::Modifiers::NONE);
+        let enter = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        frame(0.5, vec![enter]);
+        assert_eq!(frame(0.6, Vec::new()).0, 0.35);
     }
 
     /// What is shown is rounded and clamped, and nobody has edited it.

@@ -43,7 +43,7 @@ impl Converter<'_> {
                     None => matrix.transform_point3(DVec3::ZERO),
                 };
                 let intensity = Rgb(self.constant_color(node, "intensity", 1.0, Use::Emission)?);
-                self.file.lights.push(LightPart::Point { name, position, intensity, radius: 0.0 });
+                self.file.lights.push(LightPart::Point { name, hidden: false, position, intensity, radius: 0.0 });
             }
             "spot" => {
                 let matrix = self.world * node.transform("to_world")?;
@@ -72,6 +72,7 @@ impl Converter<'_> {
                 let inner_angle = inner.clamp(0.0, outer_angle);
                 self.file.lights.push(LightPart::Spot {
                     name,
+                    hidden: false,
                     position,
                     direction,
                     intensity: Rgb(intensity),
@@ -98,7 +99,7 @@ impl Converter<'_> {
                 }
                 let irradiance = Rgb(self.constant_color(node, "irradiance", 1.0, Use::Emission)?);
                 let transform = TransformPart::default();
-                self.file.lights.push(LightPart::Directional { name, direction, irradiance, transform });
+                self.file.lights.push(LightPart::Directional { name, hidden: false, direction, irradiance, transform });
             }
             plugin => {
                 let plugin = printable::name(plugin).into_owned();

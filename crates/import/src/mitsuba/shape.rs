@@ -239,11 +239,11 @@ impl Converter<'_> {
         self.file.objects.push(match material.is_textured {
             true => {
                 let (center, radius) = (DVec3::ZERO, 1.0);
-                ObjectPart::Sphere { name, center, radius, material: material_name, transform }
+                ObjectPart::Sphere { name, hidden: false, center, radius, material: material_name, transform }
             }
             false => {
                 let transform = TransformPart::default();
-                ObjectPart::Sphere { name, center, radius, material: material_name, transform }
+                ObjectPart::Sphere { name, hidden: false, center, radius, material: material_name, transform }
             }
         });
         Ok(())
@@ -274,7 +274,15 @@ impl Converter<'_> {
             false => (at(-1.0, -1.0), edge_u, edge_v),
             true => (at(1.0, -1.0), -edge_u, edge_v),
         };
-        self.file.objects.push(ObjectPart::Quad { name, corner, edge_u, edge_v, material: material.name, transform });
+        self.file.objects.push(ObjectPart::Quad {
+            name,
+            hidden: false,
+            corner,
+            edge_u,
+            edge_v,
+            material: material.name,
+            transform,
+        });
         Ok(())
     }
 

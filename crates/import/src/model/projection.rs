@@ -105,6 +105,7 @@ pub(crate) fn projection(tangents: [f64; 2]) -> LightPart {
     let corner = tangents[0].hypot(tangents[1]).atan().to_degrees().clamp(1e-6, 90.0);
     LightPart::Spot {
         name: None,
+        hidden: false,
         position: DVec3::ZERO,
         direction: DVec3::NEG_Z,
         intensity: Rgb(Vec3::ONE),

@@ -304,6 +304,7 @@ impl<'a> Builder<'a> {
         let (name, material) = (Some(item.name.clone()), item.material.clone());
         let mesh = |source, shading| ObjectPart::Mesh {
             name: name.clone(),
+            hidden: false,
             source,
             shading,
             texture_coordinates: TextureCoordinates::File,
@@ -317,6 +318,7 @@ impl<'a> Builder<'a> {
             Geometry::Sphere { radius, shape } => match even_scale(&world.matrix3) {
                 Some(scale) if !self.with_textures.contains(&item.material) => ObjectPart::Sphere {
                     name,
+                    hidden: false,
                     center: world.translation,
                     radius: radius * scale,
                     material,

@@ -81,7 +81,13 @@ pub(crate) fn light(
         "point" => {
             let power = positive("power").map_or(1.0, |power| power / (4.0 * PI));
             let intensity = rgb(scale * power * color(params, "I", tell));
-            Light::Part(LightPart::Point { name, position: world.transform_point3(from), intensity, radius: 0.0 })
+            Light::Part(LightPart::Point {
+                name,
+                hidden: false,
+                position: world.transform_point3(from),
+                intensity,
+                radius: 0.0,
+            })
         }
         "spot" => {
             let outer = params.number("coneangle").unwrap_or(30.0).clamp(0.01, 90.0);
@@ -93,6 +99,7 @@ pub(crate) fn light(
             let Some(direction) = direction else { return nowhere(tell) };
             Light::Part(LightPart::Spot {
                 name,
+                hidden: false,
                 position: world.transform_point3(from),
                 direction,
                 intensity,
@@ -111,7 +118,7 @@ pub(crate) fn light(
             let Some(direction) = direction else { return nowhere(tell) };
             let illuminance = positive("illuminance").unwrap_or(1.0);
             let irradiance = rgb(scale * illuminance * color(params, "L", tell));
-            Light::Part(LightPart::Directional { name, direction, irradiance, transform })
+            Light::Part(LightPart::Directional { name, hidden: false, direction, irradiance, transform })
         }
         "infinite" => {
             if params.has("portal") {

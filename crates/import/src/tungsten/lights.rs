@@ -39,7 +39,7 @@ impl Converter<'_> {
         }
         let intensity = Rgb(self.constant_radiance(of, 1.0 / (4.0 * PI)));
         let (name, position) = (Some(of.name().to_owned()), world.translation);
-        self.file.lights.push(LightPart::Point { name, position, intensity, radius: 0.0 });
+        self.file.lights.push(LightPart::Point { name, hidden: false, position, intensity, radius: 0.0 });
     }
 
     fn set_environment(&mut self, of: &Fields, environment: EnvironmentSource) {
@@ -110,7 +110,13 @@ impl Converter<'_> {
         let irradiance = self.constant_radiance(of, 1.0 / (TAU * (1.0 - cos).max(1e-12)));
         let irradiance = Rgb(irradiance * (PI * (1.0 - cos * cos)) as f32);
         let (name, transform) = (Some(of.name().to_owned()), TransformPart::default());
-        self.file.lights.push(LightPart::Directional { name, direction: -to_light, irradiance, transform });
+        self.file.lights.push(LightPart::Directional {
+            name,
+            hidden: false,
+            direction: -to_light,
+            irradiance,
+            transform,
+        });
     }
 }
 

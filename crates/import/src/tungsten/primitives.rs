@@ -131,14 +131,14 @@ impl<'a> Converter<'a> {
                         (DVec3::ZERO, placing::transform(&turned))
                     }
                 };
-                ObjectPart::Sphere { name, center, radius, material, transform }
+                ObjectPart::Sphere { name, hidden: false, center, radius, material, transform }
             }
             ("quad", Some(material), _) if !is_textured => {
                 // From the corner from which it faces +Y.
                 let (edge_u, edge_v) = (world.matrix3.z_axis, world.matrix3.x_axis);
                 let corner = world.translation - 0.5 * (edge_u + edge_v);
                 let transform = TransformPart::default();
-                ObjectPart::Quad { name, corner, edge_u, edge_v, material, transform }
+                ObjectPart::Quad { name, hidden: false, corner, edge_u, edge_v, material, transform }
             }
             (_, material, Some(mesh)) => {
                 let source = MeshSource::Part {
