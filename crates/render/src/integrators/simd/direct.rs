@@ -86,12 +86,13 @@ impl<S: Simd> DirectLanes<'_, S> {
     #[inline(always)]
     fn candidate<const KIND: usize>(&self, s: S, k: u32, n: f32) -> LightCandidate<S> {
         let &Self { scene, techniques, mask, place, surface, hints, sampler, .. } = self;
-        let points = s.call(LightPoints {
+        let points = s.call(&LightPoints {
             scene,
             techniques,
             mask,
             position: place.position,
-            normal: place.lit_side::<KIND>(),
+            normal: place.normal,
+            both_sides: KIND == TRANSLUCENT,
             sampler,
             dimension: first_dimension(self.depth),
             candidate: k,

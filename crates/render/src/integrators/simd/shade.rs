@@ -183,7 +183,8 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
         if is_resampled(techniques, KIND) {
             pdf = pdf / CANDIDATES as f32;
         }
-        let normal = place.lit_side::<KIND>().unwrap_or(Vector::all(pdf.all(0.0)));
+        // Light sampling uses both sides where there is none.
+        let normal = if KIND == TRANSLUCENT { Vector::all(pdf.all(0.0)) } else { place.normal };
         let path = PathLanes { throughput, pdf, position: place.position, normal, sampler, slot };
         next.append(go_on, origin, bounce.wi, &path);
         if let Some(next_media) = &mut next.media {

@@ -207,30 +207,23 @@ impl LightArrays {
         let triangles = if self.has_triangles { mask & flags.has(TRIANGLE) } else { 0 };
         let deltas = if self.has_deltas { mask & flags.has(DELTA) } else { 0 };
         let quads = mask & !spheres & !triangles & !deltas;
-        let mut all = None;
+        let zero = u[0].all(0.0);
+        let (nowhere, uv) = (Vector::all(zero), [zero; 2]);
+        let mut all =
+            LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere, is_far: 0, uv };
+        // Values are too large for an `Option` whose methods may not be inlined.
         if spheres != 0 {
-            all = Some(self.spheres(by_angle, id, spheres, position, u));
+            all = self.spheres(by_angle, id, spheres, position, u);
         }
         if triangles != 0 {
             let found = LightLanes::of(self.triangle(id).sample(by_angle, triangles, position, u));
-            all = Some(all.map_or(found, |all| found.over(triangles, all)));
+            all = if spheres == 0 { found } else { found.over(triangles, all) };
         }
         if quads != 0 && self.has_quads {
             let found = LightLanes::of(self.quad(id).sample(by_angle, quads, position, u));
-            all = Some(all.map_or(found, |all| found.over(quads, all)));
+            all = if spheres | triangles == 0 { found } else { found.over(quads, all) };
         }
-        let zero = u[0].all(0.0);
-        let nowhere = Vector { x: zero, y: zero, z: zero };
-        let none = LightLanes {
-            found: 0,
-            target: nowhere,
-            wi: nowhere,
-            pdf: zero,
-            radiance: nowhere,
-            is_far: 0,
-            uv: [zero; 2],
-        };
-        all.unwrap_or(none)
+        all
     }
 
     /// See [`LightShape::pdf`].

@@ -24,7 +24,7 @@ pub(crate) fn principled_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut Surface
     let flags = Bits::gather(&at.scene.tables.materials.flags, Bits::gather(at.materials, at.index));
     let unmapped = place.unmapped_normal();
     let mut mapped = 0;
-    if place.tangent.is_some() {
+    if place.tangent.known != 0 {
         let scale = inputs.scalar(input::NORMAL_SCALE);
         mapped = place.turn_normals(at.mask & flags.has(MAPPED), inputs.color(input::NORMAL), scale);
     }
@@ -50,9 +50,8 @@ pub(crate) fn principled_of<S: Simd>(s: S, at: &HitGroup<S>, place: &mut Surface
         layers.coat_normal = unmapped;
         let anisotropy = inputs.share(input::ANISOTROPY);
         let elongated = anisotropy.is_positive();
-        if let Some(tangent) = &place.tangent
-            && elongated != 0
-        {
+        let tangent = &place.tangent;
+        if tangent.known != 0 && elongated != 0 {
             let map = inputs.shares(input::ANISOTROPY_MAP);
             layers.widen(anisotropy * map.z);
             let (cos, sin) = (inputs.scalar(input::TURN), inputs.scalar(input::TURN + 1));

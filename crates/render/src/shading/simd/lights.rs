@@ -33,69 +33,113 @@ pub(crate) struct LightPoints<'a, S: Simd> {
     pub techniques: &'a Techniques,
     pub mask: Mask,
     pub position: Vector<S>,
-    /// The side that is lit; both are if there is none.
-    pub normal: Option<Vector<S>>,
+    /// Of the side that is lit.
+    pub normal: Vector<S>,
+    /// Whether the other side is lit too.
+    pub both_sides: bool,
     pub sampler: &'a SamplerLanes<S>,
     pub dimension: u32,
     /// Number of the sample, if several are taken.
     pub candidate: u32,
 }
 
-impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
+impl<S: Simd> Kernel<S> for &LightPoints<'_, S> {
     type Output = FoundLights<S>;
 
     #[inline(always)]
     fn run(self, _: S) -> FoundLights<S> {
-        light_points(&self)
+        light_points(self)
     }
 }
 
 #[inline(always)]
 fn light_points<S: Simd>(asked: &LightPoints<S>) -> FoundLights<S> {
-    let &LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate } = asked;
-    let tables = &*scene.tables;
-    let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
-    let zero = u[0].all(0.0);
-    let nowhere = Vector::all(zero);
-    let mut points = FoundLights { found: 0, infinite: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere };
+    let LightPoints { scene, techniques, mask, normal, both_sides, sampler, dimension, candidate, .. } = *asked;
     let environment = EnvironmentSampling::of(scene, techniques);
+    if both_sides || environment.is_some() {
+        // Apart: what most scenes do not need would make the rest slower.
+        return asked.position.x.s.call(AllLights { asked, environment });
+    }
+    let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
     let mut u_select = u[0];
-    if tables.lights.selects_apart() || environment.is_some() {
+    if scene.tables.lights.selects_apart() {
         u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
     }
-    let (mut outside, mut share) = (0, zero);
-    if let Some(environment) = environment {
-        let side = match normal {
-            Some(normal) => normal,
-            None => nowhere,
-        };
-        share = environment.share(position, side);
-        outside = mask & u_select.lt(share);
-        u_select = ((u_select - share) / (zero.all(1.0) - share)).at_least(0.0).at_most(1.0f32.next_down());
+    points_on_lights(asked, mask, Some(normal), u_select, u)
+}
+
+/// - `mask`: lanes of those of `asked`; `normal`: of the side that is lit; both are if there is none.
+#[inline(always)]
+fn points_on_lights<S: Simd>(
+    asked: &LightPoints<S>,
+    mask: Mask,
+    normal: Option<Vector<S>>,
+    u_select: Float<S>,
+    u: [Float<S>; 2],
+) -> FoundLights<S> {
+    let LightPoints { scene, techniques, position, .. } = *asked;
+    let lights = &scene.tables.lights;
+    match lights.sample_lanes(&scene.shading.textures, techniques, mask, (position, normal), u_select, u) {
+        Some(LightLanes { found, target, wi, pdf, radiance, is_far, .. }) => {
+            FoundLights { found, infinite: is_far, target, wi, pdf, radiance }
+        }
+        None => FoundLights::none(u[0]),
     }
-    let inside = mask & !outside;
-    let textures = &scene.shading.textures;
-    if inside != 0
-        && let Some(lights) = tables.lights.sample_lanes(textures, techniques, inside, (position, normal), u_select, u)
-    {
-        let LightLanes { found, target, wi, pdf, radiance, is_far, .. } = lights;
-        points = FoundLights { found, infinite: is_far, target, wi, pdf: pdf * (zero.all(1.0) - share), radiance };
-    }
-    if outside != 0
-        && let Some(environment) = environment
-    {
+}
+
+/// Light samples where the environment is sampled as well, or both sides are lit.
+struct AllLights<'a, 'b, S: Simd> {
+    asked: &'a LightPoints<'b, S>,
+    environment: Option<EnvironmentSampling<'b>>,
+}
+
+impl<S: Simd> Kernel<S> for AllLights<'_, '_, S> {
+    type Output = FoundLights<S>;
+
+    #[inline(always)]
+    fn run(self, _: S) -> FoundLights<S> {
+        let Self { asked, environment } = self;
+        let &LightPoints { scene, mask, position, normal, both_sides, sampler, dimension, candidate, .. } = asked;
+        let u = shifted(sampler.pair(dimension + DIM_LIGHT_POINT), candidate);
+        let mut u_select = u[0];
+        if scene.tables.lights.selects_apart() || environment.is_some() {
+            u_select = shifted_single(sampler.single(dimension + DIM_LIGHT), candidate);
+        }
+        let zero = u[0].all(0.0);
+        let (side, normal) = if both_sides { (Vector::all(zero), None) } else { (normal, Some(normal)) };
+        let Some(environment) = environment else { return points_on_lights(asked, mask, normal, u_select, u) };
+        let share = environment.share(position, side);
+        let outside = mask & u_select.lt(share);
+        let inside = mask & !outside;
+        let mut points = FoundLights::none(zero);
+        if inside != 0 {
+            let rest = (u_select - share) / (zero.all(1.0) - share);
+            points = points_on_lights(asked, inside, normal, rest.at_least(0.0).at_most(1.0f32.next_down()), u);
+            points.pdf = points.pdf * (zero.all(1.0) - share);
+        }
+        if outside == 0 {
+            return points;
+        }
         let (found, wi, pdf) = environment.sample_lanes(outside, position, normal, u);
         let radiance = scene.shading.environment.radiance_lanes(outside, wi);
-        points = FoundLights {
+        FoundLights {
             found: points.found | found & outside,
             infinite: points.infinite | outside,
             target: select_vector(outside, wi, points.target),
             wi: select_vector(outside, wi, points.wi),
             pdf: select(outside, pdf * share, points.pdf),
             radiance: select_vector(outside, radiance, points.radiance),
-        };
+        }
     }
-    points
+}
+
+impl<S: Simd> FoundLights<S> {
+    #[inline(always)]
+    fn none(any: Float<S>) -> Self {
+        let zero = any.all(0.0);
+        let nowhere = Vector::all(zero);
+        Self { found: 0, infinite: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere }
+    }
 }
 
 /// A place on a surface that asks for a point on a light: its position, its normal, which is zero for light on both
@@ -170,8 +214,9 @@ fn choose<S: Simd>(
     let [stream, reversed_index, screen] = lanes.samplers.each_ref().map(|part| Bits::load(s, part));
     let sampler = &SamplerLanes { stream, reversed_index, screen };
     let [position, normal] = [&lanes.positions, &lanes.normals].map(|values| Vector::from_arrays(s, values));
-    let (mask, normal) = (lanes.mask, if lanes.both_sides { None } else { Some(normal) });
-    let found = s.call(LightPoints { scene, techniques, mask, position, normal, sampler, dimension, candidate });
+    let LitLanes { mask, both_sides, .. } = *lanes;
+    let asked = LightPoints { scene, techniques, mask, position, normal, both_sides, sampler, dimension, candidate };
+    let found = s.call(&asked);
     let [target, wi, radiance] = [found.target, found.wi, found.radiance].map(|values| values.to_arrays());
     let pdf = found.pdf.to_array();
     for lane in lanes_of(found.found & lanes.mask) {

@@ -28,7 +28,8 @@ pub(crate) fn metals_of<S: Simd>(at: &HitGroup<S>, place: &SurfaceLanes<S>) -> S
     }
     let facets = Microfacets { alpha, beckmann: at.mask & flags.has(BECKMANN) }.at_least_rough();
     let mut tangent = None;
-    if let Some(TangentLanes { along_u, handedness, .. }) = place.tangent {
+    let TangentLanes { along_u, handedness, known, .. } = place.tangent;
+    if known != 0 {
         tangent = Some(tangent_axes(along_u, handedness, place.normal)[0]);
     }
     let metal = Metal {
@@ -71,7 +72,8 @@ pub(crate) fn disneys_of<S: Simd>(at: &HitGroup<S>, place: &SurfaceLanes<S>) -> 
         clearcoat: inputs.share(input::COAT),
         clearcoat_gloss: inputs.share(input::COAT_GLOSS),
     });
-    if let Some(TangentLanes { along_u, handedness, .. }) = place.tangent {
+    let TangentLanes { along_u, handedness, known, .. } = place.tangent;
+    if known != 0 {
         layers.tangent = Some(tangent_axes(along_u, handedness, place.normal)[0]);
     }
     layers.seen(place.wo, place.normal)

@@ -55,6 +55,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let mut found = TangentLanes {
             along_u: select_vector(is_flat, p, along_u),
             handedness: select(is_left, -one, one),
+            known: at.mask,
             is_final: 0,
             is_mapped: 0,
         };
@@ -82,7 +83,10 @@ impl<S: Simd> SurfaceLanes<S> {
     /// - `mask`: lanes with a map; `coded`, `scale`: as of [`normal_of_map`].
     #[inline(always)]
     pub(crate) fn turn_normals(&mut self, mask: Mask, coded: Vector<S>, scale: Float<S>) -> Mask {
-        let Some(TangentLanes { along_u, handedness, is_final, is_mapped }) = self.tangent else { return 0 };
+        let TangentLanes { along_u, handedness, known, is_final, is_mapped } = self.tangent;
+        if known == 0 {
+            return 0;
+        }
         let one = scale.all(1.0);
         let side = select(self.front, one, -one);
         let front = self.interpolated * side;

@@ -5,7 +5,6 @@ use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED, TURNED};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
-use crate::shading::simd::lanes::TRANSLUCENT;
 use crate::shading::simd::tangents::TangentLanes;
 use crate::shading::tangent::Tangent;
 use crate::shading::vertex::{Vertex, mesh_texture_point};
@@ -32,8 +31,7 @@ pub(crate) struct SurfaceLanes<S: Simd> {
     pub front: Mask,
     pub wo: Vector<S>,
     pub uv: [Float<S>; 2],
-    /// Where some material needs tangents.
-    pub tangent: Option<TangentLanes<S>>,
+    pub tangent: TangentLanes<S>,
 }
 
 /// A group of hits and their materials.
@@ -149,7 +147,7 @@ impl<S: Simd> SurfaceLanes<S> {
             front: 0,
             wo,
             uv: [zero, zero],
-            tangent: None,
+            tangent: TangentLanes::none(zero),
         };
         if flat != 0 {
             place.set_flat(table, object, [Float::gather(&hits.u, at.index), Float::gather(&hits.v, at.index)]);
@@ -182,7 +180,7 @@ impl<S: Simd> SurfaceLanes<S> {
         if let Some(corners) = &corners {
             place.smooth_meshes(s, at, row, corners);
             if with_tangents != 0 {
-                place.tangent = Some(place.mesh_tangents(s, at, row, corners, mesh & with_tangents));
+                place.tangent = place.mesh_tangents(s, at, row, corners, mesh & with_tangents);
             }
         }
         if other != 0 {
@@ -294,11 +292,11 @@ impl<S: Simd> SurfaceLanes<S> {
         self.offset = Float::load(s, &scalars[0]);
         self.uv = [Float::load(s, &scalars[1]), Float::load(s, &scalars[2])];
         let (along_u, handedness) = (Vector::from_arrays(s, along_u), Float::load(s, &scalars[3]));
-        let of_others = TangentLanes { along_u, handedness, is_final: mask, is_mapped };
-        if let Some(of_meshes) = &mut self.tangent {
-            *of_meshes = of_others.over(mask, of_meshes);
+        let of_others = TangentLanes { along_u, handedness, known: mask, is_final: mask, is_mapped };
+        if self.tangent.known != 0 {
+            self.tangent = of_others.over(mask, &self.tangent);
         } else if with_tangents & mask != 0 {
-            self.tangent = Some(of_others);
+            self.tangent = of_others;
         }
     }
 
@@ -312,12 +310,6 @@ impl<S: Simd> SurfaceLanes<S> {
             uv: [self.uv[0].to_array(), self.uv[1].to_array()],
             front: self.front,
         }
-    }
-
-    /// The side for light sampling; none for both.
-    #[inline(always)]
-    pub fn lit_side<const KIND: usize>(&self) -> Option<Vector<S>> {
-        if KIND == TRANSLUCENT { None } else { Some(self.normal) }
     }
 
     /// Origin of a ray that stays on the side of `wo`.
