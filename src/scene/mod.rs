@@ -82,6 +82,7 @@ pub use crate::scene::world::extent::{Extent, ExtentCache};
 pub use crate::scene::world::inputs::{
     CameraInput, HiddenInputs, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries,
 };
+pub(crate) use crate::scene::world::inventory::is_emitter;
 pub use crate::scene::world::inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
 pub use crate::scene::world::lights::{LightTexture, WithLight, light_of, put_light};
 pub use crate::scene::world::material_value::material_value;

@@ -178,7 +178,8 @@ impl Order {
         let by_time = self.target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
         let of_samples = now.error.map(|error| error.relative);
         let (error, outlook) = match (self.target.error, self.denoiser) {
-            (Some(goal), Some(_)) => (trend.error().or(of_samples), trend.to(goal)),
+            // Until the first is known, that of the samples would be another figure.
+            (Some(goal), Some(_)) => (trend.error(), trend.to(goal)),
             (Some(goal), None) => (of_samples, now.error.map(|error| Outlook::Samples(f64::from(error.spp_for(goal))))),
             (None, _) => (of_samples, None),
         };

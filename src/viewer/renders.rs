@@ -59,6 +59,8 @@ struct Running {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Told {
     share: f64,
+    /// The largest share so far: what was done stays done.
+    most: f64,
     spp: u32,
     error: Option<f64>,
     is_flat: bool,
@@ -161,7 +163,7 @@ impl Running {
         let told = *self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let title = RichText::new(format!("Rendering {}", self.title)).size(TEXT_SIZE).strong();
         ui.add(Label::new(title).truncate());
-        overlay::progress(ui, ui.available_width(), told.share as f32);
+        overlay::progress(ui, ui.available_width(), told.most as f32);
         let is_kept = self.kept.load(Ordering::Relaxed);
         let text = match is_kept {
             true => "saving what there is".to_owned(),
@@ -248,8 +250,10 @@ impl Work {
     /// - `share`: of all frames; `frame`: the one of `now`, and their number.
     fn tell(&self, now: Advance, share: f64, frame: Option<(u32, u32)>) {
         let Advance { spp, error, is_flat, is_sampled, .. } = now;
-        let told = Told { share, spp, error, is_flat, sampled_at: is_sampled.then(Instant::now), frame };
-        *self.told.lock().unwrap_or_else(PoisonError::into_inner) = told;
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let most = told.most.max(share);
+        *told = Told { share, most, spp, error, is_flat, sampled_at: is_sampled.then(Instant::now), frame };
+        drop(told);
         (self.waker)();
     }
 

@@ -5,6 +5,10 @@
 const EXPECTED: f64 = 0.5;
 /// Below this power the error has flattened: four times the samples took less than a third of it away.
 const FLAT: f64 = 0.25;
+/// Errors of fewer than one in so many of the samples do not count.
+const RECENT: u32 = 8;
+/// How much the expected power counts, beside the sum of squares of the logarithms of the samples from their mean.
+const PRIOR: f64 = 0.5;
 
 /// Measured errors, by samples per pixel.
 #[derive(Clone, Debug, Default)]
@@ -29,24 +33,32 @@ impl Trend {
         }
     }
 
-    /// The newest error.
+    /// The error now, by a line through the newest ones: each of them is a guess.
     pub fn error(&self) -> Option<f64> {
-        self.seen.last().map(|&(_, error)| error)
+        self.line().map(|(error, _)| error)
+    }
+
+    /// The error now, and the power of the samples with which it falls: least squares of logarithms.
+    fn line(&self) -> Option<(f64, f64)> {
+        let &(spp, _) = self.seen.last()?;
+        let recent = self.seen.iter().filter(|(fewer, _)| fewer.saturating_mul(RECENT) >= spp);
+        let logs: Vec<(f64, f64)> = recent.map(|&(spp, error)| (f64::from(spp).ln(), error.ln())).collect();
+        let n = logs.len() as f64;
+        let (mean_x, mean_y) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+        let squares: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
+        let products: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
+        let power = (PRIOR * EXPECTED - products) / (PRIOR + squares);
+        Some(((mean_y - power * (f64::from(spp).ln() - mean_x)).exp(), power))
     }
 
     /// What the error `goal` takes; `None` as long as no error is known.
     pub fn to(&self, goal: f64) -> Option<Outlook> {
-        let &(spp, error) = self.seen.last()?;
-        // The latest error of at most a `factor`-th of the samples tells how it falls: neighbours would tell noise.
-        let since = |factor: u32| {
-            let &(fewer, before) = self.seen.iter().rev().find(|(fewer, _)| fewer.saturating_mul(factor) <= spp)?;
-            Some((before / error).ln() / (f64::from(spp) / f64::from(fewer)).ln())
-        };
-        if error > goal && since(4).is_some_and(|power| power < FLAT) {
+        let (&(first, _), &(spp, _)) = (self.seen.first()?, self.seen.last()?);
+        let (error, power) = self.line()?;
+        if error > goal && power < FLAT && first.saturating_mul(4) <= spp {
             return Some(Outlook::Flat);
         }
-        let power = since(4).or(since(2)).unwrap_or(EXPECTED).clamp(FLAT, EXPECTED);
-        Some(Outlook::Samples(f64::from(spp) * (error / goal).powf(power.recip())))
+        Some(Outlook::Samples(f64::from(spp) * (error / goal).powf(power.clamp(FLAT, EXPECTED).recip())))
     }
 }
 
@@ -61,14 +73,28 @@ mod tests {
     #[test]
     fn half_the_error_takes_four_times_the_samples() {
         assert_eq!(trend(&[]).to(0.02), None);
-        assert_eq!(trend(&[(4, 0.08)]).to(0.02), Some(Outlook::Samples(64.0)));
+        let Some(Outlook::Samples(spp)) = trend(&[(4, 0.08)]).to(0.02) else { panic!() };
+        assert!((spp - 64.0).abs() < 1e-9, "{spp}");
         let Some(Outlook::Samples(spp)) = trend(&[(4, 0.08), (8, 0.08 / 2f64.sqrt()), (16, 0.04)]).to(0.02) else {
             panic!()
         };
         assert!((spp - 64.0).abs() < 1e-9, "{spp}");
         // Slower than that, but it falls.
         let Some(Outlook::Samples(spp)) = trend(&[(4, 0.08), (16, 0.05)]).to(0.02) else { panic!() };
-        assert!(spp > 200.0, "{spp}");
+        assert!(spp > 120.0, "{spp}");
+    }
+
+    #[test]
+    fn errors_that_jump_move_the_outlook_less() {
+        let jumps = [1.1, 0.9, 1.05, 0.92, 1.1, 0.95, 0.9, 1.1];
+        let mut trend = Trend::default();
+        for (i, jump) in (0..).zip(jumps) {
+            let spp = (4.0 * 1.4f64.powi(i)) as u32;
+            trend.add(spp, jump * 0.16 / f64::from(spp).sqrt());
+            let Some(Outlook::Samples(needed)) = trend.to(0.01) else { panic!("flat after {spp}") };
+            // Those of the newest errors alone would be 200 to 310.
+            assert!(i < 2 || (needed / 256.0).ln().abs() < 0.15, "{needed} after {spp}");
+        }
     }
 
     #[test]

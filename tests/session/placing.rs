@@ -136,6 +136,18 @@ fn a_new_light_lights_what_is_selected_or_seen_as_much_at_any_size() {
 }
 
 #[test]
+fn a_light_after_an_area_light_lights_what_is_seen_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let subject = driver.session.box_of(driver.named("model")).expect("its box").middle();
+    driver.edit([Edit::Add(NewThing::AreaLight)]);
+    driver.settle();
+    driver.edit([Edit::Add(NewThing::SpotLight)]);
+    let irradiance = irradiance(&driver, &NewThing::SpotLight, subject);
+    assert!((4.0..8.0).contains(&irradiance), "{irradiance}");
+}
+
+#[test]
 fn what_is_added_at_a_place_of_the_image_stands_there() {
     let folder = tempfile::tempdir().unwrap();
     for size in [0.01, 1.0, 300.0] {

@@ -8,7 +8,7 @@
 use crate::frame::navigation::Rig;
 use crate::frame::state::resources::{FreeShare, PictureSize, RenderState};
 use crate::frame::state::selection::{Projector, Selection, box_of, distance, pick};
-use crate::scene::{Extraction, Shape, View};
+use crate::scene::{Extraction, Shape, View, is_emitter};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -147,7 +147,8 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
 fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
     let objects = entities.iter().filter_map(|&entity| {
         world.get::<Shape>(entity)?;
-        box_of(world, entity)
+        // Of an area light that was just added, the light beside it would light nothing.
+        if is_emitter(world, entity) { None } else { box_of(world, entity) }
     });
     let corners = objects.flat_map(|own| own.corners()).map(|corner| (corner, corner));
     let (min, max) = corners.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))?;

@@ -5,7 +5,7 @@
 //! since they change more often than the lists.
 
 use crate::files::printable;
-use crate::scene::world::components::{ColorParam, Material, Ordinal, Shape, SurfaceMaterial};
+use crate::scene::world::components::{ColorParam, Material, MaterialSlots, Ordinal, Shape, SurfaceMaterial};
 use crate::scene::world::inputs::SceneInputs;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -114,6 +114,13 @@ impl Inventory {
     pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
         self.materials.iter().find(|entry| entry.entity == entity)
     }
+}
+
+/// Whether an object emits light by one of its materials.
+pub(crate) fn is_emitter(world: &World, object: Entity) -> bool {
+    let slots = world.get::<MaterialSlots>(object);
+    let mut materials = slots.iter().flat_map(|slots| &slots.0).flat_map(|&slot| parts_of(world, slot));
+    materials.any(|material| SurfaceMaterial::of(world, material).is_some_and(emits))
 }
 
 fn emits(material: &Material) -> bool {
