@@ -5,8 +5,9 @@ pub use crate::frame::{Command, Denoising, Progress, Session, SessionOptions, St
 pub use crate::mesh::{Mesh, MeshError};
 pub use crate::render::{Display, ErrorMetric, Integrator, PixelFilter, RenderSettings, SampleAllocation};
 pub use crate::scene::{
-    ColorParam, DirectionalLight, DisplaySettings, FilmSize, Lens, Material, MaterialSlots, Placement, PointLight,
-    Projection, Rendering, ScalarParam, SceneEnvironment, SceneSource, Shape, SpotLight, SurfaceMaterial, View,
+    ColorParam, DirectionalLight, DisplaySettings, FilmSize, Hidden, Lens, Material, MaterialSlots, Placement,
+    PointLight, Projection, Rendering, ScalarParam, SceneEnvironment, SceneSource, Shape, SpotLight, SurfaceMaterial,
+    View,
 };
 // The crate too: its derive macros name it.
 pub use bevy_ecs;

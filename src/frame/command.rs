@@ -92,6 +92,8 @@ pub enum Command {
     SetProjection(Projection),
     /// Set aperture and focus.
     SetLens(Lens),
+    /// Put the pivot at the depth of the middle of the selection, or else of the scene if the camera is outside of it.
+    PivotOnMiddle,
     /// Put the pivot at the depth of the surface at this position in the image.
     PivotAt {
         /// Fraction of the width of the image, from the left.

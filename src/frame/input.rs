@@ -21,7 +21,9 @@ use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::frame::walls::within_walls;
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
-use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
+use crate::scene::{
+    DisplaySettings, Extent, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View,
+};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 use glam::{DVec2, DVec3};
@@ -112,6 +114,18 @@ impl CommandParams<'_, '_> {
                 if let (Some(rig), Some(picked)) = (self.rig(), self.pick(x, y)) {
                     let depth = picked.depth;
                     self.set_rig(Rig { view: View { pivot_distance: depth, ..rig.view }, ..rig });
+                }
+            }
+            Command::PivotOnMiddle => {
+                let points = self.what_to_frame();
+                let ends = points.iter().map(|point| (*point, *point)).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
+                if let (Some(rig), Some((min, max))) = (self.rig(), ends) {
+                    let Extent { center, radius } = self.around.extent;
+                    let is_outside = (rig.view.eye - center).length() > radius;
+                    let depth = (0.5 * (min + max) - rig.view.eye).dot(rig.view.forward);
+                    if depth > 0.0 && (is_outside || !self.selection.0.is_empty()) {
+                        self.set_rig(Rig { view: View { pivot_distance: depth, ..rig.view }, ..rig });
+                    }
                 }
             }
             Command::PaceAt { x, y } => self.around.pace = self.pick(x, y).map(|picked| picked.depth),

@@ -414,6 +414,29 @@ fn any_environment_becomes_a_gradient_again() {
 }
 
 #[test]
+fn what_turns_by_itself_turns_about_what_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let middle = driver.session.box_of(driver.named("model")).expect("its box").middle();
+    let depth = |driver: &Driver| {
+        let view = driver.session.status().rig.view;
+        (view.pivot_distance, (middle - view.eye).dot(view.forward))
+    };
+    let near = View { pivot_distance: 0.1, ..driver.session.status().rig.view };
+    driver.session.send(Command::SetView(near));
+    driver.session.send(Command::PivotOnMiddle);
+    driver.frame();
+    let (pivot, expected) = depth(&driver);
+    assert!((pivot / expected - 1.0).abs() < 1e-6, "{pivot} is not {expected}");
+    // Within a room only what is selected counts.
+    let inside = View { eye: middle, pivot_distance: 0.1, ..near };
+    driver.session.send(Command::SetView(inside));
+    driver.session.send(Command::PivotOnMiddle);
+    driver.frame();
+    assert_eq!(depth(&driver).0, 0.1);
+}
+
+#[test]
 fn a_scene_in_which_nothing_moves_is_turned_around() {
     let mut driver = Driver::builtin("studio");
     assert!(Reel::of(&mut driver.session).is_none());

@@ -211,8 +211,7 @@ impl App {
                 self.announce_handles(now);
             }
             Action::Gizmo(mode) => {
-                // The same key again hides them.
-                self.panel.gizmo = mode.filter(|_| self.panel.gizmo != mode);
+                self.panel.gizmo = mode;
                 self.announce_handles(now);
             }
             Action::Grab(mode) => self.begin_grab(mode, now),
@@ -226,7 +225,13 @@ impl App {
                 }
             }
             Action::PlayAll => self.session.send(Command::SetPlayRange { seconds: None }),
-            Action::ToggleSpin => self.input.toggle_spin(now),
+            Action::ToggleSpin => {
+                if !self.input.is_spinning() {
+                    // What was last orbited about may be a point of the floor.
+                    self.session.send(Command::PivotOnMiddle);
+                }
+                self.input.toggle_spin(now);
+            }
             Action::PlayOrDrag if Strip::of(&self.session).is_some() => self.toggle_play(now),
             Action::PlayOrDrag | Action::ToggleDrag => self.toggle_drag(now),
             Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),

@@ -1,7 +1,7 @@
 //! Images and frames that are rendered to files beside the window.
 
 use crate::console;
-use crate::frame::Reel;
+use crate::frame::{Command, Reel};
 use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::order::{Order, Subject};
@@ -21,6 +21,10 @@ impl App {
         if frames && turns {
             // Its image needs a view that rests.
             self.input.toggle_spin(now);
+        }
+        if frames && !turns {
+            // As for a turntable that is seen first.
+            self.session.send(Command::PivotOnMiddle);
         }
         self.form.open(&self.session, frames, turns, &self.options.folder);
     }
