@@ -111,8 +111,7 @@ struct SceneReport<'a> {
 
 impl SceneReport<'_> {
     fn n_hidden(&self) -> usize {
-        let hidden = &self.inputs.hidden;
-        hidden.objects.len() + hidden.lights.len()
+        self.inputs.hidden.entities().count()
     }
 
     /// As text.

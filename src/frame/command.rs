@@ -196,7 +196,7 @@ pub enum Command {
     /// Set when to stop.
     SetTarget(Target),
     /// Report that the image is not visible: rendering stops without being paused.
-    SetHidden {
+    SetWindowHidden {
         /// Whether the image is not visible.
         hidden: bool,
     },

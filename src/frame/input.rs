@@ -12,8 +12,8 @@ use crate::frame::scene_cameras::{beside, cameras_of};
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::Explaining;
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState,
-    Renderer, StopAt, Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, FreeShare, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState, Renderer,
+    StopAt, Threads, ViewMode, WantedMoment, WindowHidden,
 };
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
@@ -21,9 +21,7 @@ use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::frame::walls::within_walls;
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
-use crate::scene::{
-    DisplaySettings, Extent, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View,
-};
+use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 use glam::{DVec2, DVec3};
@@ -48,7 +46,7 @@ pub struct CommandParams<'w, 's> {
     free: ResMut<'w, FreeShare>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
-    hidden: ResMut<'w, Hidden>,
+    hidden: ResMut<'w, WindowHidden>,
     stop_at: ResMut<'w, StopAt>,
     view_mode: ResMut<'w, ViewMode>,
     explaining: ResMut<'w, Explaining>,
@@ -117,13 +115,10 @@ impl CommandParams<'_, '_> {
                 }
             }
             Command::PivotOnMiddle => {
-                let points = self.what_to_frame();
-                let ends = points.iter().map(|point| (*point, *point)).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
-                if let (Some(rig), Some((min, max))) = (self.rig(), ends) {
-                    let Extent { center, radius } = self.around.extent;
-                    let is_outside = (rig.view.eye - center).length() > radius;
+                let around = navigation::box_around(self.what_to_frame());
+                if let (Some(rig), Some((min, max))) = (self.rig(), around) {
                     let depth = (0.5 * (min + max) - rig.view.eye).dot(rig.view.forward);
-                    if depth > 0.0 && (is_outside || !self.selection.0.is_empty()) {
+                    if depth > 0.0 && (self.around.is_outside(rig.view.eye) || !self.selection.0.is_empty()) {
                         self.set_rig(Rig { view: View { pivot_distance: depth, ..rig.view }, ..rig });
                     }
                 }
@@ -154,7 +149,7 @@ impl CommandParams<'_, '_> {
             Command::AdvanceMoment { seconds } => self.moment.advance += seconds,
             Command::SetPlayRange { seconds } => *self.range = PlayRange(seconds),
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
-            Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
+            Command::SetWindowHidden { hidden } => drop(self.hidden.set_if_neq(WindowHidden(hidden))),
             Command::SetInspection(inspection) => {
                 let look = crate::frame::ViewOptions { inspection, ..self.view_mode.0 };
                 self.view_mode.set_if_neq(ViewMode(look));
@@ -378,8 +373,7 @@ impl CommandParams<'_, '_> {
         }
         let RenderState { inputs, extents, .. } = &mut *self.shown;
         let object = inputs.objects.iter().find(|object| object.entity == active)?;
-        let corners = extents.corners_of(object).into_iter().map(|corner| (corner, corner));
-        let (min, max) = corners.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))?;
+        let (min, max) = navigation::box_around(extents.corners_of(object))?;
         let middle = 0.5 * (min + max);
         let place = Projector::new(rig, DVec2::new(self.size.aspect(), 1.0)).place(middle);
         let seen = place.and_then(|place| self.pick(place.x / self.size.aspect(), place.y));

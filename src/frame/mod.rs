@@ -65,8 +65,8 @@ pub use crate::frame::state::explain::{
 pub use crate::frame::state::history::History;
 pub use crate::frame::state::remake::MeshMeasure;
 pub use crate::frame::state::resources::{
-    CurrentScene, FrameChanges, FreeShare, Hidden, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads,
-    ViewMode,
+    CurrentScene, FrameChanges, FreeShare, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads, ViewMode,
+    WindowHidden,
 };
 pub use crate::frame::state::selection::{OwnBox, Picked, Projector, Selection, active_part, pick};
 pub use camera_path::{along, turntable};

@@ -41,6 +41,11 @@ impl SceneBounds {
         }
     }
 
+    /// Whether a position is outside of all that has an end: in front of things, not in a room.
+    pub fn is_outside(&self, eye: DVec3) -> bool {
+        (eye - self.extent.center).length() > self.extent.radius
+    }
+
     /// Whether a camera at this position sees nothing but the back of the ground.
     pub fn is_below_ground(&self, eye: DVec3) -> bool {
         self.ground.is_some_and(|ground| eye.y < ground)

@@ -19,8 +19,8 @@ use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::{Explaining, explain_pixel};
 use crate::frame::state::history::{History, notice, remember};
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FrameChanges, FreeShare, Hidden, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
-    RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
+    Clock, CurrentScene, FrameChanges, FreeShare, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
+    RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment, WindowHidden,
 };
 use crate::frame::state::seen_lights::{axis_of, light_at};
 use crate::frame::state::selection::{ActivePart, OwnBox, Selection};
@@ -167,7 +167,7 @@ impl Session {
         world.init_resource::<Focus>();
         world.init_resource::<Bookmarks>();
         world.init_resource::<ViewTrail>();
-        world.init_resource::<Hidden>();
+        world.init_resource::<WindowHidden>();
         world.init_resource::<ViewMode>();
         world.init_resource::<RenderRegion>();
         world.init_resource::<Explaining>();
@@ -373,8 +373,7 @@ impl Session {
 
     /// Whether the camera is outside of all that has an end: in front of things, not in a room.
     pub fn is_outside(&self) -> bool {
-        let SceneBounds { extent, .. } = *self.world.resource::<SceneBounds>();
-        (self.status().rig.view.eye - extent.center).length() > extent.radius
+        self.world.resource::<SceneBounds>().is_outside(self.status().rig.view.eye)
     }
 
     /// The box around an object or a light, along its own axes.

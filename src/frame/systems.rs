@@ -7,8 +7,8 @@ use crate::frame::navigation;
 use crate::frame::scene_bounds::{SceneBounds, ground_below};
 use crate::frame::state::background::{BackgroundTasks, Finished};
 use crate::frame::state::resources::{
-    Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, ShownMoment, StopAt,
-    Threads, ViewMode,
+    Clock, FrameChanges, Paused, PictureSize, RenderRegion, RenderState, Renderer, ShownMoment, StopAt, Threads,
+    ViewMode, WindowHidden,
 };
 use crate::frame::state::selection::Selection;
 use crate::frame::worker::{Job, Orders};
@@ -360,7 +360,7 @@ pub fn accumulate(
     stop_at: Res<StopAt>,
     threads: Res<Threads>,
     paused: Res<Paused>,
-    hidden: Res<Hidden>,
+    hidden: Res<WindowHidden>,
     size: Res<PictureSize>,
     brush: Res<RenderRegion>,
     (renderer, beside): (Res<Renderer>, Res<BackgroundTasks>),

@@ -6,8 +6,8 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::name::Name;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
-    Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, History, MeshMeasure, NewThing, Projector,
-    Property, Selection, Session, SessionOptions, Target, wanted_mesh,
+    Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
+    Selection, Session, SessionOptions, Target, wanted_mesh,
 };
 use firstlight::render::{Environment, Inspection, Integrator, MaterialKind};
 use firstlight::scene::animation::LightProperty;
@@ -21,9 +21,14 @@ use glam::{DVec2, DVec3, Vec3};
 impl Driver {
     /// A small picture of a scene, with two samples a pixel.
     pub fn builtin(name: &str) -> Self {
+        Self::opened(SceneSource::Builtin(name.to_owned()))
+    }
+
+    /// The same of any scene.
+    pub fn opened(source: SceneSource) -> Self {
         let target = Target { spp: Some(2), ..Target::default() };
         let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
-        let mut driver = Self::new(options, SceneSource::Builtin(name.to_owned()));
+        let mut driver = Self::new(options, source);
         driver.settle();
         driver
     }
@@ -322,39 +327,6 @@ fn what_comes_back_is_selected_as_it_was_when_it_came() {
         Edit::Undo,
     ]);
     assert_eq!(driver.selected().0, []);
-}
-
-#[test]
-fn what_is_hidden_is_left_out_of_the_image_but_not_of_the_lists() {
-    let mut driver = Driver::builtin("gallery");
-    let counts = |driver: &Driver| {
-        let inputs = driver.session.inputs();
-        let inventory = driver.session.inventory();
-        (inputs.objects.len(), inputs.lights.len(), inventory.objects.len(), inventory.lights.len())
-    };
-    driver.edit([Edit::Add(NewThing::PointLight)]);
-    let light = driver.named("point light").to_bits();
-    let all = counts(&driver);
-    let ball = driver.select("gold ball");
-    driver.edit([Edit::Hide { others: false }]);
-    assert!(!driver.has("gold ball") && driver.selected().0.is_empty());
-    assert_eq!(counts(&driver), (all.0 - 1, all.1, all.2, all.3));
-    assert_eq!(driver.session.world().resource::<History>().undo_label(), Some("hide `gold ball`"));
-    driver.edit([Edit::Undo]);
-    assert!(driver.has("gold ball") && driver.selected().0.len() == 1);
-    driver.edit([Edit::SetHidden { id: light, hidden: true }]);
-    assert_eq!(counts(&driver), (all.0, all.1 - 1, all.2, all.3));
-    driver.edit([Edit::Hide { others: true }]);
-    assert_eq!(counts(&driver), (1, 0, all.2, all.3));
-    let order: Vec<String> = driver.session.inventory().objects.into_iter().map(|entry| entry.label).collect();
-    driver.edit([Edit::ShowAll]);
-    assert_eq!((counts(&driver), driver.selected().0.len()), (all, all.2 - 1));
-    let shown: Vec<String> = driver.session.inventory().objects.into_iter().map(|entry| entry.label).collect();
-    assert_eq!(order, shown, "lists keep the order of the file");
-    driver.edit([Edit::SelectNone, Edit::Hide { others: false }, Edit::Hide { others: true }, Edit::ShowAll]);
-    assert_eq!(counts(&driver), all, "nothing is selected, nothing is hidden: nothing happens");
-    driver.edit([Edit::SetHidden { id: ball, hidden: false }]);
-    assert_eq!(counts(&driver), all);
 }
 
 #[test]

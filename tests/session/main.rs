@@ -16,3 +16,4 @@ mod random;
 mod reopening;
 mod reset;
 mod session;
+mod visibility;

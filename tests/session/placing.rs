@@ -27,11 +27,7 @@ fn model(folder: &Path, size: f64) -> Driver {
     });
     let path = folder.join("pyramid.obj");
     std::fs::write(&path, lines.collect::<String>()).unwrap();
-    let target = Target { spp: Some(2), ..Target::default() };
-    let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
-    let mut driver = Driver::new(options, SceneSource::Model(path));
-    driver.settle();
-    driver
+    Driver::opened(SceneSource::Model(path))
 }
 
 /// Where a point is in an image of 480 × 320.
@@ -355,10 +351,7 @@ fn things_stand_on_a_table_and_the_parts_of_a_thing_stay_together() {
         ],
     )"#;
     std::fs::write(&path, text).unwrap();
-    let target = Target { spp: Some(1), ..Target::default() };
-    let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
-    let mut driver = Driver::new(options, SceneSource::Scene(path));
-    driver.settle();
+    let mut driver = Driver::opened(SceneSource::Scene(path));
     let height = |driver: &Driver, name: &str| driver.get::<Placement>(name).translation.y;
     for (name, expected) in [("cup", 2.5), ("sunk", 2.5), ("beside", 0.5)] {
         driver.select(name);
@@ -434,6 +427,30 @@ fn what_turns_by_itself_turns_about_what_is_shown() {
     driver.session.send(Command::PivotOnMiddle);
     driver.frame();
     assert_eq!(depth(&driver).0, 0.1);
+}
+
+#[test]
+fn moves_of_the_camera_are_undone_one_by_one() {
+    let mut driver = Driver::builtin("gi-ball");
+    let (start, mut now) = (driver.session.status().rig.view, driver.start.elapsed());
+    let mut turn = |driver: &mut Driver, pause_ms: u64| {
+        now += std::time::Duration::from_millis(pause_ms);
+        driver.session.send(Command::Orbit { yaw_deg: 10.0, pitch_deg: 0.0 });
+        driver.session.update(now);
+        driver.session.status().rig.view
+    };
+    // One drag, of three events; then another.
+    turn(&mut driver, 3000);
+    turn(&mut driver, 100);
+    let turned = turn(&mut driver, 100);
+    turn(&mut driver, 3000);
+    let mut undo = || {
+        driver.session.send(Command::Edit(Edit::Undo));
+        now += std::time::Duration::from_millis(100);
+        driver.session.update(now);
+        driver.session.status().rig.view
+    };
+    assert_eq!([undo(), undo()], [turned, start]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! A removed entity stays and only loses its components, so that undo restores the same entity and all references to it
 //! are valid again.
 
-use crate::frame::edit::new_entity::{free_name, new_material, next_ordinal, plain_name, sized, spawn};
+use crate::frame::edit::new_entity::{first_and_more, free_name, new_material, next_ordinal, plain_name, sized, spawn};
 use crate::frame::edit::spot;
 use crate::frame::edit::spot::Spot;
 use crate::frame::edit::standing::lowest;
@@ -160,16 +160,11 @@ fn add_object(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity>
 /// Deletes what is selected, and says what that was: it may be behind something, or all around.
 pub fn delete(world: &mut World) {
     let selected = std::mem::take(&mut world.resource_mut::<Selection>().0);
-    let Some(first) = selected.first() else { return };
-    let name = world.get::<Name>(*first).map_or("an object", |name| name.as_str()).to_owned();
-    let deleted = match selected.len() {
-        1 => format!("deleted: {name}"),
-        n => format!("deleted: {name} and {} more", n - 1),
-    };
+    let Some(what) = first_and_more(world, &selected) else { return };
     for entity in selected {
         EntityState::default().put(world, entity);
     }
-    crate::frame::edit::keys::say(world, deleted);
+    crate::frame::edit::keys::say(world, format!("deleted: {what}"));
 }
 
 /// Copies the selection, and selects the copies.

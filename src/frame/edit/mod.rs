@@ -321,9 +321,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             world.resource_mut::<ActivePart>().0 = part.map(|part| (entity, part as usize));
         }
         Edit::SelectAll => {
-            let inputs = &world.resource::<RenderState>().inputs;
-            let objects = inputs.objects.iter().map(|object| object.entity);
-            let all = objects.chain(inputs.lights.iter().map(|light| light.entity)).collect();
+            let all = world.resource::<RenderState>().inputs.entities().collect();
             world.resource_mut::<Selection>().0 = all;
         }
         Edit::SelectUsers { material } => {

@@ -11,6 +11,15 @@ pub fn sized(placement: Placement, factor: f64) -> Placement {
     Placement { linear, ..placement }
 }
 
+/// The name of the first of some entities, and how many more there are; `None` without any.
+pub fn first_and_more(world: &World, entities: &[Entity]) -> Option<String> {
+    let name = world.get::<Name>(*entities.first()?).map_or("an object", |name| name.as_str());
+    Some(match entities.len() {
+        1 => name.to_owned(),
+        n => format!("{name} and {} more", n - 1),
+    })
+}
+
 /// Spawns an entity with a unique name, last in the order of the scene file.
 pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundle) -> Entity {
     let (name, ordinal) = (free_name(world, name, false), next_ordinal(world));

@@ -5,7 +5,7 @@
 //! sight, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
-use crate::frame::navigation::Rig;
+use crate::frame::navigation::{Rig, box_around};
 use crate::frame::state::resources::{FreeShare, PictureSize, RenderState};
 use crate::frame::state::selection::{Projector, Selection, box_of, distance, pick};
 use crate::scene::{Extraction, Shape, View, is_emitter};
@@ -143,15 +143,14 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
     LightSpot { place: view.eye + share * (place - view.eye), subject, radius }
 }
 
-/// Centre and radius of a ball around the boxes of objects; `None` without any that has an end.
+/// Centre and radius of a ball around the boxes of objects that are to be lit; `None` without any that has an end. An
+/// area light, such as one that was just added, needs no light.
 fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
     let objects = entities.iter().filter_map(|&entity| {
         world.get::<Shape>(entity)?;
-        // Of an area light that was just added, the light beside it would light nothing.
         if is_emitter(world, entity) { None } else { box_of(world, entity) }
     });
-    let corners = objects.flat_map(|own| own.corners()).map(|corner| (corner, corner));
-    let (min, max) = corners.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))?;
+    let (min, max) = box_around(objects.flat_map(|own| own.corners()))?;
     (min != max).then_some((0.5 * (min + max), 0.5 * (max - min).length()))
 }
 

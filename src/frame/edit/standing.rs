@@ -1,6 +1,7 @@
 //! Selected objects upright, and on what is below them.
 
 use crate::frame::edit::place::{Change, about_middle, changed};
+use crate::frame::navigation::box_around;
 use crate::frame::state::resources::RenderState;
 use crate::frame::state::selection::{OwnBox, Selection, box_of, distance_past};
 use crate::scene::{GAP_TO_GROUND, Placement, Shape, lowest_point};
@@ -35,9 +36,7 @@ fn stand(world: &mut World, turned: impl Fn(&mut World, Entity, &Placement, DVec
     }
     let ends = |placed: &[Placement]| -> Option<(DVec3, DVec3)> {
         let boxes = selected.iter().zip(placed);
-        let corners =
-            boxes.flat_map(|((.., own), placement)| OwnBox { world_from_box: placement.affine(), ..*own }.corners());
-        corners.map(|corner| (corner, corner)).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
+        box_around(boxes.flat_map(|((.., own), now)| OwnBox { world_from_box: now.affine(), ..*own }.corners()))
     };
     let before: Vec<Placement> = selected.iter().map(|(_, _, placement, _)| *placement).collect();
     let Some((low, high)) = ends(&before) else { return };

@@ -1,10 +1,10 @@
 //! Hiding objects and lights, and showing them again.
 
 use crate::frame::edit::keys::say;
+use crate::frame::edit::new_entity::first_and_more;
 use crate::frame::state::resources::RenderState;
 use crate::frame::state::selection::Selection;
 use crate::scene::Hidden;
-use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 
 /// Hides the selection, or all objects and lights but the selection, and says what that was.
@@ -16,30 +16,21 @@ pub fn hide(world: &mut World, others: bool) -> Result<(), String> {
     let wanted = match others {
         false => selected,
         true => {
-            let inputs = &world.resource::<RenderState>().inputs;
-            let objects = inputs.objects.iter().map(|object| object.entity);
-            let all = objects.chain(inputs.lights.iter().map(|light| light.entity));
+            let all = world.resource::<RenderState>().inputs.entities();
             all.filter(|entity| !selected.contains(entity)).collect()
         }
     };
-    let Some(&first) = wanted.first() else { return Err("there is nothing else that could be hidden".to_owned()) };
-    for &entity in &wanted {
+    let what = first_and_more(world, &wanted).ok_or("there is nothing else that could be hidden")?;
+    for entity in wanted {
         set_hidden(world, entity, true);
     }
-    let name = world.get::<Name>(first).map_or("an object", |name| name.as_str());
-    let what = match wanted.len() {
-        1 => name.to_owned(),
-        n => format!("{name} and {} more", n - 1),
-    };
     say(world, format!("hidden: {what} (Edit > Show all that is hidden)"));
     Ok(())
 }
 
 /// Shows all that is hidden, and selects it.
 pub fn show_all(world: &mut World) -> Result<(), String> {
-    let hidden = &world.resource::<RenderState>().inputs.hidden;
-    let objects = hidden.objects.iter().map(|(_, object)| object.entity);
-    let all: Vec<Entity> = objects.chain(hidden.lights.iter().map(|(_, light)| light.entity)).collect();
+    let all: Vec<Entity> = world.resource::<RenderState>().inputs.hidden.entities().collect();
     if all.is_empty() {
         return Err("nothing is hidden".to_owned());
     }

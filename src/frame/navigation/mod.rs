@@ -11,8 +11,8 @@ mod moves;
 
 pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
 pub use moves::{
-    VERTICAL, dolly_above, fly, frame_points, frame_rig, in_parallel, in_perspective, level, orbit, orbit_above, pan,
-    roll, turn, view_from, view_from_behind, zoom,
+    VERTICAL, box_around, dolly_above, fly, frame_points, frame_rig, in_parallel, in_perspective, level, orbit,
+    orbit_above, pan, roll, turn, view_from, view_from_behind, zoom,
 };
 
 pub use crate::frame::core::rig::{Rig, Side, Turning};

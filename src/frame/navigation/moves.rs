@@ -173,12 +173,16 @@ fn about_pivot(view: &View, forward: DVec3, up: DVec3) -> View {
     finite_or(view, View { eye: view.pivot() - forward * view.pivot_distance, forward, up, ..*view })
 }
 
+/// The lowest and the highest coordinates of points; `None` without any.
+pub fn box_around(points: impl IntoIterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    points.into_iter().map(|point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)))
+}
+
 /// Like [`frame_points`], for both kinds of cameras: an orthographic one gets the height that the points need, and is
 /// placed in front of all of them.
 pub fn frame_rig(rig: &Rig, aspect: f64, points: &[DVec3]) -> Rig {
     let Rig { view, projection, .. } = *rig;
-    let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
-    let (Some(_), Some((min, max))) = (projection.orthographic_height, around) else {
+    let (Some(_), Some((min, max))) = (projection.orthographic_height, box_around(points.iter().copied())) else {
         return Rig { view: frame_points(&view, &projection, aspect, points), ..*rig };
     };
     let middle = 0.5 * min + 0.5 * max;
@@ -200,8 +204,7 @@ pub fn frame_rig(rig: &Rig, aspect: f64, points: &[DVec3]) -> Rig {
 /// over height), with a margin; the pivot gets the depth of the centre of their box. For a single point the distance is
 /// kept; without points, the view.
 pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &[DVec3]) -> View {
-    let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
-    let Some((min, max)) = around else { return *view };
+    let Some((min, max)) = box_around(points.iter().copied()) else { return *view };
     let middle = 0.5 * min + 0.5 * max;
     if min == max {
         return finite_or(view, View { eye: middle - view.forward * view.pivot_distance, ..*view });

@@ -69,7 +69,7 @@ pub struct Paused(pub bool);
 
 /// The image is not visible: rendering stops, whatever else is requested.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hidden(pub bool);
+pub struct WindowHidden(pub bool);
 
 /// What is displayed in place of the image and over it; samples do not depend on it.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -39,6 +39,14 @@ pub struct HiddenInputs {
     pub lights: Vec<(usize, LightInput)>,
 }
 
+impl HiddenInputs {
+    /// The entities of all of it: objects, then lights.
+    pub fn entities(&self) -> impl Iterator<Item = Entity> + '_ {
+        let objects = self.objects.iter().map(|(_, object)| object.entity);
+        objects.chain(self.lights.iter().map(|(_, light)| light.entity))
+    }
+}
+
 /// The data of an object that the image depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectInput {
@@ -192,6 +200,11 @@ impl SceneInputs {
             .get(world)
             .expect("queries of optional things are always valid")
             .collect()
+    }
+
+    /// The entities of all objects and lights that are not hidden: objects, then lights.
+    pub fn entities(&self) -> impl Iterator<Item = Entity> + '_ {
+        self.objects.iter().map(|object| object.entity).chain(self.lights.iter().map(|light| light.entity))
     }
 
     /// The same with all that is hidden at its place among the others.

@@ -84,7 +84,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.resized(),
             WindowEvent::Occluded(occluded) => {
                 self.occluded = occluded;
-                self.session.send(Command::SetHidden { hidden: occluded });
+                self.session.send(Command::SetWindowHidden { hidden: occluded });
                 self.repaint_at = Some(now);
             }
             WindowEvent::Focused(false) => {

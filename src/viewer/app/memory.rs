@@ -412,6 +412,9 @@ mod tests {
         assert_eq!((second.keep_window((700, 500)), second.navigation()), (None, Navigation::Maya));
         assert_eq!(second.store.settings().0.window, Some((700, 500)));
         assert_eq!(second.store.settings().0.recent[1..], ["cornell", "ball"]);
+        // What is gone is not offered.
+        std::fs::remove_file(folder.path().join("room.ron")).unwrap();
+        assert_eq!(memory().recent, ["cornell", "ball"]);
     }
 
     /// As on a full disk: a bookmark is not said to be saved.

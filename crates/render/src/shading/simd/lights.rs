@@ -107,8 +107,10 @@ impl<S: Simd> Kernel<S> for AllLights<'_, '_, S> {
         }
         let zero = u[0].all(0.0);
         let (side, normal) = if both_sides { (Vector::all(zero), None) } else { (normal, Some(normal)) };
-        let Some(environment) = environment else { return points_on_lights(asked, mask, normal, u_select, u) };
-        let share = environment.share(position, side);
+        let share = match &environment {
+            Some(environment) => environment.share(position, side),
+            None => zero,
+        };
         let outside = mask & u_select.lt(share);
         let inside = mask & !outside;
         let mut points = FoundLights::none(zero);
@@ -117,9 +119,7 @@ impl<S: Simd> Kernel<S> for AllLights<'_, '_, S> {
             points = points_on_lights(asked, inside, normal, rest.at_least(0.0).at_most(1.0f32.next_down()), u);
             points.pdf = points.pdf * (zero.all(1.0) - share);
         }
-        if outside == 0 {
-            return points;
-        }
+        let Some(environment) = environment.filter(|_| outside != 0) else { return points };
         let (found, wi, pdf) = environment.sample_lanes(outside, position, normal, u);
         let radiance = scene.shading.environment.radiance_lanes(outside, wi);
         FoundLights {

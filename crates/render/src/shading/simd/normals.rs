@@ -55,7 +55,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let mut found = TangentLanes {
             along_u: select_vector(is_flat, p, along_u),
             handedness: select(is_left, -one, one),
-            known: at.mask,
+            known: mask,
             is_final: 0,
             is_mapped: 0,
         };
