@@ -27,6 +27,8 @@ const UNCERTAIN_GAIN: f32 = 0.5;
 /// around, but at least this square of a level.
 const LARGEST_EXCESS: f32 = 4.0;
 const LEAST_LIMIT: f32 = 0.2;
+/// How much doubt in detail counts for significance.
+const DOUBT: f32 = 0.05;
 /// Level of pixels that show an emitter in part: their own value less this multiple of the step.
 const EMITTER_STEPS: f32 = 0.5;
 
@@ -73,7 +75,8 @@ impl Comparison {
             let square = SQUARE_OF_EXCESS * squares[i].max(0.0);
             let deviation = SIGNIFICANCE * (square / n_averaged(RADIUS)).sqrt();
             let limited = limited_of_all[i].min(limited_of_usual[i]).max(0.0);
-            let ratio = limited / deviation.hypot(uncertainty * variance[i]).max(1e-30);
+            let doubt = 1.0 + DOUBT * noise.doubt[i];
+            let ratio = limited / (doubt * deviation.hypot(uncertainty * variance[i])).max(1e-30);
             excess - excess / (1.0 + ratio.powi(4))
         })?;
         Some(Self {

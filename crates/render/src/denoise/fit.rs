@@ -1,12 +1,13 @@
 //! The best linear function of the features in one window, and its error.
 
 use crate::denoise::moments::{
-    Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SCATTER, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product,
+    Blocks, COUNT, FEATURE, LIGHT, MIXED, N_CHANNELS, N_FEATURES, SCATTER, SQUARE, Sums, VARIANCE, WEIGHT, X, Y,
+    product,
 };
 use crate::denoise::noise::significant_part;
 use crate::denoise::parallel::{Stop, each};
 use bytemuck::Zeroable;
-use glam::Vec3;
+use glam::Vec4;
 
 /// Lower limit of the squared misfit of light over albedo: a fit without noise and misfit in its window is still
 /// uncertain for pixels with other features.
@@ -27,9 +28,9 @@ pub(super) struct Fit {
     mean: [f32; N_FEATURES],
     /// One over the variance of each feature plus the ridge term.
     precision: [f32; N_FEATURES],
-    /// Mean light of the window, per channel.
-    light: [f32; 3],
-    slope: [[f32; 3]; N_FEATURES],
+    /// Mean of the window, per channel.
+    light: Vec4,
+    slope: [Vec4; N_FEATURES],
     /// Mean squared residual of the fit minus the noise: the part that no fit of this kind can explain.
     pub misfit: f32,
     /// Mean variance of the noise in the window.
@@ -44,7 +45,8 @@ pub(super) struct Fit {
 
 /// Prediction of a fit for one pixel.
 pub(super) struct Prediction {
-    pub light: Vec3,
+    /// Light over albedo, and its noise.
+    pub light: Vec4,
     /// 1 + squared distance from the mean features in standard deviations.
     distance: f32,
     inverse_count: f32,
@@ -68,13 +70,13 @@ impl Fit {
     /// - `features`: with the position relative to the centre of the window's central block.
     #[inline(always)]
     pub fn predict(&self, features: &[f32; N_FEATURES]) -> Prediction {
-        let (mut light, mut distance) = (Vec3::from(self.light), 1.0);
+        let (mut light, mut distance) = (self.light, 1.0);
         for (((feature, mean), precision), slope) in
             features.iter().zip(&self.mean).zip(&self.precision).zip(&self.slope)
         {
             let off = feature - mean;
             distance += off * off * precision;
-            light += off * Vec3::from(*slope);
+            light += off * *slope;
         }
         Prediction { light, distance, inverse_count: self.inverse_count }
     }
@@ -141,7 +143,7 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES], significance: f32) -> Fit {
     let inverse_weight = 1.0 / sums[WEIGHT].max(1e-20);
     let inverse_count = 1.0 / sums[COUNT].max(1.0);
     let mean: [f32; N_FEATURES] = std::array::from_fn(|i| sums[FEATURE + i] * inverse_weight);
-    let light: [f32; 3] = std::array::from_fn(|c| sums[LIGHT + c] * inverse_weight);
+    let light = Vec4::from_array(std::array::from_fn(|c| sums[LIGHT + c] * inverse_weight));
     let (mut factor, mut precision, mut freedom) = ([[0.0; N_FEATURES]; N_FEATURES], [0.0; N_FEATURES], 1.0);
     for i in 0..N_FEATURES {
         for j in i..N_FEATURES {
@@ -169,11 +171,11 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES], significance: f32) -> Fit {
             factor[i][j] = sum * reciprocal;
         }
     }
-    let mut slope = [[0.0; 3]; N_FEATURES];
+    let mut slope = [Vec4::ZERO; N_FEATURES];
     let mut unexplained = sums[SQUARE] * inverse_weight;
-    for c in 0..3 {
+    for c in 0..N_CHANNELS {
         let covariance: [f32; N_FEATURES] =
-            std::array::from_fn(|i| sums[MIXED + 3 * i + c] * inverse_weight - mean[i] * light[c]);
+            std::array::from_fn(|i| sums[MIXED + N_CHANNELS * i + c] * inverse_weight - mean[i] * light[c]);
         let mut solution = covariance;
         for i in 0..N_FEATURES {
             for k in 0..i {
@@ -187,10 +189,13 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES], significance: f32) -> Fit {
             }
             solution[i] *= factor[i][i];
         }
-        unexplained -= light[c] * light[c];
+        let mut explained = light[c] * light[c];
         for i in 0..N_FEATURES {
-            unexplained -= solution[i] * (covariance[i] + solution[i] * ridge[i]);
+            explained += solution[i] * (covariance[i] + solution[i] * ridge[i]);
             slope[i][c] = solution[i];
+        }
+        if c < 3 {
+            unexplained -= explained;
         }
     }
     let residual = unexplained.max(0.0);

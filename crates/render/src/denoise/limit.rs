@@ -58,7 +58,11 @@ pub(super) fn limit(
     })?;
     fill(&mut samples.light, AT_ONCE, stop, |part, light| {
         let first = part * AT_ONCE;
-        light.iter_mut().zip(&excess[first..]).zip(&albedo[first..]).for_each(|((to, excess), by)| *to -= excess / by);
+        for ((i, light), excess) in (first..).zip(light).zip(&excess[first..]) {
+            let (step, late) = limited(i);
+            *light -= (excess / albedo[i]).extend(0.0);
+            light.w = (halves.change(i, step, late) / albedo[i]).element_sum();
+        }
     })?;
     fill(&mut samples.variance, AT_ONCE, stop, |part, variance| {
         for (i, variance) in (part * AT_ONCE..).zip(variance) {
@@ -79,6 +83,7 @@ mod tests {
     use super::*;
     use crate::denoise::Guides;
     use crate::film::halves::HalfSteps;
+    use glam::Vec4Swizzles;
 
     const WIDTH: usize = 40;
     const HEIGHT: usize = 30;
@@ -117,13 +122,13 @@ mod tests {
             width: WIDTH,
             height: HEIGHT,
             features: vec![[0.0; 7]; N],
-            light: light.clone(),
+            light: light.iter().map(|light| light.extend(0.0)).collect(),
             variance,
             weight: vec![1.0; N],
         };
         let excess = limit(&input, &albedo, &at_emitters, &mut samples, &|| false).unwrap();
-        let others = (0..N).any(|i| i != FIREFLY && (samples.light[i] != light[i] || excess[i] != Vec3::ZERO));
-        (samples.light[FIREFLY], samples.variance[FIREFLY], excess[FIREFLY], others)
+        let others = (0..N).any(|i| i != FIREFLY && (samples.light[i].xyz() != light[i] || excess[i] != Vec3::ZERO));
+        (samples.light[FIREFLY].xyz(), samples.variance[FIREFLY], excess[FIREFLY], others)
     }
 
     #[test]

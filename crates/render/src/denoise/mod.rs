@@ -9,6 +9,7 @@ mod blur;
 mod combine;
 mod comparison;
 mod denoised;
+mod doubt;
 mod energy;
 mod fit;
 mod input;
@@ -273,34 +274,54 @@ mod tests {
         assert!((0.9..1.02).contains(&kept), "{kept}");
     }
 
-    /// A quarter of the samples carries nearly all light, as in a room that a window lights.
-    #[test]
-    fn rare_bright_samples_leave_no_spots_on_a_smooth_wall() {
+    /// A wall whose samples are dark but for one in `one_in`, as in a room that a window lights: denoised, relative to
+    /// the reference.
+    fn denoised_wall(one_in: u32, spp: u32) -> Vec<f32> {
         let scene = Scene::of(|x, _| (0.8, Vec3::splat(1.0 + 0.3 * x as f32 / WIDTH as f32)));
         let sample = |pixel: usize, k: u32| {
-            let is_bright = hash_combine(hash_u32(pixel as u32), k).is_multiple_of(4);
-            if is_bright { 3.7 } else { 0.1 }
+            let is_bright = hash_combine(hash_u32(pixel as u32), k).is_multiple_of(one_in);
+            if is_bright { 0.1 + 0.9 * one_in as f32 } else { 0.1 }
         };
+        let mut rendered = scene.render(2, 0.0);
+        for (pixel, truth) in scene.truth.iter().enumerate() {
+            let mean = |samples: std::ops::Range<u32>| {
+                let n = samples.len() as f32;
+                *truth * samples.map(|k| sample(pixel, k)).sum::<f32>() / n
+            };
+            let halves = if spp == 1 { [mean(0..1); 2] } else { [mean(0..spp / 2), mean(spp / 2..spp)] };
+            rendered.color[pixel] = 0.5 * (halves[0] + halves[1]);
+            rendered.halves.steps[pixel] = 0.5 * (halves[1] - halves[0]);
+        }
+        let found = scene.denoise(&rendered, spp > 1).color;
+        found.iter().zip(&scene.truth).map(|(found, truth)| found.x / truth.x).collect()
+    }
+
+    /// 99th percentile of the absolute difference of two images.
+    fn most_of(a: &[f32], b: &[f32]) -> f32 {
+        let mut off: Vec<f32> = a.iter().zip(b).map(|(a, b)| (a - b).abs()).collect();
+        off.sort_by(f32::total_cmp);
+        off[off.len() * 99 / 100]
+    }
+
+    #[test]
+    fn rare_bright_samples_leave_no_spots_on_a_smooth_wall() {
         for spp in [1, 2, 4, 8, 16] {
-            let mut rendered = scene.render(2, 0.0);
-            for (pixel, truth) in scene.truth.iter().enumerate() {
-                let mean = |samples: std::ops::Range<u32>| {
-                    let n = samples.len() as f32;
-                    *truth * samples.map(|k| sample(pixel, k)).sum::<f32>() / n
-                };
-                let halves = if spp == 1 { [mean(0..1); 2] } else { [mean(0..spp / 2), mean(spp / 2..spp)] };
-                rendered.color[pixel] = 0.5 * (halves[0] + halves[1]);
-                rendered.halves.steps[pixel] = 0.5 * (halves[1] - halves[0]);
-            }
-            let found = scene.denoise(&rendered, spp > 1).color;
-            let relative: Vec<f32> = found.iter().zip(&scene.truth).map(|(found, truth)| found.x / truth.x).collect();
-            let mean = blur::blur(&relative, WIDTH, HEIGHT, 2, &|| false).unwrap();
-            let mut fine: Vec<f32> = relative.iter().zip(&mean).map(|(own, mean)| (own - mean).abs()).collect();
-            fine.sort_by(f32::total_cmp);
-            let most = fine[fine.len() * 99 / 100];
+            let wall = denoised_wall(4, spp);
+            let most = most_of(&wall, &blur::blur(&wall, WIDTH, HEIGHT, 2, &|| false).unwrap());
             // With one sample per pixel the noise is known from the residuals only.
             let allowed = if spp == 1 { 0.15 } else { 0.1 };
             assert!(most < allowed, "{spp} samples: the 99th percentile of fine variation is {most}");
+        }
+    }
+
+    /// Spots of the size of the smallest windows.
+    #[test]
+    fn small_windows_are_not_taken_for_a_bright_sample_more_or_less() {
+        for (one_in, spp, allowed) in [(8, 2, 0.15), (12, 4, 0.15), (16, 8, 0.13), (32, 8, 0.18)] {
+            let wall = denoised_wall(one_in, spp);
+            let mean = |radius| blur::blur(&wall, WIDTH, HEIGHT, radius, &|| false).unwrap();
+            let most = most_of(&mean(1), &mean(6));
+            assert!(most < allowed, "one in {one_in}, {spp} samples: the 99th percentile of spots is {most}");
         }
     }
 

@@ -7,7 +7,7 @@
 //! are added.
 
 use crate::denoise::parallel::{Stop, each};
-use glam::Vec3;
+use glam::{Vec4, Vec4Swizzles};
 
 /// Features per pixel: normal (3), nearness, position in the image (2), mean albedo.
 pub(super) const N_FEATURES: usize = 7;
@@ -15,14 +15,17 @@ pub(super) const N_FEATURES: usize = 7;
 pub(super) const X: usize = 4;
 pub(super) const Y: usize = 5;
 
-/// Layout of [`Sums`]: weights, features, products of features, light per channel, its products with features, squares
-/// of light, variances, their squares, and the number of pixels. All but the last are weighted.
+/// Channels that are fitted: three of light, and its noise.
+pub(super) const N_CHANNELS: usize = 4;
+
+/// Layout of [`Sums`]: weights, features, products of features, the channels, their products with features, squares of
+/// light, variances, their squares, and the number of pixels. All but the last are weighted.
 pub(super) const WEIGHT: usize = 0;
 pub(super) const FEATURE: usize = 1;
 const PRODUCT: usize = FEATURE + N_FEATURES;
 pub(super) const LIGHT: usize = PRODUCT + N_FEATURES * (N_FEATURES + 1) / 2;
-pub(super) const MIXED: usize = LIGHT + 3;
-pub(super) const SQUARE: usize = MIXED + 3 * N_FEATURES;
+pub(super) const MIXED: usize = LIGHT + N_CHANNELS;
+pub(super) const SQUARE: usize = MIXED + N_CHANNELS * N_FEATURES;
 pub(super) const VARIANCE: usize = SQUARE + 1;
 pub(super) const SCATTER: usize = VARIANCE + 1;
 pub(super) const COUNT: usize = SCATTER + 1;
@@ -44,8 +47,9 @@ pub(super) struct Samples {
     pub height: usize,
     /// Features; the position is zero here.
     pub features: Vec<[f32; N_FEATURES]>,
-    /// Light over albedo.
-    pub light: Vec<Vec3>,
+    /// Light over albedo, and as the last channel half of what the halves of the samples differ by, sum over channels; 0
+    /// if they are unknown.
+    pub light: Vec<Vec4>,
     /// Variance of `light`, sum over channels.
     pub variance: Vec<f32>,
     pub weight: Vec<f32>,
@@ -132,8 +136,8 @@ fn add_pixel(sums: &mut Sums, samples: &Samples, pixel: usize, x: f32, y: f32) {
     sums[COUNT] += 1.0;
     sums[VARIANCE] += weight * samples.variance[pixel];
     sums[SCATTER] += weight * samples.variance[pixel] * samples.variance[pixel];
-    sums[SQUARE] += weight * light.length_squared();
-    for c in 0..3 {
+    sums[SQUARE] += weight * light.xyz().length_squared();
+    for c in 0..N_CHANNELS {
         sums[LIGHT + c] += weight * light[c];
     }
     for i in 0..N_FEATURES {
@@ -142,8 +146,8 @@ fn add_pixel(sums: &mut Sums, samples: &Samples, pixel: usize, x: f32, y: f32) {
         for j in i..N_FEATURES {
             sums[product(i, j)] += feature * features[j];
         }
-        for c in 0..3 {
-            sums[MIXED + 3 * i + c] += feature * light[c];
+        for c in 0..N_CHANNELS {
+            sums[MIXED + N_CHANNELS * i + c] += feature * light[c];
         }
     }
 }
@@ -156,8 +160,8 @@ fn shift(sums: &mut Sums, feature: usize, by: f32) {
     for other in (0..N_FEATURES).filter(|&other| other != feature) {
         sums[product(feature, other)] += sums[FEATURE + other] * by;
     }
-    for c in 0..3 {
-        sums[MIXED + 3 * feature + c] += sums[LIGHT + c] * by;
+    for c in 0..N_CHANNELS {
+        sums[MIXED + N_CHANNELS * feature + c] += sums[LIGHT + c] * by;
     }
     sums[FEATURE + feature] += sums[WEIGHT] * by;
 }
@@ -174,7 +178,7 @@ mod tests {
             width,
             height,
             features: (0..n).map(features).collect(),
-            light: (0..n).map(|i| Vec3::new(number(i, 11), number(i, 12), number(i, 13))).collect(),
+            light: (0..n).map(|i| Vec4::new(number(i, 11), number(i, 12), number(i, 13), number(i, 16))).collect(),
             variance: (0..n).map(|i| number(i, 14)).collect(),
             weight: (0..n).map(|i| number(i, 15)).collect(),
         }

@@ -19,6 +19,10 @@ pub(super) struct Noise {
     /// evenly gain is known for the whole image only, and within a factor of two: where grains must not pass for detail,
     /// nothing is gained.
     pub independent: f32,
+    /// See [`crate::denoise::doubt::scatter`].
+    pub scatter: Vec<f32>,
+    /// See [`crate::denoise::doubt::doubt`].
+    pub doubt: Vec<f32>,
 }
 
 /// A filtered image.

@@ -10,6 +10,7 @@
 //! dominate over those that it does.
 
 use crate::denoise::blur::{Pooled, blur};
+use crate::denoise::doubt::{doubt, scatter};
 use crate::denoise::fit::Fits;
 use crate::denoise::input::DenoiseInput;
 use crate::denoise::limit::limit;
@@ -18,13 +19,15 @@ use crate::denoise::noise::{FilteredNoise, Noise};
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use crate::denoise::soften::soften;
 use bytemuck::Zeroable;
-use glam::Vec3;
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A pixel filtered by regression.
 #[derive(Clone, Copy, Zeroable)]
 pub(super) struct Candidate {
     /// Radiance.
     pub color: Vec3,
+    /// Half of what it would differ by between the halves of the samples, sum over channels, as of grey light.
+    pub noise: f32,
     /// Weight of the pixel's own value in its filtered value, 0..1.
     pub own: f32,
     /// Mean squared misfit of the windows, of light over albedo, sum over channels.
@@ -36,7 +39,8 @@ impl Candidate {
     fn mixed(&self, other: &Self, share: f32) -> Self {
         let mix = |own: f32, other: f32| own + (other - own) * share;
         let color = self.color.lerp(other.color, share);
-        Self { color, own: mix(self.own, other.own), misfit: mix(self.misfit, other.misfit) }
+        let noise = mix(self.noise, other.noise);
+        Self { color, noise, own: mix(self.own, other.own), misfit: mix(self.misfit, other.misfit) }
     }
 }
 
@@ -54,8 +58,10 @@ const N_LEVELS: u32 = 5;
 /// Standard deviations by which residuals must exceed the noise to be taken for misfit, if the noise is known apart from
 /// them.
 const SIGNIFICANCE: f32 = 3.0;
-/// How many times as much as by noise alone candidates must differ for that of the smaller windows to be taken.
-const LEAST_DIFFERENCE: f32 = 2.5;
+/// How many times as much as by noise alone candidates must differ for that of the smaller windows to be taken: around a
+/// pixel, if that is to suffice; around it and in a wide neighbourhood, if both must hold.
+const DIFFERENCE_ALONE: f32 = 6.0;
+const DIFFERENCES: [f32; 2] = [1.0, 0.7];
 /// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
@@ -79,7 +85,8 @@ pub(super) fn regression(input: &DenoiseInput, stop: Stop) -> Option<Regression>
     let pixel = |i: usize| {
         predict(&samples, &levels, n_small, i % width, i / width).map(|Predicted { light, own, misfit }| Candidate {
             // Scattered light is never negative, whatever noise of lights is around.
-            color: (light * albedo[i]).max(Vec3::ZERO) + input.guides.emitted[i],
+            noise: light.w * albedo[i].element_sum() / 3.0,
+            color: (light.xyz() * albedo[i]).max(Vec3::ZERO) + input.guides.emitted[i],
             own: own.min(1.0),
             misfit,
         })
@@ -127,7 +134,11 @@ impl RegressionStart {
             let all = (variance[i] / (albedo[i] * albedo[i])).element_sum();
             (samples.variance[i] / (independent * all).max(1e-30)).min(1.0)
         })?;
-        Some(Self { samples, blocks, albedo, noise: Noise { variance, at_emitters, excess, usual, independent } })
+        let pooled = Pooled::of(input, &at_emitters, stop)?;
+        let scatter = scatter(&samples.variance, &pooled, stop)?;
+        let doubt = doubt(input, &scatter, stop)?;
+        let noise = Noise { variance, at_emitters, excess, usual, independent, scatter, doubt };
+        Some(Self { samples, blocks, albedo, noise })
     }
 }
 
@@ -152,7 +163,7 @@ fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool], stop: St
         width: input.width,
         height: input.height,
         features: each(n, stop, features)?,
-        light: each(n, stop, |i| (input.color[i] - input.guides.emitted[i]) / albedo[i])?,
+        light: each(n, stop, |i| ((input.color[i] - input.guides.emitted[i]) / albedo[i]).extend(0.0))?,
         variance: each(n, stop, variance)?,
         weight: each(n, stop, weight)?,
     })
@@ -173,7 +184,7 @@ fn residuals(samples: &Samples, fits: &Fits, stop: Stop) -> Option<Vec<f32>> {
         let pixel = y * samples.width + x;
         let (mut sum, mut n) = (0.0, 0.0);
         fits.around(x, y, &samples.features[pixel], |fit, features, _| {
-            sum += (samples.light[pixel] - fit.predict(features).light).length_squared() * fit.unbias;
+            sum += (samples.light[pixel] - fit.predict(features).light).xyz().length_squared() * fit.unbias;
             n += 1.0;
         });
         sum / n
@@ -185,8 +196,8 @@ fn residuals(samples: &Samples, fits: &Fits, stop: Stop) -> Option<Vec<f32>> {
 /// The weighted mean over windows at one pixel.
 #[derive(Clone, Copy)]
 struct Predicted {
-    /// Light over albedo.
-    light: Vec3,
+    /// Light over albedo, and its noise.
+    light: Vec4,
     /// Weight of the pixel's own value in it.
     own: f32,
     misfit: f32,
@@ -199,7 +210,7 @@ struct Predicted {
 fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize) -> [Predicted; 3] {
     let pixel = y * samples.width + x;
     let features: &[f32; N_FEATURES] = &samples.features[pixel];
-    let (mut light, mut own, mut misfit, mut total) = (Vec3::ZERO, 0.0, 0.0, 0.0);
+    let (mut light, mut own, mut misfit, mut total) = (Vec4::ZERO, 0.0, 0.0, 0.0);
     let mut found = [Predicted { light, own, misfit }; 3];
     for fits in levels {
         fits.around(x, y, features, |fit, features, nearness| {
@@ -227,7 +238,9 @@ fn predict(samples: &Samples, levels: &[Fits], n_small: u32, x: usize, y: usize)
 
 /// Goes from windows of all sizes to smaller ones where these differ by more than the noise that they have more of: there
 /// the larger ones miss something. Compared with each other, both have so little noise that a difference tells more
-/// than that of either from the raw image, above all where few samples are bright. `None` if `stop` returned true.
+/// than that of either from the raw image, above all where few samples are bright. What counts is the product of the
+/// differences that both halves of the samples show: its expectation has no noise in it, and a single bright sample is
+/// in one half only. `None` if `stop` returned true.
 pub(super) fn pick(
     input: &DenoiseInput,
     candidates: &[Candidates],
@@ -240,14 +253,20 @@ pub(super) fn pick(
     let mut picked: Vec<Candidate> = each(n, stop, |i| candidates[i][0])?;
     for of_sizes in [1, 2] {
         let smaller = |i: usize| &candidates[i][of_sizes];
-        let off = |i: usize| smaller(i).color - picked[i].color;
-        let difference = pooled.narrow(&|i| level(i).dot(off(i) * off(i)), stop)?;
+        // Of sums over channels: a ninth for the square of three.
+        let product = each(n, stop, |i| {
+            let off = (smaller(i).color - picked[i].color).element_sum();
+            let noise = smaller(i).noise - picked[i].noise;
+            level(i).element_sum() / 9.0 * (off * off - noise * noise)
+        })?;
+        let [here, around] = [pooled.narrow(&|i| product[i], stop)?, pooled.wide(&|i| product[i], stop)?];
         let more = |i: usize| (smaller(i).own - picked[i].own).max(0.0) * level(i).dot(of_raw.usual(i));
         let noise = pooled.mean(&more, stop)?;
         let share = |i: usize| {
-            let by_noise = LEAST_DIFFERENCE * of_raw.independent * noise[i];
-            let ratio = (difference[i].max(0.0) / by_noise.max(1e-30)).min(1e9);
-            1.0 / (1.0 + ratio.powi(4))
+            let by_noise = (of_raw.independent * noise[i]).max(1e-30);
+            let [here, around] = [here[i] / (by_noise * (1.0 + of_raw.doubt[i])), around[i] / by_noise];
+            let both = significance(here / DIFFERENCES[0]) * significance(around / DIFFERENCES[1]);
+            1.0 - both.max(significance(here / DIFFERENCE_ALONE))
         };
         let share = blur(&each(n, stop, share)?, input.width, input.height, 1, stop)?;
         picked = each(n, stop, |i| smaller(i).mixed(&picked[i], share[i]))?;
@@ -263,4 +282,10 @@ pub(super) fn pick(
         covariance: each(n, stop, |i| picked[i].own * of_raw.usual(i))?,
         misfit: each(n, stop, |i| picked[i].misfit / 3.0 * albedo[i] * albedo[i])?,
     })
+}
+
+/// How far a difference is significant, 0..1, from its ratio to the least one that is.
+fn significance(ratio: f32) -> f32 {
+    let power = ratio.clamp(0.0, 1e8).powi(4);
+    power / (1.0 + power)
 }

@@ -3,8 +3,8 @@
 //! Windows of the regression that have no bright sample at random seem to have neither noise nor misfit, and their
 //! prediction outweighs all others. That is right for single fireflies; but where bright samples carry most of the
 //! light, around the focus of a caustic say, the edges of such windows are steps in the image, and the small ones are
-//! dark squares. There the noise of a window is not known, which shows in the variances of the pixels around: the mean
-//! of their squares is far above the square of their mean, in most narrow neighbourhoods. As far as that is so, and as
+//! dark squares. There the noise of a window is not known, which shows in how variances scatter
+//! ([`crate::denoise::doubt`]). As far as that is so, and as
 //! steps are within what the noise of the filtered image allows, it is blurred within surfaces.
 
 use crate::denoise::blur::{Pooled, blur};
@@ -15,8 +15,7 @@ use glam::{Vec2, Vec3};
 
 /// Reach of the blur in pixels: the side of the smallest window, whose steps vanish in it.
 const RADIUS: usize = 6;
-/// Mean square of variances over the square of their mean, in narrow neighbourhoods, from which on the noise of a
-/// window is not known. For normal noise it is 3 or less, and with one bright sample in a neighbourhood some 50.
+/// Scatter of variances from which on the noise of a window is not known.
 const UNKNOWN: f32 = 12.0;
 /// How much blur may change, squared, relative to the variance of the filtered light: more is a step that the samples
 /// show.
@@ -43,12 +42,8 @@ pub(super) fn soften(
     let (n, width, height) = (input.n_pixels(), input.width, input.height);
     let albedo: Vec<Vec3> = each(n, stop, |i| guides.albedo[i].max(Vec3::splat(LEAST_ALBEDO)))?;
     let light: Vec<Vec3> = each(n, stop, |i| (color[i] - guides.emitted[i]) / albedo[i])?;
-    let variance: Vec<f32> = each(n, stop, |i| (noise.usual(i) / (albedo[i] * albedo[i])).element_sum())?;
-    let mean = pooled.narrow(&|i| variance[i], stop)?;
-    let squares = pooled.narrow(&|i| variance[i] * variance[i], stop)?;
-    let scatter = pooled.wide(&|i| squares[i].max(0.0) / (mean[i] * mean[i]).max(1e-30), stop)?;
     let unknown: Vec<f32> = each(n, stop, |i| {
-        let ratio = (scatter[i] / UNKNOWN).clamp(0.0, 1e6);
+        let ratio = (noise.scatter[i] / UNKNOWN).clamp(0.0, 1e6);
         if noise.at_emitters[i] { 0.0 } else { 1.0 - 1.0 / (1.0 + ratio.powi(4)) }
     })?;
     if unknown.iter().all(|share| *share < LEAST_SHARE) {
@@ -80,7 +75,7 @@ pub(super) fn soften(
         sum / total
     })?;
     let change = pooled.narrow(&|i| (blurred[i] - light[i]).length_squared(), stop)?;
-    let allowed = pooled.wide(&|i| own[i] * variance[i], stop)?;
+    let allowed = pooled.wide(&|i| own[i] * (noise.usual(i) / (albedo[i] * albedo[i])).element_sum(), stop)?;
     let share: Vec<f32> = each(n, stop, |i| {
         let ratio = change[i].max(0.0) / (LARGEST_CHANGE * allowed[i]).max(1e-30);
         unknown[i] / (1.0 + ratio.min(1e9).powi(2))

@@ -42,8 +42,14 @@ impl HalfSteps {
 
     /// A change of one pixel that is made of its own noise: the expectation of its square is the variance.
     pub(crate) fn noise(&self, pixel: usize) -> Vec3 {
+        self.change(pixel, self.steps[pixel], self.late[pixel]) * self.calibration.sqrt()
+    }
+
+    /// Half of what the halves of the samples of one pixel differ by, from its step and what has come since: the
+    /// expectation of its square is the variance that independent samples would have.
+    pub(crate) fn change(&self, pixel: usize, step: Vec3, late: Vec3) -> Vec3 {
         let share = self.doubled[pixel];
-        (share * self.steps[pixel] + share.sqrt() * self.late[pixel]) * self.calibration.sqrt()
+        share * step + share.sqrt() * late
     }
 
     /// How much the mean of one pixel depends on the part of its samples that is brightest: at least what a single
