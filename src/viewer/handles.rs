@@ -1,8 +1,9 @@
 //! Overlays of the selection: its bounds and its handles, and dragging them.
 
 use crate::frame::gizmo::{ARROW_HEAD, Drag, Gizmo, Handle, Mode};
-use crate::frame::{Command, Edit, OwnBox, Projector, SceneBounds, Selection, Session};
+use crate::frame::{Command, Edit, Navigation, OwnBox, Projector, SceneBounds, Selection, Session};
 use crate::scene::{Placement, light_of};
+use crate::viewer::keys::{Action, shortcut};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
 use egui::{Align2, Color32, Context, CursorIcon, FontId, Pos2, Rect, Stroke};
@@ -169,7 +170,7 @@ impl Handles {
     }
 
     /// Draws an arrow at the edge of `free`, the uncovered part of the window, if the selection is out of view.
-    pub fn draw_hint(&self, context: &Context, free: Rect) {
+    pub fn draw_hint(&self, context: &Context, free: Rect, navigation: Navigation) {
         let (Some(projector), Some((name, middle))) = (&self.projector, &self.out_of_view) else { return };
         let inner = free.shrink(16.0);
         if !inner.is_positive() {
@@ -184,7 +185,11 @@ impl Handles {
         let across = egui::vec2(-way.y, way.x);
         let arrow = vec![tip, tip - 15.0 * way + 8.0 * across, tip - 15.0 * way - 8.0 * across];
         painter.add(egui::Shape::convex_polygon(arrow, SELECTED, Stroke::new(1.0, Color32::BLACK)));
-        let text = format!("{name} is out of view: press F to frame it");
+        let key = shortcut(navigation, &Action::Send(Command::FrameAll));
+        let text = key.map_or_else(
+            || format!("{name} is out of view"),
+            |key| format!("{name} is out of view: press {key} to frame it"),
+        );
         let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
         // A window this small shows only the arrow.
         if inner.width() < galley.size().x + 8.0 || inner.height() < galley.size().y + 8.0 {

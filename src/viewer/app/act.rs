@@ -9,7 +9,7 @@ use crate::frame::{
 use crate::render::{Inspection, Integrator};
 use crate::viewer::app::App;
 use crate::viewer::dialog::DialogPurpose;
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::{DroppedMaterial, NOTHING_SELECTED};
 use crate::viewer::saver::{DenoiseWith, Saved, Shown, new_file};
 use crate::viewer::time_line::{Ask, NOTHING_MOVES, Strip};
@@ -127,8 +127,9 @@ impl App {
     /// Says that focus is not seen while depth of field is off.
     pub(super) fn offer_depth_of_field(&mut self, now: Instant) {
         if !self.session.status().rig.lens.enabled {
-            let text = format!("{FOCUS_IS_UNSEEN}: depth of field is off (O)");
             let switch = Action::Send(Command::ToggleDepthOfField);
+            let off = with_key(self.input.navigation(), "depth of field is off", &switch);
+            let text = format!("{FOCUS_IS_UNSEEN}: {off}");
             self.toasts.add_offer(text, "Switch it on", switch, now);
         }
     }

@@ -1,11 +1,11 @@
 //! Drawing of the image and the overlays to the window.
 
-use crate::frame::{Command, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode, active_part};
+use crate::frame::{Command, Edit, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode, active_part};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
 use crate::viewer::bar::Figures;
-use crate::viewer::keys::{self, Action};
+use crate::viewer::keys::{self, Action, with_key};
 use crate::viewer::menu::{self, MenuInput};
 use crate::viewer::panel::select_number;
 use crate::viewer::presenter::{PresentError, Presenter};
@@ -29,7 +29,8 @@ impl App {
             false => &["click: select", "drop a file: open"],
         };
         if self.session.needs_keys() {
-            right.push("Set key (Ctrl+K) keeps this change".to_owned());
+            let set_key = Action::Send(Command::Edit(Edit::SetKeys { camera: false }));
+            right.push(format!("{} keeps this change", with_key(self.input.navigation(), "Set key", &set_key)));
         }
         right.extend(hints.iter().map(|hint| (*hint).to_owned()));
         let is_slow = self.loading_since.is_some_and(|since| since.elapsed() >= SLOW);
@@ -136,7 +137,7 @@ impl App {
                 }
                 renders.show(context, context.available_rect());
                 // Beside the panel, above the bar.
-                handles.draw_hint(context, context.available_rect());
+                handles.draw_hint(context, context.available_rect(), navigation);
                 let picture = session.picture();
                 if let Some((inspection, _)) = is_late {
                     overlay::legend(context, &format!("{}: working …", inspection.label()), None);

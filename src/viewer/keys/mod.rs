@@ -54,6 +54,11 @@ pub fn shortcut(navigation: Navigation, wanted: &Action) -> Option<String> {
     )
 }
 
+/// A text with the key that does this under a preset, in parentheses; without one if there is none.
+pub fn with_key(navigation: Navigation, text: &str, action: &Action) -> String {
+    shortcut(navigation, action).map_or_else(|| text.to_owned(), |key| format!("{text} ({key})"))
+}
+
 /// The movement of a held key.
 pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
     triggers().find_map(|trigger| match trigger {

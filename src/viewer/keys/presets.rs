@@ -207,6 +207,16 @@ mod tests {
     }
 
     #[test]
+    fn hints_name_the_key_of_the_preset() {
+        let frame = |navigation| crate::viewer::keys::with_key(navigation, "frame", &Action::Send(Command::FrameAll));
+        let [own, blender, maya] = [Navigation::Firstlight, Navigation::Blender, Navigation::Maya].map(frame);
+        assert_eq!([own.as_str(), maya.as_str()], ["frame (F)", "frame (A)"]);
+        assert_ne!(blender, own);
+        let none = crate::viewer::keys::with_key(Navigation::Firstlight, "pause", &Action::Send(Command::Pause));
+        assert_eq!(none, "pause");
+    }
+
+    #[test]
     fn a_preset_takes_the_place_of_what_the_table_has() {
         let none = ModifiersState::empty();
         let modes = |navigation, keys: &str| -> Vec<Option<Action>> {

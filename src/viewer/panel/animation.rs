@@ -3,7 +3,7 @@
 use crate::frame::{Command, CurrentScene, Edit, Property, Selection, Session};
 use crate::scene::animation::{Interpolation, Shutter, Track};
 use crate::scene::{Animation, Moment};
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{number, row_with_hint, rows, slider};
 use egui::Ui;
@@ -69,7 +69,7 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
                 })
             });
         }
-        keys(ui, session, animation, at, asked);
+        keys(ui, session, around, animation, at, asked);
         if !is_stored_pose {
             settings(ui, animation, length, asked);
         }
@@ -77,14 +77,17 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
 }
 
 /// Setting, deleting and finding keys.
-fn keys(ui: &mut Ui, session: &Session, animation: Option<&Animation>, at: f64, asked: &mut Asked) {
+fn keys(ui: &mut Ui, session: &Session, around: &Around, animation: Option<&Animation>, at: f64, asked: &mut Asked) {
+    let key_of = |text: &str, camera: bool| {
+        with_key(around.navigation, text, &Action::Send(Command::Edit(Edit::SetKeys { camera })))
+    };
     let hint = "at this time: what was changed, else the selection, else the camera";
     row_with_hint(ui, "keys", hint, |ui| {
         ui.horizontal(|ui| {
-            if ui.button("Set key").on_hover_text(format!("{hint} (Ctrl+K)")).clicked() {
+            if ui.button("Set key").on_hover_text(key_of(hint, false)).clicked() {
                 asked.edit(Edit::SetKeys { camera: false });
             }
-            if ui.button("Set view").on_hover_text("key of the camera at this time (Ctrl+Shift+K)").clicked() {
+            if ui.button("Set view").on_hover_text(key_of("key of the camera at this time", true)).clicked() {
                 asked.edit(Edit::SetKeys { camera: true });
             }
         })

@@ -6,7 +6,7 @@ use crate::frame::{
     focal_length, radius_of_f_stop, sharp_zone, vfov_of_focal_length,
 };
 use crate::scene::{Lens, Projection, View};
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{length, number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use crate::viewer::status::metres;
@@ -116,18 +116,20 @@ fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
 pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
         for (label, hint, command) in [
-            ("Frame", "frame the selection, or the whole scene (F)", Command::FrameAll),
-            ("Home", "go to the initial view (Home)", Command::Home),
+            ("Frame", "frame the selection, or the whole scene", Command::FrameAll),
+            ("Home", "go to the initial view", Command::Home),
             ("Level", "level the horizon", Command::Level),
-            ("Previous", "go to the previous view (Backspace)", Command::PreviousView),
-            ("Next", "go to the next view (Shift+Backspace)", Command::NextView),
+            ("Previous", "go to the previous view", Command::PreviousView),
+            ("Next", "go to the next view", Command::NextView),
         ] {
+            let hint = with_key(around.navigation, hint, &Action::Send(command.clone()));
             if ui.button(label).on_hover_text(hint).clicked() {
                 asked.send(command);
             }
         }
         let turntable = ui.selectable_label(around.spinning, "Turntable");
-        if turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked() {
+        let hint = with_key(around.navigation, "start or stop orbiting the pivot", &Action::ToggleSpin);
+        if turntable.on_hover_text(hint).clicked() {
             asked.action = Some(Action::ToggleSpin);
         }
     });
@@ -182,13 +184,12 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                     FocusTarget::Cursor(_) => 2,
                 };
                 let [x, y] = around.place;
+                let hint = |text: &str, action: Action| with_key(around.navigation, text, &action);
+                let object = "follow the selected object, else the point focused on last, when it or the camera moves";
                 for (i, (label, hint)) in [
-                    ("off", "keep the focus distance"),
-                    (
-                        "object",
-                        "follow the selected object, else the point focused on last, when it or the camera moves (L)",
-                    ),
-                    ("mouse", "follow what is under the mouse (Shift+L)"),
+                    ("off", "keep the focus distance".to_owned()),
+                    ("object", hint(object, Action::Send(Command::ToggleFocusLock))),
+                    ("mouse", hint("follow what is under the mouse", Action::FocusFollows)),
                 ]
                 .into_iter()
                 .enumerate()

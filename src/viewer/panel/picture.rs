@@ -3,7 +3,7 @@
 use crate::frame::{Command, DenoiseFilter, Denoising, Session, StopAt, Target, ViewMode};
 use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::Rendering;
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{number, row, row_with_hint, rows, slider, whole};
 use crate::viewer::status::tone_curve;
@@ -76,6 +76,7 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             }
         });
     });
+    let hint = |text: &str, action: Action| with_key(around.navigation, text, &action);
     ui.horizontal(|ui| {
         if ui.button(if status.paused { "Resume" } else { "Pause" }).clicked() {
             asked.send(if status.paused { Command::Resume } else { Command::Pause });
@@ -85,26 +86,29 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
         }
         if ui
             .selectable_label(around.brush, "Region")
-            .on_hover_text("drag a rectangle to render only that region (B)")
+            .on_hover_text(hint("drag a rectangle to render only that region", Action::Brush))
             .clicked()
         {
             asked.action = Some(Action::Brush);
         }
         if status.region.is_some()
-            && ui.button("Whole image").on_hover_text("render the whole image (Shift+B)").clicked()
+            && ui.button("Whole image").on_hover_text(hint("render the whole image", Action::ClearRegion)).clicked()
         {
             asked.send(Command::SetRegion { region: None });
         }
     });
     ui.horizontal(|ui| {
-        let larger = "render the image in any size and quality in the background, and save it (Ctrl+E)";
-        if ui.button("Save image …").on_hover_text(larger).clicked() {
+        let larger = "render the image in any size and quality in the background, and save it";
+        if ui.button("Save image …").on_hover_text(hint(larger, Action::RenderTo { frames: false })).clicked() {
             asked.action = Some(Action::RenderTo { frames: false });
         }
-        if ui.button("PNG").on_hover_text("save the image as it is displayed now, in a new file (K)").clicked() {
+        let displayed =
+            hint("save the image as it is displayed now, in a new file", Action::Screenshot { linear: false });
+        if ui.button("PNG").on_hover_text(displayed).clicked() {
             asked.action = Some(Action::Screenshot { linear: false });
         }
-        if ui.button("EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
+        let linear = hint("save linear light (HDR) in a new file", Action::Screenshot { linear: true });
+        if ui.button("EXR").on_hover_text(linear).clicked() {
             asked.action = Some(Action::Screenshot { linear: true });
         }
         let layers =
