@@ -3,7 +3,7 @@
 use crate::frame::gizmo::{ARROW_HEAD, Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, Navigation, OwnBox, Projector, SceneBounds, Selection, Session};
 use crate::scene::{Placement, light_of};
-use crate::viewer::keys::{Action, shortcut};
+use crate::viewer::keys::{Action, with_key};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
 use egui::{Align2, Color32, Context, CursorIcon, FontId, Pos2, Rect, Stroke};
@@ -185,11 +185,8 @@ impl Handles {
         let across = egui::vec2(-way.y, way.x);
         let arrow = vec![tip, tip - 15.0 * way + 8.0 * across, tip - 15.0 * way - 8.0 * across];
         painter.add(egui::Shape::convex_polygon(arrow, SELECTED, Stroke::new(1.0, Color32::BLACK)));
-        let key = shortcut(navigation, &Action::Send(Command::FrameAll));
-        let text = key.map_or_else(
-            || format!("{name} is out of view"),
-            |key| format!("{name} is out of view: press {key} to frame it"),
-        );
+        let frame = Action::Send(Command::FrameAll);
+        let text = with_key(navigation, &format!("{name} is out of view: frame it"), &frame);
         let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
         // A window this small shows only the arrow.
         if inner.width() < galley.size().x + 8.0 || inner.height() < galley.size().y + 8.0 {

@@ -8,7 +8,7 @@ use crate::render::Integrator;
 use crate::scene::{
     BUILTIN_MESHES, BUILTIN_SCENES, HiddenInputs, LightInput, LightKind, MaterialSlots, MeshSource, Rendering, library,
 };
-use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut};
+use crate::viewer::keys::{Action, Item, Menu, REDO, UNDO, items, menu, shortcut, with_key};
 use crate::viewer::openable::{self, Recent};
 use crate::viewer::submenu::{part, scrolled};
 use crate::viewer::thumbnails::Thumbnails;
@@ -125,12 +125,12 @@ fn effect_of(action: &Action) -> &'static str {
 /// Text about a command of the bar: its name, its key, and what it does.
 pub fn hint(input: &MenuInput, action: &Action) -> String {
     let Some((item, binding)) = items().find(|(item, _)| item.action == *action) else { return String::new() };
-    let key = shortcut(input.navigation, action).map(|key| format!(" ({key})")).unwrap_or_default();
     let name = name_of(input.session, item);
+    let named = with_key(input.navigation, &name, action);
     if name.eq_ignore_ascii_case(binding.effect) || name != item.name {
-        return format!("{name}{key}");
+        return named;
     }
-    format!("{name}{key}: {}", binding.effect)
+    format!("{named}: {}", binding.effect)
 }
 
 /// Whether a command would do anything now.

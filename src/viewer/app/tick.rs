@@ -4,7 +4,7 @@ use crate::frame::{Command, MessageKind, Selection};
 use crate::viewer::app::act::{FOCUS_IS_UNSEEN, LEFT};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
-use crate::viewer::keys::Action;
+use crate::viewer::keys::{Action, with_key};
 use crate::viewer::openable::short_name;
 use crate::viewer::toasts::{IN_FOLDER, Toasts, Tone};
 use std::time::{Duration, Instant};
@@ -61,7 +61,9 @@ impl App {
         let n_warnings = new.clone().filter(|message| message.kind == MessageKind::Warning).count();
         let is_flood = n_warnings > Toasts::MOST_WARNINGS;
         if is_flood {
-            self.toasts.add(Tone::Problem, format!("{n_warnings} warnings: see Messages in the panel (N)"), now);
+            let text = format!("{n_warnings} warnings: see Messages in the panel");
+            let text = with_key(self.input.navigation(), &text, &Action::TogglePanel);
+            self.toasts.add(Tone::Problem, text, now);
         }
         for message in new.filter(|message| !is_flood || message.kind != MessageKind::Warning) {
             match message.kind {

@@ -94,7 +94,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, materials, false, &mut |ui| materials::materials(ui, state, session, asked));
             section(ui, lights, false, &mut |ui| lights::lights(ui, state, session, asked));
             section(ui, sky, false, &mut |ui| lights::sky(ui, session, asked));
-            section(ui, open, false, &mut |ui| scene::open(ui, session, around.recent, asked));
+            section(ui, open, false, &mut |ui| scene::open(ui, session, around, asked));
             section(ui, statistics, true, &mut |ui| statistics::statistics(ui, session, around));
             section(ui, messages, true, &mut |ui| messages::messages(ui, session));
             state.open = open_now;

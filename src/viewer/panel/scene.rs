@@ -3,9 +3,10 @@
 use crate::frame::{Edit, NewThing, Selection, Session};
 use crate::scene::{MeshSource, ObjectEntry};
 use crate::viewer::dialog::DialogPurpose;
-use crate::viewer::openable::{self, Recent};
+use crate::viewer::keys::{Action, with_key};
+use crate::viewer::openable;
 use crate::viewer::panel::list::{Listed, Which, list};
-use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::state::{Around, Asked, PanelState};
 use crate::viewer::panel::widgets::selectable;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
@@ -26,16 +27,17 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
 }
 
 /// Opening of a file by dialog, recent files, and the built-in scenes.
-pub fn open(ui: &mut Ui, session: &Session, recent: Recent, asked: &mut Asked) {
-    if ui.button("File …").on_hover_text("open a scene, a model or a saved image (Ctrl+O)").clicked() {
+pub fn open(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
+    let hint = with_key(around.navigation, "open a scene, a model or a saved image", &Action::OpenDialog);
+    if ui.button("File …").on_hover_text(hint).clicked() {
         asked.dialog = Some(DialogPurpose::Open);
     }
     ui.weak("or drop a file on the window");
-    if let Some(command) = openable::recent(ui, session, recent) {
+    if let Some(command) = openable::recent(ui, session, around.recent) {
         asked.send(command);
     }
     ui.collapsing("Built-in scenes", |ui| {
-        if let Some(command) = openable::scenes(ui, recent.thumbnails) {
+        if let Some(command) = openable::scenes(ui, around.recent.thumbnails) {
             asked.send(command);
         }
     });

@@ -4,6 +4,11 @@ use crate::denoise::parallel::{Stop, each};
 use crate::film::halves::HalfSteps;
 use glam::Vec3;
 
+/// Squared difference of normals that counts as another surface.
+pub(super) const OTHER_NORMAL: f32 = 0.02;
+/// Difference of nearness that counts as another surface.
+pub(super) const OTHER_NEARNESS: f32 = 0.02;
+
 /// Properties of the visible surfaces, mean per pixel; each list row by row from the top.
 #[derive(Clone, Copy, Debug)]
 pub struct Guides<'a> {

@@ -8,7 +8,7 @@
 //! steps are within what the noise of the filtered image allows, it is blurred within surfaces.
 
 use crate::denoise::blur::{Pooled, blur};
-use crate::denoise::input::DenoiseInput;
+use crate::denoise::input::{DenoiseInput, OTHER_NEARNESS, OTHER_NORMAL};
 use crate::denoise::noise::Noise;
 use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use glam::{Vec2, Vec3};
@@ -22,10 +22,6 @@ const UNKNOWN: f32 = 12.0;
 const LARGEST_CHANGE: f32 = 1.0;
 /// Share of the blur below which a pixel stays as it is.
 const LEAST_SHARE: f32 = 1e-3;
-/// Squared difference of normals that counts as another surface.
-const OTHER_NORMAL: f32 = 0.02;
-/// Difference of nearness that counts as another surface.
-const OTHER_NEARNESS: f32 = 0.02;
 
 /// Returns the filtered image with such blur; `None` if `stop` returned true.
 ///
