@@ -1,7 +1,7 @@
 //! Kd-tree over primitives of one kind: binary nodes, the same nodes collapsed to [`Node8`], and leaf blocks shared by
 //! both.
 
-use super::build::{LeafMaker, build};
+use super::build::{LeafMaker, append_part, build};
 use super::leaf::{BLOCK, LeafBlock, Prims};
 use super::node8::{LEAF, Node8, collapse};
 use super::nodes::{KdNode, KdNodes};
@@ -145,16 +145,10 @@ impl<B: LeafBlock, M: Fn(&[u32]) -> B + Sync, C: Fn(&[u32]) -> Vec<B::Compact> +
         }
     }
 
-    fn with_room_for(&self, parts: &[&Blocks<B>]) -> Blocks<B> {
-        let n_blocks = parts.iter().map(|part| part.blocks.len()).sum();
-        let n_compact = parts.iter().map(|part| part.compact.len()).sum();
-        Blocks { blocks: Vec::with_capacity(n_blocks), compact: Vec::with_capacity(n_compact) }
-    }
-
-    fn add_part(&self, leaves: &mut Blocks<B>, mut part: Blocks<B>) -> impl Fn(u32) -> u32 {
+    fn add_part(&self, leaves: &mut Blocks<B>, part: Blocks<B>, share: f64) -> impl Fn(u32) -> u32 {
         let (n_blocks, n_compact) = (leaves.blocks.len(), leaves.compact.len());
-        leaves.blocks.append(&mut part.blocks);
-        leaves.compact.append(&mut part.compact);
+        append_part(&mut leaves.blocks, part.blocks, share);
+        append_part(&mut leaves.compact, part.compact, share);
         check_count(leaves.blocks.len().max(leaves.compact.len()));
         move |first| first + if first & COMPACT == 0 { n_blocks } else { n_compact } as u32
     }

@@ -3,7 +3,8 @@
 //! Builds top-down. Large nodes bin their references along each axis, small ones evaluate every face of every
 //! reference. A split must lower the expected cost, so a fan of thousands of triangles around one vertex ends as one
 //! leaf; the number of references is bounded as well ([`BuildConfig::max_growth`]). Large subtrees are built in
-//! parallel; the result never depends on the number of threads.
+//! parallel; the result never depends on the number of threads. Leaves are made at the end, straight into their final
+//! array: until then a leaf is a list of primitives, which takes a tenth of the memory.
 //!
 //! Sources: Wald and Havran 2006 for cost and clipping; Hunt, Mark and Stoll 2006 for bins.
 //! Start reading at [`build`].
@@ -26,11 +27,19 @@ pub(super) trait LeafMaker: Sync {
     /// Adds the leaf with these primitives, ascending; returns the two numbers that its node stores.
     fn make(&self, leaves: &mut Self::Leaves, prims: &[u32]) -> (u32, u32);
 
-    /// Returns an empty set with capacity for the leaves of all parts.
-    fn with_room_for(&self, parts: &[&Self::Leaves]) -> Self::Leaves;
-
     /// Appends the leaves of a part; returns the map from a leaf's first number in the part to that in the whole.
-    fn add_part(&self, leaves: &mut Self::Leaves, part: Self::Leaves) -> impl Fn(u32) -> u32;
+    ///
+    /// - `share`: about how much of the whole is done with this part, above 0 and up to 1.
+    fn add_part(&self, leaves: &mut Self::Leaves, part: Self::Leaves, share: f64) -> impl Fn(u32) -> u32;
+}
+
+/// Appends the leaves of a part, with room for the rest of the whole: blocks are copied wherever an array grows.
+pub(super) fn append_part<T>(to: &mut Vec<T>, mut part: Vec<T>, share: f64) {
+    let n = to.len() + part.len();
+    if n > to.capacity() {
+        to.reserve_exact((1.05 * n as f64 / share) as usize - to.len());
+    }
+    to.append(&mut part);
 }
 
 /// Builds the nodes and, in the order of the nodes, the leaves.
@@ -49,79 +58,120 @@ pub(super) fn build<M: LeafMaker>(
         references.par_iter().with_min_len(FORK_ABOVE).map(Reference::bounds).reduce(|| Aabb::EMPTY, Aabb::union);
     let growth = (references.len() as f32 * config.max_growth) as usize + 64;
     let set = InstructionSet::detect();
-    let builder = Builder { primitives, config, maker, padding: clip_padding(&bounds), set };
-    let root = builder.subtree(references, bounds, growth, 0);
-    let mut parts = Vec::new();
-    root.collect_leaves(&mut parts);
-    let (mut nodes, mut leaves) = (vec![KdNode::leaf(0, 0)], maker.with_room_for(&parts));
-    root.flatten(0, &mut nodes, maker, &mut leaves);
+    let builder = Builder { primitives, config, padding: clip_padding(&bounds), set };
+    let mut root = builder.subtree(references, bounds, growth, 0);
+    let leaves = make_leaves(&mut root, maker);
+    let mut nodes = vec![KdNode::leaf(0, 0)];
+    root.flatten(0, &mut nodes);
+    nodes.shrink_to_fit();
     (KdNodes { nodes, bounds }, leaves)
 }
 
-/// A finished part of the tree, before it is copied into the arrays.
-enum Subtree<L> {
-    Fork { axis: usize, split: f32, children: Box<[Subtree<L>; 2]> },
-    Done(Arena<L>),
+/// A finished part of the tree, before it is copied into the array of nodes.
+enum Subtree {
+    Fork { axis: usize, split: f32, children: Box<[Subtree; 2]> },
+    Done(Arena),
 }
 
-impl<L> Subtree<L> {
-    fn collect_leaves<'a>(&'a self, parts: &mut Vec<&'a L>) {
+impl Subtree {
+    fn collect_arenas<'a>(&'a mut self, arenas: &mut Vec<&'a mut Arena>) {
         match self {
-            Self::Fork { children, .. } => children.iter().for_each(|child| child.collect_leaves(parts)),
-            Self::Done(arena) => parts.push(&arena.leaves),
+            Self::Fork { children, .. } => children.iter_mut().for_each(|child| child.collect_arenas(arenas)),
+            Self::Done(arena) => arenas.push(arena),
         }
     }
 
-    fn flatten<M: LeafMaker<Leaves = L>>(self, slot: usize, nodes: &mut Vec<KdNode>, maker: &M, leaves: &mut L) {
+    fn flatten(self, slot: usize, nodes: &mut Vec<KdNode>) {
         match self {
             Self::Fork { axis, split, children } => {
                 let first = nodes.len();
                 nodes.extend([KdNode::leaf(0, 0); 2]);
                 nodes[slot] = KdNode::inner(axis, split, first as u32);
                 let [lower, upper] = *children;
-                lower.flatten(first, nodes, maker, leaves);
-                upper.flatten(first + 1, nodes, maker, leaves);
+                lower.flatten(first, nodes);
+                upper.flatten(first + 1, nodes);
             }
-            Self::Done(Arena { nodes: part, leaves: part_leaves }) => {
-                let in_whole = maker.add_part(leaves, part_leaves);
-                flatten(&part, 0, slot, nodes, &in_whole);
-            }
+            Self::Done(arena) => flatten(&arena.nodes, 0, slot, nodes),
         }
     }
 }
 
 /// A subtree built by one thread.
 #[derive(Default)]
-struct Arena<L> {
+struct Arena {
     nodes: Vec<ArenaNode>,
-    leaves: L,
+    /// The primitives of all leaves, until these are made.
+    prims: Vec<u32>,
 }
 
 enum ArenaNode {
     /// The lower child is the next node.
-    Inner {
-        axis: usize,
-        split: f32,
-        above: u32,
-    },
-    Leaf {
-        first: u32,
-        count: u32,
-    },
+    Inner { axis: u8, split: f32, above: u32 },
+    /// A range of [`Arena::prims`]; once the leaf is made, the two numbers that its node stores.
+    Leaf { first: u32, count: u32 },
 }
 
+impl Arena {
+    /// Frees memory that was set aside for more: there are thousands of parts.
+    fn shrink(&mut self) {
+        self.nodes.shrink_to_fit();
+        self.prims.shrink_to_fit();
+    }
+
+    /// Makes the leaves, and frees the lists of their primitives.
+    fn make_leaves<M: LeafMaker>(&mut self, maker: &M) -> M::Leaves {
+        let (prims, mut leaves) = (std::mem::take(&mut self.prims), M::Leaves::default());
+        for node in &mut self.nodes {
+            if let ArenaNode::Leaf { first, count } = node {
+                (*first, *count) = maker.make(&mut leaves, &prims[*first as usize..][..*count as usize]);
+            }
+        }
+        leaves
+    }
+
+    /// Changes the first number of each leaf that is not empty.
+    fn renumber(&mut self, in_whole: impl Fn(u32) -> u32) {
+        for node in &mut self.nodes {
+            match node {
+                ArenaNode::Leaf { first, count } if *count > 0 => *first = in_whole(*first),
+                _ => (),
+            }
+        }
+    }
+}
+
+/// Makes the leaves of the whole tree, in the order of the nodes, some parts at a time.
+fn make_leaves<M: LeafMaker>(root: &mut Subtree, maker: &M) -> M::Leaves {
+    let mut arenas = Vec::new();
+    root.collect_arenas(&mut arenas);
+    let n_prims: usize = arenas.iter().map(|arena| arena.prims.len()).sum();
+    let (mut leaves, mut n_done) = (M::Leaves::default(), 0);
+    for some in arenas.chunks_mut(PARTS_AT_A_TIME) {
+        n_done += some.iter().map(|arena| arena.prims.len()).sum::<usize>();
+        let share = (n_done as f64 / n_prims as f64).max(f64::EPSILON);
+        let made: Vec<_> = some.par_iter_mut().map(|arena| arena.make_leaves(maker)).collect();
+        for (arena, part) in some.iter_mut().zip(made) {
+            arena.renumber(maker.add_part(&mut leaves, part, share));
+        }
+    }
+    leaves
+}
+
+/// Parts of the tree whose leaves are made in parallel: enough for many threads, and a few megabytes.
+const PARTS_AT_A_TIME: usize = 64;
+
 /// Copies the subtree at `index` of a part to `nodes[slot]` and the end of `nodes`.
-fn flatten(part: &[ArenaNode], index: usize, slot: usize, nodes: &mut Vec<KdNode>, in_whole: &impl Fn(u32) -> u32) {
+fn flatten(part: &[ArenaNode], index: usize, slot: usize, nodes: &mut Vec<KdNode>) {
     match part[index] {
         ArenaNode::Inner { axis, split, above } => {
             let first = nodes.len();
             nodes.extend([KdNode::leaf(0, 0); 2]);
-            nodes[slot] = KdNode::inner(axis, split, first as u32);
-            flatten(part, index + 1, first, nodes, in_whole);
-            flatten(part, above as usize, first + 1, nodes, in_whole);
+            nodes[slot] = KdNode::inner(axis.into(), split, first as u32);
+            flatten(part, index + 1, first, nodes);
+            flatten(part, above as usize, first + 1, nodes);
         }
         ArenaNode::Leaf { count: 0, .. } => nodes[slot] = KdNode::leaf(0, 0),
-        ArenaNode::Leaf { first, count } => nodes[slot] = KdNode::leaf(in_whole(first), count),
+        ArenaNode::Leaf { first, count } => nodes[slot] = KdNode::leaf(first, count),
     }
 }
 
@@ -135,10 +185,9 @@ struct BuildScratch {
     prims: Vec<u32>,
 }
 
-struct Builder<'a, P, M> {
+struct Builder<'a, P> {
     primitives: &'a P,
     config: &'a BuildConfig,
-    maker: &'a M,
     padding: f32,
     set: InstructionSet,
 }
@@ -150,27 +199,28 @@ const DEDUP_ABOVE: usize = 64;
 /// Subtrees with more references than this are built in parallel.
 const FORK_ABOVE: usize = 1024;
 
-impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
+impl<P: Primitives> Builder<'_, P> {
     /// Builds a subtree, in parallel if it is large.
     ///
     /// - `growth`: references that this subtree may add to those given.
-    fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Subtree<M::Leaves> {
+    fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Subtree {
         let count = references.len();
         let mut arena = Arena::default();
-        let mut below = references.clone();
         if count > FORK_ABOVE
             && let Some(split) = self.choose(&references, &cell, depth)
         {
+            let at_most = references.iter().filter(|it| it.is_below(split.axis, split.at)).count();
+            let mut below = vec![references[0]; at_most + 1];
             let (n_below, n_above) = self.divide(&mut references, &mut below, &split);
             references.truncate(n_above);
             below.truncate(n_below);
             let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) else {
                 references.append(&mut below);
                 self.make_leaf(&references, &mut Vec::new(), &mut arena);
+                arena.shrink();
                 return Subtree::Done(arena);
             };
             references.shrink_to_fit();
-            below.shrink_to_fit();
             let (cell_below, cell_above) = split_cell(&cell, &split);
             let (lower, upper) = rayon::join(
                 || self.subtree(below, cell_below, growth_below, depth + 1),
@@ -178,8 +228,9 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             );
             return Subtree::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
         }
-        let mut scratch = BuildScratch { stack: references, below, prims: Vec::new() };
+        let mut scratch = BuildScratch { below: references.clone(), stack: references, prims: Vec::new() };
         self.sequential(&mut scratch, 0, cell, growth, depth, &mut arena);
+        arena.shrink();
         Subtree::Done(arena)
     }
 
@@ -191,7 +242,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         cell: Aabb,
         growth: usize,
         depth: u32,
-        arena: &mut Arena<M::Leaves>,
+        arena: &mut Arena,
     ) {
         let count = scratch.stack.len() - start;
         if let Some(split) = self.choose(&scratch.stack[start..], &cell, depth) {
@@ -201,10 +252,10 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
                 let (cell_below, cell_above) = split_cell(&cell, &split);
                 let index = arena.nodes.len();
-                arena.nodes.push(ArenaNode::Inner { axis: split.axis, split: split.at, above: 0 });
+                arena.nodes.push(ArenaNode::Inner { axis: split.axis as u8, split: split.at, above: 0 });
                 self.sequential(scratch, start + n_above, cell_below, growth_below, depth + 1, arena);
                 let above = arena.nodes.len() as u32;
-                arena.nodes[index] = ArenaNode::Inner { axis: split.axis, split: split.at, above };
+                arena.nodes[index] = ArenaNode::Inner { axis: split.axis as u8, split: split.at, above };
                 self.sequential(scratch, start, cell_above, growth_above, depth + 1, arena);
                 return;
             }
@@ -215,7 +266,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
 
     /// Makes the leaf of these references. After a split that was rejected because it adds too many references, the
     /// references of both sides are among them and may name the same primitive.
-    fn make_leaf(&self, references: &[Reference], prims: &mut Vec<u32>, arena: &mut Arena<M::Leaves>) {
+    fn make_leaf(&self, references: &[Reference], prims: &mut Vec<u32>, arena: &mut Arena) {
         prims.clear();
         prims.extend(references.iter().map(|reference| reference.prim));
         prims.sort_unstable();
@@ -224,8 +275,8 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             let mut seen = HashSet::new();
             prims.retain(|&prim| self.primitives.shape(prim).is_none_or(|shape| seen.insert(shape)));
         }
-        let (first, count) = self.maker.make(&mut arena.leaves, prims);
-        arena.nodes.push(ArenaNode::Leaf { first, count });
+        arena.nodes.push(ArenaNode::Leaf { first: arena.prims.len() as u32, count: prims.len() as u32 });
+        arena.prims.extend_from_slice(prims);
     }
 
     fn choose(&self, references: &[Reference], cell: &Aabb, depth: u32) -> Option<Split> {
@@ -239,8 +290,9 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         }
     }
 
-    /// Moves the parts below the plane to the front of `below`, those above to the front of `references`; returns the
-    /// number of each. A side that a primitive does not reach gets no part.
+    /// Moves the parts below the plane to the front of `below`, which has room for all that
+    /// [`may be`](Reference::is_below) below and one more, those above to the front of `references`; returns the number
+    /// of each. A side that a primitive does not reach gets no part.
     ///
     /// Most references lie on one side, and the branch is unpredictable: each is written to both sides and counted on
     /// one.

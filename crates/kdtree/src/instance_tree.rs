@@ -2,7 +2,7 @@
 
 use super::block_tree::BlockTree;
 use super::blocks::TriangleBlock;
-use super::build::{LeafMaker, build};
+use super::build::{LeafMaker, append_part, build};
 use super::leaf::{BLOCK, Prims};
 use super::mesh_tree::{BuildPreset, Triangles};
 use super::node8::{DescentRay, LEAF, Node8, STACK, collapse};
@@ -238,13 +238,9 @@ impl LeafMaker for BoxBlocks<'_> {
         (first as u32, count as u32)
     }
 
-    fn with_room_for(&self, parts: &[&Vec<BoxBlock>]) -> Vec<BoxBlock> {
-        Vec::with_capacity(parts.iter().map(|part| part.len()).sum())
-    }
-
-    fn add_part(&self, blocks: &mut Vec<BoxBlock>, mut part: Vec<BoxBlock>) -> impl Fn(u32) -> u32 {
+    fn add_part(&self, blocks: &mut Vec<BoxBlock>, part: Vec<BoxBlock>, share: f64) -> impl Fn(u32) -> u32 {
         let n_before = blocks.len() as u32;
-        blocks.append(&mut part);
+        append_part(blocks, part, share);
         move |first| first + n_before
     }
 }
