@@ -249,6 +249,14 @@ fn what_is_wrong_around_values_is_told_where_it_is() {
             scene("materials: { \"clay\": diffuse(0.5) },"),
             "3:34: `diffuse` has fields with names, such as `albedo: 0.5`, found `0.5` without one",
         ),
+        (
+            scene("environment: constant(color: (1, 1, 1)),"),
+            "3:27: the value of `constant` has no name: write `constant((1, 1, 1))`",
+        ),
+        (
+            scene(&format!("{clay},\n    objects: [mesh(source: ply(file: \"a.ply\"), material: \"clay\")],")),
+            "4:32: the value of `ply` has no name: write `ply(\"a.ply\")`",
+        ),
         ("(camera: \u{feff}(0, 1))".to_owned(), "1:"),
         (format!("# comment\n({view})"), "1:1: a comment begins with `//`, not with `#`"),
         (format!("{view},\n{clay},\n"), "1:1: a scene is in round brackets: put `(` before `camera`"),

@@ -90,6 +90,15 @@ fn unnamed(text: &str, at: usize) -> Option<(usize, String)> {
     Some((at, format!("`{kind}` has fields with names,{example} found `{value}` without one")))
 }
 
+/// Position of a name that does not belong there, and the kind around it, for the value at `start`: some kinds have one
+/// value without a name, such as `constant(0.5)`.
+fn named_without_need<'a>(text: &'a str, start: usize, name: &str) -> Option<(usize, &'a str)> {
+    let before = text[..start].trim_end().strip_suffix(':')?.trim_end().strip_suffix(name)?;
+    let outside = before.trim_end().strip_suffix('(')?;
+    let kind = outside.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
+    matches!(kind, "constant" | "builtin" | "obj" | "ply" | "stl").then_some((before.len(), kind))
+}
+
 /// Where a kind belongs that is unknown at its place, for messages.
 fn elsewhere(what: &str, found: &str) -> Option<String> {
     match (what, found) {
@@ -151,6 +160,10 @@ fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
         _ => return None,
     }
     let field = field_at(text, offset)?;
+    if let Some((at, kind)) = named_without_need(text, field.start, field.name) {
+        let value = field.quoted();
+        return Some((at, format!("the value of `{kind}` has no name: write `{kind}({value})`")));
+    }
     // Inside `constant(…)` and for unknown fields, the message names the expected type.
     let expectation = field.expectation().filter(|_| !field.is_within_kind(offset));
     // A value of the right form is followed by what does not belong there.
