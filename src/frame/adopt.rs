@@ -12,7 +12,7 @@ use crate::frame::state::resources::{Clock, CurrentScene, PlayRange, RenderState
 use crate::frame::views::ViewTrail;
 use crate::scene::{
     Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
-    camera_follows,
+    camera_follows, show_moment_from_here,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::World;
@@ -45,6 +45,10 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
             Severity::Warning => MessageKind::Warning,
         };
         status.say(now, kind, warning.to_string());
+    }
+    if scene.shot.is_some() {
+        let text = format!("an image of this program holds its scene: {} is open as the image shows it", status.scene);
+        status.say(now, MessageKind::Note, text);
     }
     world.insert_resource(CurrentScene(Arc::new(scene)));
     world.insert_resource(SavedAs::default());
@@ -118,10 +122,10 @@ pub(super) fn set_moment(world: &mut World, seconds: f64) {
     let mut was_saved = !world.resource::<History>().is_unsaved();
     if !was_saved {
         // What tracks take back is not there to be saved.
-        crate::scene::show_moment(world, shown);
+        show_moment_from_here(world, shown);
         was_saved = History::is_clean_as_it_is(world);
     }
-    crate::scene::show_moment(world, seconds);
+    show_moment_from_here(world, seconds);
     let content = History::content(world);
     if was_saved {
         world.resource_mut::<History>().mark_clean(content);

@@ -42,7 +42,7 @@ pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<S
 }
 
 /// Returns the f-number of a lens radius in metres, for a film 24 mm high and the field of view in perspective.
-fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
+pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * lens_radius)
 }
 

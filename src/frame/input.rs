@@ -18,7 +18,7 @@ use crate::frame::state::resources::{
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
-use crate::frame::walls::within_walls;
+use crate::frame::walls::{before_wall, is_in_room, within_walls};
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
@@ -100,11 +100,12 @@ impl CommandParams<'_, '_> {
             if steered.lens.focus_distance != rig.lens.focus_distance {
                 self.focus.set_if_neq(Focus::default());
             }
-            let is_from_side = matches!(command, Command::ViewFrom(_) | Command::ViewFromBehind);
-            self.set_rig(match &self.shown.extraction {
-                Some(scene) if is_from_side => Rig { view: within_walls(scene, &rig.view, steered.view), ..steered },
-                _ => steered,
+            let view = self.shown.extraction.as_ref().map(|scene| match command {
+                Command::ViewFrom(_) | Command::ViewFromBehind => within_walls(scene, &rig.view, steered.view),
+                Command::Dolly { .. } => before_wall(scene, &rig.view, steered.view),
+                _ => steered.view,
             });
+            self.set_rig(Rig { view: view.unwrap_or(steered.view), ..steered });
             return;
         }
         match command {
@@ -118,7 +119,8 @@ impl CommandParams<'_, '_> {
                 let around = navigation::box_around(self.what_to_frame());
                 if let (Some(rig), Some((min, max))) = (self.rig(), around) {
                     let depth = (0.5 * (min + max) - rig.view.eye).dot(rig.view.forward);
-                    if depth > 0.0 && (self.around.is_outside(rig.view.eye) || !self.selection.0.is_empty()) {
+                    let in_room = self.shown.extraction.as_ref().is_some_and(|scene| is_in_room(scene, &rig.view));
+                    if depth > 0.0 && (!in_room || !self.selection.0.is_empty()) {
                         self.set_rig(Rig { view: View { pivot_distance: depth, ..rig.view }, ..rig });
                     }
                 }

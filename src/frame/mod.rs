@@ -76,8 +76,8 @@ pub use command::Command;
 pub use core::oidn;
 pub use edit::{Edit, Id, NewThing, Property, PropertyError, set_by_name, sky_strength, textures};
 pub use focus::{
-    Aperture, Focus, FocusTarget, SharpZone, f_number, f_number_decimals, focal_length, radius_of_f_stop, sharp_zone,
-    vfov_of_focal_length,
+    Aperture, Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, focal_length, radius_of_f_stop,
+    sharp_zone, vfov_of_focal_length,
 };
 pub use material_preview::MaterialPreview;
 pub use object_map::{ObjectMap, ObjectMapSource, Outline};

@@ -24,6 +24,8 @@ pub struct SceneBounds {
     /// Height of the ground that the home position is above, metres: of a plane, of which there is nothing to be seen from
     /// below.
     pub ground: Option<f64>,
+    /// Height of the floor that the home position stands on, metres.
+    pub floor: Option<f64>,
 }
 
 impl SceneBounds {
@@ -37,13 +39,8 @@ impl SceneBounds {
             aspect,
             turning: self.turning,
             pace: self.pace,
-            ground: self.ground,
+            ground: self.ground.or(self.floor),
         }
-    }
-
-    /// Whether a position is outside of all that has an end: in front of things, not in a room.
-    pub fn is_outside(&self, eye: DVec3) -> bool {
-        (eye - self.extent.center).length() > self.extent.radius
     }
 
     /// Whether a camera at this position sees nothing but the back of the ground.

@@ -26,6 +26,7 @@ use crate::frame::state::seen_lights::{axis_of, light_at};
 use crate::frame::state::selection::{ActivePart, OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
 use crate::frame::views::{Bookmarks, ViewTrail};
+use crate::frame::walls::is_in_room;
 use crate::frame::worker::{Waker, Worker};
 use crate::render::{Film, Prepared, RenderSettings, SampleAllocation};
 use crate::scene::{
@@ -142,6 +143,7 @@ impl Session {
             side_view: None,
             pace: None,
             ground: None,
+            floor: None,
         };
         world.insert_resource(around);
         world.init_resource::<Clock>();
@@ -371,9 +373,11 @@ impl Session {
         self.world.resource_mut::<Status>().say(now, MessageKind::Saved, text);
     }
 
-    /// Whether the camera is outside of all that has an end: in front of things, not in a room.
-    pub fn is_outside(&self) -> bool {
-        self.world.resource::<SceneBounds>().is_outside(self.status().rig.view.eye)
+    /// Whether the camera is in a room, not in front of things; `None` while the scene is not there to be seen.
+    pub fn is_in_room(&self) -> Option<bool> {
+        let shown = self.world.resource::<RenderState>();
+        let scene = shown.extraction.as_ref().filter(|_| !shown.builds_missing)?;
+        Some(is_in_room(scene, &self.status().rig.view))
     }
 
     /// The box around an object or a light, along its own axes.

@@ -28,8 +28,6 @@ pub struct Settings {
     pub navigation: Navigation,
     /// Whether the user has been asked for them.
     pub greeted: bool,
-    /// Whether a plain drag orbits rather than looks around, if the user has chosen.
-    pub orbits: Option<bool>,
     /// The noise of the image in the window.
     pub denoising: Denoising,
     /// What denoises it.
@@ -49,7 +47,6 @@ impl Default for Settings {
             recent: Vec::new(),
             navigation: Navigation::default(),
             greeted: false,
-            orbits: None,
             denoising: Denoising::Denoised,
             denoiser: DenoiseFilter::default(),
             panel: false,

@@ -11,6 +11,7 @@ use crate::frame::state::resources::{
     ViewMode, WindowHidden,
 };
 use crate::frame::state::selection::Selection;
+use crate::frame::walls::floor_below;
 use crate::frame::worker::{Job, Orders};
 use crate::kdtree::HitSpace;
 use crate::render::RenderSettings;
@@ -169,6 +170,7 @@ pub fn rebuild(
             *unsettled_since = waits_for_rest(inputs, trees, origin).then_some(clock.0);
             around.extent = extents.extent(inputs);
             around.corners = extents.corners(inputs);
+            around.floor = extraction.as_ref().and_then(|scene| floor_below(scene, &around.home.view));
             for problem in extraction.iter().flat_map(|extraction| &extraction.problems) {
                 status.say(clock.0, MessageKind::Warning, problem.clone());
             }

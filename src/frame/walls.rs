@@ -1,7 +1,9 @@
-//! Views from a side that stay in the room.
+//! Rooms: whether a camera is in one, its floor, and movements that stay there.
 
 use crate::frame::state::selection::distance;
 use crate::scene::{Extraction, View};
+use glam::DVec3;
+use std::f64::consts::PI;
 
 /// Part of the way to a wall.
 const SHORT_OF: f64 = 0.95;
@@ -15,4 +17,56 @@ pub fn within_walls(scene: &Extraction, from: &View, to: View) -> View {
     let room = wall.map(|wall| wall + (from.eye - to.pivot()).dot(outwards)).filter(|room| *room > 0.0);
     let pivot_distance = room.map_or(to.pivot_distance, |room| to.pivot_distance.min(SHORT_OF * room));
     View { eye: to.pivot() + pivot_distance * outwards, pivot_distance, ..to }
+}
+
+/// Moves a view that goes away from its pivot, in a room, only as far as the wall behind it.
+pub fn before_wall(scene: &Extraction, from: &View, to: View) -> View {
+    let away = to.pivot_distance - from.pivot_distance;
+    let wall = if away > 0.0 { distance(scene, from.eye, -from.forward) } else { None };
+    let Some(wall) = wall.filter(|wall| away > SHORT_OF * wall && is_in_room(scene, from)) else { return to };
+    let pivot_distance = from.pivot_distance + SHORT_OF * wall;
+    View { eye: from.pivot() - pivot_distance * from.forward, pivot_distance, ..to }
+}
+
+/// Height of what a view stands on: something level below the camera, and not above what it looks at.
+pub fn floor_below(scene: &Extraction, view: &View) -> Option<f64> {
+    /// Distance of the rays that tell whether it is level, and its roughness, relative to the height of the camera.
+    const ASIDE: f64 = 0.05;
+    const UNEVEN: f64 = 1e-3;
+    let down = |from: DVec3| distance(scene, from, DVec3::NEG_Y);
+    let height = down(view.eye)?;
+    let is_level = [(1.0, 0.0), (-0.5, 0.866), (-0.5, -0.866)].iter().all(|(x, z)| {
+        let beside = view.eye + ASIDE * height * DVec3::new(*x, 0.0, *z);
+        down(beside).is_some_and(|found| (found - height).abs() < UNEVEN * height)
+    });
+    let floor = view.eye.y - height;
+    (is_level && floor < view.pivot().y).then_some(floor)
+}
+
+/// Directions that are looked into for a ceiling.
+const N_DIRECTIONS: u32 = 200;
+
+/// The least height of their end, for directions of length 1: what is level may go out through a window.
+const LEAST_RISE: f64 = 0.25;
+
+/// Part of the directions in which there is a ceiling above a camera in a room: 0.88 to 1 in fourteen rooms of the field;
+/// 0.7 and less before things.
+const ROOFED: f64 = 0.8;
+
+/// A ceiling is not farther away than so many times what is in the middle of the image: else it is a sky around things.
+const MOST_HEIGHT: f64 = 10.0;
+
+/// Whether a camera is in a room: wherever it looks upwards there is something.
+pub fn is_in_room(scene: &Extraction, view: &View) -> bool {
+    let reach = MOST_HEIGHT * distance(scene, view.eye, view.forward).unwrap_or(view.pivot_distance);
+    let golden = PI * (3.0 - 5.0f64.sqrt());
+    // Evenly over the sphere above that height.
+    let is_roofed = |i: &u32| {
+        let rise = 1.0 - (1.0 - LEAST_RISE) * (f64::from(*i) + 0.5) / f64::from(N_DIRECTIONS);
+        let (turn, level) = (f64::from(*i) * golden, (1.0 - rise * rise).sqrt());
+        let direction = DVec3::new(level * turn.cos(), rise, level * turn.sin());
+        distance(scene, view.eye, direction).is_some_and(|distance| distance < reach)
+    };
+    let n_roofed = (0..N_DIRECTIONS).filter(is_roofed).count();
+    n_roofed as f64 >= ROOFED * f64::from(N_DIRECTIONS)
 }

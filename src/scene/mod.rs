@@ -87,7 +87,7 @@ pub use crate::scene::world::inventory::{Inventory, LightEntry, MaterialEntry, O
 pub use crate::scene::world::lights::{LightTexture, WithLight, light_of, put_light};
 pub use crate::scene::world::material_value::material_value;
 pub use crate::scene::world::trees::Trees;
-pub use animation::{Animation, Moment, camera_follows, show_moment};
+pub use animation::{Animation, Moment, camera_follows, show_moment, show_moment_from_here};
 pub use builtin::{BUILTIN_SCENES, SCENES_IMAGE, builtin_text};
 pub use describe::Description;
 pub(crate) use extract::origin_of;

@@ -1,6 +1,7 @@
 //! Choosing a file inside the window: to open it, where the desktop has no dialog, and to save.
 
 use crate::viewer::dialog::DialogPurpose;
+use crate::viewer::file_preview::FilePreview;
 use egui::Context;
 use egui_file_dialog::{DialogState, FileDialog};
 use std::path::{Path, PathBuf};
@@ -10,14 +11,16 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct Browser {
     open: Option<(DialogPurpose, Box<FileDialog>)>,
+    preview: FilePreview,
 }
 
 impl Browser {
     /// Opens the browser in a folder.
     ///
-    /// - `name`: of the file to be saved, as a proposal.
+    /// - `name`: of the file to be saved, as a proposal; of one that is shown, if files are to be opened.
     pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, name: &str, screen: egui::Vec2) {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
+        let first = folder.join(name);
         // Long names and lists have room in a large window.
         let wanted = egui::vec2(720.0, 440.0).max(0.7 * screen);
         let size = wanted.min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));
@@ -45,7 +48,8 @@ impl Browser {
             DialogPurpose::SaveFrames => dialog.pick_directory(),
             _ => dialog.pick_file(),
         }
-        self.open = Some((purpose, Box::new(dialog)));
+        dialog.set_right_panel_width(FilePreview::WIDTH);
+        (self.open, self.preview) = (Some((purpose, Box::new(dialog))), FilePreview::new(first));
     }
 
     pub fn is_open(&self) -> bool {
@@ -54,12 +58,21 @@ impl Browser {
 
     /// Draws the browser; returns the file that was chosen.
     pub fn show(&mut self, context: &Context) -> Option<(DialogPurpose, PathBuf)> {
-        // At once, also from the field of the name.
-        if context.input(|input| input.key_pressed(egui::Key::Escape)) {
+        // At once, also from the field of the name; but a menu of its own first.
+        if context.input(|input| input.key_pressed(egui::Key::Escape)) && !egui::Popup::is_any_open(context) {
             self.open = None;
         }
         let (purpose, dialog) = self.open.as_mut()?;
-        dialog.update(context);
+        // What is to be saved is no image that is there.
+        let has_preview = !purpose.saves() && context.content_rect().width() >= FilePreview::LEAST_WINDOW;
+        if has_preview {
+            let preview = &mut self.preview;
+            dialog.update_with_right_panel_ui(context, &mut |ui, dialog| {
+                preview.show(ui, dialog.selected_entry().map(egui_file_dialog::DirectoryEntry::as_path));
+            });
+        } else {
+            dialog.update(context);
+        }
         let chosen = dialog.take_picked().map(|path| (*purpose, path));
         if chosen.is_some() || *dialog.state() != DialogState::Open {
             self.open = None;

@@ -18,6 +18,8 @@ const MIDDLE: Color32 = Color32::from_gray(235);
 /// Points that a pressed mouse may move without moving anything.
 const CLICK_TOLERANCE: f64 = 4.0;
 const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
+/// From the end of an axis, points.
+const END_REACH: f64 = 10.0;
 
 /// The overlays to be drawn, computed before drawing.
 #[derive(Default)]
@@ -28,8 +30,13 @@ pub struct Handles {
     bodies: Vec<Entity>,
     /// Lights without a surface that are not selected.
     lights: Vec<DVec3>,
-    /// Axes of selected spot lights, from the light to what they hit.
-    axes: Vec<[DVec3; 2]>,
+    /// Axes of selected spot lights, from the light to what they hit; their ends can be dragged.
+    axes: Vec<(Entity, [DVec3; 2])>,
+    /// The spot light whose end is under the mouse, or is dragged.
+    aimed: Option<Entity>,
+    is_aiming: bool,
+    /// Of the part of the window that the panel leaves free, points.
+    size: DVec2,
     gizmo: Option<(Gizmo, Projector)>,
     projector: Option<Projector>,
     hovered: Option<Handle>,
@@ -56,6 +63,7 @@ impl Handles {
     pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, projector: Projector, size: DVec2) {
         self.boxes.clear();
         self.bodies.clear();
+        self.size = size;
         let radius = session.world().resource::<SceneBounds>().extent.radius;
         let selected = session.world().resource::<Selection>().0.clone();
         for &entity in &selected {
@@ -71,7 +79,7 @@ impl Handles {
         let lights = session.inputs().lights.iter().filter(|light| light.light.has_position());
         let others = lights.filter(|light| !selected.contains(&light.entity));
         self.lights = others.map(|light| light.placement.translation).collect();
-        self.axes = selected.iter().filter_map(|light| session.axis_of(*light)).collect();
+        self.axes = selected.iter().filter_map(|light| Some((*light, session.axis_of(*light)?))).collect();
         self.projector = Some(projector);
         self.gizmo = mode.and_then(|mode| self.gizmo_of(session, mode));
         self.out_of_view = match (self.boxes.last(), selected.last()) {
@@ -99,10 +107,37 @@ impl Handles {
 
     /// Handles a mouse press; returns whether it grabbed a handle.
     pub fn grab(&mut self, mouse: DVec2) -> bool {
-        let Some((gizmo, projector)) = self.gizmo else { return false };
-        let handle = gizmo.handle_at(mouse, &projector);
-        self.grabbed = handle.map(|handle| Grabbed { gizmo, handle, from: mouse, now: None });
-        handle.is_some()
+        let handle = self.gizmo.and_then(|(gizmo, projector)| Some((gizmo, gizmo.handle_at(mouse, &projector)?)));
+        self.grabbed = handle.map(|(gizmo, handle)| Grabbed { gizmo, handle, from: mouse, now: None });
+        self.aimed = self.end_at(mouse).filter(|_| self.grabbed.is_none());
+        self.is_aiming = self.aimed.is_some();
+        self.is_grabbed()
+    }
+
+    /// An axis in the window; it ends where it leaves the window, so that its end can be dragged.
+    fn shown_axis(&self, [from, to]: [DVec3; 2]) -> Option<[DVec2; 2]> {
+        let [from, to] = self.projector?.segment(from, to)?;
+        let [least, most] = [DVec2::splat(END_REACH), self.size - END_REACH];
+        let is_in = |at: DVec2| at.cmpge(least).all() && at.cmple(most).all();
+        if !is_in(from) {
+            return Some([from, to]);
+        }
+        // The part of the way to the first edge.
+        let way = to - from;
+        let room = DVec2::select(way.cmpgt(DVec2::ZERO), most - from, least - from) / way;
+        let part = [room.x, room.y].into_iter().filter(|part| part.is_finite()).fold(1.0, f64::min);
+        Some([from, from + part * way])
+    }
+
+    /// The spot light whose axis ends at the mouse.
+    fn end_at(&self, mouse: DVec2) -> Option<Entity> {
+        let is_near = |axis: [DVec3; 2]| self.shown_axis(axis).is_some_and(|[_, end]| end.distance(mouse) <= END_REACH);
+        self.axes.iter().find(|(_, axis)| is_near(*axis)).map(|(light, _)| *light)
+    }
+
+    /// The spot light that a drag aims.
+    pub fn aimed(&self) -> Option<Entity> {
+        self.aimed.filter(|_| self.is_aiming)
     }
 
     /// Whether a drag that begins on this moves it, if it is selected.
@@ -125,7 +160,12 @@ impl Handles {
 
     /// Handles a mouse movement; returns the command of a drag, and whether the handles must be redrawn.
     pub fn mouse_at(&mut self, mouse: DVec2, snap: bool) -> (Option<Command>, bool) {
-        let Some((gizmo, projector)) = self.gizmo else { return (None, false) };
+        if self.is_aiming {
+            return (None, false);
+        }
+        let end = self.end_at(mouse);
+        let is_other_end = std::mem::replace(&mut self.aimed, end) != end;
+        let Some((gizmo, projector)) = self.gizmo else { return (None, is_other_end) };
         if let Some(grabbed) = &mut self.grabbed {
             let drag = grabbed.gizmo.drag(grabbed.handle, grabbed.from, mouse, &projector, snap);
             if drag.is_none() || drag == grabbed.now {
@@ -142,31 +182,34 @@ impl Handles {
         let hovered = gizmo.handle_at(mouse, &projector);
         let news = hovered != self.hovered;
         self.hovered = hovered;
-        (None, news)
+        (None, news || is_other_end)
     }
 
     /// Handles a mouse release; returns whether a handle was grabbed.
     pub fn release(&mut self) -> bool {
         self.pressed = None;
-        self.grabbed.take().is_some()
+        std::mem::take(&mut self.is_aiming) | self.grabbed.take().is_some()
     }
 
     /// The shape of the mouse.
     ///
     /// - `is_over_body`: whether it is on a selected object, which a drag would move.
     pub fn cursor(&self, is_over_body: bool) -> Option<CursorIcon> {
+        if self.aimed.is_some() {
+            return Some(CursorIcon::Crosshair);
+        }
         let moves = self.gizmo.is_some_and(|(gizmo, _)| gizmo.mode == Mode::Move);
         let is_body = self.grabbed.as_ref().map_or(is_over_body, |grabbed| grabbed.handle == Handle::Middle);
         (moves && is_body).then_some(CursorIcon::Move)
     }
 
     pub fn is_grabbed(&self) -> bool {
-        self.grabbed.is_some()
+        self.grabbed.is_some() || self.is_aiming
     }
 
     /// Whether a press would take a handle, or has taken one.
     pub fn is_lit(&self) -> bool {
-        self.is_grabbed() || self.hovered.is_some()
+        self.is_grabbed() || self.hovered.is_some() || self.aimed.is_some()
     }
 
     /// Draws an arrow at the edge of `free`, the uncovered part of the window, if the selection is out of view.
@@ -207,10 +250,12 @@ impl Handles {
         let painter = context.layer_painter(egui::LayerId::background());
         let lights = self.lights.iter().filter(|_| marks_lights).filter_map(|light| projector.place(*light));
         lights.for_each(|place| draw_light(&painter, pos(place)));
-        for [from, to] in self.axes.iter().filter_map(|[from, to]| projector.segment(*from, *to)) {
+        for (light, axis) in &self.axes {
+            let Some([from, to]) = self.shown_axis(*axis) else { continue };
             painter.line_segment([pos(from), pos(to)], Stroke::new(3.0, Color32::from_black_alpha(110)));
             painter.line_segment([pos(from), pos(to)], Stroke::new(1.5, SELECTED));
-            painter.circle_filled(pos(to), 3.0, SELECTED);
+            let (radius, color) = if self.aimed == Some(*light) { (6.0, GRABBED) } else { (4.5, SELECTED) };
+            painter.circle(pos(to), radius, color, Stroke::new(1.0, Color32::BLACK));
         }
         for (i, (entity, own, is_point)) in self.boxes.iter().enumerate() {
             if outlined(*entity) || own.min == own.max && !is_point {

@@ -35,6 +35,7 @@ mod change;
 mod dialog;
 pub mod display;
 mod file_manager;
+mod file_preview;
 mod form_preview;
 mod grab;
 mod greeting;

@@ -9,6 +9,7 @@ use crate::frame::{
 use crate::render::{DenoiseSource, Film, GuideGatherer, Prepared, RenderSettings, guide_samples};
 use crate::scene::whole_file::Replace;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
+use crate::viewer::saver::file_stem;
 use crate::viewer::status::{percent, samples};
 use crate::viewer::trend::{Outlook, Trend};
 use glam::{UVec2, Vec3};
@@ -28,6 +29,8 @@ pub struct Order {
     pub format: PictureFormat,
     /// The file of the image, or the folder of the frames.
     pub path: PathBuf,
+    /// Somebody has chosen this file, and agreed that another of this name is replaced.
+    pub may_replace: bool,
     /// The frames of the animation; `None` for the image as it is seen now.
     pub frames: Option<RangeInclusive<u32>>,
     /// They are those of a turn of the camera.
@@ -58,6 +61,8 @@ pub struct Advance {
 /// A finished image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finished {
+    /// Where it was written: if its name was taken meanwhile, under another one.
+    pub path: PathBuf,
     pub spp: u32,
     /// Relative error of what was written, once it is known.
     pub error: Option<f64>,
@@ -144,7 +149,7 @@ impl Order {
             return Ok(None);
         }
         let error = denoised.as_ref().map(|found| found.error).or(film.error_estimate().map(|error| error.relative));
-        let finished = Finished { spp: film.spp(), error, is_complete };
+        let mut finished = Finished { path: self.path.clone(), spp: film.spp(), error, is_complete };
         let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
         let display = draft.display();
         let mut note = draft.note(&self.path, self.size, samples, display.into());
@@ -155,7 +160,12 @@ impl Order {
         }
         let colors = denoised.as_ref().map(|denoised| &denoised.color[..]);
         let print = Print { film: &film, display: &display, size: self.size, note: Some(&note), denoised: colors };
-        print.write(&self.path, Replace::AllButFilms).map_err(|error| error.to_string())?;
+        if self.may_replace {
+            print.write(&self.path, Replace::AllButFilms).map_err(|error| error.to_string())?;
+        } else {
+            let stem = file_stem(&self.path.to_string_lossy());
+            finished.path = print.write_unused(&self.path, &stem).map_err(|error| error.to_string())?;
+        }
         Ok(Some(finished))
     }
 
@@ -241,6 +251,7 @@ mod tests {
             denoiser: None,
             format: PictureFormat::Png,
             path,
+            may_replace: true,
             frames: None,
             is_turntable: false,
         }
@@ -266,6 +277,24 @@ mod tests {
         order.render_unless(&|| false, &subject, &|| false, |now| told.push((now.spp, now.is_sampled))).unwrap();
         assert_eq!(told.last(), Some(&(2, true)));
         assert!(told[..told.len() - 1].iter().all(|(_, is_sampled)| !is_sampled), "{told:?}");
+    }
+
+    #[test]
+    fn a_file_that_nobody_has_chosen_is_never_replaced() {
+        let (folder, subject) = (tempfile::tempdir().unwrap(), subject());
+        let order = order(folder.path(), Target { spp: Some(2), ..Target::default() });
+        let write = |order: &Order| {
+            let finished = order.render_unless(&|| false, &subject, &|| false, |_| ()).unwrap().unwrap();
+            finished.path.file_name().unwrap().to_string_lossy().into_owned()
+        };
+        // A screenshot that took the proposed name while the form was open.
+        std::fs::write(&order.path, "another").unwrap();
+        let proposed = Order { may_replace: false, ..order.clone() };
+        assert_eq!((write(&proposed), write(&proposed)), ("a-0001.png".to_owned(), "a-0002.png".to_owned()));
+        assert_eq!(std::fs::read_to_string(&order.path).unwrap(), "another");
+        assert_eq!(write(&order), "a.png");
+        std::fs::remove_file(&order.path).unwrap();
+        assert_eq!(write(&proposed), "a.png");
     }
 
     #[test]

@@ -99,6 +99,8 @@ pub struct OrderForm {
     filter: DenoiseFilter,
     format: PictureFormat,
     file: PathBuf,
+    /// Somebody has chosen the file.
+    is_chosen: bool,
     folder: PathBuf,
     /// First and last frame; `None` for a single image.
     frames: Option<(u32, u32)>,
@@ -121,6 +123,7 @@ impl Default for OrderForm {
             filter: DenoiseFilter::default(),
             format: PictureFormat::Png,
             file: PathBuf::new(),
+            is_chosen: false,
             folder: PathBuf::new(),
             frames: None,
             is_turntable: false,
@@ -180,7 +183,7 @@ impl OrderForm {
             self.of_image.error = (seen.clamp(0.25, NOISE) * 100.0).floor() / 100.0;
         }
         // Each time another one, so that nothing is replaced by a second click.
-        self.file = new_file(folder, scene, self.format.extension());
+        (self.file, self.is_chosen) = (new_file(folder, scene, self.format.extension()), false);
         (self.is_open, self.problem) = (true, None);
     }
 
@@ -191,12 +194,13 @@ impl OrderForm {
             return;
         }
         match PictureFormat::of(&path) {
-            Ok(format) => (self.file, self.format) = (path, format),
+            Ok(format) => (self.file, self.format, self.is_chosen) = (path, format, true),
             Err(_) => {
+                // The name that is asked about has no extension.
                 let mut name = path.file_name().unwrap_or_default().to_owned();
                 name.push(".");
                 name.push(self.format.extension());
-                self.file = path.with_file_name(name);
+                (self.file, self.is_chosen) = (path.with_file_name(name), false);
             }
         }
     }
@@ -217,6 +221,7 @@ impl OrderForm {
             denoiser: self.denoised.then_some(self.filter),
             format: self.format,
             path: self.path().to_owned(),
+            may_replace: self.is_chosen,
             frames: self.frames.map(|(first, last)| first..=last),
             is_turntable: self.is_turntable,
         }
@@ -319,7 +324,7 @@ impl OrderForm {
             for (format, name, about) in FORMATS {
                 if ui.selectable_label(self.format == format, name).on_hover_text(about).clicked() {
                     self.format = format;
-                    self.file.set_extension(format.extension());
+                    self.is_chosen &= !self.file.set_extension(format.extension());
                 }
             }
         });
@@ -441,6 +446,7 @@ mod tests {
         assert_eq!((form.file.clone(), form.format), (PathBuf::from("/a/room.exr"), PictureFormat::Exr));
         form.place(DialogPurpose::SaveImage, PathBuf::from("/a/room.v2"));
         assert_eq!(form.file, Path::new("/a/room.v2.exr"));
+        assert!(!form.order().may_replace, "another name than the one that was asked about");
         assert_eq!(form.order().target.error, Some(0.01));
         form.of_image.limit = Limit::Samples;
         let order = form.order();

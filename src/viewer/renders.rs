@@ -106,7 +106,6 @@ impl Renders {
         let path = std::path::absolute(&order.path).unwrap_or_else(|_| order.path.clone());
         let title = path.file_name().map_or_else(|| stem.clone(), |name| name.to_string_lossy().into_owned());
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
-        let saved = path.clone();
         let run = move || {
             let outcome = match worker_threads().num_threads(threads).build() {
                 Ok(pool) => pool.install(|| work.run(&Order { path, ..order }, source, &stem)),
@@ -114,7 +113,6 @@ impl Renders {
             };
             // If the window is gone, nobody is told.
             if let Some(outcome) = outcome.transpose() {
-                let outcome = outcome.map(|news| (saved, news));
                 let _ = sender.send(outcome.map_err(|reason| format!("the image was not saved: {reason}")));
             }
             waker();
@@ -257,8 +255,8 @@ impl Work {
         (self.waker)();
     }
 
-    /// Returns the message at the end; `None` for what was cancelled.
-    fn run(&self, order: &Order, source: Source, stem: &str) -> Result<Option<String>, String> {
+    /// Returns where it is and the message at the end; `None` for what was cancelled.
+    fn run(&self, order: &Order, source: Source, stem: &str) -> Result<Option<(PathBuf, String)>, String> {
         match source {
             Source::Still(subject) => {
                 let tell = |now: Advance| self.tell(now, now.share, None);
@@ -266,9 +264,13 @@ impl Work {
                 let Some(finished) = order.render_unless(&cancelled, &subject, &|| self.stops(), tell)? else {
                     return Ok(None);
                 };
-                Ok(Some(format!("saved {} ({})", order.path.display(), finished.describe(order.size))))
+                let news = format!("saved {} ({})", finished.path.display(), finished.describe(order.size));
+                Ok(Some((finished.path, news)))
             }
-            Source::Frames(reel, settings) => self.frames(order, *reel, settings, stem),
+            Source::Frames(reel, settings) => {
+                let news = self.frames(order, *reel, settings, stem)?;
+                Ok(news.map(|news| (order.path.clone(), news)))
+            }
         }
     }
 
@@ -293,7 +295,7 @@ impl Work {
             let tell = |now: Advance| {
                 self.tell(now, (f64::from(done) + now.share) / f64::from(n), Some((done + 1, n)));
             };
-            let one = Order { path: order.frame_path(stem, number), ..order.clone() };
+            let one = Order { path: order.frame_path(stem, number), may_replace: true, ..order.clone() };
             // Half a frame is none, unless somebody keeps it.
             let Some(frame) = one.render_unless(&is_ended, &subject, &|| self.stops(), tell)? else { break };
             saved += 1;
@@ -364,6 +366,7 @@ mod tests {
             denoiser: None::<DenoiseFilter>,
             format: PictureFormat::Png,
             path: folder.path().join("new"),
+            may_replace: false,
             frames: Some(3..=5),
             is_turntable: false,
         };

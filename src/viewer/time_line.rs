@@ -1,6 +1,8 @@
 //! The strip of an animation above the bar: play, the frame, its keys, what part of it plays, and a button that renders
 //! the frames.
 
+use crate::format::camera::camera;
+use crate::frame::navigation::Rig;
 use crate::frame::{Command, CurrentScene, Edit, PlayRange, Session};
 use crate::scene::{Animation, Moment};
 use crate::viewer::keys::{Action, PlayEnd};
@@ -37,6 +39,41 @@ pub struct Strip {
     pub plays: [u32; 2],
     /// Frames with a key.
     keys: Vec<f64>,
+    /// The camera of the animation, if it moves one.
+    camera: Option<AnimatedCamera>,
+}
+
+/// A camera that an animation moves.
+#[derive(Clone, Debug, PartialEq)]
+struct AnimatedCamera {
+    /// Where it is now.
+    rig: Rig,
+    /// The window looks through it.
+    is_shown: bool,
+}
+
+impl AnimatedCamera {
+    fn of(animation: &Animation, seconds: f64, shown: &Rig) -> Option<Self> {
+        if !animation.moves_camera() {
+            return None;
+        }
+        let (view, projection, lens) = camera(&animation.camera_at(seconds));
+        let is_shown = !animation.has_lost(&shown.view, &shown.projection, &shown.lens, seconds);
+        Some(Self { rig: Rig { view, projection, lens }, is_shown })
+    }
+
+    /// A button that tells whether it is looked through, and goes back to it.
+    fn show(&self, ui: &mut Ui) -> Vec<Ask> {
+        let hint = match self.is_shown {
+            true => "the animation moves the camera, until you move it",
+            false => "look through the camera of the animation again",
+        };
+        if !ui.selectable_label(self.is_shown, "Camera").on_hover_text(hint).clicked() || self.is_shown {
+            return Vec::new();
+        }
+        let Rig { view, projection, lens } = self.rig;
+        [Command::SetView(view), Command::SetProjection(projection), Command::SetLens(lens)].map(Ask::Send).into()
+    }
 }
 
 /// What is asked for on the strip.
@@ -64,13 +101,14 @@ impl Strip {
             // What has been made in files has its length.
             let more = if animation.can_grow() { Animation::frames_to_key(ROOM, fps) } else { 0 };
             let reach = n.max(more).max((shown * fps).ceil() as u32 + 1);
-            return Some(Self { fps, n, reach, frame: Some(shown * fps), plays: plays(fps, n), keys });
+            let camera = AnimatedCamera::of(animation, shown, &session.status().rig);
+            return Some(Self { fps, n, reach, frame: Some(shown * fps), plays: plays(fps, n), keys, camera });
         }
         // A glTF model in its stored pose.
         let length = world.get_resource::<CurrentScene>()?.0.model_length()?;
         let fps = world.get_resource::<Animation>().map_or(24.0, |animation| animation.fps);
         let n = Animation::frames_to_key(length, fps);
-        Some(Self { fps, n, reach: n, frame: None, plays: plays(fps, n), keys: Vec::new() })
+        Some(Self { fps, n, reach: n, frame: None, plays: plays(fps, n), keys: Vec::new(), camera: None })
     }
 
     /// The frame, and the last one of the animation unless it lies beyond that.
@@ -166,6 +204,9 @@ pub fn show(context: &Context, strip: &Strip, is_playing: bool) -> Vec<Ask> {
                 let hint = "render the frames to a folder in the background";
                 if ui.button("Render frames …").on_hover_text(hint).clicked() {
                     asked.push(Ask::Act(Action::RenderTo { frames: true }));
+                }
+                if let Some(camera) = &strip.camera {
+                    asked.extend(camera.show(ui));
                 }
                 let size = egui::vec2(ui.available_width() - 8.0, HEIGHT);
                 if size.x < 40.0 {
@@ -273,7 +314,7 @@ mod tests {
     use super::*;
 
     fn strip(n: u32) -> Strip {
-        Strip { fps: 24.0, n, reach: n, frame: Some(0.0), plays: [0, n - 1], keys: Vec::new() }
+        Strip { fps: 24.0, n, reach: n, frame: Some(0.0), plays: [0, n - 1], keys: Vec::new(), camera: None }
     }
 
     #[test]

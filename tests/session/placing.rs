@@ -367,14 +367,31 @@ fn things_stand_on_a_table_and_the_parts_of_a_thing_stay_together() {
 }
 
 #[test]
-fn the_camera_is_outside_of_things_or_in_a_room() {
+fn the_camera_is_in_front_of_things_or_in_a_room() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = model(folder.path(), 1.0);
-    assert!(driver.session.is_outside());
+    assert_eq!(driver.session.is_in_room(), Some(false));
+    // Between things, but under the sky.
     let view = driver.session.status().rig.view;
-    driver.session.send(Command::SetView(View { eye: DVec3::new(0.0, 0.5, 0.0), ..view }));
+    driver.session.send(Command::SetView(View { eye: DVec3::new(0.0, 1.5, 0.0), ..view }));
     driver.frame();
-    assert!(!driver.session.is_outside());
+    assert_eq!(driver.session.is_in_room(), Some(false));
+    // Before a box that is open, and inside of it.
+    let mut driver = Driver::builtin("cornell");
+    assert_eq!(driver.session.is_in_room(), Some(false));
+    let view = driver.session.status().rig.view;
+    driver.session.send(Command::SetView(View { eye: DVec3::new(0.0, 1.5, -0.5), ..view }));
+    driver.frame();
+    assert_eq!(driver.session.is_in_room(), Some(true));
+    // The wheel does not throw it through the wall behind it, where there is one.
+    let view = View::look_at(DVec3::new(-0.3, 1.5, -0.5), DVec3::new(-0.9, 1.5, -0.5), DVec3::Y).unwrap();
+    for (factor, between) in [(1.5, -0.1..0.5), (1e3, 0.9..1.0)] {
+        driver.session.send(Command::SetView(view));
+        driver.session.send(Command::Dolly { factor });
+        driver.frame();
+        let x = driver.session.status().rig.view.eye.x;
+        assert!(between.contains(&x), "{factor}: {x}");
+    }
 }
 
 #[test]
@@ -485,4 +502,61 @@ fn a_turntable_of_an_animation_stands_at_its_moment_and_leaves_the_tracks_of_the
         assert_eq!(scene.entities.len(), at_moment.entities.len());
     }
     assert_eq!(placed(&driver), before, "the session goes on");
+}
+
+#[test]
+fn whoever_flies_away_from_the_camera_of_an_animation_stays_there_until_it_goes_back() {
+    let mut driver = Driver::builtin("carousel");
+    let go = |driver: &mut Driver, seconds: f64| {
+        driver.session.send(Command::SetMoment { seconds: Some(seconds) });
+        driver.settle();
+        driver.session.status().rig
+    };
+    let on_track = [1.0, 1.5, 2.0, 2.5].map(|seconds| go(&mut driver, seconds));
+    assert!(on_track.windows(2).all(|two| two[0].view != two[1].view));
+    // Another aperture is no other place.
+    go(&mut driver, 1.0);
+    driver.session.send(Command::SetAperture { radius: 0.0123 });
+    driver.frame();
+    let followed = go(&mut driver, 1.5);
+    assert_eq!((followed.view.eye, followed.lens.radius), (on_track[1].view.eye, 0.0123));
+    driver.session.send(Command::Orbit { yaw_deg: 25.0, pitch_deg: 5.0 });
+    driver.frame();
+    let flown = driver.session.status().rig;
+    let placed = |driver: &Driver| driver.session.inputs().objects.iter().map(|it| it.placement).collect::<Vec<_>>();
+    let before = placed(&driver);
+    assert_eq!(go(&mut driver, 2.0), flown);
+    assert!(placed(&driver) != before && !driver.session.has_unsaved_edits());
+    // Frames are those of the animation.
+    let scene = Reel::of(&mut driver.session).unwrap().open().unwrap().at(2.5).0;
+    let eye = scene.origin + scene.prepared.camera.eye.as_dvec3();
+    assert!(eye.abs_diff_eq(on_track[3].view.eye, 1e-5), "{eye}");
+    driver.session.send(Command::SetView(on_track[2].view));
+    driver.frame();
+    assert_eq!(go(&mut driver, 2.5).view.eye, on_track[3].view.eye);
+}
+
+#[test]
+fn orbits_stay_above_the_floor_that_the_camera_stands_on() {
+    let mut driver = Driver::builtin("cornell");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("floor.ron");
+    let text = r#"(
+        camera: (eye: (0, 1, 3), look_at: (0, 0.5, 0)),
+        environment: constant(1),
+        materials: { "grey": diffuse(albedo: 0.5) },
+        objects: [
+            quad(corner: (-5, 0, 5), edge_u: (10, 0, 0), edge_v: (0, 0, -10), material: "grey"),
+            sphere(center: (0, 0.5, 0), radius: 0.5, material: "grey"),
+        ],
+    )"#;
+    std::fs::write(&path, text).unwrap();
+    driver.session.open(SceneSource::Scene(path));
+    driver.run_until(|session| session.inputs().objects.len() == 2);
+    driver.settle();
+    for pitch_deg in [15.0; 8].into_iter().chain([-15.0; 16]) {
+        driver.session.send(Command::Orbit { yaw_deg: 10.0, pitch_deg });
+        driver.frame();
+        assert!(driver.session.status().rig.view.eye.y > 0.0);
+    }
 }

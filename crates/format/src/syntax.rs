@@ -90,13 +90,22 @@ fn unnamed(text: &str, at: usize) -> Option<(usize, String)> {
     Some((at, format!("`{kind}` has fields with names,{example} found `{value}` without one")))
 }
 
-/// Position of a name that does not belong there, and the kind around it, for the value at `start`: some kinds have one
-/// value without a name, such as `constant(0.5)`.
-fn named_without_need<'a>(text: &'a str, start: usize, name: &str) -> Option<(usize, &'a str)> {
-    let before = text[..start].trim_end().strip_suffix(':')?.trim_end().strip_suffix(name)?;
-    let outside = before.trim_end().strip_suffix('(')?;
-    let kind = outside.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
-    matches!(kind, "constant" | "builtin" | "obj" | "ply" | "stl").then_some((before.len(), kind))
+/// Position and message of a name that does not belong there: some kinds have one value without a name, such as
+/// `constant(0.5)`.
+///
+/// - `offset`: of the name, or of its value.
+fn named_without_need(text: &str, offset: usize) -> Option<(usize, String)> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let behind = text[offset..].trim_start_matches(is_word);
+    let is_name = behind.len() < text.len() - offset && behind.trim_start().starts_with(':');
+    // Behind the colon, the field is that of the name.
+    let inside = if is_name { text.len() - behind.trim_start().len() + 1 } else { offset };
+    let field = field_at(text, inside)?;
+    let before = text[..field.start].trim_end().strip_suffix(':')?.trim_end().strip_suffix(field.name)?;
+    let kind = before.trim_end().strip_suffix('(')?.rsplit(|c| !is_word(c)).next()?;
+    let value = field.quoted();
+    matches!(kind, "constant" | "builtin" | "obj" | "ply" | "stl")
+        .then(|| (before.len(), format!("the value of `{kind}` has no name: write `{kind}({value})`")))
 }
 
 /// Where a kind belongs that is unknown at its place, for messages.
@@ -160,9 +169,8 @@ fn wrong_form(error: &SpannedError, text: &str) -> Option<(usize, String)> {
         _ => return None,
     }
     let field = field_at(text, offset)?;
-    if let Some((at, kind)) = named_without_need(text, field.start, field.name) {
-        let value = field.quoted();
-        return Some((at, format!("the value of `{kind}` has no name: write `{kind}({value})`")));
+    if let Some(found) = named_without_need(text, offset) {
+        return Some(found);
     }
     // Inside `constant(…)` and for unknown fields, the message names the expected type.
     let expectation = field.expectation().filter(|_| !field.is_within_kind(offset));

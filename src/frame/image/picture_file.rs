@@ -144,7 +144,26 @@ impl Print<'_> {
     /// # Errors
     /// If no number is free, or the file cannot be written.
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
-        let mut names = numbered(folder, stem, format.extension());
+        self.write_first(numbered(folder, stem, format.extension()), format)
+    }
+
+    /// Writes the image to `path`, or where that is taken beside it as [`write_new`](Self::write_new) does. Returns the
+    /// path.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn write_unused(&self, path: &Path, stem: &str) -> Result<PathBuf, WriteError> {
+        let format = PictureFormat::of(path)?;
+        let beside = numbered(path.parent().unwrap_or(Path::new("")), stem, format.extension());
+        self.write_first(std::iter::once(path.to_path_buf()).chain(beside), format)
+    }
+
+    /// Writes the image under the first free name.
+    fn write_first(
+        &self,
+        mut names: impl Iterator<Item = PathBuf>,
+        format: PictureFormat,
+    ) -> Result<PathBuf, WriteError> {
         let first = free_of(&mut names)?;
         let file = self.encode_beside(format, &first, Replace::AllButFilms)?;
         file.finish_new(std::iter::once(first.clone()).chain(names))?.ok_or(WriteError::NoFreeName(first))

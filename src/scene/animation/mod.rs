@@ -19,7 +19,7 @@ pub use crate::format::property::{CameraProperty, LightProperty, ObjectProperty,
 pub use crate::format::quantity::Quantity;
 pub use keying::{KeysOf, animation_or_new, delete_keys, follow_tracks, set_keys};
 pub(super) use model::ModelMotion;
-pub use moment::{Moment, camera_follows, off_their_tracks, show_moment};
+pub use moment::{Moment, camera_follows, off_their_tracks, show_moment, show_moment_from_here};
 
 use crate::format::camera::CameraPart;
 use crate::format::material_property::MaterialProperty;

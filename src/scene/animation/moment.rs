@@ -63,6 +63,23 @@ impl Animation {
         self.model.as_ref().is_some_and(ModelMotion::moves_camera) || self.has_camera_track()
     }
 
+    /// Whether it moves the camera, but this one is not where its tracks have it at this time. What has no track may be
+    /// anything, such as the aperture.
+    pub fn has_lost(&self, view: &View, projection: &Projection, lens: &Lens, seconds: f64) -> bool {
+        if !self.moves_camera() {
+            return false;
+        }
+        let rest = rest_camera(self, seconds, view, projection, lens);
+        let (on_track, wide, _) = camera(&Self { camera: rest, ..self.clone() }.camera_at(seconds));
+        let reach = ROUNDING * (1.0 + view.eye.length() + view.pivot_distance);
+        let turned = on_track.forward.distance(view.forward).max(on_track.up.distance(view.up));
+        let is_near = on_track.eye.distance(view.eye) <= reach
+            && (on_track.pivot_distance - view.pivot_distance).abs() <= reach
+            && turned <= ROUNDING.sqrt()
+            && wide.shows_the_same(projection);
+        !is_near
+    }
+
     /// The camera at a time, as in a scene file.
     pub fn camera_at(&self, seconds: f64) -> CameraPart {
         let mut part = self.camera.clone();
@@ -86,6 +103,17 @@ fn of_entities(entities: impl Iterator<Item = Entity>) -> HashMap<Entity, usize>
 pub fn show_moment(world: &mut World, seconds: f64) {
     keep_changes(world);
     place(world, seconds);
+}
+
+/// Like [`show_moment`], but a camera that somebody has flown away from its tracks stays where it is.
+pub fn show_moment_from_here(world: &mut World, seconds: f64) {
+    let Some(CameraInput { entity, view, projection, lens }) = flown_camera(world) else {
+        return show_moment(world, seconds);
+    };
+    place(world, seconds);
+    put(world, entity, view);
+    put(world, entity, projection);
+    put(world, entity, lens);
 }
 
 /// Sets the time without first storing changes of the camera.
@@ -156,6 +184,14 @@ fn keep_changes(world: &mut World) {
         let mut animation = world.resource_mut::<Animation>();
         animation.camera = rest_camera(&animation, shown, &view, &projection, &lens);
     }
+}
+
+/// The camera, if somebody has flown it away from its tracks.
+fn flown_camera(world: &mut World) -> Option<CameraInput> {
+    let seen = SceneInputs::of(world).camera?;
+    let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
+    let animation = world.get_resource::<Animation>()?;
+    animation.has_lost(&seen.view, &seen.projection, &seen.lens, shown).then_some(seen)
 }
 
 /// Objects, lights and materials that are not as the animation has them at the current time: another time loses that.

@@ -324,9 +324,6 @@ impl App {
 
     fn toggle_drag(&mut self, now: Instant) {
         let orbits = self.input.toggle_orbits();
-        if let Some(trouble) = self.memory.keep_drag(orbits) {
-            self.toasts.add(Tone::Problem, trouble, now);
-        }
         self.toasts.add(Tone::News, if orbits { "drag: orbit" } else { "drag: look around" }, now);
     }
 
@@ -459,10 +456,11 @@ impl App {
             self.toasts.add(Tone::News, "nothing has been saved yet", now);
             return;
         };
+        // Without a program of the desktop, the browser of this one shows it.
         if let Err(reason) = file_manager::show(&path) {
-            let text = path.display().to_string();
-            self.copy(|context| context.copy_text(text));
-            self.toasts.add(Tone::News, format!("{reason}: the path is on the clipboard"), now);
+            log::info!("{reason}");
+            self.choose_place(DialogPurpose::Open, &path);
+            self.repaint_at = Some(now);
         }
     }
 

@@ -139,6 +139,11 @@ impl ApplicationHandler<Wake> for App {
                 if let Some(command) = command {
                     self.session.send(command);
                 }
+                let [x, y] = self.input.place();
+                // Nothing lies in the sky at which to aim.
+                if let Some(light) = self.handles.aimed().filter(|_| self.session.entity_at(x, y).is_some()) {
+                    self.session.send(Command::Edit(Edit::AimAt { id: light.to_bits(), x, y }));
+                }
                 if news {
                     self.repaint_at = Some(now);
                 }

@@ -222,18 +222,6 @@ impl Memory {
         self.store.settings().0.navigation
     }
 
-    /// Whether a plain drag orbits, if the user has chosen.
-    pub fn drag(&self) -> Option<bool> {
-        self.store.settings().0.orbits
-    }
-
-    /// Stores what a plain drag does for the next window.
-    pub fn keep_drag(&self, orbits: bool) -> Option<String> {
-        let mut settings = self.store.settings().0;
-        settings.orbits = Some(orbits);
-        self.store.keep_settings(&settings).err().map(String::from)
-    }
-
     /// Whether the user has never been asked for keys and gestures.
     pub fn is_new(&self) -> bool {
         let settings = self.store.settings().0;

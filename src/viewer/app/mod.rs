@@ -163,6 +163,8 @@ struct App {
     last_tick: Option<Instant>,
     /// When a movement was last passed to the session.
     steered_at: Instant,
+    /// A scene was opened, and whether its camera begins in a room is not known yet.
+    asks_for_room: bool,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
@@ -214,11 +216,11 @@ impl App {
             crate::console::remark(format_args!("warning: {trouble}"));
             toasts.add(Tone::Problem, trouble, start);
         }
-        let mut input = Input::new(options.width, options.height, memory.navigation());
-        input.set_orbits(memory.drag());
+        let input = Input::new(options.width, options.height, memory.navigation());
         Ok(Self {
             start,
             steered_at: start,
+            asks_for_room: false,
             pending,
             session,
             form: OrderForm::default(),

@@ -36,7 +36,14 @@ impl App {
         // It is about the scene before.
         if self.memory.take_opened() {
             self.toasts.end(LEFT);
-            self.input.set_outside(self.session.is_outside());
+            self.input.forget_drag();
+            self.asks_for_room = true;
+        }
+        if self.asks_for_room
+            && let Some(in_room) = self.session.is_in_room()
+        {
+            self.input.set_in_room(in_room);
+            self.asks_for_room = false;
         }
         if let Some(left) = self.memory.take_left(&self.session) {
             self.toasts.add_offer(LEFT.to_owned(), "Go back to it", Action::ReturnTo(left), now);

@@ -60,10 +60,11 @@ pub struct Input {
     spin: Option<Instant>,
     /// Until when the time of the animation has been advanced, if it plays.
     play: Option<Instant>,
-    /// Whether a drag with the left button orbits the pivot instead of turning the camera, if the user has chosen that.
+    /// Whether a drag with the left button orbits the pivot instead of turning the camera, if the user has chosen that for
+    /// this scene.
     orbits: Option<bool>,
-    /// What is looked at is a model alone, which is seen from outside.
-    is_outside: bool,
+    /// The camera of the scene begins in a room.
+    in_room: bool,
     /// Whether the mouse moves the view without a button.
     captured: bool,
     /// Whether focus follows the mouse.
@@ -118,7 +119,7 @@ impl Input {
             spin: None,
             play: None,
             orbits: None,
-            is_outside: false,
+            in_room: true,
             captured: false,
             focuses: false,
             sum: Sum::default(),
@@ -199,19 +200,19 @@ impl Input {
         orbits
     }
 
-    /// Whether a plain drag orbits the pivot: as the user has chosen, else if the camera began outside of what it shows.
+    /// Whether a plain drag orbits the pivot: as the user has chosen, else unless the camera began in a room.
     pub fn orbits(&self) -> bool {
-        self.orbits.unwrap_or(self.is_outside)
+        self.orbits.unwrap_or(!self.in_room)
     }
 
-    /// Tells whether the camera begins outside of what it shows, and not in a room.
-    pub fn set_outside(&mut self, is_outside: bool) {
-        self.is_outside = is_outside;
+    /// Tells whether the camera of a scene begins in a room, and not in front of things.
+    pub fn set_in_room(&mut self, in_room: bool) {
+        self.in_room = in_room;
     }
 
-    /// Sets what the user has chosen for a plain drag.
-    pub fn set_orbits(&mut self, orbits: Option<bool>) {
-        self.orbits = orbits;
+    /// Forgets what was chosen for a plain drag: that was for the scene before.
+    pub fn forget_drag(&mut self) {
+        self.orbits = None;
     }
 
     /// Ends a drag of which another use is made.

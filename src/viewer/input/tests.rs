@@ -191,9 +191,9 @@ fn steps_repeat_and_toggles_do_not() {
 }
 
 #[test]
-fn a_drag_orbits_what_it_is_outside_of_until_another_use_is_chosen_and_a_captured_mouse_looks() {
+fn a_drag_orbits_things_until_another_use_is_chosen_for_the_scene_and_a_captured_mouse_looks() {
     let (mut input, start) = input();
-    input.set_outside(true);
+    input.set_in_room(false);
     let orbits = |input: &mut Input| {
         input.button(MouseButton::Left, true, start);
         let [x, y] = input.cursor_place();
@@ -207,7 +207,10 @@ fn a_drag_orbits_what_it_is_outside_of_until_another_use_is_chosen_and_a_capture
     assert!(matches!(input.take(start)[..], [Command::Turn { .. }]));
     input.set_captured(false);
     assert!(!input.toggle_orbits() && !orbits(&mut input), "Space");
-    input.set_outside(false);
+    input.forget_drag();
+    assert!(orbits(&mut input), "another scene");
+    input.set_in_room(true);
+    assert!(!orbits(&mut input));
     assert!(input.toggle_orbits() && orbits(&mut input));
     // A drag of which another use is made turns nothing.
     input.button(MouseButton::Left, true, start);

@@ -2,13 +2,15 @@
 
 use crate::files::printable;
 use crate::frame::{
-    Aperture, Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals,
+    Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop,
     focal_length, radius_of_f_stop, sharp_zone, vfov_of_focal_length,
 };
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
-use crate::viewer::panel::widgets::{length, number, proportional, row, row_with_hint, rows, slider, vector, whole};
+use crate::viewer::panel::widgets::{
+    length, millimetres, number, proportional, row, row_with_hint, rows, slider, vector, whole,
+};
 use crate::viewer::status::metres;
 use egui::Ui;
 
@@ -50,10 +52,8 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
                     }
                 });
                 let metres = focal_length(&rig.projection);
-                row(ui, "focal length", |ui| {
-                    if let Some(metres) = length(ui, metres, 0.01 * metres, "of the lens, for a sensor 24 mm high")
-                        && metres > 0.0
-                    {
+                row_with_hint(ui, "focal length", "of the lens, for a sensor 24 mm high", |ui| {
+                    if let Some(metres) = millimetres(ui, metres) {
                         set(asked, vfov_of_focal_length(metres));
                     }
                 })
@@ -218,9 +218,14 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 if let Some(diameter) = length(ui, diameter, proportional(diameter), "diameter of the lens") {
                     asked.send(Command::SetAperture { radius: 0.5 * diameter });
                 }
-                let Aperture::FNumber(stop) = Aperture::of(lens.radius, &rig.projection) else { return };
+                let stop = f_stop(lens.radius, &rig.projection);
+                // Numbers that no photographer knows too: what vanishes while one types leaves the keys to the scene.
+                let range = 1e-4..=1e6;
+                if rig.projection.orthographic_height.is_some() || !range.contains(&stop) {
+                    return;
+                }
                 let mut new = stop;
-                let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6);
+                let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(range);
                 let drag = drag.max_decimals(f_number_decimals(stop)).update_while_editing(false);
                 if ui.add(drag).on_hover_text("f-number, for a sensor 24 mm high").changed() {
                     asked.send(Command::SetAperture { radius: radius_of_f_stop(new, &rig.projection) });

@@ -93,6 +93,20 @@ pub fn length(ui: &mut Ui, metres: f64, speed: f64, hint: &str) -> Option<f64> {
     ui.add(drag).on_hover_text(hint).changed().then_some(new)
 }
 
+/// The focal length of a lens: a number is in millimetres, as on lenses.
+pub fn millimetres(ui: &mut Ui, metres: f64) -> Option<f64> {
+    let value = 1e3 * metres;
+    let mut new = value;
+    let drag = egui::DragValue::new(&mut new)
+        .speed(proportional(value))
+        .range(0.1..=1e5)
+        .suffix(" mm")
+        .max_decimals(1)
+        .custom_parser(|text| of_length(text, 1e-3).map(|metres| 1e3 * metres))
+        .update_while_editing(false);
+    ui.add(drag).changed().then_some(1e-3 * new)
+}
+
 /// Metres of a typed length.
 ///
 /// - `unit`: of a number without one, metres.
