@@ -20,7 +20,7 @@ impl Browser {
     /// - `name`: of the file to be saved, as a proposal; of one that is shown, if files are to be opened.
     pub fn open(&mut self, purpose: DialogPurpose, folder: &Path, name: &str, screen: egui::Vec2) {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-        let first = folder.join(name);
+        let first = (!name.is_empty()).then(|| folder.join(name));
         // Long names and lists have room in a large window.
         let wanted = egui::vec2(720.0, 440.0).max(0.7 * screen);
         let size = wanted.min(screen - egui::vec2(40.0, 90.0)).max(egui::vec2(120.0, 80.0));

@@ -27,8 +27,8 @@ impl FilePreview {
     pub const LEAST_WINDOW: f32 = 900.0;
 
     /// - `first`: the file that is shown before one is selected.
-    pub fn new(first: PathBuf) -> Self {
-        Self { first: Some(first), ..Self::default() }
+    pub fn new(first: Option<PathBuf>) -> Self {
+        Self { first, ..Self::default() }
     }
 
     /// Draws the image of the selected file, if it is one.

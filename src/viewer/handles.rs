@@ -163,7 +163,7 @@ impl Handles {
         if self.is_aiming {
             return (None, false);
         }
-        let end = self.end_at(mouse);
+        let end = self.end_at(mouse).filter(|_| self.grabbed.is_none());
         let is_other_end = std::mem::replace(&mut self.aimed, end) != end;
         let Some((gizmo, projector)) = self.gizmo else { return (None, is_other_end) };
         if let Some(grabbed) = &mut self.grabbed {
@@ -401,6 +401,30 @@ mod tests {
             let handles = Handles { gizmo: mode.and_then(with), ..Handles::default() };
             assert_eq!(handles.cursor(true), None, "{mode:?}: a drag moves the camera");
         }
+    }
+
+    #[test]
+    fn the_end_of_an_axis_can_be_grabbed_and_stays_in_the_window() {
+        let view = View::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y).unwrap();
+        let size = DVec2::new(800.0, 600.0);
+        let projector = Projector::new(&Rig { view, ..Rig::default() }, size);
+        let with = |end: DVec3| Handles {
+            axes: vec![(Entity::PLACEHOLDER, [DVec3::ZERO, end])],
+            projector: Some(projector),
+            size,
+            ..Handles::default()
+        };
+        let near = projector.place(DVec3::X).unwrap();
+        for (end, place) in [(DVec3::X, near), (100.0 * DVec3::X, DVec2::new(790.0, 300.0))] {
+            let mut handles = with(end);
+            assert!(!handles.grab(place - 30.0) && handles.aimed().is_none());
+            assert!(handles.mouse_at(place + 3.0, false).1, "it is marked");
+            assert!(handles.grab(place + 3.0) && handles.aimed() == Some(Entity::PLACEHOLDER));
+            assert!(handles.release() && handles.aimed().is_none());
+        }
+        // A light that is out of view keeps its axis as it is.
+        let [_, end] = with(DVec3::X).shown_axis([100.0 * DVec3::X, DVec3::X]).unwrap();
+        assert_eq!(end, near);
     }
 
     #[test]
