@@ -1,5 +1,6 @@
 //! The list of everything that emits light, and the environment.
 
+use crate::files::printable;
 use crate::format::property::SkyProperty;
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::{Environment, MaterialKind};
@@ -18,6 +19,7 @@ use crate::viewer::panel::widgets::{
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
+use std::path::Path;
 
 impl Listed for LightEntry {
     fn listed(&self) -> (Entity, &str, &str) {
@@ -82,7 +84,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
                 asked.edit(Edit::Set { id: id.to_bits(), property, value });
             }
         }
-        ColorParam::Texture(texture) => drop(ui.weak(&*crate::files::printable::name(&texture.name))),
+        ColorParam::Texture(texture) => drop(ui.weak(&*printable::name(&texture.name))),
     }
 }
 
@@ -152,7 +154,11 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 EnvironmentSource::Image { file, rotate, .. } => (file.as_str(), *rotate),
                 _ => ("?", f64::from(rotation.to_degrees())),
             };
-            row(ui, "image", |ui| ui.add(egui::Label::new(file).truncate()));
+            // The name, which is at the end of a path, is what tells images apart.
+            let name = Path::new(file).file_name().unwrap_or_default().to_string_lossy();
+            row(ui, "image", |ui| {
+                ui.add(egui::Label::new(&*printable::name(&name)).truncate()).on_hover_text(printable::name(file))
+            });
             strength_row(ui, asked, *scale);
             row(ui, "rotation", |ui| {
                 if let Some(angle_deg) = number(ui, angle_deg, 0.5, -360.0..=360.0, "°") {
