@@ -223,7 +223,9 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     until_changed(&program, || click(&program, 1, (585, 326)));
     let before = emission(&saved(&program, &path));
     until_changed(&program, || program.drag(1, (600, 281), (-60, 0)));
-    program.drag(1, (645, 304), (-60, 0));
+    // Saved in between, so that the title tells when the next one has been seen.
+    saved(&program, &path);
+    until_changed(&program, || program.drag(1, (645, 304), (-60, 0)));
     let file = saved(&program, &path);
     let camera = &file.camera;
     let away = camera.eye.distance(glam::DVec3::new(0.0, 1.5, 0.0));
