@@ -49,7 +49,7 @@ const N_DIRECTIONS: u32 = 200;
 /// The least height of their end, for directions of length 1: what is level may go out through a window.
 const LEAST_RISE: f64 = 0.25;
 
-/// Part of the directions in which there is a ceiling above a camera in a room: 0.88 to 1 in fourteen rooms of the field;
+/// Part of the directions in which there is a ceiling above a camera in a room: 0.88 to 1 in twelve rooms of the field;
 /// 0.7 and less before things.
 const ROOFED: f64 = 0.8;
 
