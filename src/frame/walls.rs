@@ -19,13 +19,14 @@ pub fn within_walls(scene: &Extraction, from: &View, to: View) -> View {
     View { eye: to.pivot() + pivot_distance * outwards, pivot_distance, ..to }
 }
 
-/// Moves a view that goes away from its pivot, in a room, only as far as the wall behind it.
+/// Moves a view that goes away from its pivot, in a room, only as far as the wall behind it, and not up to that: its lens
+/// would be in the wall.
 pub fn before_wall(scene: &Extraction, from: &View, to: View) -> View {
-    let away = to.pivot_distance - from.pivot_distance;
-    let wall = if away > 0.0 { distance(scene, from.eye, -from.forward) } else { None };
-    let Some(wall) = wall.filter(|wall| away > SHORT_OF * wall && is_in_room(scene, from)) else { return to };
-    let pivot_distance = from.pivot_distance + SHORT_OF * wall;
-    View { eye: from.pivot() - pivot_distance * from.forward, pivot_distance, ..to }
+    let is_away = to.pivot_distance > from.pivot_distance;
+    let wall = if is_away { distance(scene, from.eye, -from.forward) } else { None };
+    let most = wall.map(|wall| (SHORT_OF * (from.pivot_distance + wall)).max(from.pivot_distance));
+    let Some(most) = most.filter(|most| *most < to.pivot_distance && is_in_room(scene, from)) else { return to };
+    View { eye: from.pivot() - most * from.forward, pivot_distance: most, ..to }
 }
 
 /// Height of what a view stands on: something level below the camera, and not above what it looks at.

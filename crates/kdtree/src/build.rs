@@ -4,7 +4,7 @@
 //! reference. A split must lower the expected cost, so a fan of thousands of triangles around one vertex ends as one
 //! leaf; the number of references is bounded as well ([`BuildConfig::max_growth`]). Large subtrees are built in
 //! parallel; the result never depends on the number of threads. Leaves are made at the end, straight into their final
-//! array: until then a leaf is a list of primitives, which takes a tenth of the memory.
+//! array: until then a leaf is a list of primitives, which takes less memory.
 //!
 //! Sources: Wald and Havran 2006 for cost and clipping; Hunt, Mark and Stoll 2006 for bins.
 //! Start reading at [`build`].
@@ -33,11 +33,13 @@ pub(super) trait LeafMaker: Sync {
     fn add_part(&self, leaves: &mut Self::Leaves, part: Self::Leaves, share: f64) -> impl Fn(u32) -> u32;
 }
 
-/// Appends the leaves of a part, with room for the rest of the whole: blocks are copied wherever an array grows.
+/// Appends the leaves of a part, with room for the rest of the whole: blocks are copied wherever an array grows. What a
+/// first part tells of the rest may be far off, so there is never room for many times what is there.
 pub(super) fn append_part<T>(to: &mut Vec<T>, mut part: Vec<T>, share: f64) {
     let n = to.len() + part.len();
     if n > to.capacity() {
-        to.reserve_exact((1.05 * n as f64 / share) as usize - to.len());
+        let wanted = (1.05 * n as f64 / share) as usize;
+        to.reserve_exact(wanted.min(8 * n).max(n) - to.len());
     }
     to.append(&mut part);
 }
