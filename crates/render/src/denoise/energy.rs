@@ -12,9 +12,9 @@ use crate::denoise::parallel::{LEAST_ALBEDO, Stop, each};
 use glam::Vec3;
 
 /// Radius in pixels of the two box filters that average what was taken away.
-const RADIUS: usize = 12;
+const RADIUS: usize = 24;
 /// Standard deviations by which the mean must differ from zero.
-const SIGNIFICANCE: f32 = 6.0;
+const SIGNIFICANCE: f32 = 8.0;
 
 /// Returns the radiance that each pixel gets back; `None` if `stop` returned true.
 ///
