@@ -151,11 +151,6 @@ pub enum Command {
         /// Height in pixels.
         height: u32,
     },
-    /// Report which share of the image's width, about its middle, nothing covers: views are framed for it.
-    SetFreeShare {
-        /// Above 0, at most 1.
-        share: f64,
-    },
     /// Stop rendering until [`Command::Resume`]; changes are still displayed.
     Pause,
     /// End a pause.
@@ -281,10 +276,6 @@ impl Command {
             // A size of zero is a minimised window.
             Self::Resize { width, height } => check_film_size((*width).max(1), (*height).max(1)),
             Self::SetTarget(target) => target.check(),
-            Self::SetFreeShare { share } if !(0.0 < *share && *share <= 1.0) => {
-                let allowed = "be above 0 and at most 1".to_owned();
-                Err(BadValue::OutOfRange { field: "share", value: share.to_string(), allowed })
-            }
             Self::SetMoment { seconds: Some(seconds) } | Self::AdvanceMoment { seconds } if !seconds.is_finite() => {
                 let allowed = "be a finite number of seconds".to_owned();
                 Err(BadValue::OutOfRange { field: "at", value: seconds.to_string(), allowed })

@@ -12,13 +12,13 @@ use crate::frame::scene_cameras::{beside, cameras_of};
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::Explaining;
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FreeShare, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState, Renderer,
-    StopAt, Threads, ViewMode, WantedMoment, WindowHidden,
+    Clock, CurrentScene, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState, Renderer, StopAt,
+    Threads, ViewMode, WantedMoment, WindowHidden,
 };
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
-use crate::frame::walls::{before_wall, is_in_room, within_walls};
+use crate::frame::walls::{around_walls, before_wall, is_in_room, within_walls};
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
@@ -43,7 +43,6 @@ pub struct CommandParams<'w, 's> {
     display_settings: ResMut<'w, DisplaySettings>,
     rendering: ResMut<'w, Rendering>,
     size: ResMut<'w, PictureSize>,
-    free: ResMut<'w, FreeShare>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
     hidden: ResMut<'w, WindowHidden>,
@@ -103,6 +102,13 @@ impl CommandParams<'_, '_> {
             let view = self.shown.extraction.as_ref().map(|scene| match command {
                 Command::ViewFrom(_) | Command::ViewFromBehind => within_walls(scene, &rig.view, steered.view),
                 Command::Dolly { .. } => before_wall(scene, &rig.view, steered.view),
+                Command::Orbit { .. } => {
+                    let reach = self.around.reach.filter(|(view, _)| *view == rig.view);
+                    let reach = reach.map_or(steered.view.pivot_distance, |(_, reach)| reach);
+                    let view = around_walls(scene, &rig.view, steered.view, reach);
+                    self.around.reach = (view.pivot_distance < reach).then_some((view, reach));
+                    view
+                }
                 _ => steered.view,
             });
             self.set_rig(Rig { view: view.unwrap_or(steered.view), ..steered });
@@ -139,7 +145,7 @@ impl CommandParams<'_, '_> {
             Command::FrameAll => {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
-                    let framed = navigation::frame_rig(&rig, self.free.aspect(*self.size), &points);
+                    let framed = navigation::frame_rig(&rig, self.size.aspect(), &points);
                     let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
                     self.set_rig(Rig { lens, ..framed });
                     if lens.enabled && lens != rig.lens {
@@ -227,7 +233,6 @@ impl CommandParams<'_, '_> {
                 self.set_tone_curve(next);
             }
             Command::Resize { width, height } => self.resize(PictureSize { width, height }),
-            Command::SetFreeShare { share } => drop(self.free.set_if_neq(FreeShare(share))),
             Command::Pause => drop(self.paused.set_if_neq(Paused(true))),
             Command::Resume => drop(self.paused.set_if_neq(Paused(false))),
             Command::Restart => self.shown.restart = Some("requested"),
@@ -243,7 +248,7 @@ impl CommandParams<'_, '_> {
             Command::Open { path } => match SceneSource::parse(&path) {
                 Ok(source) => {
                     let choice = ModelChoice::default();
-                    let (how, aspect, pool) = ((self.up.0, None), self.free.aspect(*self.size), self.renderer.0.pool());
+                    let (how, aspect, pool) = ((self.up.0, None), self.size.aspect(), self.renderer.0.pool());
                     self.beside.load(source, how, choice, aspect, pool, None);
                 }
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),

@@ -65,8 +65,7 @@ pub use crate::frame::state::explain::{
 pub use crate::frame::state::history::History;
 pub use crate::frame::state::remake::MeshMeasure;
 pub use crate::frame::state::resources::{
-    CurrentScene, FrameChanges, FreeShare, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads, ViewMode,
-    WindowHidden,
+    CurrentScene, FrameChanges, Paused, PictureSize, PlayRange, RenderRegion, StopAt, Threads, ViewMode, WindowHidden,
 };
 pub use crate::frame::state::selection::{OwnBox, Picked, Projector, Selection, active_part, pick};
 pub use camera_path::{along, turntable};
@@ -90,4 +89,4 @@ pub use scene_bounds::SceneBounds;
 pub use session::{Session, SessionError, SessionOptions, Stage};
 pub use settings::{LeftView, Navigation, SceneBookmarks, Settings, SettingsStore, scene_name};
 pub use views::{Bookmarks, ViewTrail};
-pub use worker::{ViewOptions, Waker};
+pub use worker::{KeptDenoised, KeptFilm, ViewOptions, Waker};

@@ -40,9 +40,6 @@ pub(super) struct RecordingHeader {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) seed: u32,
-    /// [`FreeShare`](crate::frame::FreeShare) when the first scene was opened; 1 if not given.
-    #[serde(default)]
-    pub(super) free: Option<f64>,
 }
 
 /// A built-in scene, or a file by its path relative to the recording.
@@ -155,9 +152,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
             header.program
         )));
     }
-    let RecordingHeader { width, height, up, free, .. } = header;
-    let free = free.map_or(Ok(()), |share| Command::SetFreeShare { share }.check());
-    free.map_err(|bad| format!("{}:1: {bad}", path.display()))?;
+    let RecordingHeader { width, height, up, .. } = header;
     // A window without a size yet sets it by a command.
     check_film_size(width.max(1), height.max(1)).map_err(|bad| format!("{}:1: {bad}", path.display()))?;
     if let Some(up) = up.filter(|up| !matches!(up, 'y' | 'z')) {

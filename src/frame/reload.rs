@@ -12,7 +12,7 @@ use crate::frame::saving::SavedAs;
 use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::history::History;
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FreeShare, PictureSize, PlayRange, RenderState, Renderer, WantedMoment,
+    Clock, CurrentScene, PictureSize, PlayRange, RenderState, Renderer, WantedMoment,
 };
 use crate::frame::watch::Watch;
 use crate::scene::{
@@ -174,7 +174,7 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     }
     let choice = ModelChoice { at, ..current.choice.clone() };
     let how = (current.up.or(world.resource::<ModelUp>().0), current.environment.clone());
-    let aspect = world.resource::<FreeShare>().aspect(*world.resource::<PictureSize>());
+    let aspect = world.resource::<PictureSize>().aspect();
     let pool = world.resource::<Renderer>().0.pool();
     let known = Some(current.clone());
     world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);

@@ -6,7 +6,7 @@ use crate::frame::core::status::MessageKind;
 use crate::frame::input::ModelUp;
 use crate::frame::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
 use crate::frame::state::background::BackgroundTasks;
-use crate::frame::state::resources::{CurrentScene, FreeShare, PictureSize, RenderState, SceneGeneration, StopAt};
+use crate::frame::state::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
 use crate::frame::{Command, Session, SessionOptions};
 use crate::render::{ErrorMetric, Film, Room, SampleAllocation};
 use crate::scene::{
@@ -52,7 +52,6 @@ impl Session {
             width,
             height,
             seed: self.world().resource::<Rendering>().0.seed,
-            free: Some(self.world().resource::<FreeShare>().0).filter(|share| *share < 1.0),
         };
         // Replaces an older recording only once the first line is complete; further lines are appended.
         let first = ron::to_string(&header).expect("a line is plain data") + "\n";
@@ -143,7 +142,6 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         yielding: false,
         waker: None,
     })?;
-    session.world_mut().insert_resource(FreeShare(header.free.unwrap_or(1.0)));
     let environment = header.environment.map(|image| folder_of(path).join(text_to_path(&image)));
     session.open_choice(source, environment, ModelChoice { allow_outside: options.allow_outside, ..header.choice });
     let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };

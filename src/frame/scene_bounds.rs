@@ -2,7 +2,7 @@
 
 use crate::frame::core::rig::{Rig, Turning};
 use crate::frame::navigation::Surroundings;
-use crate::scene::{Extent, Material, ObjectInput, SceneInputs, Shape};
+use crate::scene::{Extent, Material, ObjectInput, SceneInputs, Shape, View};
 use bevy_ecs::prelude::Resource;
 use glam::DVec3;
 
@@ -21,6 +21,8 @@ pub struct SceneBounds {
     pub side_view: Option<DVec3>,
     /// Distance to the target of flying, metres.
     pub pace: Option<f64>,
+    /// The view that was moved nearer to its pivot by a wall, and the distance to which orbits take it again.
+    pub reach: Option<(View, f64)>,
     /// Height of the ground that the home position is above, metres: of a plane, of which there is nothing to be seen from
     /// below.
     pub ground: Option<f64>,

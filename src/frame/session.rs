@@ -19,15 +19,15 @@ use crate::frame::state::background::BackgroundTasks;
 use crate::frame::state::explain::{Explaining, explain_pixel};
 use crate::frame::state::history::{History, notice, remember};
 use crate::frame::state::resources::{
-    Clock, CurrentScene, FrameChanges, FreeShare, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion,
-    RenderState, Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment, WindowHidden,
+    Clock, CurrentScene, FrameChanges, MAX_THREADS, Paused, PictureSize, PlayRange, RenderRegion, RenderState,
+    Renderer, SceneGeneration, StopAt, Threads, ViewMode, WantedMoment, WindowHidden,
 };
 use crate::frame::state::seen_lights::{axis_of, light_at};
 use crate::frame::state::selection::{ActivePart, OwnBox, Selection};
 use crate::frame::systems::{accumulate, develop, edit, present, rebuild, reset};
 use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::frame::walls::is_in_room;
-use crate::frame::worker::{Waker, Worker};
+use crate::frame::worker::{KeptFilm, Waker, Worker};
 use crate::render::{Film, Prepared, RenderSettings, SampleAllocation};
 use crate::scene::{
     BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
@@ -142,6 +142,7 @@ impl Session {
             turning: Turning::default(),
             side_view: None,
             pace: None,
+            reach: None,
             ground: None,
             floor: None,
         };
@@ -158,7 +159,6 @@ impl Session {
         world.init_resource::<SavedAs>();
         world.init_resource::<WantedMoment>();
         world.init_resource::<PlayRange>();
-        world.init_resource::<FreeShare>();
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
         world.insert_resource(HotReload::new(waker));
@@ -216,7 +216,7 @@ impl Session {
 
     /// Like [`Self::open_lit_by`], for a model with several cameras, times or variants.
     pub fn open_choice(&mut self, source: SceneSource, environment: Option<PathBuf>, choice: ModelChoice) {
-        let aspect = self.world.resource::<FreeShare>().aspect(*self.world.resource::<PictureSize>());
+        let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
         self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool, None);
@@ -279,8 +279,10 @@ impl Session {
     /// Requests the film of the current view for saving; never blocks. It is sent once every pixel has a sample at full
     /// resolution; a coarser one is sent if the view changes or the workers go to sleep before that. Without a film,
     /// the channel is closed.
-    pub fn keep_film(&self) -> Receiver<Film> {
-        self.world.resource::<Renderer>().0.keep_film()
+    ///
+    /// - `denoised`: with the denoised image that is displayed, or as soon as one is.
+    pub fn keep_film(&self, denoised: bool) -> Receiver<KeptFilm> {
+        self.world.resource::<Renderer>().0.keep_film(denoised)
     }
 
     /// Returns the metadata for an image of the current view: see [`MetadataDraft::note`].

@@ -19,6 +19,33 @@ pub fn within_walls(scene: &Extraction, from: &View, to: View) -> View {
     View { eye: to.pivot() + pivot_distance * outwards, pivot_distance, ..to }
 }
 
+/// Moves a view that orbits in a room, `to`, as far towards its pivot as is needed for the way to it to be free; back to
+/// `reach`, the distance that it came from, where that is.
+pub fn around_walls(scene: &Extraction, from: &View, to: View, reach: f64) -> View {
+    /// Distances that are tried, and halvings of the one between the last two.
+    const STEPS: u32 = 16;
+    const HALVINGS: u32 = 12;
+    let pivot = to.pivot();
+    let at = |distance: f64| View { eye: pivot - distance * to.forward, pivot_distance: distance, ..to };
+    let is_free = |to: f64| {
+        let way = at(to).eye - from.eye;
+        let direction = way.try_normalize();
+        direction
+            .and_then(|direction| distance(scene, from.eye, direction))
+            .is_none_or(|hit| SHORT_OF * hit > way.length())
+    };
+    if is_free(reach) || !is_in_room(scene, from) {
+        return at(reach);
+    }
+    let mut nearer = (1..STEPS).map(|i| reach * (1.0 - f64::from(i) / f64::from(STEPS)));
+    let Some(first) = nearer.find(|to| is_free(*to)) else { return *from };
+    let (free, _) = (0..HALVINGS).fold((first, first + reach / f64::from(STEPS)), |(free, blocked), _| {
+        let middle = 0.5 * (free + blocked);
+        if is_free(middle) { (middle, blocked) } else { (free, middle) }
+    });
+    at(free)
+}
+
 /// Moves a view that goes away from its pivot, in a room, only as far as the wall behind it, and not up to that: its lens
 /// would be in the wall.
 pub fn before_wall(scene: &Extraction, from: &View, to: View) -> View {

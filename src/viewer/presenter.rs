@@ -1,7 +1,7 @@
 //! Presents an image and the overlays on a window: the only file that uses pixels and wgpu.
 //!
-//! One graphics device serves both. The image and the window have separate sizes; the image is stretched over the
-//! window, so a coarse image shown while moving fills it too. Nothing here waits for rendering.
+//! One graphics device serves both. The image has its place at the left of the window, beside the panel; where it has
+//! another height, because the window has just been resized, it is stretched over it. Nothing here waits for rendering.
 
 use crate::frame::Picture;
 use pixels::{Pixels, PixelsBuilder, ScalingMode, SurfaceTexture, wgpu};
@@ -39,7 +39,7 @@ pub struct Presenter {
     egui_state: egui_winit::State,
     pixels: Pixels<'static>,
     surface_size: (u32, u32),
-    picture_size: (u32, u32),
+    buffer_size: (u32, u32),
     window: Arc<Window>,
 }
 
@@ -83,8 +83,8 @@ impl Presenter {
         let egui_renderer =
             egui_wgpu::Renderer::new(pixels.device(), pixels.surface_texture_format(), Default::default());
         let size = (width, height);
-        let mut presenter = Self { egui_renderer, egui_state, pixels, surface_size: size, picture_size: size, window };
-        presenter.fit_picture()?;
+        let mut presenter = Self { egui_renderer, egui_state, pixels, surface_size: size, buffer_size: size, window };
+        presenter.fit_buffer()?;
         Ok(presenter)
     }
 
@@ -109,25 +109,43 @@ impl Presenter {
 
     /// Sets the image to show.
     ///
-    /// - `aside`: how far it is moved to the left, pixels.
-    pub fn set_picture(&mut self, picture: &Picture, aside: u32) -> Result<(), PresentError> {
-        let size = (picture.width, picture.height);
-        if size.0 == 0 || size.1 == 0 || picture.rgba.len() != size.0 as usize * size.1 as usize * 4 {
+    /// - `free`: width of its place in the window, physical pixels: one of another width is centred there.
+    pub fn set_picture(&mut self, picture: &Picture, free: u32) -> Result<(), PresentError> {
+        let (width, height) = (picture.width, picture.height);
+        if width == 0 || height == 0 || picture.rgba.len() != width as usize * height as usize * 4 {
             return Ok(());
         }
-        if size != self.picture_size {
+        self.fit_surface()?;
+        let is_in_place = height == self.surface_size.1;
+        let size = if is_in_place { self.surface_size } else { (width, height) };
+        if size != self.buffer_size {
             self.pixels.resize_buffer(size.0, size.1)?;
-            self.picture_size = size;
-            self.fit_picture()?;
+            self.buffer_size = size;
+            self.fit_buffer()?;
         }
-        copy_aside(&picture.rgba, self.pixels.frame_mut(), size.0, aside);
+        let free = if is_in_place { free.min(size.0) } else { width };
+        copy_centred(&picture.rgba, width as usize, self.pixels.frame_mut(), size.0 as usize, free as usize);
         Ok(())
     }
 
-    /// Fits the image to the window; at equal sizes without scaling, which is cheaper.
-    fn fit_picture(&mut self) -> Result<(), PresentError> {
+    /// Follows the size of the window; returns false for one without pixels.
+    fn fit_surface(&mut self) -> Result<bool, PresentError> {
+        let size = self.window.inner_size();
+        if size.width == 0 || size.height == 0 {
+            return Ok(false);
+        }
+        let surface_size = (size.width.min(self.max_side()), size.height.min(self.max_side()));
+        if self.surface_size != surface_size {
+            self.surface_size = surface_size;
+            self.fit_buffer()?;
+        }
+        Ok(true)
+    }
+
+    /// Fits the buffer to the window; at equal sizes without scaling, which is cheaper.
+    fn fit_buffer(&mut self) -> Result<(), PresentError> {
         let (width, height) = self.surface_size;
-        let is_as_large = self.picture_size == self.surface_size;
+        let is_as_large = self.buffer_size == self.surface_size;
         self.pixels.set_scaling_mode(if is_as_large { ScalingMode::PixelPerfect } else { ScalingMode::Fill });
         // The position of the image depends on the mode and is recomputed by this call.
         Ok(self.pixels.resize_surface(width, height)?)
@@ -155,17 +173,12 @@ impl Presenter {
 
     /// Draws; returns false if the surface was not ready.
     fn draw(&mut self, jobs: &[egui::ClippedPrimitive], pixels_per_point: f32) -> Result<bool, PresentError> {
-        let size = self.window.inner_size();
-        if size.width == 0 || size.height == 0 {
+        if !self.fit_surface()? {
             return Ok(true);
         }
-        let surface_size = (size.width.min(self.max_side()), size.height.min(self.max_side()));
-        if self.surface_size != surface_size {
-            self.surface_size = surface_size;
-            self.fit_picture()?;
-        }
         // Uses the surface's own size: the window's may be newer already.
-        let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: [surface_size.0, surface_size.1], pixels_per_point };
+        let (width, height) = self.surface_size;
+        let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point };
         let (egui_renderer, window) = (&mut self.egui_renderer, &self.window);
         let result = self.pixels.render_with(|encoder, view, context| {
             context.scaling_renderer.render(encoder, view);
@@ -197,37 +210,41 @@ impl Presenter {
     }
 }
 
-/// Copies an image, moved to the left by `aside` pixels; what is uncovered at the right repeats its edge, so that the bar
-/// shows no seam.
+/// Copies an image to the middle of the first `free` pixels of wider or narrower rows; what it does not reach repeats its
+/// edges, so that the bar over all of the window shows no seam.
 ///
-/// - `width`: of both, pixels of four bytes.
-fn copy_aside(from: &[u8], to: &mut [u8], width: u32, aside: u32) {
-    let aside = aside.min(width.saturating_sub(1));
-    if aside == 0 {
+/// - `from`, `to`: pixels of four bytes, in rows of `width` and `to_width` pixels; as many rows in both.
+fn copy_centred(from: &[u8], width: usize, to: &mut [u8], to_width: usize, free: usize) {
+    if (free, to_width) == (width, width) {
         return to.copy_from_slice(from);
     }
-    let (row, left) = (4 * width as usize, 4 * aside as usize);
-    for (from, to) in from.chunks_exact(row).zip(to.chunks_exact_mut(row)) {
-        let (shown, uncovered) = to.split_at_mut(row - left);
-        shown.copy_from_slice(&from[left..]);
-        uncovered.as_chunks_mut::<4>().0.fill(from[row - 4..].try_into().expect("a pixel has four bytes"));
+    let (left, skipped) = (free.saturating_sub(width) / 2, width.saturating_sub(free) / 2);
+    let shown = width.min(free);
+    let rows = from.chunks_exact(4 * width).zip(to.chunks_exact_mut(4 * to_width));
+    for (from, to) in rows {
+        let (from, to) = (from.as_chunks::<4>().0, to.as_chunks_mut::<4>().0);
+        to[..left].fill(from[0]);
+        to[left..left + shown].copy_from_slice(&from[skipped..skipped + shown]);
+        to[left + shown..].fill(from[width - 1]);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::copy_centred;
 
     #[test]
-    fn an_image_moves_to_the_left_by_whole_pixels() {
-        let image: Vec<u8> = (0..24).collect();
-        let moved = |aside| {
-            let mut to = vec![9; 24];
-            copy_aside(&image, &mut to, 3, aside);
+    fn an_image_is_centred_in_what_the_panel_leaves_free() {
+        let pixels = |numbers: &[u8]| numbers.iter().flat_map(|n| [*n; 4]).collect::<Vec<u8>>();
+        let image = pixels(&[1, 2, 3, 4, 5, 6]);
+        let placed = |to_width: usize, free| {
+            let mut to = vec![9; 4 * 2 * to_width];
+            copy_centred(&image, 3, &mut to, to_width, free);
             to
         };
-        assert_eq!(moved(0), image);
-        assert_eq!(moved(1), [&image[4..12], &image[8..12], &image[16..24], &image[20..24]].concat());
-        assert_eq!(moved(7), [image[8..12].repeat(3), image[20..24].repeat(3)].concat());
+        assert_eq!(placed(3, 3), image);
+        assert_eq!(placed(5, 3), pixels(&[1, 2, 3, 3, 3, 4, 5, 6, 6, 6]), "the panel is open");
+        assert_eq!(placed(3, 1), pixels(&[2, 3, 3, 5, 6, 6]), "it has just been opened");
+        assert_eq!(placed(5, 5), pixels(&[1, 1, 2, 3, 3, 4, 4, 5, 6, 6]), "or closed");
     }
 }

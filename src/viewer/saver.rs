@@ -1,7 +1,7 @@
 //! Saves images on separate threads, so that the window stays responsive.
 
 use crate::frame::{
-    DenoiseFilter, FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Waker,
+    DenoiseFilter, FeatureLayers, FeatureNames, KeptFilm, LayeredPicture, PictureFormat, PictureLayer, Print, Waker,
 };
 use crate::render::{
     DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, guide_samples,
@@ -81,11 +81,13 @@ impl Saver {
         Self { ending, folder, waker, sender, receiver, threads: Vec::new() }
     }
 
-    /// Saves the film that will arrive, with the metadata of `draft`, under the name of `scene` and the next free
-    /// number; a PNG with `size` pixels.
+    /// Saves the film that will arrive, with the metadata of `draft`, under the name of `scene` and the next free number;
+    /// a PNG with `size` pixels.
+    ///
+    /// - `denoise`: for an image that is displayed denoised, but has not been yet; raw without it.
     pub fn save(
         &mut self,
-        (film, denoise): (Receiver<Film>, Option<DenoiseWith>),
+        (film, denoise): (Receiver<KeptFilm>, Option<DenoiseWith>),
         draft: Option<MetadataDraft>,
         display: Display,
         size: (u32, u32),
@@ -94,8 +96,9 @@ impl Saver {
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
-            let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
-            let denoised = denoise.and_then(|with| with.denoise(&film, &ending));
+            let KeptFilm { film, denoised } = film.recv().map_err(|_| "there was no image to save".to_owned())?;
+            let shown = denoised.map(|shown| (shown.colors, shown.by));
+            let denoised = denoise.and_then(|with| shown.or_else(|| with.denoise(&film, &ending)));
             let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
             print(&folder, &stem, (&film, denoised), draft, &display, size, format)
         });
@@ -104,7 +107,7 @@ impl Saver {
     /// Saves the film that will come as a linear image with layers of what it shows.
     pub fn save_layers(
         &mut self,
-        film: Receiver<Film>,
+        film: Receiver<KeptFilm>,
         shown: Shown,
         draft: Option<MetadataDraft>,
         display: Display,
@@ -112,7 +115,7 @@ impl Saver {
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
-            let film = film.recv().map_err(|_| "there was no image to save".to_owned())?;
+            let KeptFilm { film, .. } = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             let Shown { prepared, names, settings, filter, threads, size } = shown;
             let failed = |reason: &dyn std::fmt::Display| format!("the image was not saved: {reason}");
             let pool = worker_threads().num_threads(threads).build();
@@ -253,13 +256,29 @@ fn without_number(mut stem: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::KeptDenoised;
+    use crate::render::advance;
+    use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    fn ready(film: Film) -> Receiver<Film> {
+    fn ready(film: Film) -> Receiver<KeptFilm> {
+        ready_denoised(film, None)
+    }
+
+    fn ready_denoised(film: Film, denoised: Option<KeptDenoised>) -> Receiver<KeptFilm> {
         let (sender, receiver) = channel();
-        sender.send(film).unwrap();
+        sender.send(KeptFilm { film, denoised }).unwrap();
         receiver
+    }
+
+    fn cornell() -> (SceneInputs, Extraction) {
+        let loaded = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        loaded.spawn(&mut world);
+        let inputs = SceneInputs::of(&mut world);
+        let extraction = Extraction::new(&inputs, &loaded.trees);
+        (inputs, extraction)
     }
 
     #[test]
@@ -287,14 +306,8 @@ mod tests {
 
     #[test]
     fn a_picture_with_layers_has_all_that_are_known() {
-        use crate::render::advance;
-        use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
         let folder = tempfile::tempdir().unwrap();
-        let loaded = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
-        let mut world = bevy_ecs::world::World::new();
-        loaded.spawn(&mut world);
-        let inputs = SceneInputs::of(&mut world);
-        let extraction = Extraction::new(&inputs, &loaded.trees);
+        let (inputs, extraction) = cornell();
         let mut saver = Saver::new(folder.path(), Arc::new(|| ()));
         // The error is known from the second sample on.
         for (spp, n_layers) in [(1, 10), (4, 11)] {
@@ -308,6 +321,28 @@ mod tests {
             let [Ok(Kept { path, coarse: false })] = &saver.finished()[..] else { panic!("it cannot be saved") };
             assert_eq!(PictureLayer::in_file(path).len(), n_layers, "{spp} samples");
         }
+    }
+
+    /// A denoised image that is displayed is saved as it is, in a moment; linear light is raw.
+    #[test]
+    fn what_is_displayed_is_saved() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut saver = Saver::new(folder.path(), Arc::new(|| ()));
+        let with = || DenoiseWith {
+            prepared: cornell().1.prepared,
+            settings: RenderSettings::default(),
+            filter: DenoiseFilter::Own,
+            threads: 1,
+        };
+        let displayed = || KeptDenoised { colors: vec![Vec3::ONE; 12], by: DenoiseFilter::Own };
+        let mut save = |denoise, format| {
+            let film = ready_denoised(Film::new(4, 3), Some(displayed()));
+            saver.save((film, denoise), None, Display::default(), (4, 3), "gallery", format);
+            let [Ok(Kept { path, .. })] = &saver.finish()[..] else { panic!("it cannot be saved") };
+            image::open(path).unwrap().to_rgb8().into_raw()
+        };
+        assert!(save(Some(with()), PictureFormat::Png).iter().all(|value| *value > 200));
+        assert_eq!(save(None, PictureFormat::Png), [0; 36], "the film has no light");
     }
 
     #[test]

@@ -142,7 +142,7 @@ fn a_session_gives_its_samples_to_the_region_until_it_is_cleared() {
         assert!(region.contains(x, y) || film.mean(x, y) == few.mean(x, y), "{x},{y}");
     }
     // A picture that is kept now does not wait for the rest.
-    let kept = session.keep_film().recv_timeout(Duration::from_secs(60)).unwrap();
+    let kept = session.keep_film(false).recv_timeout(Duration::from_secs(60)).unwrap().film;
     assert_eq!((kept.spp(), kept.max_spp()), (8, 64));
     // It stays over a restart, once every pixel has a sample.
     session.send(Command::Restart);

@@ -9,7 +9,7 @@ use firstlight::frame::{
     Bookmarks, Command, DenoiseFilter, Denoising, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property,
     Selection, Session, SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Environment, Inspection, Integrator, MaterialKind};
+use firstlight::render::{Environment, Inspection, Integrator, MaterialKind, develop_colors};
 use firstlight::scene::animation::LightProperty;
 use firstlight::scene::{
     ColorParam, DirectionalLight, Inventory, LoadOptions, Material, MaterialSlots, MeshOptions, MeshOrigin,
@@ -395,6 +395,15 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     assert_eq!((driver.get::<Shape>("serpent"), count(&driver)), (whole, n_objects));
 }
 
+/// The denoised image that a screenshot has, developed.
+fn screenshot(driver: &Driver) -> Option<Vec<u8>> {
+    let kept = driver.session.keep_film(true).recv().unwrap();
+    let (size, display) = ((kept.film.width(), kept.film.height()), driver.session.status().display);
+    let mut rgba = Vec::new();
+    develop_colors(&kept.denoised?.colors, size, &display, size, &mut rgba);
+    Some(rgba)
+}
+
 /// Samples stay, the raw image comes back byte for byte, and what is displayed is named.
 #[test]
 fn the_denoised_image_keeps_all_samples_and_has_an_error() {
@@ -406,6 +415,7 @@ fn the_denoised_image_keeps_all_samples_and_has_an_error() {
     let denoised = driver.session.picture().rgba.clone();
     assert_ne!(denoised, raw);
     assert_eq!([driver.session.status().denoising, driver.session.picture().denoising], [Denoising::Denoised; 2]);
+    assert!(screenshot(&driver) == Some(denoised.clone()), "what is saved is what is displayed");
     driver.session.send(Command::SetDenoising(Denoising::Split));
     driver.run_until(|session| session.is_idle() && session.picture().denoising == Denoising::Split);
     let (picture, width) = (driver.session.picture(), 4 * driver.session.picture().width as usize);
@@ -416,6 +426,7 @@ fn the_denoised_image_keeps_all_samples_and_has_an_error() {
     driver.session.send(Command::NextDenoising);
     driver.run_until(|session| session.is_idle() && session.picture().denoising == Denoising::Raw);
     assert_eq!((&driver.session.picture().rgba, driver.session.status().denoised_error), (&raw, None));
+    assert_eq!(screenshot(&driver), None);
     assert_eq!((driver.session.status().restarts, driver.session.status().spp), (restarts, 2));
     // A moving camera: the coarse image is smoothed, and named so.
     driver.session.send(Command::SetDenoising(Denoising::Denoised));

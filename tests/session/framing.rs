@@ -1,17 +1,18 @@
-//! Models and selections are framed for the part of the image that nothing covers.
+//! Models and selections are framed for the size of the image; views from a side.
 
 use crate::driver::{Drive, Driver};
 use firstlight::frame::navigation::{Rig, Side};
-use firstlight::frame::{Command, Projector, SessionOptions, Target};
+use firstlight::frame::{Command, PictureSize, Projector, SessionOptions, Target};
 use firstlight::scene::{Projection, SceneSource, View};
 use glam::{DVec2, DVec3};
 use std::path::{Path, PathBuf};
 
 /// The leftmost and the rightmost place of a wide bar, as fractions of the width of the image.
 fn seen(driver: &Driver) -> (f64, f64) {
-    let projector = Projector::new(&driver.session.status().rig, DVec2::new(2.0, 1.0));
+    let aspect = driver.session.world().resource::<PictureSize>().aspect();
+    let projector = Projector::new(&driver.session.status().rig, DVec2::new(aspect, 1.0));
     let corner = |i: u32| DVec3::new(f64::from(i & 1) * 8.0, f64::from(i >> 1 & 1), f64::from(i >> 2 & 1));
-    let places = (0..8).map(|i| 0.5 * projector.place(corner(i)).expect("it is in front of the camera").x);
+    let places = (0..8).map(|i| projector.place(corner(i)).expect("it is in front of the camera").x / aspect);
     places.fold((1.0, 0.0), |(left, right), x| (x.min(left), x.max(right)))
 }
 
@@ -38,29 +39,25 @@ fn opened(path: &Path) -> Driver {
 }
 
 #[test]
-fn what_is_opened_or_framed_beside_a_panel_is_not_behind_it() {
+fn what_is_opened_or_framed_fills_the_image() {
     let folder = tempfile::tempdir().unwrap();
     let path = bar(folder.path());
     let mut driver = opened(&path);
-    let (left, right) = seen(&driver);
-    assert!(left > 0.0 && left < 0.15 && right > 0.85 && right < 1.0, "all of the image: {left} to {right}");
-    let is_between = |driver: &Driver, from: f64, to: f64| {
+    let is_framed = |driver: &Driver| {
         let (left, right) = seen(driver);
-        assert!(left > from && left < from + 0.1 && right < to && right > to - 0.1, "{left} to {right}");
+        assert!(left > 0.0 && left < 0.15 && right > 0.85 && right < 1.0, "{left} to {right}");
     };
-    driver.session.send(Command::SetFreeShare { share: 0.6 });
+    is_framed(&driver);
+    // As when a panel is opened beside it.
+    driver.session.send(Command::Resize { width: 38, height: 32 });
     driver.session.send(Command::FrameAll);
     driver.frame();
-    is_between(&driver, 0.2, 0.8);
-    driver.session.send(Command::SetFreeShare { share: 0.4 });
+    is_framed(&driver);
+    driver.session.send(Command::Resize { width: 26, height: 32 });
     let before = driver.session.n_adopted();
     driver.session.send(Command::Open { path });
     driver.run_until(|session| session.n_adopted() > before && session.is_idle());
-    is_between(&driver, 0.3, 0.7);
-    // Nothing else is a share.
-    for share in [0.0, -1.0, 1.5, f64::NAN] {
-        assert!(Command::SetFreeShare { share }.check().is_err());
-    }
+    is_framed(&driver);
 }
 
 /// Where the camera is when a scene is seen from a side.

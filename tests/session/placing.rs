@@ -392,6 +392,19 @@ fn the_camera_is_in_front_of_things_or_in_a_room() {
         let x = driver.session.status().rig.view.eye.x;
         assert!(between.contains(&x), "{factor}: {x}");
     }
+    // Nor does an orbit about what is near the other wall, which comes back as far out as it was.
+    let view = View::look_at(DVec3::new(0.5, 1.5, -0.5), DVec3::new(-0.5, 1.5, -0.5), DVec3::Y).unwrap();
+    driver.session.send(Command::SetView(view));
+    driver.frame();
+    let mut leftmost = f64::INFINITY;
+    for i in 0..36 {
+        driver.session.send(Command::Orbit { yaw_deg: if i < 18 { -10.0 } else { 10.0 }, pitch_deg: 0.0 });
+        driver.frame();
+        leftmost = leftmost.min(driver.session.status().rig.view.eye.x);
+    }
+    let around = driver.session.status().rig.view;
+    assert!(leftmost > -1.0 && leftmost < -0.9, "{leftmost}");
+    assert!((around.eye - view.eye).length() < 1e-6, "{}", around.eye);
 }
 
 #[test]

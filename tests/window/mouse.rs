@@ -208,7 +208,7 @@ fn a_scene_is_framed_focused_lit_and_rendered_while_one_flies_on() {
     let program = desktop.open(&["room.ron", "--size", "800x600"], &[]);
     title_is(&program, "room.ron");
     seen(&program);
-    // The image has moved aside, out of the way of the panel.
+    // The image is what the panel leaves free.
     let ball = (226, 200);
     let frame = (ball.0 + 4, ball.1 + 30);
     open(&program, 3, ball, frame);
@@ -285,7 +285,7 @@ fn a_material_is_dropped_on_an_object_and_the_panel_keeps_clicks_from_what_is_be
     until("the menu of the image", || is_dark(&program, frame).then_some(()));
     program.key("Escape");
     until("the menu to close", || (!is_dark(&program, frame)).then_some(()));
-    // The image has moved aside: the middle of the ball is that of what the panel leaves free.
+    // The middle of the ball is that of what the panel leaves free.
     let (row, ball) = ((585, 263), (256, 200));
     program.drag(1, row, (ball.0 - row.0, ball.1 - row.1));
     title_is(&program, "*room.ron");

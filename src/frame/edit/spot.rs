@@ -6,7 +6,7 @@
 //! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
 use crate::frame::navigation::{Rig, box_around};
-use crate::frame::state::resources::{FreeShare, PictureSize, RenderState};
+use crate::frame::state::resources::{PictureSize, RenderState};
 use crate::frame::state::selection::{Projector, Selection, box_of, distance, pick};
 use crate::scene::{Extraction, Shape, View, is_emitter};
 use bevy_ecs::prelude::{Entity, World};
@@ -64,14 +64,13 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
     Spot { foot: place - below.unwrap_or(0.0) * DVec3::Y, size: SHARE * distance }
 }
 
-/// Whether a point is in the part of the image that nothing covers.
+/// Whether a point is in the image.
 pub fn is_seen(world: &World, point: DVec3) -> bool {
     let Some(camera) = &world.resource::<RenderState>().inputs.camera else { return false };
     let rig = Rig { view: camera.view, projection: camera.projection, lens: camera.lens };
     let aspect = world.resource::<PictureSize>().aspect();
-    let free = 0.5 * world.get_resource::<FreeShare>().copied().unwrap_or_default().0;
     let place = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(point);
-    place.is_some_and(|at| (at.x / aspect - 0.5).abs() < free && (0.0..1.0).contains(&at.y))
+    place.is_some_and(|at| (0.0..aspect).contains(&at.x) && (0.0..1.0).contains(&at.y))
 }
 
 /// A position for a light, and what it is to light.

@@ -35,23 +35,6 @@ impl PictureSize {
     }
 }
 
-/// Share of the width of the image that nothing covers, about its middle: views are framed for it.
-#[derive(Resource, Clone, Copy, Debug, PartialEq)]
-pub struct FreeShare(pub f64);
-
-impl Default for FreeShare {
-    fn default() -> Self {
-        Self(1.0)
-    }
-}
-
-impl FreeShare {
-    /// Width over height of the part of an image of this size that is free.
-    pub fn aspect(self, size: PictureSize) -> f64 {
-        self.0 * size.aspect()
-    }
-}
-
 /// When to stop rendering.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopAt(pub Target);

@@ -199,7 +199,7 @@ pub struct Projector {
 }
 
 impl Projector {
-    /// - `size`: size of the window, in the units of projected points.
+    /// - `size`: size of the image, in the units of projected points.
     pub fn new(rig: &Rig, size: DVec2) -> Self {
         let Rig { view, projection, .. } = rig;
         Self {
@@ -211,11 +211,6 @@ impl Projector {
             is_orthographic: projection.orthographic_height.is_some(),
             middle: 0.5 * size,
         }
-    }
-
-    /// The projection to an image whose centre is so far to the left of that of the window, in its units.
-    pub fn moved_aside(self, by: f64) -> Self {
-        Self { middle: self.middle - DVec2::new(by, 0.0), ..self }
     }
 
     /// Projects a point; `None` if it is not in front of the camera.

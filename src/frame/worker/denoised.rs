@@ -8,14 +8,14 @@
 
 use crate::frame::core::denoising::Denoising;
 use crate::frame::worker::denoiser::{Request, ToDenoise};
-use crate::frame::worker::shared::lock;
+use crate::frame::worker::shared::{KeptDenoised, lock};
 use crate::frame::worker::thread::Loop;
 use crate::frame::worker::views::{Settled, ViewKey};
 use crate::render::{
     DenoiseSource, Film, Inspection, MovingImage, Relighting, develop, develop_colors, guide_samples, relight,
     smooth_film,
 };
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -165,10 +165,7 @@ impl Loop<'_> {
         if let Some((settled, share)) = settled.and_then(|settled| Some((settled, self.raw_share(settled)?)))
             && wanted == Denoising::Denoised
         {
-            let mut colors = film.means();
-            let denoised = &settled.denoised.color;
-            colors.iter_mut().zip(denoised).for_each(|(raw, denoised)| *raw = denoised.lerp(*raw, share));
-            develop_colors(&colors, key.size.into(), &self.display, (width, height), rgba);
+            develop_colors(&mixed(film, settled, share), key.size.into(), &self.display, (width, height), rgba);
             return Some(Developed { settled: of_settled, is_mixed: true, ..Developed::as_is(wanted) });
         }
         let surfaces = self.scheduler.surfaces(divider);
@@ -218,6 +215,18 @@ impl Loop<'_> {
         Some(Developed { denoising: wanted, settled: of_settled, is_mixed: false, smoothing, relighting })
     }
 
+    /// The denoised image that is displayed of the film; `None` where it is the raw or a smoothed one.
+    pub(super) fn displayed_denoised(&self, film: &Film) -> Option<KeptDenoised> {
+        let is_current = self.film.as_ref().is_some_and(|(_, current)| std::ptr::eq(current, film));
+        let settled = self.settled(self.settled_key().filter(|_| is_current)?)?;
+        let colors = match self.wanted_denoising() {
+            Denoising::Raw => return None,
+            Denoising::Denoised if let Some(share) = self.raw_share(settled) => mixed(film, settled, share),
+            Denoising::Denoised | Denoising::Split => settled.denoised.color.clone(),
+        };
+        Some(KeptDenoised { colors, by: settled.by })
+    }
+
     /// Share of the raw image in a mix with one that was denoised from fewer samples; `None` unless the raw image has
     /// become the better one, as far as both errors are known. A busy machine may leave no time for denoising.
     fn raw_share(&self, settled: &Settled) -> Option<f32> {
@@ -258,6 +267,15 @@ impl Loop<'_> {
             self.views.smooth_again = Some((key, Instant::now() + SAMPLES_FIRST * took));
         }
     }
+}
+
+/// A mix of the raw and the denoised image.
+///
+/// - `share`: that of the raw one, 0..1.
+fn mixed(film: &Film, settled: &Settled, share: f32) -> Vec<Vec3> {
+    let mut colors = film.means();
+    colors.iter_mut().zip(&settled.denoised.color).for_each(|(raw, denoised)| *raw = denoised.lerp(*raw, share));
+    colors
 }
 
 /// How an image was developed.

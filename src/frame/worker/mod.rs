@@ -15,7 +15,7 @@ mod show;
 mod thread;
 mod views;
 
-pub use shared::{Answer, Job, Orders, Question, Stats, ViewOptions, Waker};
+pub use shared::{Answer, Job, KeptDenoised, KeptFilm, Orders, Question, Stats, ViewOptions, Waker};
 
 use crate::frame::core::latency::LatencyHistogram;
 use crate::frame::core::offline::Target;
@@ -27,7 +27,7 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use shared::{BESIDE, Inbox, NICENESS, Shared, WORKERS, lock, make_pool};
+use shared::{BESIDE, Inbox, NICENESS, Shared, ToKeep, WORKERS, lock, make_pool};
 
 /// Handle of the render thread.
 pub struct Worker {
@@ -125,9 +125,9 @@ impl Worker {
     }
 
     /// Requests the film of the current view for saving: see [`Session::keep_film`](crate::frame::Session::keep_film).
-    pub fn keep_film(&self) -> Receiver<Film> {
+    pub fn keep_film(&self, denoised: bool) -> Receiver<KeptFilm> {
         let (sender, receiver) = channel();
-        self.post(|inbox| inbox.to_keep.push(sender));
+        self.post(|inbox| inbox.to_keep.push(ToKeep { sender, denoised }));
         receiver
     }
 

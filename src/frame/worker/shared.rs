@@ -8,7 +8,7 @@ use crate::render::{
     BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
     SeenSurface, worker_threads,
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -157,6 +157,31 @@ impl Orders {
     }
 }
 
+/// A request for a film for saving.
+pub(super) struct ToKeep {
+    pub sender: Sender<KeptFilm>,
+    /// Also the denoised image, if one is displayed or about to be.
+    pub denoised: bool,
+}
+
+/// A film that is kept for saving.
+#[derive(Clone)]
+pub struct KeptFilm {
+    /// Linear radiance.
+    pub film: Film,
+    /// The denoised image that is displayed, if it was asked for and is one at full resolution.
+    pub denoised: Option<KeptDenoised>,
+}
+
+/// A denoised image that is displayed.
+#[derive(Clone)]
+pub struct KeptDenoised {
+    /// Radiance of each pixel, row by row from the top; W·m⁻²·sr⁻¹.
+    pub colors: Vec<Vec3>,
+    /// The filter that was used.
+    pub by: DenoiseFilter,
+}
+
 /// Messages to the thread; a later message of a kind replaces an earlier one.
 #[derive(Default)]
 pub(super) struct Inbox {
@@ -169,7 +194,7 @@ pub(super) struct Inbox {
     pub look: Option<ViewOptions>,
     pub question: Option<(Question, Sender<Answer>)>,
     pub film_wanted: Vec<Sender<Film>>,
-    pub to_keep: Vec<Sender<Film>>,
+    pub to_keep: Vec<ToKeep>,
     pub quit: bool,
 }
 

@@ -7,7 +7,7 @@ use crate::frame::core::status::Picture;
 use crate::frame::worker::denoiser::Denoiser;
 use crate::frame::worker::idle::IdleFilms;
 use crate::frame::worker::shared::{
-    Answer, BESIDE, Job, NICENESS, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool,
+    Answer, BESIDE, Job, KeptFilm, NICENESS, Question, Shared, Stats, ToKeep, ViewOptions, WORKERS, lock, make_pool,
 };
 use crate::frame::worker::views::Views;
 use crate::render::{
@@ -66,7 +66,7 @@ pub struct Loop<'a> {
     /// The job of the image handed over last.
     pub(super) pictured: u64,
     /// Requests for a film for saving.
-    to_keep: Vec<Sender<Film>>,
+    to_keep: Vec<ToKeep>,
 }
 
 impl<'a> Loop<'a> {
@@ -309,7 +309,7 @@ impl<'a> Loop<'a> {
         self.is_uneven |= region.is_some();
         let is_raw = self.wanted_denoising() == Denoising::Raw;
         let Some((_, film)) = &mut self.film else { return };
-        if divider == 1 && !self.to_keep.is_empty() && !self.is_uneven {
+        if divider == 1 && !self.to_keep.is_empty() && !self.is_uneven && film.max_spp() > film.spp() {
             // A saved image must be reproducible from its sample count, so all pixels get the same number of samples.
             (target_spp, at_most) = (film.max_spp().max(1), None);
         }
@@ -412,19 +412,26 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// Sends the film to the pending requests: at full resolution, or with `no_better` as it is.
+    /// Sends the film to the pending requests: at full resolution, and denoised if that is displayed then; or with
+    /// `no_better` as it is.
     fn hand_out(&mut self, no_better: bool) {
         if self.to_keep.is_empty() {
             return;
         }
-        if let Some((divider, film)) = self.visible()
-            && ((*divider == 1 && (self.is_uneven || film.max_spp() == film.spp())) || no_better)
-        {
-            let film = film.clone();
-            for sender in self.to_keep.drain(..) {
-                // Fails if the receiver has been dropped.
-                let _ = sender.send(film.clone());
-            }
+        let Some((divider, film)) = self.visible() else { return };
+        if !((*divider == 1 && (self.is_uneven || film.max_spp() == film.spp())) || no_better) {
+            return;
+        }
+        let displayed = self.displayed_denoised(film);
+        // The first denoised image of a view is made already.
+        let waits = displayed.is_none() && !no_better && self.wanted_denoising() != Denoising::Raw;
+        if waits && self.to_keep.iter().all(|request| request.denoised) {
+            return;
+        }
+        let film = film.clone();
+        for ToKeep { sender, denoised } in self.to_keep.extract_if(.., |request| !(waits && request.denoised)) {
+            // Fails if the receiver has been dropped.
+            let _ = sender.send(KeptFilm { film: film.clone(), denoised: displayed.clone().filter(|_| denoised) });
         }
     }
 

@@ -421,7 +421,7 @@ impl App {
         let denoise = denoiser
             .and_then(|filter| self.session.rendered().map(|rendered| (filter, rendered)))
             .map(|(filter, (prepared, settings))| DenoiseWith { prepared, settings, filter, threads });
-        self.saver.save((self.session.keep_film(), denoise), draft, display, size, &scene, format);
+        self.saver.save((self.session.keep_film(denoise.is_some()), denoise), draft, display, size, &scene, format);
     }
 
     /// Saves the image with all layers, in the size of the window.
@@ -436,7 +436,7 @@ impl App {
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
         let filter = self.session.world().resource::<ViewMode>().0.filter;
         let shown = Shown { prepared, names, settings, filter, threads, size };
-        self.saver.save_layers(self.session.keep_film(), shown, draft, display, &scene);
+        self.saver.save_layers(self.session.keep_film(false), shown, draft, display, &scene);
     }
 
     fn copy_image(&mut self, now: Instant) {

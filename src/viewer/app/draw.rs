@@ -3,7 +3,7 @@
 use crate::frame::{Command, Edit, Explaining, Navigation, SceneBounds, Selection, StopAt, ViewMode, active_part};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
-use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY};
+use crate::viewer::app::{App, REPAINT_DELAY, SLOW, WIDGET_REPAINT_DELAY, outlasts};
 use crate::viewer::bar::Figures;
 use crate::viewer::keys::{self, Action, with_key};
 use crate::viewer::menu::{self, MenuInput};
@@ -11,6 +11,7 @@ use crate::viewer::panel::select_number;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::time_line::Strip;
 use crate::viewer::{bar, greeting, help as key_list, overlay, panel, status, story, time_line};
+use egui::{Pos2, Rect};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -43,8 +44,11 @@ impl App {
         self.strip = Strip::of(&self.session);
         let (Some(presenter), Some(window)) = (&mut self.presenter, &self.window) else { return Ok(()) };
         let picture = self.session.picture();
-        if self.shown_picture != Some(picture.number) {
-            presenter.set_picture(picture, self.aside)?;
+        // When the panel has been opened, until there is as good an image of the new width.
+        let is_held = self.held.is_some_and(|restarts| outlasts(restarts, self.session.status(), picture));
+        if !is_held && self.shown_picture != Some(picture.number) {
+            self.held = None;
+            presenter.set_picture(picture, self.input.size()[0] as u32)?;
             tracing::debug!("image {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
@@ -56,7 +60,6 @@ impl App {
         };
         let is_late = self.inspected_since.filter(|(_, since)| now >= *since + SLOW);
         self.handles.update(&mut self.session, self.panel.gizmo, projector, free);
-        let aside = self.aside as f32 / presenter.pixels_per_point();
         let selected = self.session.world().resource::<Selection>().0.clone();
         self.outlines.leave(self.session.status().restarts);
         self.outlines.update(presenter.egui_context(), &selected, active_part(self.session.world()));
@@ -117,7 +120,7 @@ impl App {
                         session.world().resource::<SceneBounds>().extent.radius,
                     );
                 }
-                let image = context.content_rect().translate(egui::vec2(-aside, 0.0));
+                let image = Rect::from_min_size(Pos2::ZERO, egui::vec2(free.x as f32, free.y as f32));
                 outlines.draw(context, image);
                 let is_over_body = outlines.hovered().is_some_and(|entity| handles.is_body(entity));
                 if let Some(cursor) = handles.cursor(is_over_body) {
@@ -189,7 +192,7 @@ impl App {
         self.repaint_at = repaint_at.into_iter().chain(late_at).min();
         (self.last_draw, self.unseen_since) = (Some(now), None);
         self.shown_figures = figures;
-        self.move_aside(now);
+        self.leave_room(now)?;
         // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.execute(asked, now);

@@ -31,7 +31,7 @@ pub mod run;
 mod tick;
 
 use crate::frame::{
-    Command, Explaining, Focus, FocusTarget, FreeShare, Projector, Session, SessionOptions, Target, Waker,
+    Command, Explaining, Focus, FocusTarget, Picture, Projector, Session, SessionOptions, Status, Target, Waker,
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::viewer::app::leaving::Leaving;
@@ -50,7 +50,7 @@ use crate::viewer::order_form::OrderForm;
 use crate::viewer::outlines::Outlines;
 use crate::viewer::palette::Palette;
 use crate::viewer::panel::{self, PanelState};
-use crate::viewer::presenter::Presenter;
+use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
 use crate::viewer::region_tool::RegionTool;
@@ -130,8 +130,10 @@ struct App {
     over_widgets: bool,
     /// What panels left free when the window was drawn last, points.
     free: egui::Rect,
-    /// How far the image is moved to the left, out of the way of the panel, physical pixels.
-    aside: u32,
+    /// Width that the panel takes from the image, points.
+    covered: f32,
+    /// Restarts until the panel was opened, while the image from before is still shown.
+    held: Option<u64>,
     // Before the window, so that the device is dropped before the display.
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
@@ -183,8 +185,13 @@ impl App {
         waker: Waker,
         stop_requested: Arc<AtomicBool>,
     ) -> Result<Self, ViewerError> {
+        let mut memory = Memory::of_platform();
+        let panel = PanelState { previews: Previews::new(waker.clone()), ..memory.panel() };
+        // A model is framed before the panel is drawn.
+        let covered = if panel.shown { panel::width(options.width as f32) } else { 0.0 };
+        let image_width = options.width.saturating_sub(covered.round() as u32);
         let mut session = Session::new(SessionOptions {
-            width: options.width,
+            width: image_width,
             height: options.height,
             threads: options.threads,
             seed: options.seed,
@@ -196,13 +203,6 @@ impl App {
             waker: Some(waker.clone()),
         })
         .map_err(|error| ViewerError::Session(error.into()))?;
-        let mut memory = Memory::of_platform();
-        let panel = PanelState { previews: Previews::new(waker.clone()), ..memory.panel() };
-        if panel.shown && options.width > 0 {
-            // A model is framed before the panel is drawn.
-            let window = options.width as f32;
-            session.world_mut().insert_resource(FreeShare(f64::from(1.0 - panel::width(window) / window)));
-        }
         if let Some(path) = &options.record {
             let recorded = session.record(path, &options.source, options.environment.as_deref(), &options.choice);
             recorded.map_err(|error| ViewerError::Session(error.into()))?;
@@ -216,7 +216,7 @@ impl App {
             crate::console::remark(format_args!("warning: {trouble}"));
             toasts.add(Tone::Problem, trouble, start);
         }
-        let input = Input::new(options.width, options.height, memory.navigation());
+        let input = Input::new(image_width, options.height, memory.navigation());
         Ok(Self {
             start,
             steered_at: start,
@@ -251,7 +251,8 @@ impl App {
             overlays: true,
             over_widgets: false,
             free: egui::Rect::EVERYTHING,
-            aside: 0,
+            covered,
+            held: None,
             presenter: None,
             window: None,
             title: String::new(),
@@ -278,7 +279,7 @@ impl App {
 
     /// Adapts to a new size or scale factor of the window.
     fn resized(&mut self) {
-        let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
+        let Some(window) = &self.window else { return };
         let size = window.inner_size();
         let logical = size.to_logical::<u32>(window.scale_factor());
         if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
@@ -286,11 +287,20 @@ impl App {
             self.window_size = size_to_keep((logical.width, logical.height), self.fitted_size, wanted);
             self.keep_size_at = Some(Instant::now() + RESIZE_DELAY);
         }
-        let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
+        window.request_redraw();
+        self.resize_image();
+    }
+
+    /// Gives the image the part of the window that the panel leaves free: what is saved is what is seen.
+    fn resize_image(&mut self) {
+        let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
+        let [width, height] = <[u32; 2]>::from(window.inner_size()).map(|side| side.min(presenter.max_side()));
+        let covered = (self.covered * presenter.pixels_per_point()).round() as u32;
+        // A window without pixels is minimised.
+        let width = if width == 0 { 0 } else { width.saturating_sub(covered).max(1) };
         self.input.resize(width, height);
         self.session.send(Command::Resize { width, height });
         self.needs_tick = true;
-        window.request_redraw();
     }
 
     /// Stores the window's size. Not only at exit: X11 ends the program itself when the display is lost.
@@ -328,38 +338,57 @@ impl App {
         layer.is_some_and(|layer| layer.order != egui::Order::Background) || !self.free.contains(place)
     }
 
-    /// The projection to the window, in points, and the size of what the panel leaves free of it.
+    /// The projection to the image, and its size, in points.
     fn projector(&self) -> (Projector, DVec2) {
-        let scale = self.scale();
-        let (size, aside) = (DVec2::from_array(self.input.size()) / scale, f64::from(self.aside) / scale);
-        let projector = Projector::new(&self.session.status().rig, size).moved_aside(aside);
-        (projector, size - DVec2::new(2.0 * aside, 0.0))
+        let size = DVec2::from_array(self.input.size()) / self.scale();
+        (Projector::new(&self.session.status().rig, size), size)
     }
 
-    /// Moves the image out of the way of the panel, as it was drawn last, so that its centre is that of the part of the
-    /// window that is free; draws again if that is news. Samples stay; what is framed from now on fits that part.
-    fn move_aside(&mut self, now: Instant) {
-        let Some(presenter) = &self.presenter else { return };
-        let context = presenter.egui_context();
-        let covered = context.content_rect().right() - self.free.right();
-        let aside = (0.5 * covered * presenter.pixels_per_point()).round() as u32;
-        if aside != self.aside {
-            self.aside = aside;
-            self.input.set_aside(aside);
-            self.shown_picture = None;
-            self.repaint_at = Some(now);
+    /// Gives the image another width if the panel, as it was drawn last, has been opened or closed.
+    fn leave_room(&mut self, now: Instant) -> Result<(), PresentError> {
+        let Some(presenter) = &self.presenter else { return Ok(()) };
+        let covered = presenter.egui_context().content_rect().right() - self.free.right();
+        if covered == self.covered {
+            return Ok(());
         }
-        let [width, _] = self.input.size();
-        let share = 1.0 - 2.0 * f64::from(aside) / width.max(1.0);
-        if share > 0.0 && share != self.session.world().resource::<FreeShare>().0 {
-            self.session.send(Command::SetFreeShare { share });
-            self.needs_tick = true;
+        let is_whole = covered > self.covered && self.session.picture().divider == 1;
+        self.held = is_whole.then_some(self.session.status().restarts);
+        self.covered = covered;
+        self.resize_image();
+        // Until there is a new image, the middle of this one is in the middle.
+        if let Some(presenter) = &mut self.presenter {
+            presenter.set_picture(self.session.picture(), self.input.size()[0] as u32)?;
         }
+        self.repaint_at = Some(now);
+        Ok(())
     }
 
     /// Whether focus follows the mouse, and the mouse is not in the panel.
     fn focus_follows(&self) -> bool {
         let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
         follows && !self.over_widgets
+    }
+}
+
+/// Whether an image is still better than a new one of the same view, in another width.
+///
+/// - `restarts`: when it was made.
+fn outlasts(restarts: u64, status: &Status, new: &Picture) -> bool {
+    status.restarts <= restarts + 1 && (new.divider > 1 || status.awaits_denoised)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_is_held_until_there_is_one_as_good_of_the_same_view() {
+        let lasts = |restarts, awaits_denoised, divider| {
+            let status = Status { restarts, awaits_denoised, ..Status::default() };
+            outlasts(3, &status, &Picture { divider, ..Picture::default() })
+        };
+        assert!(lasts(4, false, 3) && lasts(4, true, 1));
+        assert!(!lasts(4, false, 1), "it is as good");
+        assert!(!lasts(5, false, 3), "another view");
     }
 }

@@ -49,11 +49,9 @@ pub struct Input {
     held: Vec<Held>,
     drag: Option<Drag>,
     last_press: Option<(Instant, [f64; 2])>,
-    /// Window size and mouse position, physical pixels.
+    /// Image size and mouse position, physical pixels.
     size: [f64; 2],
     cursor: [f64; 2],
-    /// How far the image is moved to the left in the window, physical pixels.
-    aside: f64,
     /// Strides per second.
     speed: f64,
     /// Start of the part of the turntable rotation that has not been counted.
@@ -114,7 +112,6 @@ impl Input {
             last_press: None,
             size: [f64::from(width), f64::from(height)],
             cursor: [0.0; 2],
-            aside: 0.0,
             speed: 1.0,
             spin: None,
             play: None,
@@ -126,13 +123,9 @@ impl Input {
         }
     }
 
+    /// Sets the size of the image, physical pixels.
     pub fn resize(&mut self, width: u32, height: u32) {
         self.size = [f64::from(width), f64::from(height)];
-    }
-
-    /// The image is moved so far to the left in the window, physical pixels.
-    pub fn set_aside(&mut self, aside: u32) {
-        self.aside = f64::from(aside);
     }
 
     pub fn set_modifiers(&mut self, modifiers: ModifiersState, now: Instant) {
@@ -513,7 +506,7 @@ impl Input {
         }
     }
 
-    /// Size of the window, physical pixels.
+    /// Size of the image, physical pixels.
     pub fn size(&self) -> [f64; 2] {
         self.size
     }
@@ -525,7 +518,7 @@ impl Input {
 
     /// A position in the window, physical pixels, as a fraction of the image.
     pub fn fractions(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [((x + self.aside), self.size[0]), (y, self.size[1])].map(|(at, size)| (at / size.max(1.0)).clamp(0.0, 1.0))
+        [(x, self.size[0]), (y, self.size[1])].map(|(at, size)| (at / size.max(1.0)).clamp(0.0, 1.0))
     }
 }
 

@@ -55,7 +55,7 @@ pub fn width(window: f32) -> f32 {
 
 /// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
-    // Opaque: the image has moved aside, and ends below it.
+    // Opaque: the image ends beside it.
     let frame = egui::Frame::NONE.fill(crate::viewer::overlay::PANE.to_opaque()).inner_margin(egui::Margin {
         left: 10,
         right: 4,
