@@ -39,12 +39,15 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     shown.adopted = Some(SCENE_OPENED.to_owned());
     let mut status = world.resource_mut::<Status>();
     status.scene = scene.source.title();
+    // What was said of another scene; what was said just now may be of this one.
+    status.messages.retain(|message| message.kind == MessageKind::Saved || message.at == now);
     for warning in scene.warnings.summary() {
         let kind = match warning.severity {
             Severity::Notice => MessageKind::Note,
             Severity::Warning => MessageKind::Warning,
         };
-        status.say(now, kind, warning.to_string());
+        let others = scene.warnings.others_like(&warning).map(ToString::to_string).collect();
+        status.say_first(now, kind, warning.to_string(), others);
     }
     if scene.shot.is_some() {
         let text = format!("an image of this program holds its scene: {} is open as the image shows it", status.scene);

@@ -57,7 +57,9 @@ pub use crate::frame::image::film_file::{
     read_film_file_within, read_film_summary, write_film_file, write_film_into, write_film_with_features,
 };
 pub use crate::frame::image::layered_picture::{LayeredPicture, PictureLayer};
-pub use crate::frame::image::picture_file::{PictureFormat, Print, is_whole_picture, write_errors, write_film};
+pub use crate::frame::image::picture_file::{
+    PictureFormat, Print, is_whole_picture, numbered, write_errors, write_film,
+};
 pub use crate::frame::image::snapshot_names::SnapshotNames;
 pub use crate::frame::state::explain::{
     End, Explaining, LightRow, PathRecord, PixelStory, SeenObject, Stop, brightness,
@@ -82,7 +84,7 @@ pub use material_preview::MaterialPreview;
 pub use object_map::{ObjectMap, ObjectMapSource, Outline};
 pub use recording::check_recordable;
 pub use recovery::{LeftBehind, Recovery};
-pub use reel::{OpenReel, Reel, scene_at};
+pub use reel::{OpenReel, Reel, has_left_camera, scene_at};
 pub use replay::{ReplayOptions, Replayed, replay};
 pub use saving::SavedAs;
 pub use scene_bounds::SceneBounds;

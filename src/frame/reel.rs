@@ -20,8 +20,17 @@ pub struct Reel {
     display: DisplaySettings,
     rig: Rig,
     fps: f64,
-    /// The rigs of a turntable, and the moment that is shown meanwhile, seconds; `None` for the frames of an animation.
-    turns: Option<(Vec<Rig>, Option<f64>)>,
+    course: Course,
+}
+
+/// Where the camera is.
+enum Course {
+    /// Where the animation has it; where it was flown to if that does not move it.
+    Animated,
+    /// Where it was flown to, off the tracks of the animation.
+    Flown(Rig),
+    /// On a turntable, and the moment that is shown meanwhile, seconds.
+    Turntable(Vec<Rig>, Option<f64>),
 }
 
 /// A reel that frames can be taken from.
@@ -30,17 +39,31 @@ pub struct OpenReel {
     trees: Trees,
     world: World,
     camera: Option<Entity>,
-    turns: Option<(Vec<Rig>, Option<f64>)>,
+    course: Course,
     fps: f64,
 }
 
+/// Whether the view has left the camera of an animation that moves it; `None` if none does.
+pub fn has_left_camera(session: &Session) -> Option<bool> {
+    let world = session.world();
+    let animation = world.get_resource::<Animation>().filter(|animation| animation.moves_camera())?;
+    let seconds = world.get_resource::<Moment>().map_or(0.0, |moment| moment.0);
+    let Rig { view, projection, lens } = session.status().rig;
+    Some(animation.has_lost(&view, &projection, &lens, seconds))
+}
+
 impl Reel {
-    /// The scene of a session; `None` if nothing in it moves.
+    /// The scene of a session, seen as it is in the window: by the camera of the animation, unless the view has left it.
+    /// `None` if nothing in it moves.
     pub fn of(session: &mut Session) -> Option<Self> {
         let world = session.world();
         let animation = world.get_resource::<Animation>().filter(|animation| animation.moves())?;
         let fps = animation.fps;
-        Self::with(session, fps, None)
+        let course = match has_left_camera(session) {
+            Some(true) => Course::Flown(session.status().rig),
+            Some(false) | None => Course::Animated,
+        };
+        Self::with(session, fps, course)
     }
 
     /// One turn of the camera around its pivot, at the moment that is shown: `n` frames, of 1 / `n` of a second
@@ -48,16 +71,16 @@ impl Reel {
     pub fn turntable_of(session: &mut Session, n: u32) -> Option<Self> {
         let moment = session.world().get_resource::<Moment>().map(|moment| moment.0);
         let rigs = turntable(&session.status().rig, n);
-        Self::with(session, f64::from(n), Some((rigs, moment)))
+        Self::with(session, f64::from(n), Course::Turntable(rigs, moment))
     }
 
-    fn with(session: &mut Session, fps: f64, turns: Option<(Vec<Rig>, Option<f64>)>) -> Option<Self> {
+    fn with(session: &mut Session, fps: f64, course: Course) -> Option<Self> {
         let world = session.world();
         let current = world.get_resource::<CurrentScene>()?.0.clone();
         let (rendering, display) = (*world.resource::<Rendering>(), *world.resource::<DisplaySettings>());
         let (trees, rig) = (world.resource::<RenderState>().trees.clone(), session.status().rig);
         let description = session.describe();
-        Some(Self { current, description, trees, rendering, display, rig, fps, turns })
+        Some(Self { current, description, trees, rendering, display, rig, fps, course })
     }
 
     /// Frames per second: frame i is at i / fps.
@@ -70,7 +93,7 @@ impl Reel {
     /// # Errors
     /// If a file of the scene is gone.
     pub fn open(self) -> Result<OpenReel, String> {
-        let Self { current, description, trees, rendering, display, rig, fps, turns } = self;
+        let Self { current, description, trees, rendering, display, rig, fps, course } = self;
         let mut world = World::new();
         let scene = current.described(&description, trees.clone()).map_err(|error| error.to_string())?;
         scene.spawn(&mut world);
@@ -81,19 +104,20 @@ impl Reel {
         if let Some(camera) = camera {
             world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }
-        Ok(OpenReel { current, trees, world, camera, turns, fps })
+        Ok(OpenReel { current, trees, world, camera, course, fps })
     }
 }
 
 impl OpenReel {
     /// The snapshot at a moment, seconds, and the metadata of its image. They do not depend on the moments before.
     pub fn at(&mut self, seconds: f64) -> (Extraction, MetadataDraft) {
-        let Some((rigs, moment)) = &self.turns else {
-            return scene_at(&mut self.world, &self.current, &mut self.trees, seconds);
+        let (rig, moment) = match &self.course {
+            Course::Animated => (None, Some(seconds)),
+            Course::Flown(rig) => (Some(rig), Some(seconds)),
+            Course::Turntable(rigs, moment) => (rigs.get((seconds * self.fps).round() as usize), *moment),
         };
         moment.iter().for_each(|moment| show_moment(&mut self.world, *moment));
-        let frame = (seconds * self.fps).round() as usize;
-        if let (Some(camera), Some(rig)) = (self.camera, rigs.get(frame)) {
+        if let (Some(camera), Some(rig)) = (self.camera, rig) {
             // Its keys may have moved it elsewhere.
             self.world.entity_mut(camera).insert((rig.view, rig.projection, rig.lens));
         }

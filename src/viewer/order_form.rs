@@ -1,7 +1,7 @@
 //! The form of "Save image …" and "Render frames …": size, quality, format and place of what is to be rendered.
 
-use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Target, ViewMode};
-use crate::scene::{Animation, FilmSize};
+use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Target, ViewMode, has_left_camera};
+use crate::scene::FilmSize;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
@@ -20,6 +20,8 @@ const FORMATS: [(PictureFormat, &str, &str); 3] = [
     (PictureFormat::Exr, "EXR", "linear light, for other programs"),
 ];
 const WIDTH: f32 = 330.0;
+/// Of a side.
+const MOST_PIXELS: u32 = 32_768;
 
 /// What ends an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +92,8 @@ pub struct OrderForm {
     /// The scene that it was filled in for.
     scene: String,
     size: (u32, u32),
+    /// Width over height that is kept when one of them is changed.
+    ratio: Option<f64>,
     of_scene: (u32, u32),
     of_image: Ending,
     of_frames: Ending,
@@ -106,6 +110,8 @@ pub struct OrderForm {
     frames: Option<(u32, u32)>,
     /// The frames are those of a turn of the camera.
     is_turntable: bool,
+    /// Whether the view has left the camera of the animation, if that moves one.
+    left_camera: Option<bool>,
     problem: Option<String>,
 }
 
@@ -115,6 +121,7 @@ impl Default for OrderForm {
             is_open: false,
             scene: String::new(),
             size: SIZES[0],
+            ratio: None,
             of_scene: SIZES[0],
             of_image: Ending::default(),
             of_frames: Ending::default(),
@@ -127,6 +134,7 @@ impl Default for OrderForm {
             folder: PathBuf::new(),
             frames: None,
             is_turntable: false,
+            left_camera: None,
             problem: None,
         }
     }
@@ -145,9 +153,9 @@ impl OrderForm {
     /// Opens the form for the scene of the session.
     ///
     /// - `frames`: what plays of its animation, or a turn around it if nothing moves, rather than one image; `folder`: of
-    ///   files that are not chosen yet.
+    ///   files that are not chosen yet; `taken`: absolute paths that others are going to write.
     /// - `turns`: the view is turning around, which frames are to show too.
-    pub fn open(&mut self, session: &Session, frames: bool, turns: bool, folder: &Path) {
+    pub fn open(&mut self, session: &Session, frames: bool, turns: bool, (folder, taken): (&Path, &[PathBuf])) {
         let world = session.world();
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let look = world.resource::<ViewMode>().0;
@@ -170,10 +178,9 @@ impl OrderForm {
                 None
             }
             true => {
-                let moves = world.get_resource::<Animation>().is_some_and(Animation::moves);
-                self.is_turntable = !moves || turns;
-                let plays = Strip::of(session).filter(|_| !self.is_turntable).map(|strip| strip.plays);
-                Some(plays.map_or((0, TURN - 1), |[first, last]| (first, last)))
+                let strip = Strip::of(session).filter(|_| !turns);
+                self.is_turntable = strip.is_none();
+                Some(strip.map_or((0, TURN - 1), |Strip { plays: [first, last], .. }| (first, last)))
             }
         };
         // A saved image is no worse than what is seen, unless that has been chosen.
@@ -183,7 +190,7 @@ impl OrderForm {
             self.of_image.error = (seen.clamp(0.25, NOISE) * 100.0).floor() / 100.0;
         }
         // Each time another one, so that nothing is replaced by a second click.
-        (self.file, self.is_chosen) = (new_file(folder, scene, self.format.extension()), false);
+        (self.file, self.is_chosen) = (new_file(folder, scene, self.format.extension(), taken), false);
         (self.is_open, self.problem) = (true, None);
     }
 
@@ -229,11 +236,13 @@ impl OrderForm {
 
     /// Draws the form while it is open.
     ///
-    /// - `window`: pixels of the image in the window; `preview`: a small image of what would be saved.
-    pub fn show(&mut self, context: &Context, window: (u32, u32), preview: Option<&TextureHandle>) -> Option<Wish> {
+    /// - `preview`: a small image of what would be saved.
+    pub fn show(&mut self, context: &Context, session: &Session, preview: Option<&TextureHandle>) -> Option<Wish> {
         if !self.is_open {
             return None;
         }
+        let window = (session.picture().width, session.picture().height);
+        self.left_camera = has_left_camera(session);
         let (mut wish, mut open) = (None, true);
         // A value that is typed and a list of sizes have their own Enter and Escape.
         let is_typed = context.wants_keyboard_input() || egui::Popup::is_any_open(context);
@@ -292,8 +301,12 @@ impl OrderForm {
     fn rows(&mut self, ui: &mut Ui, window: (u32, u32), wish: &mut Option<Wish>) {
         ui.label("size");
         ui.horizontal(|ui| {
+            let before = self.size;
             for side in [&mut self.size.0, &mut self.size.1] {
-                ui.add(DragValue::new(side).range(1..=32_768).speed(2.0).update_while_editing(false));
+                ui.add(DragValue::new(side).range(1..=MOST_PIXELS).speed(2.0).update_while_editing(false));
+            }
+            if let Some(ratio) = self.ratio {
+                self.size = in_ratio(before, self.size, ratio);
             }
             let sizes = sizes(self.of_scene, window);
             let used = sizes.iter().find(|(_, size)| *size == self.size);
@@ -304,10 +317,18 @@ impl OrderForm {
             ComboBox::from_id_salt("size").selected_text(used).width(130.0).show_ui(ui, |ui| {
                 for (name, size) in sizes {
                     let colon = if name.is_empty() { "" } else { ": " };
-                    ui.selectable_value(&mut self.size, size, format!("{name}{colon}{}", as_text(size)));
+                    if ui.selectable_value(&mut self.size, size, format!("{name}{colon}{}", as_text(size))).clicked() {
+                        self.ratio = self.ratio.map(|_| ratio_of(size));
+                    }
                 }
             });
         });
+        ui.end_row();
+        ui.label("keep ratio");
+        let mut keeps = self.ratio.is_some();
+        if ui.checkbox(&mut keeps, "").on_hover_text("a side that is changed takes the other with it").clicked() {
+            self.ratio = keeps.then(|| ratio_of(self.size));
+        }
         ui.end_row();
         ui.label("until");
         ui.horizontal(|ui| {
@@ -343,6 +364,15 @@ impl OrderForm {
                 ui.add(DragValue::new(last).speed(0.2).update_while_editing(false));
             });
             ui.end_row();
+            if let Some(has_left) = self.left_camera.filter(|_| !self.is_turntable) {
+                ui.label("camera");
+                let (text, about) = match has_left {
+                    true => ("this view in all frames", "`Camera` on the time line goes back to that of the animation"),
+                    false => ("of the animation", "until you move the view"),
+                };
+                ui.label(text).on_hover_text(about);
+                ui.end_row();
+            }
         }
         let (label, purpose) = match self.frames {
             Some(_) => ("folder", DialogPurpose::SaveFrames),
@@ -384,6 +414,20 @@ fn sizes(scene: (u32, u32), window: (u32, u32)) -> Vec<(String, (u32, u32))> {
     named.into_iter().chain(others).map(|(name, size)| (name.to_owned(), size)).collect()
 }
 
+fn ratio_of((width, height): (u32, u32)) -> f64 {
+    f64::from(width) / f64::from(height.max(1))
+}
+
+/// A size of which one side has been changed, with the other one of this ratio.
+fn in_ratio(before: (u32, u32), now: (u32, u32), ratio: f64) -> (u32, u32) {
+    let side = |pixels: f64| pixels.round().clamp(1.0, f64::from(MOST_PIXELS)) as u32;
+    match now {
+        _ if now == before => now,
+        (width, _) if width != before.0 => (width, side(f64::from(width) / ratio)),
+        (_, height) => (side(f64::from(height) * ratio), height),
+    }
+}
+
 /// The size of the scene, or that of the window where it has more pixels: an image is not coarser than what is seen.
 fn larger(scene: (u32, u32), window: (u32, u32)) -> (u32, u32) {
     let pixels = |size: (u32, u32)| u64::from(size.0) * u64::from(size.1);
@@ -402,6 +446,15 @@ mod tests {
         assert_eq!(larger((640, 360), (1280, 720)), (1280, 720));
         assert_eq!(larger((3840, 2160), (1280, 720)), (3840, 2160));
         assert_eq!(larger((640, 360), (0, 0)), (640, 360));
+    }
+
+    #[test]
+    fn sides_keep_their_ratio() {
+        let ratio = ratio_of((1920, 1080));
+        assert_eq!(in_ratio((1920, 1080), (1920, 1080), ratio), (1920, 1080));
+        assert_eq!(in_ratio((1920, 1080), (1280, 1080), ratio), (1280, 720));
+        assert_eq!(in_ratio((1, 1), (1, 1080), ratio), (1920, 1080), "of what it was at first, not of what is rounded");
+        assert_eq!(in_ratio((1920, 1080), (32_768, 1080), 0.01), (32_768, 32_768));
     }
 
     #[test]
@@ -427,7 +480,7 @@ mod tests {
         session.update(Duration::from_millis(1));
         let mut form = OrderForm::default();
         let mut proposed = || {
-            form.open(&session, true, false, folder.path());
+            form.open(&session, true, false, (folder.path(), &[]));
             assert!(form.is_turntable && form.order().frames == Some(0..=TURN - 1), "nothing moves");
             form.path().to_owned()
         };
@@ -435,7 +488,7 @@ mod tests {
         assert_eq!((&first, proposed()), (&folder.path().join("studio-frames"), first.clone()));
         std::fs::create_dir(&first).unwrap();
         assert_eq!(proposed(), folder.path().join("studio-frames-2"));
-        form.open(&session, false, true, folder.path());
+        form.open(&session, false, true, (folder.path(), &[]));
         assert!(!form.order().is_turntable, "an image");
     }
 

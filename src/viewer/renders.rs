@@ -45,6 +45,7 @@ pub struct Renders {
 
 struct Running {
     title: String,
+    path: PathBuf,
     told: Arc<Mutex<Told>>,
     cancelled: Arc<AtomicBool>,
     /// What there is by now is to be written.
@@ -105,10 +106,10 @@ impl Renders {
         };
         let path = std::path::absolute(&order.path).unwrap_or_else(|_| order.path.clone());
         let title = path.file_name().map_or_else(|| stem.clone(), |name| name.to_string_lossy().into_owned());
-        let (sender, waker) = (self.sender.clone(), self.waker.clone());
+        let (sender, waker, written) = (self.sender.clone(), self.waker.clone(), path.clone());
         let run = move || {
             let outcome = match worker_threads().num_threads(threads).build() {
-                Ok(pool) => pool.install(|| work.run(&Order { path, ..order }, source, &stem)),
+                Ok(pool) => pool.install(|| work.run(&Order { path: written, ..order }, source, &stem)),
                 Err(error) => Err(format!("cannot start threads: {error}")),
             };
             // If the window is gone, nobody is told.
@@ -119,8 +120,13 @@ impl Renders {
         };
         let thread = std::thread::Builder::new().name("save".to_owned()).spawn(run);
         let thread = thread.map_err(|error| format!("the image was not saved: cannot start a thread: {error}"))?;
-        self.running.push(Running { title, told, cancelled, kept, goal, since: Instant::now(), thread });
+        self.running.push(Running { title, path, told, cancelled, kept, goal, since: Instant::now(), thread });
         Ok(())
+    }
+
+    /// The absolute paths that they are going to write.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.running.iter().map(|running| running.path.clone()).collect()
     }
 
     /// The results since the last call.

@@ -2,6 +2,7 @@
 
 use crate::frame::{
     DenoiseFilter, FeatureLayers, FeatureNames, KeptFilm, LayeredPicture, PictureFormat, PictureLayer, Print, Waker,
+    numbered,
 };
 use crate::render::{
     DenoiseSource, Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, gather_guides, guide_samples,
@@ -67,6 +68,8 @@ pub struct Saver {
     /// Whether the window is closed: long renders end early.
     ending: Arc<AtomicBool>,
     folder: PathBuf,
+    /// Absolute paths that others are going to write.
+    taken: Vec<PathBuf>,
     waker: Waker,
     sender: Sender<Saved>,
     receiver: Receiver<Saved>,
@@ -78,7 +81,12 @@ impl Saver {
     pub fn new(folder: &Path, waker: Waker) -> Self {
         let (sender, receiver) = channel();
         let (ending, folder) = (Arc::default(), folder.to_owned());
-        Self { ending, folder, waker, sender, receiver, threads: Vec::new() }
+        Self { ending, folder, taken: Vec::new(), waker, sender, receiver, threads: Vec::new() }
+    }
+
+    /// Leaves names free that others have announced, absolute paths.
+    pub fn leave_free(&mut self, taken: Vec<PathBuf>) {
+        self.taken = taken;
     }
 
     /// Saves the film that will arrive, with the metadata of `draft`, under the name of `scene` and the next free number;
@@ -95,12 +103,13 @@ impl Saver {
         format: PictureFormat,
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
+        let taken = self.taken.clone();
         self.spawn(move || {
             let KeptFilm { film, denoised } = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             let shown = denoised.map(|shown| (shown.colors, shown.by));
             let denoised = denoise.and_then(|with| shown.or_else(|| with.denoise(&film, &ending)));
             let denoised = denoised.as_ref().map(|(colors, filter)| (&colors[..], *filter));
-            print(&folder, &stem, (&film, denoised), draft, &display, size, format)
+            print((&folder, &stem, &taken), (&film, denoised), draft, &display, size, format)
         });
     }
 
@@ -114,6 +123,7 @@ impl Saver {
         scene: &str,
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
+        let taken = self.taken.clone();
         self.spawn(move || {
             let KeptFilm { film, .. } = film.recv().map_err(|_| "there was no image to save".to_owned())?;
             let Shown { prepared, names, settings, filter, threads, size } = shown;
@@ -138,7 +148,7 @@ impl Saver {
                 layers: &layers,
                 note: note.as_deref(),
             };
-            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse })?)
+            Ok(picture.write_new(&folder, &stem, &taken).map(|path| Kept { path, coarse })?)
         });
     }
 
@@ -182,8 +192,7 @@ fn with_filter(note: String, filter: DenoiseFilter, in_layer: bool) -> String {
 
 /// Writes a film with its metadata, under the next free number.
 fn print(
-    folder: &Path,
-    stem: &str,
+    (folder, stem, taken): (&Path, &str, &[PathBuf]),
     (film, denoised): (&Film, Option<(&[Vec3], DenoiseFilter)>),
     draft: Option<MetadataDraft>,
     display: &Display,
@@ -196,7 +205,7 @@ fn print(
     }
     let denoised = denoised.map(|(colors, _)| colors);
     let print = Print { film, display, size, note: note.as_deref(), denoised };
-    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
+    Ok(print.write_new(folder, stem, format, taken).map(|path| Kept { path, coarse })?)
 }
 
 /// Whether a film is coarser than the requested image, and the metadata of the image.
@@ -216,10 +225,11 @@ fn metadata_of(
 }
 
 /// Returns an unused name of a file in `folder` for the open scene: `NAME-0001.ron`.
-pub fn new_file(folder: &Path, scene: &str, extension: &str) -> PathBuf {
+///
+/// - `taken`: absolute paths that others are going to write.
+pub fn new_file(folder: &Path, scene: &str, extension: &str, taken: &[PathBuf]) -> PathBuf {
     let stem = file_stem(scene);
-    let names = (1..=u32::MAX).map(|number| folder.join(format!("{stem}-{number:04}.{extension}")));
-    let mut free = names.filter(|path| !path.exists());
+    let mut free = numbered(folder, &stem, extension, taken).filter(|path| !path.exists());
     free.next().unwrap_or_else(|| folder.join(format!("{stem}.{extension}")))
 }
 
@@ -376,9 +386,9 @@ mod tests {
             assert_eq!(file_stem(&format!("{name}.ron")), name);
         }
         let folder = tempfile::tempdir().unwrap();
-        let first = new_file(folder.path(), "model.obj", "ron");
+        let first = new_file(folder.path(), "model.obj", "ron", &[]);
         assert_eq!(first, folder.path().join("model-0001.ron"));
         std::fs::write(&first, "").unwrap();
-        assert_eq!(new_file(folder.path(), &first.to_string_lossy(), "ron"), folder.path().join("model-0002.ron"));
+        assert_eq!(new_file(folder.path(), &first.to_string_lossy(), "ron", &[]), folder.path().join("model-0002.ron"));
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::format::camera::camera;
 use crate::frame::navigation::Rig;
-use crate::frame::{Command, CurrentScene, Edit, PlayRange, Session};
+use crate::frame::{Command, CurrentScene, Edit, PlayRange, Session, has_left_camera};
 use crate::scene::{Animation, Moment};
 use crate::viewer::keys::{Action, PlayEnd};
 use crate::viewer::overlay::{GLASS, KEY, TEXT, TEXT_SIZE};
@@ -53,12 +53,9 @@ struct AnimatedCamera {
 }
 
 impl AnimatedCamera {
-    fn of(animation: &Animation, seconds: f64, shown: &Rig) -> Option<Self> {
-        if !animation.moves_camera() {
-            return None;
-        }
+    fn of(session: &Session, animation: &Animation, seconds: f64) -> Option<Self> {
+        let is_shown = !has_left_camera(session)?;
         let (view, projection, lens) = camera(&animation.camera_at(seconds));
-        let is_shown = !animation.has_lost(&shown.view, &shown.projection, &shown.lens, seconds);
         Some(Self { rig: Rig { view, projection, lens }, is_shown })
     }
 
@@ -101,7 +98,7 @@ impl Strip {
             // What has been made in files has its length.
             let more = if animation.can_grow() { Animation::frames_to_key(ROOM, fps) } else { 0 };
             let reach = n.max(more).max((shown * fps).ceil() as u32 + 1);
-            let camera = AnimatedCamera::of(animation, shown, &session.status().rig);
+            let camera = AnimatedCamera::of(session, animation, shown);
             return Some(Self { fps, n, reach, frame: Some(shown * fps), plays: plays(fps, n), keys, camera });
         }
         // A glTF model in its stored pose.

@@ -5,7 +5,9 @@ use crate::viewer::keys::Action;
 use std::time::{Duration, Instant};
 
 /// The button of what was saved.
-pub const IN_FOLDER: &str = "Show in its folder";
+pub const IN_FOLDER: (&str, Action) = ("Show in its folder", Action::ShowSaved);
+/// The button of a message that counts others.
+pub const ALL_MESSAGES: (&str, Action) = ("Show all", Action::Section("Messages"));
 
 /// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,8 +46,8 @@ impl Toasts {
     }
 
     /// Says something with a button, long enough to click it.
-    pub fn add_offer(&mut self, text: String, button: &'static str, action: Action, now: Instant) {
-        self.show(Tone::News, text, Some((button, action)), now);
+    pub fn add_offer(&mut self, tone: Tone, text: String, (button, action): (&'static str, Action), now: Instant) {
+        self.show(tone, text, Some((button, action)), now);
     }
 
     /// Says that something is being done, until news of the same first word say what became of it, or it [ends](Self::end).

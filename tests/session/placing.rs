@@ -5,6 +5,7 @@ use bevy_ecs::entity::Entity;
 use firstlight::format::property::SkyProperty;
 use firstlight::frame::{
     Command, Edit, Focus, FocusTarget, NewThing, OpenReel, Projector, Property, Reel, SessionOptions, Target,
+    has_left_camera,
 };
 use firstlight::render::Environment;
 use firstlight::scene::animation::ObjectProperty;
@@ -540,12 +541,19 @@ fn whoever_flies_away_from_the_camera_of_an_animation_stays_there_until_it_goes_
     let before = placed(&driver);
     assert_eq!(go(&mut driver, 2.0), flown);
     assert!(placed(&driver) != before && !driver.session.has_unsaved_edits());
-    // Frames are those of the animation.
-    let scene = Reel::of(&mut driver.session).unwrap().open().unwrap().at(2.5).0;
-    let eye = scene.origin + scene.prepared.camera.eye.as_dvec3();
-    assert!(eye.abs_diff_eq(on_track[3].view.eye, 1e-5), "{eye}");
+    // Frames show what is seen: that view, or the camera of the animation.
+    let frame = |driver: &mut Driver| {
+        let scene = Reel::of(&mut driver.session).unwrap().open().unwrap().at(2.5).0;
+        scene.origin + scene.prepared.camera.eye.as_dvec3()
+    };
+    assert_eq!(has_left_camera(&driver.session), Some(true));
+    let eye = frame(&mut driver);
+    assert!(eye.abs_diff_eq(flown.view.eye, 1e-5), "{eye}");
     driver.session.send(Command::SetView(on_track[2].view));
     driver.frame();
+    assert_eq!(has_left_camera(&driver.session), Some(false));
+    let eye = frame(&mut driver);
+    assert!(eye.abs_diff_eq(on_track[3].view.eye, 1e-5), "{eye}");
     assert_eq!(go(&mut driver, 2.5).view.eye, on_track[3].view.eye);
 }
 

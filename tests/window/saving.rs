@@ -9,6 +9,10 @@ use std::time::Duration;
 
 fn saved(program: &Program, path: &Path) -> String {
     program.key("ctrl+s");
+    // Without a file of its own it asks for a name, and proposes one.
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(!path.exists(), "nobody was asked");
+    program.key("Return");
     until(&format!("{} to be saved", path.display()), || std::fs::read_to_string(path).ok())
 }
 

@@ -158,6 +158,11 @@ impl Warnings {
         };
         first.map(line).collect()
     }
+
+    /// The other warnings of the kind of one of the [summary](Self::summary) that are listed.
+    pub fn others_like(&self, first: &Warning) -> impl Iterator<Item = &Warning> {
+        self.list.iter().filter(move |warning| warning.kind == first.kind).skip(1)
+    }
 }
 
 impl Deref for Warnings {
@@ -310,6 +315,8 @@ mod tests {
         all.push("another");
         assert_eq!((all.len(), all.total()), (Warnings::MAX_OF_KIND + 1, 1_000_001));
         assert_eq!(all.summary()[0].to_string(), "vertex 0 is not finite (and 999999 more)");
+        let others: Vec<String> = all.others_like(&all.summary()[0]).map(ToString::to_string).collect();
+        assert_eq!((&others[0][..], others.len() + 1), ("vertex 1 is not finite", Warnings::MAX_OF_KIND));
         let mut others = Warnings::default();
         others.append(&all.of_file(Path::new("a.ply")));
         assert_eq!((others.len(), others.total()), (all.len(), all.total()));

@@ -120,6 +120,8 @@ pub struct Message {
     pub kind: MessageKind,
     /// One or more lines, safe to print.
     pub text: String,
+    /// Others of the same kind that `text` only counts, safe to print.
+    pub others: Vec<String>,
 }
 
 /// How serious a [`Message`] is.
@@ -157,12 +159,18 @@ impl Status {
 
     /// Adds a message, made safe to print, at a time on the session's clock; drops the oldest one beyond a hundred.
     pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
+        self.say_first(at, kind, text, Vec::new());
+    }
+
+    /// Like [`Self::say`], with the texts of others of the same kind, which `text` only counts.
+    pub(crate) fn say_first(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>, others: Vec<String>) {
         let text = printable::lines(&text.into());
+        let others = others.iter().map(|other| printable::lines(other)).collect();
         // Displaying messages is the task of the session's owner; the log only keeps a copy.
         tracing::info!("{kind:?}: {text}");
         if self.messages.len() == Self::MAX_MESSAGES {
             self.messages.pop_front();
         }
-        self.messages.push_back(Message { at, kind, text });
+        self.messages.push_back(Message { at, kind, text, others });
     }
 }

@@ -35,7 +35,7 @@ const TOUCH: f64 = 0.97;
 /// The middle of the image.
 pub const MIDDLE: [f64; 2] = [0.5; 2];
 
-/// Finds a position; if nothing is free, it is the surface at `at` in the image, 0..1 from its upper left corner.
+/// Finds a position in view; if nothing is free, it is the surface at `at` in the image, 0..1 from its upper left corner.
 pub fn find(world: &World, at: [f64; 2]) -> Spot {
     let shown = world.resource::<RenderState>();
     let (view, projection) = shown.inputs.camera.map(|camera| (camera.view, camera.projection)).unwrap_or_default();
@@ -53,15 +53,19 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
         for depth in depths {
             // Closer objects look larger, so they are made smaller.
             let size = share * depth;
-            if let Some(foot) = stand(scene, &view, place - forward * (distance - depth), size) {
+            if let Some(foot) = stand(scene, &view, place - forward * (distance - depth), size)
+                && is_seen(world, foot + size * DVec3::Y)
+            {
                 return Spot { foot, size };
             }
         }
         share *= 0.6;
     }
-    // On what is below, even if it is in the way there.
+    // On what is below, even if it is in the way there; or in the air, where one would not see it below.
+    let size = SHARE * distance;
     let below = self::distance(scene, place, -DVec3::Y).filter(|below| *below < distance);
-    Spot { foot: place - below.unwrap_or(0.0) * DVec3::Y, size: SHARE * distance }
+    let foot = place - below.unwrap_or(0.0) * DVec3::Y;
+    Spot { foot: if is_seen(world, foot + size * DVec3::Y) { foot } else { place }, size }
 }
 
 /// Whether a point is in the image.

@@ -166,10 +166,12 @@ impl LayeredPicture<'_> {
 
     /// Writes the image into `folder` as `STEM-0001.exr`, or with the next free number. Returns the path.
     ///
+    /// - `taken`: absolute paths of files that are still to be written.
+    ///
     /// # Errors
     /// As [`Self::write`], and if no number is free.
-    pub fn write_new(&self, folder: &Path, stem: &str) -> Result<PathBuf, WriteError> {
-        let mut names = numbered(folder, stem, "exr");
+    pub fn write_new(&self, folder: &Path, stem: &str, taken: &[PathBuf]) -> Result<PathBuf, WriteError> {
+        let mut names = numbered(folder, stem, "exr", taken);
         let path = free_of(&mut names)?;
         let bytes = self.bytes(&path)?;
         let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;

@@ -111,9 +111,13 @@ pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), Wr
     out.finish()
 }
 
-/// The names of new images of this stem.
-pub(super) fn numbered(folder: &Path, stem: &str, extension: &str) -> impl Iterator<Item = PathBuf> {
-    (1..=u32::MAX).map(move |number| folder.join(format!("{stem}-{number:04}.{extension}")))
+/// The names of new files of this stem.
+///
+/// - `taken`: absolute paths of files that are still to be written.
+pub fn numbered(folder: &Path, stem: &str, extension: &str, taken: &[PathBuf]) -> impl Iterator<Item = PathBuf> {
+    let is_taken = |path: &PathBuf| std::path::absolute(path).is_ok_and(|path| taken.contains(&path));
+    let names = (1..=u32::MAX).map(move |number| folder.join(format!("{stem}-{number:04}.{extension}")));
+    names.filter(move |path| !is_taken(path))
 }
 
 /// The first name that no file has, by which errors call the image.
@@ -141,10 +145,18 @@ impl Print<'_> {
     /// Writes the image into `folder` as `STEM-0001`, or with the next free number: never over an existing file, even
     /// if another program creates it at the same time. Returns the path.
     ///
+    /// - `taken`: absolute paths of files that are still to be written.
+    ///
     /// # Errors
     /// If no number is free, or the file cannot be written.
-    pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
-        self.write_first(numbered(folder, stem, format.extension()), format)
+    pub fn write_new(
+        &self,
+        folder: &Path,
+        stem: &str,
+        format: PictureFormat,
+        taken: &[PathBuf],
+    ) -> Result<PathBuf, WriteError> {
+        self.write_first(numbered(folder, stem, format.extension(), taken), format)
     }
 
     /// Writes the image to `path`, or where that is taken beside it as [`write_new`](Self::write_new) does. Returns the
@@ -154,7 +166,7 @@ impl Print<'_> {
     /// Likewise.
     pub fn write_unused(&self, path: &Path, stem: &str) -> Result<PathBuf, WriteError> {
         let format = PictureFormat::of(path)?;
-        let beside = numbered(path.parent().unwrap_or(Path::new("")), stem, format.extension());
+        let beside = numbered(path.parent().unwrap_or(Path::new("")), stem, format.extension(), &[]);
         self.write_first(std::iter::once(path.to_path_buf()).chain(beside), format)
     }
 
@@ -299,16 +311,18 @@ mod tests {
         let (film, display) = (Film::new(5, 3), Display::default());
         std::fs::write(folder.path().join("gallery-0002.png"), "not ours").unwrap();
         let print = Print { film: &film, display: &display, size: (10, 6), note: None, denoised: None };
-        let save = |format| print.write_new(folder.path(), "gallery", format).unwrap();
+        let taken = [folder.path().join("gallery-0004.png")];
+        let save = |format| print.write_new(folder.path(), "gallery", format, &taken).unwrap();
         let first = save(PictureFormat::Png);
         assert_eq!(first, folder.path().join("gallery-0001.png"));
         assert_eq!(save(PictureFormat::Png), folder.path().join("gallery-0003.png"));
         assert_eq!(save(PictureFormat::Exr), folder.path().join("gallery-0001.exr"));
+        assert_eq!(save(PictureFormat::Png), folder.path().join("gallery-0005.png"), "another is to be written before");
         assert_eq!(std::fs::read(folder.path().join("gallery-0002.png")).unwrap(), b"not ours");
         assert_eq!(image::image_dimensions(first).unwrap(), (10, 6));
         let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
         assert_eq!(linear, (5, 3));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5, "nothing temporary is left");
     }
 
     /// What cannot be written has the name that it would have got.
@@ -318,7 +332,7 @@ mod tests {
         let (film, display) = (Film::new(5, 3), Display::default());
         let print = Print { film: &film, display: &display, size: (10, 6), note: None, denoised: None };
         let too_long = "x".repeat(250);
-        let told = print.write_new(folder.path(), &too_long, PictureFormat::Png).unwrap_err().to_string();
+        let told = print.write_new(folder.path(), &too_long, PictureFormat::Png, &[]).unwrap_err().to_string();
         assert!(told.contains("x-0001.png: "), "{told}");
     }
 

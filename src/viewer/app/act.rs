@@ -130,7 +130,7 @@ impl App {
             let switch = Action::Send(Command::ToggleDepthOfField);
             let off = with_key(self.input.navigation(), "depth of field is off", &switch);
             let text = format!("{FOCUS_IS_UNSEEN}: {off}");
-            self.toasts.add_offer(text, "Switch it on", switch, now);
+            self.toasts.add_offer(Tone::News, text, ("Switch it on", switch), now);
         }
     }
 
@@ -160,8 +160,8 @@ impl App {
             }
             Action::Screenshot { linear } => self.screenshot(linear),
             Action::RenderTo { frames } => self.open_form(frames, now),
-            Action::SaveScene { new: false } => self.save_scene(),
-            Action::SaveScene { new: true } => self.choose_place(DialogPurpose::SaveScene, &self.scene_path(true)),
+            Action::SaveScene { new: false } if self.session.scene_file().is_some() => self.save_scene(),
+            Action::SaveScene { .. } => self.choose_place(DialogPurpose::SaveScene, &self.scene_path(true)),
             Action::CopyView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
                 // Whoever started from a desktop has no terminal.
@@ -291,7 +291,7 @@ impl App {
 
     pub(super) fn scene_path(&self, new: bool) -> PathBuf {
         let known = self.session.scene_file().filter(|_| !new);
-        known.unwrap_or_else(|| new_file(&self.options.folder, &self.session.status().scene, "ron"))
+        known.unwrap_or_else(|| new_file(&self.options.folder, &self.session.status().scene, "ron", &[]))
     }
 
     fn toggle_play(&mut self, now: Instant) {
@@ -421,6 +421,7 @@ impl App {
         let denoise = denoiser
             .and_then(|filter| self.session.rendered().map(|rendered| (filter, rendered)))
             .map(|(filter, (prepared, settings))| DenoiseWith { prepared, settings, filter, threads });
+        self.saver.leave_free(self.renders.paths());
         self.saver.save((self.session.keep_film(denoise.is_some()), denoise), draft, display, size, &scene, format);
     }
 
@@ -436,6 +437,7 @@ impl App {
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
         let filter = self.session.world().resource::<ViewMode>().0.filter;
         let shown = Shown { prepared, names, settings, filter, threads, size };
+        self.saver.leave_free(self.renders.paths());
         self.saver.save_layers(self.session.keep_film(false), shown, draft, display, &scene);
     }
 
@@ -475,7 +477,7 @@ impl App {
     pub(super) fn tell_saved(&mut self, path: PathBuf, news: String, now: Instant) {
         // Whoever was elsewhere meanwhile finds it in the list of messages.
         self.session.log_saved(news.clone());
-        self.toasts.add_offer(news, IN_FOLDER, Action::ShowSaved, now);
+        self.toasts.add_offer(Tone::News, news, IN_FOLDER, now);
         self.last_saved = Some(path);
     }
 

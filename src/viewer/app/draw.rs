@@ -106,7 +106,6 @@ impl App {
                 None
             }
         };
-        let window_size = (session.picture().width, session.picture().height);
         let chosen_name = chosen_name.as_deref();
         let free_now = &mut self.free;
         let presented = presenter.present(|context| {
@@ -159,7 +158,7 @@ impl App {
             if greets {
                 greeted = greeting::show(context);
             }
-            wish = form.show(context, window_size, preview.as_ref());
+            wish = form.show(context, session, preview.as_ref());
             file = browser.show(context);
             let found = palette.show(context, || menu::all(&menu_input));
             clicked = clicked.take().or(found);

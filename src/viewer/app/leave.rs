@@ -116,7 +116,7 @@ impl App {
             // It is offered again by the next window.
             (_, PromptAnswer::Later) => {}
             (Prompt::Restore(left), PromptAnswer::Yes) => {
-                let path = new_file(&self.options.folder, &left.title, "ron");
+                let path = new_file(&self.options.folder, &left.title, "ron", &[]);
                 if let Err(reason) = self.leaving.restore(left, path) {
                     self.toasts.add(Tone::Problem, reason, now);
                 }

@@ -8,6 +8,7 @@ use crate::viewer::order::{Order, Subject};
 use crate::viewer::order_form::Wish;
 use crate::viewer::renders::{Outcome, Source};
 use crate::viewer::saver::file_stem;
+use crate::viewer::time_line::Strip;
 use crate::viewer::toasts::Tone;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -23,10 +24,14 @@ impl App {
             self.input.toggle_spin(now);
         }
         if frames && !turns {
-            // As for a turntable that is seen first.
-            self.session.send(Command::PivotOnMiddle);
+            match Strip::of(&self.session) {
+                // A model in the pose of its file begins to move.
+                Some(strip) => strip.before_play(false).into_iter().for_each(|command| self.session.send(command)),
+                // As for a turntable that is seen first.
+                None => self.session.send(Command::PivotOnMiddle),
+            }
         }
-        self.form.open(&self.session, frames, turns, &self.options.folder);
+        self.form.open(&self.session, frames, turns, (&self.options.folder, &self.renders.paths()));
     }
 
     /// Does what the form asks for.

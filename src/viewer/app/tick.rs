@@ -4,9 +4,9 @@ use crate::frame::{Command, MessageKind, Selection};
 use crate::viewer::app::act::{FOCUS_IS_UNSEEN, LEFT};
 use crate::viewer::app::options::ViewerError;
 use crate::viewer::app::{App, FIGURES_INTERVAL, FRAME, MAX_WAIT, SLOW};
-use crate::viewer::keys::{Action, with_key};
+use crate::viewer::keys::Action;
 use crate::viewer::openable::short_name;
-use crate::viewer::toasts::{IN_FOLDER, Toasts, Tone};
+use crate::viewer::toasts::{ALL_MESSAGES, IN_FOLDER, Toasts, Tone};
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -46,7 +46,7 @@ impl App {
             self.asks_for_room = false;
         }
         if let Some(left) = self.memory.take_left(&self.session) {
-            self.toasts.add_offer(LEFT.to_owned(), "Go back to it", Action::ReturnTo(left), now);
+            self.toasts.add_offer(Tone::News, LEFT.to_owned(), ("Go back to it", Action::ReturnTo(left)), now);
         }
         let status = self.session.status();
         match (status.opening, self.opening_since) {
@@ -68,18 +68,19 @@ impl App {
         let n_warnings = new.clone().filter(|message| message.kind == MessageKind::Warning).count();
         let is_flood = n_warnings > Toasts::MOST_WARNINGS;
         if is_flood {
-            let text = format!("{n_warnings} warnings: see Messages in the panel");
-            let text = with_key(self.input.navigation(), &text, &Action::TogglePanel);
-            self.toasts.add(Tone::Problem, text, now);
+            self.toasts.add_offer(Tone::Problem, format!("{n_warnings} warnings"), ALL_MESSAGES, now);
         }
         for message in new.filter(|message| !is_flood || message.kind != MessageKind::Warning) {
             match message.kind {
                 MessageKind::Note => self.toasts.add(Tone::News, message.text.clone(), now),
-                MessageKind::Warning | MessageKind::Error => {
+                MessageKind::Warning | MessageKind::Error if message.others.is_empty() => {
                     self.toasts.add(Tone::Problem, message.text.clone(), now);
                 }
+                MessageKind::Warning | MessageKind::Error => {
+                    self.toasts.add_offer(Tone::Problem, message.text.clone(), ALL_MESSAGES, now);
+                }
                 MessageKind::Saved => {
-                    self.toasts.add_offer(message.text.clone(), IN_FOLDER, Action::ShowSaved, now);
+                    self.toasts.add_offer(Tone::News, message.text.clone(), IN_FOLDER, now);
                     self.last_saved = self.session.scene_file().and_then(|path| std::path::absolute(path).ok());
                 }
             }

@@ -18,5 +18,8 @@ pub fn messages(ui: &mut Ui, session: &Session) {
             MessageKind::Error => Color32::from_rgb(250, 140, 120),
         };
         ui.add(egui::Label::new(RichText::new(&message.text).color(color)).wrap());
+        for other in &message.others {
+            ui.add(egui::Label::new(RichText::new(other).weak()).wrap());
+        }
     }
 }
