@@ -18,7 +18,7 @@ use crate::frame::state::resources::{
 use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
-use crate::frame::walls::{around_walls, before_wall, is_in_room, within_walls};
+use crate::frame::walls::{around_walls, before_wall, frame_in_sight, is_in_room, within_walls};
 use crate::frame::{Command, Projector};
 use crate::render::{Inspection, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
@@ -145,7 +145,14 @@ impl CommandParams<'_, '_> {
             Command::FrameAll => {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
-                    let framed = navigation::frame_rig(&rig, self.size.aspect(), &points);
+                    let scene = self.shown.extraction.as_ref().filter(|_| !self.selection.0.is_empty());
+                    let (framed, is_other_side) = match scene {
+                        Some(scene) => frame_in_sight(scene, &rig, self.size.aspect(), &points),
+                        None => (navigation::frame_rig(&rig, self.size.aspect(), &points), false),
+                    };
+                    if is_other_side {
+                        self.note("framed from a side on which it is not hidden".to_owned());
+                    }
                     let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
                     self.set_rig(Rig { lens, ..framed });
                     if lens.enabled && lens != rig.lens {

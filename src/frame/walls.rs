@@ -1,5 +1,7 @@
 //! Rooms: whether a camera is in one, its floor, and movements that stay there.
 
+use crate::frame::core::rig::{Rig, Turning};
+use crate::frame::navigation::{box_around, frame_rig, orbit};
 use crate::frame::state::selection::distance;
 use crate::scene::{Extraction, View};
 use glam::DVec3;
@@ -54,6 +56,67 @@ pub fn before_wall(scene: &Extraction, from: &View, to: View) -> View {
     let most = wall.map(|wall| (SHORT_OF * (from.pivot_distance + wall)).max(from.pivot_distance));
     let Some(most) = most.filter(|most| *most < to.pivot_distance && is_in_room(scene, from)) else { return to };
     View { eye: from.pivot() - most * from.forward, pivot_distance: most, ..to }
+}
+
+/// Frames the outermost points of something from the present side, or from the nearest side on which it is not hidden
+/// behind other things. Returns whether it is from another side.
+///
+/// - `aspect`: of the image, width over height.
+pub fn frame_in_sight(scene: &Extraction, rig: &Rig, aspect: f64, points: &[DVec3]) -> (Rig, bool) {
+    /// Yaw and pitch of the sides, degrees, the nearest first.
+    const SIDES: [(f64, f64); 10] = [
+        (0.0, 25.0),
+        (-35.0, 10.0),
+        (35.0, 10.0),
+        (0.0, 50.0),
+        (-75.0, 20.0),
+        (75.0, 20.0),
+        (-130.0, 20.0),
+        (130.0, 20.0),
+        (180.0, 20.0),
+        (0.0, 80.0),
+    ];
+    /// Shares that are to be seen: of the present side, which is kept, and of another one.
+    const ENOUGH: [f64; 2] = [0.25, 0.7];
+    let here = frame_rig(rig, aspect, points);
+    let seen = share_in_sight(scene, &here.view, points);
+    if seen >= ENOUGH[0] || rig.projection.orthographic_height.is_some() {
+        return (here, false);
+    }
+    let sides = SIDES.iter().map(|(yaw, pitch)| {
+        let view = orbit(&rig.view, yaw.to_radians(), pitch.to_radians(), Turning::default());
+        let there = frame_rig(&Rig { view, ..*rig }, aspect, points);
+        (there, share_in_sight(scene, &there.view, points))
+    });
+    let mut best = (here, seen);
+    for side in sides {
+        if side.1 > best.1 {
+            best = side;
+        }
+        if best.1 >= ENOUGH[1] {
+            break;
+        }
+    }
+    (best.0, best.1 > seen)
+}
+
+/// Share of the directions to some of the points in which nothing else is nearer.
+fn share_in_sight(scene: &Extraction, view: &View, points: &[DVec3]) -> f64 {
+    const MOST: usize = 64;
+    let Some((min, max)) = box_around(points.iter().copied()) else { return 1.0 };
+    let middle = 0.5 * (min + max);
+    let radius = points.iter().map(|point| point.distance(middle)).fold(0.0, f64::max);
+    let nearest = (view.eye.distance(middle) - radius).max(0.0);
+    let some = points.iter().step_by(points.len().div_ceil(MOST));
+    let (mut n, mut free) = (0.0, 0.0);
+    for point in some {
+        // Within its outline.
+        let way = point.lerp(middle, 0.25) - view.eye;
+        let hit = way.try_normalize().and_then(|direction| distance(scene, view.eye, direction));
+        n += 1.0;
+        free += if hit.is_none_or(|hit| hit >= SHORT_OF * nearest) { 1.0 } else { 0.0 };
+    }
+    free / n
 }
 
 /// Height of what a view stands on: something level below the camera, and not above what it looks at.

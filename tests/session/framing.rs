@@ -26,6 +26,10 @@ fn bar(folder: &Path) -> PathBuf {
 }
 
 fn opened(path: &Path) -> Driver {
+    opened_scene(SceneSource::Model(path.to_owned()))
+}
+
+fn opened_scene(source: SceneSource) -> Driver {
     let options = SessionOptions {
         width: 64,
         height: 32,
@@ -33,7 +37,7 @@ fn opened(path: &Path) -> Driver {
         target: Target { spp: Some(1), ..Target::default() },
         ..SessionOptions::default()
     };
-    let mut driver = Driver::new(options, SceneSource::Model(path.to_owned()));
+    let mut driver = Driver::new(options, source);
     driver.settle();
     driver
 }
@@ -124,5 +128,27 @@ fn from_outside_the_walls_of_a_room_are_what_a_view_from_a_side_shows() {
     for (side, expected) in [(Side::Top, DVec3::Y), (Side::Right, DVec3::X), (Side::Back, -DVec3::Z)] {
         let eye = view_from(&mut driver, outside, DVec3::new(4.0, 0.5, 0.5), side);
         assert!((eye - DVec3::new(4.0, 0.5, 0.5) - 19.5 * expected).length() < 1e-6, "{side:?}: {eye}");
+    }
+}
+
+#[test]
+fn what_is_hidden_is_framed_from_another_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let wall = "quad(corner: (-3, -3, 0.45), edge_u: (6, 0, 0), edge_v: (0, 6, 0), material: \"grey\"),";
+    for (wall, is_hidden) in [("", false), (wall, true)] {
+        let text = format!(
+            "(camera: (eye: (0, 0, 6), look_at: (0, 0, 0)), environment: constant(1),
+              materials: {{ \"grey\": diffuse(albedo: 0.5) }},
+              objects: [{wall} sphere(name: \"ball\", center: (0, 0, 0), radius: 0.2, material: \"grey\")])"
+        );
+        let path = folder.path().join("scene.ron");
+        std::fs::write(&path, text).unwrap();
+        let mut driver = opened_scene(SceneSource::Scene(path));
+        driver.select("ball");
+        driver.session.send(Command::FrameAll);
+        driver.frame();
+        let eye = driver.session.status().rig.view.eye;
+        assert_eq!(eye.z < 0.45, is_hidden, "{eye}");
+        assert!(eye.length() < 2.0, "{eye}");
     }
 }

@@ -75,7 +75,7 @@ pub fn add(world: &mut World, new: &NewThing, at: [f64; 2]) {
 }
 
 /// Irradiance of what a new light is made for, W/m²: white becomes twice as bright as the white of the display, so that
-/// the difference is seen in other light.
+/// the difference is seen in other light. In a room, no more than a quarter of what is around becomes brighter.
 const NEW_IRRADIANCE: f64 = 2.0 * PI;
 
 /// Adds a light, as bright as its distance needs; `None` for everything else.
@@ -88,13 +88,14 @@ fn add_light(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity> 
     let (way, distance) = (spot.way(), spot.way().length());
     let direction = way.try_normalize().unwrap_or(DVec3::NEG_Y);
     let irradiance = NEW_IRRADIANCE / f64::from(world.resource::<DisplaySettings>().0.exposure_stops).exp2();
-    let intensity = Vec3::splat((irradiance * distance * distance) as f32);
+    let reach = spot::room_around(world, spot.place).map_or(distance, |room| distance.min(room));
+    let intensity = Vec3::splat((irradiance * reach * reach) as f32);
     let placement = Placement::at(spot.place);
     Some(match new {
         AreaLight => {
             // Its light is soft, and its own shadow small.
             let edge = 0.8 * spot.radius;
-            let white = (irradiance * (distance / edge).powi(2)) as f32;
+            let white = (irradiance * (reach / edge).powi(2)) as f32;
             let material = new_material(world, "light", Material::emissive(white * Vec3::new(1.0, 0.92, 0.8)));
             // u × v points to what it lights.
             let u = direction.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);

@@ -61,10 +61,13 @@ pub fn find(world: &World, at: [f64; 2]) -> Spot {
         }
         share *= 0.6;
     }
-    // On what is below, even if it is in the way there; or in the air, where one would not see it below.
+    // On top of what is there, even if something is in the way; or in the air, where one would not see it.
     let size = SHARE * distance;
-    let below = self::distance(scene, place, -DVec3::Y).filter(|below| *below < distance);
-    let foot = place - below.unwrap_or(0.0) * DVec3::Y;
+    let before = place - (1.0 - TOUCH) * size * forward;
+    let height = self::distance(scene, before, DVec3::Y).map_or(2.0 * size, |free| (TOUCH * free).min(2.0 * size));
+    let above = before + height * DVec3::Y;
+    let fall = self::distance(scene, above, -DVec3::Y).filter(|fall| *fall < distance + height).unwrap_or(height);
+    let foot = above - fall * DVec3::Y;
     Spot { foot: if is_seen(world, foot + size * DVec3::Y) { foot } else { place }, size }
 }
 
@@ -146,6 +149,15 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
     LightSpot { place: view.eye + share * (place - view.eye), subject, radius }
 }
 
+/// The distance of the nearest quarter of what is around a place; `None` in the open.
+pub fn room_around(world: &World, place: DVec3) -> Option<f64> {
+    let scene = world.resource::<RenderState>().extraction.as_ref()?;
+    let mut around: Vec<f64> = directions().filter_map(|direction| distance(scene, place, direction)).collect();
+    around.sort_by(f64::total_cmp);
+    let quarter = RAYS as usize / 4;
+    (around.len() >= 3 * quarter).then(|| around[quarter])
+}
+
 /// Centre and radius of a ball around the boxes of objects that are to be lit; `None` without any that has an end. An
 /// area light, such as one that was just added, needs no light.
 fn ball_around(world: &mut World, entities: &[Entity]) -> Option<(DVec3, f64)> {
@@ -179,14 +191,21 @@ fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>)
 /// Returns the position of an object after dropping it from here, if there is space for it.
 fn stand(scene: &Extraction, view: &View, place: DVec3, size: f64) -> Option<DVec3> {
     let middle = place + DVec3::Y * size;
-    let (to_middle, away) = (middle - view.eye, (middle - view.eye).length());
+    let away = (middle - view.eye).length();
+    let is_hidden = |place: DVec3| {
+        let way = place - view.eye;
+        distance(scene, view.eye, way / way.length()).is_some_and(|free| free < way.length())
+    };
     // An invisible position may be inside of an object.
-    if distance(scene, view.eye, to_middle / away).is_some_and(|free| free < away) {
+    if is_hidden(middle) {
         return None;
     }
     // Without a ground, or far above it, the object floats.
     let fall = distance(scene, middle, -DVec3::Y).filter(|fall| *fall < away).unwrap_or(size);
     let middle = middle + DVec3::Y * (size - fall);
+    if is_hidden(middle) {
+        return None;
+    }
     let is_free = |direction: DVec3| {
         // Distance to the surface of a cube of side 2 · `size`.
         let reach = size / direction.abs().max_element();

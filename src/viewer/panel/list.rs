@@ -4,7 +4,8 @@
 //! search or the scene changes.
 
 use bevy_ecs::prelude::Entity;
-use egui::{CursorIcon, Rect, Sense, Ui, vec2};
+use egui::scroll_area::ScrollSource;
+use egui::{CursorIcon, Pos2, Rect, Sense, Ui, Vec2, vec2};
 
 /// An item that a list can show.
 pub trait Listed {
@@ -22,6 +23,34 @@ pub struct ListState {
     found: Option<(u64, String, Vec<usize>)>,
     /// The chosen item when the list was last drawn, to detect a change.
     chosen: Option<Entity>,
+    wheel: Wheel,
+}
+
+/// Whether a turn of the wheel is for a list: one that begins over the list. One that scrolls the panel goes on when a
+/// list comes under the mouse.
+#[derive(Default)]
+struct Wheel {
+    /// Where the list was drawn last.
+    place: Option<Rect>,
+    /// When the wheel was turned last, seconds.
+    turned: f64,
+    is_for_list: bool,
+}
+
+impl Wheel {
+    /// Seconds of rest that end a turn.
+    const REST: f64 = 0.4;
+
+    /// - `now`: seconds; `turns`: the wheel is being turned; `mouse`: where it is.
+    fn is_for_list(&mut self, now: f64, turns: bool, mouse: Option<Pos2>) -> bool {
+        if turns {
+            if now > self.turned + Self::REST {
+                self.is_for_list = self.place.zip(mouse).is_some_and(|(place, mouse)| place.contains(mouse));
+            }
+            self.turned = now;
+        }
+        !turns || self.is_for_list
+    }
 }
 
 /// Identity of a list, revision of the scene, the item that is to be in view, and the height of rows.
@@ -78,11 +107,16 @@ pub fn list<T: Listed>(
     if target.is_some() || which.chosen.is_none() {
         state.chosen = which.chosen;
     }
-    let mut area = egui::ScrollArea::vertical().id_salt(which.id).max_height(height);
+    let (now, turns, mouse) = ui.input(|input| {
+        let turns = [input.raw_scroll_delta, input.smooth_scroll_delta].iter().any(|delta| *delta != Vec2::ZERO);
+        (input.time, turns, input.pointer.hover_pos())
+    });
+    let source = ScrollSource { mouse_wheel: state.wheel.is_for_list(now, turns, mouse), ..ScrollSource::ALL };
+    let mut area = egui::ScrollArea::vertical().id_salt(which.id).max_height(height).scroll_source(source);
     if is_new_search {
         area = area.vertical_scroll_offset(0.0);
     }
-    area.min_scrolled_height(height.min(all)).auto_shrink([false, true]).animated(false).show_rows(
+    let drawn = area.min_scrolled_height(height.min(all)).auto_shrink([false, true]).animated(false).show_rows(
         ui,
         text,
         found.len(),
@@ -108,6 +142,7 @@ pub fn list<T: Listed>(
             }
         },
     );
+    state.wheel.place = Some(drawn.inner_rect);
     if all > height || state.height.is_some() {
         let moved = grip(ui);
         if moved != 0.0 {
@@ -148,6 +183,17 @@ mod tests {
         fn listed(&self) -> (Entity, &str, &str) {
             (Entity::PLACEHOLDER, self.0, self.1)
         }
+    }
+
+    #[test]
+    fn a_wheel_that_scrolls_the_panel_is_not_caught_by_a_list() {
+        let place = Rect::from_min_max(Pos2::new(0.0, 100.0), Pos2::new(200.0, 300.0));
+        let mut wheel = Wheel { place: Some(place), ..Wheel::default() };
+        let (outside, inside) = (Some(Pos2::new(50.0, 50.0)), Some(Pos2::new(50.0, 150.0)));
+        assert!(!wheel.is_for_list(10.0, true, outside));
+        assert!(!wheel.is_for_list(10.3, true, inside), "the same turn");
+        assert!(wheel.is_for_list(10.8, true, inside), "another one");
+        assert!(wheel.is_for_list(11.1, true, outside) && wheel.is_for_list(20.0, false, outside));
     }
 
     #[test]
