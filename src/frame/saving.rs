@@ -25,6 +25,8 @@ struct SavedState {
     result: Result<SavedScene, WriteError>,
     content: Fingerprint,
     clean: Content,
+    /// Images that the scene names where it was opened, and not where it is saved.
+    lost: Vec<String>,
 }
 
 /// Requests and running saves.
@@ -72,14 +74,21 @@ pub fn save(world: &mut World) {
         saving.threads.retain(|thread| !thread.is_finished());
         std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner))
     };
-    for SavedState { path, result, content, clean } in finished {
+    for SavedState { path, result, content, clean, lost } in finished {
         match result {
             Ok(saved) => {
                 let notes: String = saved.notes.iter().map(|note| format!("; {note}")).collect();
+                let is_first = world.resource::<SavedAs>().path.as_ref() != Some(&path);
                 let mut status = world.resource_mut::<Status>();
                 status.scene = path.display().to_string();
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 status.say(now, MessageKind::Saved, format!("saved {}{notes}", whole.display()));
+                if is_first && let [first, others @ ..] = &lost[..] {
+                    let more = if others.is_empty() { String::new() } else { format!(" (and {} more)", others.len()) };
+                    let text =
+                        format!("the saved scene does not name what is missing: `{first}`{more}; the opened one does");
+                    status.say_first(now, MessageKind::Warning, text, others.to_vec());
+                }
                 world.insert_resource(SavedAs { path: Some(path), content: Some(content) });
                 world.resource_mut::<History>().mark_clean(clean);
             }
@@ -98,10 +107,17 @@ pub fn save(world: &mut World) {
         let mut saving = world.resource_mut::<Saving>();
         let (finished, waker) = (saving.finished.clone(), saving.waker.clone());
         let target = path.clone();
+        let lost = current.as_ref().map_or_else(Vec::new, |current| current.lost_images.clone());
         let work = move || {
             let content = content.fingerprint();
             let result = description.save(&path);
-            finished.lock().unwrap_or_else(PoisonError::into_inner).push(SavedState { path, result, content, clean });
+            finished.lock().unwrap_or_else(PoisonError::into_inner).push(SavedState {
+                path,
+                result,
+                content,
+                clean,
+                lost,
+            });
             if let Some(waker) = waker {
                 waker();
             }

@@ -308,14 +308,16 @@ impl Session {
     }
 
     /// Where the open scene is saved: the last saved file, or else the scene file that was opened. None for a scene of an
-    /// archive, whose files may be deleted at any time, and for that of an image, which may name any scene file of the
-    /// user's as its own.
+    /// archive, whose files may be deleted at any time, for that of an image, which may name any scene file of the user's
+    /// as its own, and for one without some of its images, which the file still names.
     pub fn scene_file(&self) -> Option<PathBuf> {
         let saved = self.world.resource::<SavedAs>().path.clone();
         saved.or_else(|| {
             let scene = &self.world.get_resource::<CurrentScene>()?.0;
             match &scene.source {
-                SceneSource::Scene(path) if scene.shot.is_none() && unpacked_folder(path).is_none() => {
+                SceneSource::Scene(path)
+                    if scene.shot.is_none() && unpacked_folder(path).is_none() && scene.lost_images.is_empty() =>
+                {
                     Some(path.clone())
                 }
                 _ => None,

@@ -104,6 +104,8 @@ impl LoadedScene {
     /// Removes the textures and the environment of images that cannot be read. Materials get what is shown instead, so that
     /// the scene can be saved and opened again.
     pub(super) fn leave_out_pictures(&mut self, lost: &HashSet<String>) {
+        self.lost_images = lost.iter().cloned().collect();
+        self.lost_images.sort();
         let file = &mut self.file;
         if let EnvironmentSource::Image { file: image, scale, .. } = &file.environment
             && lost.contains(image)

@@ -36,6 +36,9 @@ pub struct LoadedScene {
     pub(super) environment_image: Option<Arc<ImageTexture>>,
     /// Their files, each with its stamp at the time of reading.
     pub(super) picture_files: HashMap<String, (PathBuf, Stamp)>,
+    /// Images of textures and of the environment that could not be read, by name, in order: what is saved has none of
+    /// them.
+    pub lost_images: Vec<String>,
     /// The scene of another renderer that was opened and the files that it includes, each with its stamp.
     pub(super) text_files: Vec<(PathBuf, Stamp)>,
     /// Trees of its meshes and of its groups of spheres.
@@ -76,6 +79,7 @@ impl LoadedScene {
             pictures: HashMap::new(),
             environment_image: None,
             picture_files: HashMap::new(),
+            lost_images: Vec::new(),
             text_files: Vec::new(),
             trees: Trees::default(),
             warnings: Warnings::default(),

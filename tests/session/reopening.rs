@@ -337,3 +337,31 @@ fn what_an_image_names_as_its_scene_is_not_where_it_is_saved() {
     driver.run_until(|session| !session.is_saving());
     assert_eq!(driver.session.scene_file(), Some(new));
 }
+
+/// Where the disk with the images is away for a day, the scene that names them is left as it is.
+#[test]
+fn a_scene_without_its_images_is_saved_to_another_file_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = write_room(folder.path());
+    let path = folder.path().join("room.ron");
+    let (text, tiles) = (std::fs::read_to_string(&path).unwrap(), folder.path().join("tiles.png"));
+    std::fs::remove_file(&tiles).unwrap();
+    let mut driver = Driver::small(source);
+    driver.settle();
+    assert_eq!(driver.session.scene_file(), None);
+    let new = folder.path().join("new.ron");
+    driver.session.send(Command::SaveScene { path: new.clone() });
+    driver.run_until(|session| !session.is_saving());
+    driver.frame();
+    let said = |driver: &Driver| {
+        let warnings = driver.session.status().messages.iter().filter(|said| said.kind == MessageKind::Warning);
+        warnings.filter(|said| said.text.contains("does not name what is missing: `tiles.png`")).count()
+    };
+    assert_eq!((said(&driver), driver.session.scene_file()), (1, Some(new.clone())));
+    assert!(text.contains("tiles.png") && !std::fs::read_to_string(&new).unwrap().contains("tiles.png"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    driver.session.send(Command::SaveScene { path: new });
+    driver.run_until(|session| !session.is_saving());
+    driver.frame();
+    assert_eq!(said(&driver), 1, "once is enough");
+}

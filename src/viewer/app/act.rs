@@ -410,8 +410,7 @@ impl App {
         }
         let format = if linear { PictureFormat::Exr } else { PictureFormat::Png };
         let status = self.session.status();
-        let picture = self.session.picture();
-        let size = (picture.width.max(1), picture.height.max(1));
+        let size = self.input.size().map(|side| side.max(1.0) as u32).into();
         let (display, scene) = (status.display, status.scene.clone());
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
         // A PNG looks like the window; linear light is what the samples say.
@@ -430,8 +429,7 @@ impl App {
         let names = self.session.feature_names();
         let Some((names, (prepared, settings))) = names.zip(self.session.rendered()) else { return };
         self.toasts.add_progress("screenshot: saving layers …", now);
-        let picture = self.session.picture();
-        let size = (picture.width.max(1), picture.height.max(1));
+        let size = self.input.size().map(|side| side.max(1.0) as u32).into();
         let status = self.session.status();
         let (display, scene, threads) = (status.display, status.scene.clone(), status.threads);
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
