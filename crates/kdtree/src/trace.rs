@@ -24,7 +24,7 @@ use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
 use crate::geometry::Aabb;
 use glam::Affine3A;
-use std::cell::RefCell;
+use std::cell::Cell;
 use std::sync::Arc;
 
 /// Rays that pass through all objects before the next ones start.
@@ -206,7 +206,12 @@ fn trace<A: Answers + ?Sized>(
     class: RayClass,
     answers: &mut A,
 ) {
-    STATES.with_borrow_mut(|state| trace_in(state, set, (top, scene), (rays, class), answers));
+    // Taken out meanwhile: a tree that is built while rays are traced waits for helpers, and this thread may take over work
+    // that traces rays too.
+    let kept = STATES.take();
+    let mut state = kept.unwrap_or_else(|| Box::new(StreamStates { one: StreamState::new(), two: None }));
+    trace_in(&mut state, set, (top, scene), (rays, class), answers);
+    STATES.set(Some(state));
 }
 
 /// State of streams over one level and over two.
@@ -216,7 +221,7 @@ struct StreamStates {
 }
 
 thread_local! {
-    static STATES: RefCell<StreamStates> = RefCell::new(StreamStates { one: StreamState::new(), two: None });
+    static STATES: Cell<Option<Box<StreamStates>>> = const { Cell::new(None) };
 }
 
 fn trace_in<A: Answers + ?Sized>(
