@@ -49,7 +49,7 @@ pub fn has_left_camera(session: &Session) -> Option<bool> {
     let animation = world.get_resource::<Animation>().filter(|animation| animation.moves_camera())?;
     let seconds = world.get_resource::<Moment>().map_or(0.0, |moment| moment.0);
     let Rig { view, projection, lens } = session.status().rig;
-    Some(animation.has_lost(&view, &projection, &lens, seconds))
+    Some(animation.is_left_by(&view, &projection, &lens, seconds))
 }
 
 impl Reel {

@@ -2,10 +2,9 @@
 
 use crate::frame::core::rig::{Rig, Turning};
 use crate::frame::navigation::{box_around, frame_rig, orbit};
-use crate::frame::state::selection::distance;
+use crate::frame::state::selection::{directions, distance};
 use crate::scene::{Extraction, View};
 use glam::DVec3;
-use std::f64::consts::PI;
 
 /// Part of the way to a wall.
 const SHORT_OF: f64 = 0.95;
@@ -150,14 +149,7 @@ const MOST_HEIGHT: f64 = 10.0;
 /// Whether a camera is in a room: wherever it looks upwards there is something.
 pub fn is_in_room(scene: &Extraction, view: &View) -> bool {
     let reach = MOST_HEIGHT * distance(scene, view.eye, view.forward).unwrap_or(view.pivot_distance);
-    let golden = PI * (3.0 - 5.0f64.sqrt());
-    // Evenly over the sphere above that height.
-    let is_roofed = |i: &u32| {
-        let rise = 1.0 - (1.0 - LEAST_RISE) * (f64::from(*i) + 0.5) / f64::from(N_DIRECTIONS);
-        let (turn, level) = (f64::from(*i) * golden, (1.0 - rise * rise).sqrt());
-        let direction = DVec3::new(level * turn.cos(), rise, level * turn.sin());
-        distance(scene, view.eye, direction).is_some_and(|distance| distance < reach)
-    };
-    let n_roofed = (0..N_DIRECTIONS).filter(is_roofed).count();
+    let is_roofed = |direction: &DVec3| distance(scene, view.eye, *direction).is_some_and(|away| away < reach);
+    let n_roofed = directions(N_DIRECTIONS, LEAST_RISE).filter(is_roofed).count();
     n_roofed as f64 >= ROOFED * f64::from(N_DIRECTIONS)
 }

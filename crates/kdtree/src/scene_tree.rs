@@ -344,3 +344,39 @@ impl SceneRay {
         Self { ray: *ray, shear: Shear::new(ray.dir), wide: RayF64::new(ray) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BuildPreset, MeshTree};
+    use glam::Affine3A;
+
+    /// While a thread waits for its helpers, it may take over work that traces rays too.
+    #[test]
+    fn rays_are_traced_by_a_thread_that_builds_a_tree_for_rays() {
+        const SIDE: u32 = 150;
+        let vertex = |i: u32| Vec3::new((i % SIDE) as f32, ((i * 7) % 5) as f32, (i / SIDE) as f32);
+        let positions: Vec<Vec3> = (0..SIDE * SIDE).map(vertex).collect();
+        let cells = (0..SIDE - 1).flat_map(|y| (0..SIDE - 1).map(move |x| y * SIDE + x));
+        let triangles: Vec<[u32; 3]> =
+            cells.flat_map(|i| [[i, i + 1, i + SIDE], [i + 1, i + SIDE + 1, i + SIDE]]).collect();
+        let mut rays = RayBatch::default();
+        (0..64).for_each(|i| rays.push(&Ray::new(Vec3::new(2.3 * i as f32 + 0.1, 9.0, 70.2), Vec3::NEG_Y)));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+        for _ in 0..16 {
+            let tree = Arc::new(MeshTree::deferred(&positions, &triangles, BuildPreset::Best));
+            let place = |tree| Shape::Mesh { tree, world_from_object: Affine3A::IDENTITY, space: HitSpace::Object };
+            let scene = SceneTree::build(vec![place(tree.clone())]);
+            assert!(!tree.is_built());
+            let found: Vec<Vec<Option<Hit>>> = pool.install(|| {
+                let trace = |_: i32| {
+                    let mut hits = HitBatch::default();
+                    scene.closest_hits(&rays, RayClass::Coherent, &mut hits);
+                    (0..64).map(|i| hits.get(i)).collect()
+                };
+                (0..512).into_par_iter().map(trace).collect()
+            });
+            assert!(found[0].iter().all(Option::is_some) && found.iter().all(|hits| *hits == found[0]));
+        }
+    }
+}

@@ -7,11 +7,10 @@
 
 use crate::frame::navigation::{Rig, box_around};
 use crate::frame::state::resources::{PictureSize, RenderState};
-use crate::frame::state::selection::{Projector, Selection, box_of, distance, pick};
+use crate::frame::state::selection::{Projector, Selection, box_of, directions, distance, pick};
 use crate::scene::{Extraction, Shape, View, is_emitter};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DVec2, DVec3};
-use std::f64::consts::TAU;
 
 /// A position for an object, with free space for a cube of side `2 * size` above it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +151,8 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
 /// The distance of the nearest quarter of what is around a place; `None` in the open.
 pub fn room_around(world: &World, place: DVec3) -> Option<f64> {
     let scene = world.resource::<RenderState>().extraction.as_ref()?;
-    let mut around: Vec<f64> = directions().filter_map(|direction| distance(scene, place, direction)).collect();
+    let mut around: Vec<f64> =
+        directions(RAYS, -1.0).filter_map(|direction| distance(scene, place, direction)).collect();
     around.sort_by(f64::total_cmp);
     let quarter = RAYS as usize / 4;
     (around.len() >= 3 * quarter).then(|| around[quarter])
@@ -211,16 +211,5 @@ fn stand(scene: &Extraction, view: &View, place: DVec3, size: f64) -> Option<DVe
         let reach = size / direction.abs().max_element();
         distance(scene, middle, direction).is_none_or(|free| free > TOUCH * reach)
     };
-    directions().all(is_free).then(|| middle - DVec3::Y * size)
-}
-
-/// Uniform directions: a spiral from pole to pole whose turns are as far apart as its points.
-fn directions() -> impl Iterator<Item = DVec3> {
-    const GOLDEN: f64 = 0.618_033_988_749_895;
-    (0..RAYS).map(|i| {
-        let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(RAYS);
-        let (sin, cos) = (TAU * GOLDEN * f64::from(i)).sin_cos();
-        let across = (1.0 - y * y).sqrt();
-        DVec3::new(cos * across, y, sin * across)
-    })
+    directions(RAYS, -1.0).all(is_free).then(|| middle - DVec3::Y * size)
 }

@@ -8,6 +8,7 @@ use crate::scene::light_of;
 use crate::scene::{Extraction, MaterialSlots, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
+use std::f64::consts::PI;
 
 /// The selected objects and lights, in the order of selection; the last one is active.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
@@ -106,6 +107,20 @@ fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Opti
 pub fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64> {
     let ray = Ray::new((from - scene.origin).as_vec3(), direction.as_vec3());
     scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
+}
+
+/// So many directions, evenly over the sphere above a height: a spiral from its pole, whose turns are as far apart as its
+/// points.
+///
+/// - `lowest`: of the end of a direction, −1 for all of the sphere.
+pub fn directions(n: u32, lowest: f64) -> impl Iterator<Item = DVec3> {
+    let golden = PI * (3.0 - 5.0f64.sqrt());
+    (0..n).map(move |i| {
+        let y = 1.0 - (1.0 - lowest) * (f64::from(i) + 0.5) / f64::from(n);
+        let (sin, cos) = (f64::from(i) * golden).sin_cos();
+        let across = (1.0 - y * y).sqrt();
+        DVec3::new(cos * across, y, sin * across)
+    })
 }
 
 /// Like [`distance`], through some objects.

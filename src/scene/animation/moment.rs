@@ -65,7 +65,7 @@ impl Animation {
 
     /// Whether it moves the camera, but this one is not where its tracks have it at this time. What has no track may be
     /// anything, such as the aperture.
-    pub fn has_lost(&self, view: &View, projection: &Projection, lens: &Lens, seconds: f64) -> bool {
+    pub fn is_left_by(&self, view: &View, projection: &Projection, lens: &Lens, seconds: f64) -> bool {
         if !self.moves_camera() {
             return false;
         }
@@ -191,7 +191,7 @@ fn flown_camera(world: &mut World) -> Option<CameraInput> {
     let seen = SceneInputs::of(world).camera?;
     let shown = world.get_resource::<Moment>().copied().unwrap_or_default().0;
     let animation = world.get_resource::<Animation>()?;
-    animation.has_lost(&seen.view, &seen.projection, &seen.lens, shown).then_some(seen)
+    animation.is_left_by(&seen.view, &seen.projection, &seen.lens, shown).then_some(seen)
 }
 
 /// Objects, lights and materials that are not as the animation has them at the current time: another time loses that.
