@@ -11,8 +11,8 @@ use crate::frame::state::history::History;
 use crate::frame::state::resources::{Clock, CurrentScene, PlayRange, RenderState, SceneGeneration, ViewMode};
 use crate::frame::views::ViewTrail;
 use crate::scene::{
-    Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, Severity, View,
-    camera_follows, show_moment_from_here,
+    Animation, DisplaySettings, Lens, LoadedScene, Moment, Projection, Rendering, SceneInputs, View, camera_follows,
+    show_moment_from_here,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::World;
@@ -41,14 +41,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     status.scene = scene.source.title();
     // What was said of another scene; what was said just now may be of this one.
     status.messages.retain(|message| message.kind == MessageKind::Saved || message.at == now);
-    for warning in scene.warnings.summary() {
-        let kind = match warning.severity {
-            Severity::Notice => MessageKind::Note,
-            Severity::Warning => MessageKind::Warning,
-        };
-        let others = scene.warnings.others_like(&warning).map(ToString::to_string).collect();
-        status.say_first(now, kind, warning.to_string(), others);
-    }
+    status.say_warnings(now, &scene.warnings);
     if scene.shot.is_some() {
         let text = format!("an image of this program holds its scene: {} is open as the image shows it", status.scene);
         status.say(now, MessageKind::Note, text);

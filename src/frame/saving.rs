@@ -83,11 +83,11 @@ pub fn save(world: &mut World) {
                 status.scene = path.display().to_string();
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 status.say(now, MessageKind::Saved, format!("saved {}{notes}", whole.display()));
-                if is_first && let [first, others @ ..] = &lost[..] {
-                    let more = if others.is_empty() { String::new() } else { format!(" (and {} more)", others.len()) };
-                    let text =
-                        format!("the saved scene does not name what is missing: `{first}`{more}; the opened one does");
-                    status.say_first(now, MessageKind::Warning, text, others.to_vec());
+                if is_first {
+                    let text = |name: &String| {
+                        format!("`{name}` is missing, and the saved scene does not name it; the opened one does")
+                    };
+                    status.say_warnings(now, &lost.iter().map(text).collect());
                 }
                 world.insert_resource(SavedAs { path: Some(path), content: Some(content) });
                 world.resource_mut::<History>().mark_clean(clean);

@@ -355,7 +355,9 @@ fn a_scene_without_its_images_is_saved_to_another_file_and_says_so() {
     driver.frame();
     let said = |driver: &Driver| {
         let warnings = driver.session.status().messages.iter().filter(|said| said.kind == MessageKind::Warning);
-        warnings.filter(|said| said.text.contains("does not name what is missing: `tiles.png`")).count()
+        warnings
+            .filter(|said| said.text.contains("`tiles.png` is missing, and the saved scene does not name it"))
+            .count()
     };
     assert_eq!((said(&driver), driver.session.scene_file()), (1, Some(new.clone())));
     assert!(text.contains("tiles.png") && !std::fs::read_to_string(&new).unwrap().contains("tiles.png"));

@@ -1,6 +1,7 @@
 //! Output of a session: the image and the status.
 
 use crate::files::printable;
+use crate::files::warnings::{Severity, Warnings};
 use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 use crate::frame::core::rig::Rig;
 use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, Legend, RayCounts, Region};
@@ -159,13 +160,24 @@ impl Status {
 
     /// Adds a message, made safe to print, at a time on the session's clock; drops the oldest one beyond a hundred.
     pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
-        self.say_first(at, kind, text, Vec::new());
+        self.say_first(at, kind, &text.into(), Vec::new());
     }
 
-    /// Like [`Self::say`], with the texts of others of the same kind, which `text` only counts.
-    pub(crate) fn say_first(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>, others: Vec<String>) {
-        let text = printable::lines(&text.into());
-        let others = others.iter().map(|other| printable::lines(other)).collect();
+    /// Adds a message for each kind of warning, with the others of that kind.
+    pub(crate) fn say_warnings(&mut self, at: Duration, warnings: &Warnings) {
+        for first in warnings.summary() {
+            let kind = match first.severity {
+                Severity::Notice => MessageKind::Note,
+                Severity::Warning => MessageKind::Warning,
+            };
+            let others = warnings.others_like(&first).map(|other| printable::lines(&other.to_string())).collect();
+            self.say_first(at, kind, &first.to_string(), others);
+        }
+    }
+
+    /// - `others`: texts of the same kind, safe to print.
+    fn say_first(&mut self, at: Duration, kind: MessageKind, text: &str, others: Vec<String>) {
+        let text = printable::lines(text);
         // Displaying messages is the task of the session's owner; the log only keeps a copy.
         tracing::info!("{kind:?}: {text}");
         if self.messages.len() == Self::MAX_MESSAGES {
