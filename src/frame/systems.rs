@@ -348,6 +348,7 @@ pub fn reset(
     }
     if found.0.restarts() {
         shown.generation += 1;
+        shown.view += u64::from(found.0.changes_view());
         status.restarts += 1;
         status.restart_cause = found.0.to_string();
         tracing::debug!("restart {}: {}", shown.generation, status.restart_cause);
@@ -399,6 +400,7 @@ pub fn accumulate(
     {
         orders.job = Some(Job {
             generation: shown.generation,
+            view: shown.view,
             prepared: extraction.prepared.clone(),
             settings: shown.settings,
             width,

@@ -1,7 +1,7 @@
 //! The denoised image of a session: displayed, saved, by another filter.
 
 use crate::driver::{Drive, Driver};
-use firstlight::frame::{Command, DenoiseFilter, Denoising};
+use firstlight::frame::{Command, DenoiseFilter, Denoising, PictureSize, Target};
 use firstlight::render::develop_colors;
 
 /// The denoised image that a screenshot has, developed.
@@ -41,6 +41,38 @@ fn the_denoised_image_keeps_all_samples_and_has_an_error() {
     driver.session.send(Command::SetDenoising(Denoising::Denoised));
     driver.session.send(Command::Turn { yaw_deg: 5.0, pitch_deg: 0.0 });
     driver.run_until(|session| session.status().restarts > restarts && session.status().denoised_error.is_some());
+}
+
+/// As when the panel is opened and closed, also while rendering is paused.
+#[test]
+fn an_image_of_the_size_before_has_its_samples_and_is_denoised() {
+    let mut driver = Driver::builtin("gallery");
+    driver.session.send(Command::SetDenoising(Denoising::Denoised));
+    driver.run_until(|session| session.status().denoised_error.is_some() && session.is_idle());
+    let of = |driver: &Driver| (driver.session.picture().rgba.clone(), driver.session.status().clone());
+    let (rgba, status) = of(&driver);
+    let PictureSize { width, height } = *driver.session.world().resource::<PictureSize>();
+    let resize = |driver: &mut Driver, width| {
+        let restarts = driver.session.status().restarts;
+        driver.session.send(Command::Resize { width, height });
+        driver.run_until(|session| session.status().restarts > restarts && session.is_idle());
+    };
+    driver.session.send(Command::SetTarget(Target { spp: Some(1), ..Target::default() }));
+    for narrower in [width - 7, width - 5] {
+        resize(&mut driver, narrower);
+        assert_eq!((driver.session.status().spp, driver.session.picture().width), (1, narrower));
+    }
+    driver.session.send(Command::Pause);
+    resize(&mut driver, width);
+    let (rgba_after, after) = of(&driver);
+    assert!(rgba_after == rgba, "the same image, denoised");
+    assert_eq!((after.spp, after.rays, after.denoised_spp), (status.spp, status.rays, status.denoised_spp));
+    // Another view has samples of its own, in any size.
+    driver.session.send(Command::Resume);
+    driver.session.send(Command::Turn { yaw_deg: 5.0, pitch_deg: 0.0 });
+    resize(&mut driver, width - 7);
+    resize(&mut driver, width);
+    assert_eq!(driver.session.status().spp, 1);
 }
 
 /// Where the other filter is not installed, firstlight's own is used, and named.

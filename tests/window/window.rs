@@ -210,6 +210,8 @@ fn a_person_edits_inspects_and_takes_it_back() {
     let Some(desktop) = Desktop::start() else { return };
     let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
     until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    // Several samples per pixel: what comes back below is more than a first sample made again.
+    std::thread::sleep(Duration::from_secs(1));
     program.pause_raw();
     let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 150, 60, 200, 220).to_image();
     let steady = |program: &Program| {

@@ -8,7 +8,7 @@
 //! | material, texture, environment, light power, delta light moved | [`Level::Shading`] | all trees |
 //! | object or other light moved, given other materials, any added, removed | [`Level::TopTree`] | every mesh's own tree |
 //! | a mesh or a group of spheres | [`Level::MeshTree`] | other trees |
-//! | image size | [`Level::Resize`] | the scene side |
+//! | image size | [`Level::Resize`] | the scene side; samples of the size before, until another change |
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
@@ -72,6 +72,11 @@ impl Changes {
     /// Whether the samples are invalid.
     pub fn restarts(&self) -> bool {
         self.0.iter().any(|change| change.level >= Level::Restart)
+    }
+
+    /// Whether samples would be invalid in an image of the same size.
+    pub fn changes_view(&self) -> bool {
+        self.0.iter().any(|change| change.level >= Level::Restart && change.level != Level::Resize)
     }
 
     /// The part of the snapshot that has to be rebuilt.

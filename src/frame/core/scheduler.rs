@@ -191,6 +191,12 @@ impl Scheduler {
         self.restart(now);
     }
 
+    /// Goes on at full resolution after a restart, with `spp` samples per pixel for which `spent` seconds were spent.
+    pub fn go_on(&mut self, spp: u32, spent: f64) {
+        self.phase = Phase::Full;
+        (self.spp, self.spent) = (spp, spent);
+    }
+
     /// Changes the target; keeps all samples.
     pub fn set_target(&mut self, target: Target) {
         self.target = target;

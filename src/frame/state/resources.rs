@@ -149,6 +149,8 @@ pub struct RenderState {
     /// A scene has been opened, for this reason.
     pub(crate) adopted: Option<String>,
     pub(crate) generation: u64,
+    /// Increases with every restart but those for another size of the image.
+    pub(crate) view: u64,
     /// Increases when anything but the camera is changed.
     pub(crate) revision: u64,
 }

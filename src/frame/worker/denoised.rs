@@ -67,7 +67,7 @@ impl Loop<'_> {
     }
 
     /// Identifies denoised images of the film at full resolution.
-    fn settled_key(&self) -> Option<ViewKey> {
+    pub(super) fn settled_key(&self) -> Option<ViewKey> {
         let (job, (divider, film)) = (self.job.as_ref()?, self.film.as_ref()?);
         let size = UVec2::new(film.width(), film.height());
         (*divider == 1).then_some(ViewKey { generation: job.generation, inspection: Inspection::Picture, size })

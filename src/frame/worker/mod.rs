@@ -4,14 +4,16 @@
 //! A new job sets a flag that the workers poll, so that they abandon their work within milliseconds. Every job has a
 //! generation number; an image carries that of its job.
 //!
-//! This file is the handle used by the session; `thread` is the thread itself, `show` makes the images, and `idle`
-//! keeps memory.
+//! This file is the handle used by the session; `thread` is the thread itself, `start` begins a job, `show` makes the
+//! images, `idle` keeps memory, and `aside` the samples of the size before.
 
+mod aside;
 mod denoised;
 mod denoiser;
 mod idle;
 mod shared;
 mod show;
+mod start;
 mod thread;
 mod views;
 
@@ -214,7 +216,8 @@ mod tests {
             panic!("no image came: {:?}", worker.stats());
         };
         worker.set_look(ViewOptions { denoising: Denoising::Denoised, ..ViewOptions::default() });
-        let job = Job { generation: 1, prepared: prepared.clone(), settings, width: 48, height: 36, pace: None };
+        let job =
+            Job { generation: 1, view: 1, prepared: prepared.clone(), settings, width: 48, height: 36, pace: None };
         worker.order(Orders { job: Some(job), ..Orders::default() });
         next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
         worker.set_prepared(1, prepared);

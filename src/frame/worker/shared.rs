@@ -33,6 +33,8 @@ pub type Waker = Arc<dyn Fn() + Send + Sync>;
 #[derive(Clone)]
 pub struct Job {
     pub generation: u64,
+    /// Jobs of the same number differ in the size of the image alone.
+    pub view: u64,
     pub prepared: Prepared,
     pub settings: RenderSettings,
     pub width: u32,

@@ -4,6 +4,7 @@ use crate::frame::core::denoising::Denoising;
 use crate::frame::core::offline::Target;
 use crate::frame::core::scheduler::{RenderStep, SLOWEST_FRAME, Scheduler, StepReport};
 use crate::frame::core::status::Picture;
+use crate::frame::worker::aside::SetAside;
 use crate::frame::worker::denoiser::Denoiser;
 use crate::frame::worker::idle::IdleFilms;
 use crate::frame::worker::shared::{
@@ -34,7 +35,7 @@ pub(super) const MOST_IMAGES: f32 = 12.0;
 /// State of the render thread.
 pub struct Loop<'a> {
     pub(super) shared: &'a Shared,
-    clock: Instant,
+    pub(super) clock: Instant,
     /// Time of the last restart.
     pub(super) restarted_at: Instant,
     pub(super) scheduler: Scheduler,
@@ -49,13 +50,15 @@ pub struct Loop<'a> {
     /// Region that gets all samples, in fractions of the image.
     region: Option<[f64; 4]>,
     /// Whether the film has tiles that are ahead because of a region.
-    is_uneven: bool,
+    pub(super) is_uneven: bool,
     question: Option<(Question, Sender<Answer>)>,
     pub(super) job: Option<Job>,
     pub(super) film: Option<(u32, Film)>,
     /// The previous film, as long as the new one has pixels without a sample.
     pub(super) previous: Option<(u32, Film)>,
-    idle: IdleFilms,
+    pub(super) idle: IdleFilms,
+    /// Of the same view in another size.
+    pub(super) aside: Option<SetAside>,
     pub(super) stats: Stats,
     /// An image that is not shared, for its memory.
     pub(super) spare: Picture,
@@ -89,6 +92,7 @@ impl<'a> Loop<'a> {
             film: None,
             previous: None,
             idle: IdleFilms::default(),
+            aside: None,
             stats: Stats { asleep: true, ..Stats::default() },
             spare: Picture::default(),
             redraw: false,
@@ -168,27 +172,7 @@ impl<'a> Loop<'a> {
             self.region = region;
         }
         if let Some(job) = orders.job {
-            let size = (job.width, job.height);
-            self.denoiser.want(job.generation);
-            self.scheduler.set_pace(job.pace);
-            self.scheduler.resize(size.0, size.1, self.clock.elapsed());
-            let threads = lock(&self.shared.pool).current_num_threads();
-            self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
-            self.restarted_at = Instant::now();
-            let has_same_scene = |old: &Job| old.prepared.has_scene_of(&job.prepared);
-            if !self.job.as_ref().is_some_and(has_same_scene) {
-                self.kept_images = 1.0;
-            }
-            let is_as_large = self.job.as_ref().is_some_and(|old| (old.width, old.height) == size);
-            self.job = Some(job);
-            let films = [self.previous.take(), self.film.take()];
-            if is_as_large {
-                films.into_iter().flatten().for_each(|(_, film)| self.idle.keep(film));
-            } else {
-                self.idle.forget();
-            }
-            self.redraw = false;
-            self.scheduler.set_region(None, 0, None);
+            self.start(job);
         } else if self.region != region_before {
             self.scheduler_sees_region();
             self.redraw = true;
@@ -215,7 +199,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Passes the rendered region and its progress to the scheduler.
-    fn scheduler_sees_region(&mut self) {
+    pub(super) fn scheduler_sees_region(&mut self) {
         let Some((1, film)) = &self.film else { return };
         let region = self.active_region();
         let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
