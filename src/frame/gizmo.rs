@@ -93,6 +93,9 @@ const REACH: f64 = 8.0;
 /// Range of the squares between two axes, as parts of their length.
 const SQUARE: (f64, f64) = (0.3, 0.48);
 const RING_STEPS: usize = 48;
+/// Cosine of the angle between view and axis below which a ring is too narrow to follow the mouse around it: a pixel
+/// across it would be many degrees.
+const EDGE_ON: f64 = 0.35;
 /// Steps of a snapped drag in degrees.
 const SNAP_DEG: f64 = 15.0;
 
@@ -191,16 +194,19 @@ impl Gizmo {
             (Mode::Move, Handle::Middle) => Some(Drag::Move(on_plane(view, to)? - on_plane(view, from)?)),
             (Mode::Turn, handle) => {
                 let axis = if let Handle::Axis(i) = handle { self.axes[i] } else { view };
-                let angle = match (on_plane(axis, from), on_plane(axis, to)) {
-                    (Some(a), Some(b)) => {
-                        let (a, b) = (a - self.center, b - self.center);
+                let grabbed = on_plane(axis, from).map(|point| point - self.center);
+                let is_open = view.dot(axis).abs() > EDGE_ON;
+                let angle = match (grabbed, on_plane(axis, to)) {
+                    (Some(a), Some(b)) if is_open => {
+                        let b = b - self.center;
                         a.cross(b).dot(axis).atan2(a.dot(b))
                     }
-                    // A ring seen edge-on turns with the mouse movement along its tangent.
+                    // By the movement along the tangent where the ring was grabbed, or where it is nearest.
                     _ => {
-                        let tangent = axis.cross(view).try_normalize()?;
-                        let (a, b) =
-                            (projector.place(self.center)?, projector.place(self.center + self.size * tangent)?);
+                        let radius = grabbed.unwrap_or(view.dot(axis) * axis - view).try_normalize()?;
+                        let point = self.center + self.size * radius;
+                        let next = point + 0.01 * self.size * axis.cross(radius);
+                        let (a, b) = (projector.place(point)?, projector.place(next)?);
                         (to - from).dot((b - a).try_normalize()?) / LENGTH
                     }
                 };
@@ -304,6 +310,26 @@ mod tests {
         let Some(Drag::Turn { axis: DVec3::Y, angle_deg }) = turn(false) else { panic!() };
         assert!((angle_deg - 37.0).abs() < 1e-9, "{angle_deg}");
         assert_eq!(turn(true), Some(Drag::Turn { axis: DVec3::Y, angle_deg: 30.0 }));
+    }
+
+    #[test]
+    fn a_ring_that_is_seen_nearly_edge_on_turns_with_the_mouse_on_either_side() {
+        let view = View::look_at(DVec3::new(0.0, 1.0, 9.0), DVec3::ZERO, DVec3::Y).unwrap();
+        let projector = Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        let ring = Gizmo::at(DVec3::ZERO, Mode::Turn, DVec3::AXES, &projector).unwrap();
+        let angle = |radius: DVec3, by: DVec2| {
+            let from = projector.place(ring.size * radius).unwrap();
+            match ring.drag(Handle::Axis(1), from, from + by, &projector, false) {
+                Some(Drag::Turn { axis: DVec3::Y, angle_deg }) => angle_deg,
+                other => panic!("{other:?}"),
+            }
+        };
+        let right = DVec2::new(LENGTH, 0.0);
+        let [near, far] = [DVec3::Z, DVec3::NEG_Z].map(|radius| angle(radius, right));
+        assert!((near - 57.3).abs() < 0.1 && (far + near).abs() < 1e-6, "{near} {far}");
+        // A few pixels across it are a few degrees.
+        let end = angle(DVec3::X, DVec2::new(0.0, -4.0));
+        assert!(end.abs() < 5.0 && angle(DVec3::Z, DVec2::new(0.0, -4.0)).abs() < 1e-6, "{end}");
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use crate::driver::{Drive, Driver};
 use crate::random::Random;
 use firstlight::frame::{Command, Edit, NewThing, Projector};
-use firstlight::scene::{Placement, PointLight, SceneSource, Shape};
+use firstlight::scene::{
+    ColorParam, Material, MaterialSlots, Placement, PointLight, SceneSource, Shape, SurfaceMaterial,
+};
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
@@ -63,4 +65,44 @@ fn a_new_light_burns_no_more_than_a_quarter_of_a_room() {
     };
     let share = (0..20_000).filter(is_burnt).count() as f64 / 20_000.0;
     assert!(share > 0.1 && share < 0.3, "{share} of what is around: {place}");
+}
+
+/// Where one clicks: under the ceiling a lamp that shines down, and elsewhere one that is seen, in the room with all of its
+/// corners.
+#[test]
+fn a_new_area_light_hangs_from_the_ceiling_or_stays_in_the_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let (low, high) = (DVec3::new(-3.0, 0.0, -3.0), DVec3::new(3.0, 2.6, 3.0));
+    let objects = "
+        quad(corner: (-3, 0, -3), edge_u: (0, 0, 6), edge_v: (6, 0, 0)),
+        quad(name: \"ceiling\", corner: (-3, 2.6, -3), edge_u: (6, 0, 0), edge_v: (0, 0, 6)),
+        quad(corner: (-3, 0, -3), edge_u: (6, 0, 0), edge_v: (0, 2.6, 0)),
+        quad(corner: (-3, 0, 3), edge_u: (0, 2.6, 0), edge_v: (6, 0, 0)),
+        quad(corner: (-3, 0, -3), edge_u: (0, 2.6, 0), edge_v: (0, 0, 6)),
+        quad(corner: (3, 0, -3), edge_u: (0, 0, 6), edge_v: (0, 2.6, 0)),";
+    for (selected, [x, y], hangs) in [
+        (None, [0.5, 0.15], true),
+        (Some("ceiling"), [0.3, 0.2], true),
+        (None, [0.5, 0.5], false),
+        (None, [0.2, 0.9], false),
+        (None, [0.95, 0.6], false),
+    ] {
+        let mut driver = opened(folder.path(), "eye: (0, 1.4, 2.8), look_at: (0, 1.3, 0), vfov: 70", objects);
+        if let Some(name) = selected {
+            driver.select(name);
+        }
+        driver.edit([Edit::AddAt { thing: NewThing::AreaLight, x, y }]);
+        driver.settle();
+        let corner = driver.get::<Placement>("area light").translation;
+        let Shape::Quad { edge_u, edge_v } = driver.get::<Shape>("area light") else { panic!("a square") };
+        let corners = [corner, corner + edge_u, corner + edge_v, corner + edge_u + edge_v];
+        let are_inside = corners.iter().all(|corner| corner.cmpgt(low).all() && corner.cmplt(high).all());
+        let faces_down = edge_u.cross(edge_v).normalize().y < -0.999;
+        assert!(are_inside && edge_u.length() > 0.2, "[{x}, {y}]: {corners:?}");
+        assert_eq!(faces_down && corner.y > 2.3, hangs, "[{x}, {y}]: {corners:?}");
+        let material = driver.get::<MaterialSlots>("area light").0[0];
+        let material = &driver.session.world().get::<SurfaceMaterial>(material).unwrap().0;
+        let Material::Emissive { radiance: ColorParam::Rgb(radiance) } = material else { panic!("it emits") };
+        assert!(radiance.x > 1.9, "[{x}, {y}]: it looks bright itself: {radiance}");
+    }
 }

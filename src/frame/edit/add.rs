@@ -20,7 +20,7 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_PI, PI};
 
 /// What can be added. `spot` finds its position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -93,13 +93,15 @@ fn add_light(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity> 
     let placement = Placement::at(spot.place);
     Some(match new {
         AreaLight => {
-            // Its light is soft, and its own shadow small.
-            let edge = 0.8 * spot.radius;
-            let white = (irradiance * (reach / edge).powi(2)) as f32;
-            let material = new_material(world, "light", Material::emissive(white * Vec3::new(1.0, 0.92, 0.8)));
             // u × v points to what it lights.
             let u = direction.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);
-            let (edge_u, edge_v) = (edge * u, edge * direction.cross(u));
+            let v = direction.cross(u);
+            // Its light is soft, and its own shadow small.
+            let edge = spot::free_edge(world, spot.place, [u, v], 0.8 * spot.radius);
+            // A large square nearby is all around: its irradiance is π times its radiance.
+            let white = (irradiance * (reach / edge).powi(2).max(FRAC_1_PI)) as f32;
+            let material = new_material(world, "light", Material::emissive(white * Vec3::new(1.0, 0.92, 0.8)));
+            let (edge_u, edge_v) = (edge * u, edge * v);
             let corner = Placement::at(spot.place - 0.5 * (edge_u + edge_v));
             spawn(world, "area light", (Shape::Quad { edge_u, edge_v }, corner, MaterialSlots(vec![material])))
         }

@@ -7,7 +7,7 @@
 
 use crate::frame::navigation::{Rig, box_around};
 use crate::frame::state::resources::{PictureSize, RenderState};
-use crate::frame::state::selection::{Projector, Selection, box_of, directions, distance, pick};
+use crate::frame::state::selection::{Picked, Projector, Selection, box_of, directions, distance, pick};
 use crate::scene::{Extraction, Shape, View, is_emitter};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DVec2, DVec3};
@@ -96,8 +96,8 @@ impl LightSpot {
     }
 }
 
-/// Finds a position for a light: beside and above the selected objects, or else what is in the middle of the image, and
-/// in view with them. The way to it from the camera is free of walls and ceilings.
+/// Finds a position for a light: beside and above the selected objects, or else what is at a place of the image, and in
+/// view with them. The way to it from the camera is free of walls and ceilings. From a ceiling, it hangs.
 ///
 /// - `shows_front`: it is as far from the camera as what it lights, in whatever direction that is seen. So an emissive
 ///   square that faces it shows the camera its front, from the side, and its dark back hides nothing.
@@ -107,18 +107,29 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
     /// Of a square: from above where there is room, else from a side.
     const ASIDE: [DVec3; 4] =
         [DVec3::new(0.6, 1.2, 0.0), DVec3::new(-0.6, 1.2, 0.0), DVec3::new(1.2, 0.6, 0.0), DVec3::new(-1.2, 0.6, 0.0)];
+    /// Shares of these that are tried until it is in view.
+    const NEARER: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
     /// Part of the way to an obstacle.
     const SHORT_OF: f64 = 0.8;
     let shown = world.resource::<RenderState>();
     let (view, projection) = shown.inputs.camera.map(|camera| (camera.view, camera.projection)).unwrap_or_default();
+    let depth_of = |place: DVec3| (place - view.eye).dot(view.forward);
+    // A wall or the ground is lit where it is seen, and so is what is all around.
+    let is_thing = |(center, radius): &(DVec3, f64)| *radius < 0.5 * depth_of(*center);
     let chosen = world.resource::<Selection>().0.clone();
-    let (subject, radius) = ball_around(world, &chosen).unwrap_or_else(|| {
-        let (place, object) = seen(world, &view, at);
-        let depth = (place - view.eye).dot(view.forward);
-        // A wall or the ground is lit where it is seen.
-        let near = object.and_then(|object| ball_around(world, &[object])).filter(|(_, radius)| *radius < 0.5 * depth);
-        near.unwrap_or((place, 0.6 * projection.half_height(depth)))
-    });
+    let (subject, radius) = match ball_around(world, &chosen).filter(is_thing) {
+        Some(thing) => thing,
+        None => {
+            let (place, picked) = seen(world, &view, at);
+            let radius = 0.6 * projection.half_height(depth_of(place));
+            let thing = picked.and_then(|picked| ball_around(world, &[picked.entity])).filter(is_thing);
+            let ceiling = picked.filter(|picked| thing.is_none() && picked.normal.y < -0.5);
+            if let Some(Picked { normal, .. }) = ceiling {
+                return below(world, place, normal, radius);
+            }
+            thing.unwrap_or((place, radius))
+        }
+    };
     // Level, whatever the camera does.
     let right = DVec3::new(view.right().x, 0.0, view.right().z).try_normalize().unwrap_or(DVec3::X);
     let level = DMat3::from_cols(right, DVec3::Y, right.cross(DVec3::Y));
@@ -140,12 +151,37 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
             _ => 1.0,
         }
     };
-    let places = offsets.iter().map(|offset| subject + radius * (axes * *offset));
-    let (place, share) = places
-        .map(|place| (place, free_share(place)))
-        .reduce(|best, other| if other.1 > best.1 { other } else { best })
-        .unwrap_or((subject, 1.0));
-    LightSpot { place: view.eye + share * (place - view.eye), subject, radius }
+    let freest = |nearer: f64| {
+        let places = offsets.iter().map(|offset| subject + nearer * radius * (axes * *offset));
+        let (place, share) = places
+            .map(|place| (place, free_share(place)))
+            .reduce(|best, other| if other.1 > best.1 { other } else { best })
+            .unwrap_or((subject, 1.0));
+        view.eye + share * (place - view.eye)
+    };
+    let place = NEARER.into_iter().map(freest).find(|place| is_seen(world, *place)).unwrap_or_else(|| freest(1.0));
+    LightSpot { place, subject, radius }
+}
+
+/// A position below a point of a ceiling, for a light that shines away from it.
+fn below(world: &World, ceiling: DVec3, normal: DVec3, radius: f64) -> LightSpot {
+    /// Relative to the size of what is lit.
+    const DISTANCE: f64 = 0.1;
+    let place = ceiling + DISTANCE * radius * normal;
+    let scene = world.resource::<RenderState>().extraction.as_ref();
+    let free = scene.and_then(|scene| distance(scene, place, normal)).unwrap_or(radius);
+    LightSpot { place, subject: place + free * normal, radius }
+}
+
+/// The longest edge, metres, of a square about a place that no surface cuts.
+///
+/// - `u`, `v`: unit vectors along its edges; `most`: that is wanted.
+pub fn free_edge(world: &World, place: DVec3, [u, v]: [DVec3; 2], most: f64) -> f64 {
+    let Some(scene) = &world.resource::<RenderState>().extraction else { return most };
+    let ways = [u, -u, v, -v, u + v, u - v, v - u, -u - v];
+    // The border of a square of two metres is as far away as they are long.
+    let free = ways.into_iter().filter_map(|way| Some(distance(scene, place, way.normalize())? / way.length()));
+    free.map(|free| 2.0 * TOUCH * free).fold(most, f64::min)
 }
 
 /// The distance of the nearest quarter of what is around a place; `None` in the open.
@@ -175,8 +211,8 @@ pub fn surface_at(world: &World, [x, y]: [f64; 2]) -> Option<DVec3> {
     pick(scene, x, y, world.resource::<PictureSize>().aspect()).map(|hit| hit.point)
 }
 
-/// The point at a place of the image and its object: a point as far as the pivot where nothing near is seen.
-fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>) {
+/// The point at a place of the image and its surface: a point as far as the pivot where nothing near is seen.
+fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Picked>) {
     let aspect = world.resource::<PictureSize>().aspect();
     let projection = world.resource::<RenderState>().inputs.camera.map(|camera| camera.projection).unwrap_or_default();
     let up = projection.half_height(view.pivot_distance);
@@ -185,7 +221,7 @@ fn seen(world: &World, view: &View, [x, y]: [f64; 2]) -> (DVec3, Option<Entity>)
     let Some(scene) = &world.resource::<RenderState>().extraction else { return pivot };
     // A surface far behind the pivot is a wall, or the ground near the horizon.
     let hit = pick(scene, x, y, aspect).filter(|hit| hit.depth < 4.0 * view.pivot_distance);
-    hit.map_or(pivot, |hit| (hit.point, Some(hit.entity)))
+    hit.map_or(pivot, |hit| (hit.point, Some(hit)))
 }
 
 /// Returns the position of an object after dropping it from here, if there is space for it.

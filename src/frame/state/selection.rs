@@ -63,6 +63,8 @@ pub struct Picked {
     pub part: usize,
     /// World position, metres.
     pub point: DVec3,
+    /// Unit normal of the surface, on the side of the camera.
+    pub normal: DVec3,
     /// Depth along the view axis, metres.
     pub depth: f64,
 }
@@ -98,9 +100,11 @@ fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Opti
     let hit = scene.prepared.geometry.tree.closest_hit(&ray)?;
     let depth = f64::from(hit.t * ray.dir.dot(camera.forward));
     let point = scene.origin + ray.at(hit.t).as_dvec3();
+    let normal = scene.prepared.geometry.tree.surface_point(&ray, &hit).geometric_normal.as_dvec3();
+    let normal = if normal.dot(ray.dir.as_dvec3()) > 0.0 { -normal } else { normal };
     let entity = *scene.entities.get(hit.object as usize)?;
     let part = scene.prepared.geometry.objects.get(hit.object as usize)?.slot_of(hit.prim);
-    (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, part, point, depth })
+    (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, part, point, normal, depth })
 }
 
 /// Returns the distance in metres from a world position along a unit direction to the closest hit.
