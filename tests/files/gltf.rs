@@ -427,6 +427,34 @@ fn lights_of_the_file_are_those_of_the_scene() {
 }
 
 #[test]
+fn hidden_nodes_hide_what_is_below_them() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let visible = |is: bool| json!({ "KHR_node_visibility": { "visible": is } });
+    writer.json["extensionsUsed"] = json!(["KHR_node_visibility", "KHR_lights_punctual"]);
+    writer.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 4.0 }] } });
+    writer.json["nodes"] = json!([
+        { "mesh": 0, "extensions": visible(true) },
+        { "children": [2, 3], "extensions": visible(false) },
+        { "mesh": 0, "translation": [900, 0, 0], "extensions": visible(true) },
+        { "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+    ]);
+    writer.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    let scene = opened(&writer.glb());
+    let objects = scene.file.objects.iter().filter(|object| matches!(object, ObjectPart::Mesh { .. }));
+    assert_eq!(objects.map(ObjectPart::is_hidden).collect::<Vec<_>>(), [false, true]);
+    let is_of_file = |light: &&LightPart| matches!(light, LightPart::Point { .. });
+    assert!(scene.file.lights.iter().find(is_of_file).is_some_and(LightPart::is_hidden));
+    assert!(!scene.warnings.join("\n").contains("KHR_node_visibility"));
+    let eye = scene.file.camera.eye;
+    assert!(eye.length() < 20.0, "what is hidden is not framed: the camera is at {eye}");
+    // A file that shows nothing shows all.
+    writer.json["scenes"] = json!([{ "nodes": [1] }]);
+    let scene = opened(&writer.glb());
+    assert!(!scene.file.objects[0].is_hidden() && scene.warnings.join("\n").contains("all of its meshes are hidden"));
+}
+
+#[test]
 fn variants_and_what_is_not_modelled_are_told() {
     let mut writer = Writer::default();
     quad(&mut writer);

@@ -38,12 +38,12 @@ pub(crate) fn camera_of(camera: &GltfCamera, center: DVec3) -> CameraPart {
 pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart {
     let position = placed.world.translation;
     let direction = placed.world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
-    let intensity = Rgb(placed.light.intensity);
+    let (intensity, hidden) = (Rgb(placed.light.intensity), placed.is_hidden);
     match placed.light.kind {
-        GltfLightKind::Point => LightPart::Point { name, hidden: false, position, intensity, radius: 0.0 },
+        GltfLightKind::Point => LightPart::Point { name, hidden, position, intensity, radius: 0.0 },
         GltfLightKind::Spot { inner, outer } => LightPart::Spot {
             name,
-            hidden: false,
+            hidden,
             position,
             direction,
             intensity,
@@ -59,7 +59,7 @@ pub(crate) fn light_of(placed: &PlacedLight, name: Option<String>) -> LightPart 
         },
         GltfLightKind::Directional => LightPart::Directional {
             name,
-            hidden: false,
+            hidden,
             direction,
             irradiance: intensity,
             transform: TransformPart::default(),

@@ -121,7 +121,9 @@ impl Maker<'_> {
                 document.omissions.tell(&format!("meshes {i}"), sentence);
                 continue;
             }
-            framing.add(&mesh.mesh, *corners, &placed.world);
+            if !placed.is_hidden {
+                framing.add(&mesh.mesh, *corners, &placed.world);
+            }
             shown.push((i, *corners));
             extend(&mut bounds, *corners, &placed.world);
             let names: Vec<String> = (mesh.keys.iter())
@@ -140,7 +142,11 @@ impl Maker<'_> {
                 at: at.map(Seconds),
             };
             let (material, materials) = if is_one { (Some(names[0].clone()), None) } else { (None, Some(names)) };
-            objects.push(ObjectPart::mesh(Some(name), source, material, materials, transform(&placed.world)));
+            let mut object = ObjectPart::mesh(Some(name), source, material, materials, transform(&placed.world));
+            if let ObjectPart::Mesh { hidden, .. } = &mut object {
+                *hidden = placed.is_hidden;
+            }
+            objects.push(object);
         }
         if objects.is_empty() {
             return Err(self.wrong(document.omissions.nothing_left()));

@@ -26,6 +26,7 @@ pub(crate) struct PlacedMesh {
     pub key: MeshKey,
     pub world: DAffine3,
     pub node: u32,
+    pub is_hidden: bool,
 }
 
 /// A light in the world; its axis is −z of its own coordinates.
@@ -36,6 +37,7 @@ pub(crate) struct PlacedLight {
     pub light: GltfLight,
     pub world: DAffine3,
     pub node: u32,
+    pub is_hidden: bool,
 }
 
 /// The contents of the scene of a file.
@@ -77,6 +79,7 @@ impl Document {
             let json = &self.root.nodes[node as usize];
             let part = |what: &str| format!("{}.{what}", place("nodes", node));
             let world = posed.tree.worlds[node as usize];
+            let is_hidden = posed.tree.hidden[node as usize];
             let named = |name: &Option<String>| name.clone().filter(|name| !name.is_empty());
             let light = self.light_of(node).and_then(|light| match world.translation.abs().max_element() {
                 far if far > bounds::MAX_COORDINATE && light.is_some() => Err((String::new(), GltfProblem::TooFar)),
@@ -84,7 +87,7 @@ impl Document {
             });
             if let Some(Some(light)) = self.omissions.kept(&part("light"), light) {
                 let name = named(&json.name).or_else(|| light.name.clone());
-                found.lights.push(PlacedLight { name, light, world, node });
+                found.lights.push(PlacedLight { name, light, world, node, is_hidden });
             }
             let Some(mesh) = json.mesh else { continue };
             let Some(json_mesh) = self.omissions.kept(&part("mesh"), self.mesh(mesh)) else { continue };
@@ -100,8 +103,8 @@ impl Document {
                 let world = world * instance;
                 // Where nothing moves, a mesh at the place of an equal one shows nothing more, and costs each ray as much.
                 let here = match moved[node as usize] {
-                    true => (key, Some(node), bits(&instance)),
-                    false => (key, None, bits(&world)),
+                    true => (key, is_hidden, Some(node), bits(&instance)),
+                    false => (key, is_hidden, None, bits(&world)),
                 };
                 if found.meshes.len() as u64 + repeated as u64 / REPEATED >= self.most_elements() {
                     let problem = GltfProblem::Count { count: found.meshes.len() as u64 + 1 };
@@ -111,8 +114,12 @@ impl Document {
                     repeated += 1;
                     continue;
                 }
-                found.meshes.push(PlacedMesh { name: name.clone(), key, world, node });
+                found.meshes.push(PlacedMesh { name: name.clone(), key, world, node, is_hidden });
             }
+        }
+        if !found.meshes.is_empty() && found.meshes.iter().all(|placed| placed.is_hidden) {
+            found.meshes.iter_mut().for_each(|placed| placed.is_hidden = false);
+            self.omissions.tell("hidden meshes", "all of its meshes are hidden: they are shown".to_owned());
         }
         if repeated > 0 {
             let meshes = if repeated == 1 { "mesh lies" } else { "meshes lie" };

@@ -36,7 +36,7 @@ impl Document {
         let mut warnings = Vec::new();
         let mut normals_from_file = true;
         let (limit, mut room) = (self.most_numbers(), self.most_own_numbers());
-        for placed in &assembly.meshes {
+        for placed in assembly.meshes.iter().filter(|placed| !placed.is_hidden) {
             if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let (built, kept) = self.numbers_of(placed.key.mesh);
                 let left = room.checked_sub(kept).filter(|_| built <= self.most_own_numbers());

@@ -122,6 +122,14 @@ pub(crate) struct Node {
     pub extensions: Extensions,
 }
 
+impl Node {
+    /// Whether the node and all below it are hidden (`KHR_node_visibility`).
+    pub(crate) fn is_hidden(&self) -> bool {
+        let visibility = self.extensions.get("KHR_node_visibility");
+        visibility.and_then(|extension| extension.get("visible")?.as_bool()) == Some(false)
+    }
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Mesh {

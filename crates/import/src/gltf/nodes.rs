@@ -16,6 +16,8 @@ pub(crate) struct Tree {
     pub scene: Vec<u32>,
     /// From the coordinates of each node of the file to the world, metres.
     pub worlds: Vec<DAffine3>,
+    /// Whether each node of the file is hidden, by itself or by one above it.
+    pub hidden: Vec<bool>,
     /// From mesh coordinates to the world by each joint of each skin, once something needs it.
     pub skins: Vec<OnceLock<Arc<[DAffine3]>>>,
 }
@@ -77,6 +79,7 @@ impl Document {
         let mut tree = Tree {
             scene: Vec::new(),
             worlds: vec![DAffine3::IDENTITY; count],
+            hidden: vec![false; count],
             skins: vec![OnceLock::new(); self.root.skins.len()],
         };
         let mut is_placed = vec![false; count];
@@ -133,8 +136,8 @@ impl Document {
     /// - `is_shown`: whether they belong to the scene; nothing is told about others.
     fn place_below(&self, root: u32, pose: &Pose, tree: &mut Tree, is_placed: &mut [bool], is_shown: bool) {
         let count = is_placed.len();
-        let mut todo = vec![(root, DAffine3::IDENTITY)];
-        while let Some((index, above)) = todo.pop() {
+        let mut todo = vec![(root, DAffine3::IDENTITY, false)];
+        while let Some((index, above, is_above_hidden)) = todo.pop() {
             let part = place("nodes", index);
             if std::mem::replace(&mut is_placed[index as usize], true) {
                 if is_shown {
@@ -151,13 +154,15 @@ impl Document {
                 }
                 continue;
             }
+            let is_hidden = is_above_hidden || self.root.nodes[index as usize].is_hidden();
             tree.worlds[index as usize] = world;
+            tree.hidden[index as usize] = is_hidden;
             if is_shown {
                 tree.scene.push(index);
             }
             for (i, &child) in self.root.nodes[index as usize].children.iter().enumerate().rev() {
                 if (child as usize) < count {
-                    todo.push((child, world));
+                    todo.push((child, world, is_hidden));
                 } else if is_shown {
                     let problem = GltfProblem::Index { list: "nodes", index: child, count };
                     self.omissions.kept::<()>(&format!("{part}.children[{i}]"), Err((String::new(), problem)));
