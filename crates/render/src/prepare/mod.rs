@@ -28,6 +28,7 @@ pub(crate) mod prepared;
 mod radiance_unit;
 pub(crate) mod surface_table;
 mod touching;
+pub(crate) mod twins;
 
 pub use exposed::{Exposed, moment_of_sample};
 pub use prepared::{Features, Moments, Prepared};

@@ -20,6 +20,7 @@ use crate::prepare::occluders::Occluders;
 use crate::prepare::portals::Portals;
 use crate::prepare::radiance_unit::radiance_unit;
 use crate::prepare::surface_table::SurfaceTable;
+use crate::prepare::twins::Twins;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch};
 use glam::Vec3;
@@ -103,6 +104,7 @@ pub(crate) struct Tables {
     pub(crate) lights: LightTable,
     pub(crate) bodies: Bodies,
     pub(crate) contacts: Contacts,
+    pub(crate) twins: Twins,
     pub(crate) environment_sampler: Option<Arc<EnvironmentSampler>>,
     pub(crate) materials: MaterialTable,
     pub(crate) classic: ClassicTable,
@@ -284,6 +286,7 @@ impl Tables {
             materials: &before.shading.materials,
             contacts: &before.tables.contacts,
         });
+        let twins = Twins::of(geometry, before.map(|before| (&*before.geometry, &before.tables.twins)));
         let portals = before.and_then(|before| before.tables.last_portals());
         let before = before.filter(|before| is_same(&before.shading.environment, environment));
         let (ambient, environment_sampler) = match before.map(|before| &before.tables) {
@@ -324,6 +327,7 @@ impl Tables {
             lights,
             bodies,
             contacts,
+            twins,
             environment_sampler,
             materials: MaterialTable::build(geometry, materials, textures),
             classic: ClassicTable::build(materials),

@@ -21,6 +21,14 @@ use firstlight_kdtree::geometry::{Ray, robust};
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use glam::Vec3;
 
+/// What a ray does where it hits something.
+enum Passing {
+    /// It goes on.
+    Past(Ray),
+    /// It ends at this hit, which may be that of the other one of two triangles back to back.
+    Met(Hit),
+}
+
 /// Maximum number of surfaces that a ray may pass: bounds the work, far above any real scene.
 const MOST_PASSED: usize = 10_000;
 
@@ -39,7 +47,7 @@ impl Prepared {
     pub(crate) fn closest_hits_behind_panes(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         self.geometry.tree.closest_hits(rays, class, hits);
         if self.tables.features.cutouts || self.tables.features.panes {
-            self.pass_on(rays, hits, self.in_all(), |_, ray, hit| Some(self.past(ray, hit)?.0));
+            self.pass_on(rays, hits, self.in_all(), |_, ray, hit| self.past(ray, hit).0);
         }
     }
 
@@ -61,24 +69,24 @@ impl Prepared {
             return passed;
         }
         self.any_hits_passing(rays, class, occluded, |i, ray, hit| {
-            let (onwards, share) = self.past(ray, hit)?;
+            let (passing, share) = self.past(ray, hit);
             if share != Vec3::ONE {
                 passed.push((i, share));
             }
-            Some(onwards)
+            passing
         });
         passed
     }
 
     /// Among surfaces that rays may pass, the closest hit tells where a ray continues.
     ///
-    /// - `past`: returns the continuation behind a hit of the ray with this number, if it may pass.
+    /// - `past`: what the ray with this number does at a hit.
     fn any_hits_passing(
         &self,
         rays: &RayBatch,
         class: RayClass,
         occluded: &mut Vec<bool>,
-        mut past: impl FnMut(usize, &Ray, &Hit) -> Option<Ray>,
+        mut past: impl FnMut(usize, &Ray, &Hit) -> Passing,
     ) {
         let mut hits = HitBatch::default();
         let Some(occluders) = &self.occluders else {
@@ -119,19 +127,22 @@ impl Prepared {
 
     /// Replaces hits that rays pass by the next ones behind them, which `closest_hits` finds.
     ///
-    /// - `past`: returns the continuation behind a hit of the ray with this number, if it may pass.
+    /// - `past`: what the ray with this number does at a hit.
     fn pass_on(
         &self,
         rays: &RayBatch,
         hits: &mut HitBatch,
         closest_hits: impl Fn(&RayBatch, &mut HitBatch),
-        mut past: impl FnMut(usize, &Ray, &Hit) -> Option<Ray>,
+        mut past: impl FnMut(usize, &Ray, &Hit) -> Passing,
     ) {
         let mut open: Vec<(usize, Ray)> = Vec::new();
         for i in 0..rays.len() {
             let ray = rays.get(i);
-            if let Some(onwards) = hits.get(i).and_then(|hit| past(i, &ray, &hit)) {
-                open.push((i, onwards));
+            let Some(hit) = hits.get(i) else { continue };
+            match past(i, &ray, &hit) {
+                Passing::Past(onwards) => open.push((i, onwards)),
+                Passing::Met(met) if met.prim != hit.prim => hits.set(i, Some(met)),
+                Passing::Met(_) => {}
             }
         }
         let (mut batch, mut found) = (RayBatch::default(), HitBatch::default());
@@ -144,29 +155,37 @@ impl Prepared {
             closest_hits(&batch, &mut found);
             let mut k = 0;
             open.retain_mut(|(i, ray)| {
-                let hit = found.get(k);
+                let passing = found.get(k).map(|hit| past(*i, ray, &hit));
                 k += 1;
-                if let Some(onwards) = hit.and_then(|hit| past(*i, ray, &hit)) {
-                    *ray = onwards;
-                    return true;
-                }
+                let met = match passing {
+                    Some(Passing::Past(onwards)) => {
+                        *ray = onwards;
+                        return true;
+                    }
+                    Some(Passing::Met(hit)) => Some(hit),
+                    None => None,
+                };
                 let first = rays.get(*i);
-                hits.set(*i, hit.map(|hit| Hit { t: along(&first, ray.at(hit.t)), ..hit }));
+                hits.set(*i, met.map(|hit| Hit { t: along(&first, ray.at(hit.t)), ..hit }));
                 false
             });
         }
     }
 
-    /// Returns the continuation of a ray behind its hit, if that is cut out.
+    /// A ray goes on behind a hit that is cut out.
     #[inline]
-    fn past_cutout(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
+    fn past_cutout(&self, ray: &Ray, hit: &Hit) -> Passing {
+        self.past_cutout_of(ray, hit, false)
+    }
+
+    /// - `is_twin`: of two triangles back to back, it is the one that faces the ray.
+    fn past_cutout_of(&self, ray: &Ray, hit: &Hit, is_twin: bool) -> Passing {
         let id = material_of(self, hit);
-        let cutout = self.tables.cutouts[id as usize].as_ref()?;
+        let Some(cutout) = &self.tables.cutouts[id as usize] else { return Passing::Met(*hit) };
         let (unit, of_unit) = of_unit_length(ray, hit);
         // Most hits are decided by their side: a whole vertex, with its textures, costs several times as much.
         let point = self.geometry.tree.surface_point(&unit, &of_unit);
-        let front = (-unit.dir).dot(point.geometric_normal) >= 0.0;
-        if cutout.has_back || front {
+        if cutout.has_back || is_twin || (-unit.dir).dot(point.geometric_normal) >= 0.0 {
             let opacity = match cutout.opacity {
                 ScalarInput::Constant(opacity) => opacity,
                 map @ ScalarInput::Texture(_) => map.eval(self, self.texture_point(id, &unit, &of_unit)),
@@ -176,32 +195,39 @@ impl Prepared {
                 None => opacity >= 1.0 || probability(ray, hit) < opacity,
             };
             if is_there {
-                return None;
+                return Passing::Met(*hit);
             }
+        } else if let Some(twin) = self.tables.twins.facing(&self.geometry, hit) {
+            return self.past_cutout_of(ray, &twin, true);
         }
         let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
-        Some(from_behind(origin, ray))
+        Passing::Past(from_behind(origin, ray))
     }
 
-    /// Returns the continuation of a ray behind its hit, and the share of light that passes; `None` where none does.
-    fn past(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, Vec3)> {
-        if let Some(onwards) = self.past_cutout(ray, hit) {
-            return Some((onwards, Vec3::ONE));
-        }
-        let id = material_of(self, hit);
-        if !self.tables.panes[id as usize] {
-            return None;
-        }
-        let (unit, of_unit) = of_unit_length(ray, hit);
-        let vertex = Vertex::new(self, &unit, &of_unit, id);
-        let share = match &self.shading.materials[id as usize] {
-            Material::Principled { .. } => {
-                principled_at(self, id, &vertex, &mut None, 0, true)?.straight(vertex.wo, vertex.normal)
-            }
-            Material::Blend { .. } => blend_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
-            _ => lobe_at(self, id, &vertex, None)?.straight(vertex.wo, vertex.normal),
+    /// A ray goes on behind cutouts and panes. The second is the share of light that passes.
+    fn past(&self, ray: &Ray, hit: &Hit) -> (Passing, Vec3) {
+        let met = match self.past_cutout(ray, hit) {
+            Passing::Met(met) => met,
+            onwards @ Passing::Past(_) => return (onwards, Vec3::ONE),
         };
-        (share != Vec3::ZERO).then(|| (from_behind(vertex.passing(ray.dir), ray), share))
+        let id = material_of(self, &met);
+        if !self.tables.panes[id as usize] {
+            return (Passing::Met(met), Vec3::ONE);
+        }
+        let (unit, of_unit) = of_unit_length(ray, &met);
+        let vertex = Vertex::new(self, &unit, &of_unit, id);
+        let straight = match &self.shading.materials[id as usize] {
+            Material::Principled { .. } => principled_at(self, id, &vertex, &mut None, 0, true)
+                .map(|layered| layered.straight(vertex.wo, vertex.normal)),
+            Material::Blend { .. } => {
+                blend_at(self, id, &vertex, None).map(|blend| blend.straight(vertex.wo, vertex.normal))
+            }
+            _ => lobe_at(self, id, &vertex, None).map(|lobe| lobe.straight(vertex.wo, vertex.normal)),
+        };
+        match straight.filter(|share| *share != Vec3::ZERO) {
+            Some(share) => (Passing::Past(from_behind(vertex.passing(ray.dir), ray)), share),
+            None => (Passing::Met(met), Vec3::ONE),
+        }
     }
 
     /// Returns the point of a hit for texture lookups; `ray` is of unit length.
@@ -255,7 +281,9 @@ mod tests {
     use crate::core::snapshot::Object;
     use crate::sampling::Sampler;
     use crate::test_scene::prepared;
-    use firstlight_kdtree::Shape;
+    use firstlight_kdtree::{BuildPreset, MeshTree, Shape};
+    use glam::{Affine3A, Quat};
+    use std::sync::Arc;
 
     /// A scene of small quads and spheres, of materials by turns, and rays of any length through it.
     fn crowd(materials: Vec<Material>, used: &[u32]) -> (Prepared, RayBatch) {
@@ -303,5 +331,54 @@ mod tests {
                 assert!((400..3600).contains(&n), "{n} rays of 4,000 are occluded");
             }
         }
+    }
+
+    /// A sheet of one-sided triangles, each with one that faces the other way.
+    #[test]
+    fn no_ray_passes_one_sided_triangles_that_lie_back_to_back() {
+        let mut mesh = firstlight_mesh::procedural::icosphere(6);
+        let backs = mesh.triangles.iter().map(|[a, b, c]| [*c, *b, *a]).collect::<Vec<_>>();
+        let n = backs.len() as u32;
+        mesh.triangles.extend(backs);
+        let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
+        let world_from_object = Affine3A::from_scale_rotation_translation(
+            Vec3::new(0.3, -0.4, 0.5),
+            Quat::from_rotation_x(0.7),
+            Vec3::splat(0.5),
+        );
+        let shape = Shape::Mesh { tree, world_from_object, space: Default::default() };
+        let mut sheet = Material::of_kind(MaterialKind::Principled, Vec3::ONE.into()).expect("no blend");
+        if let Material::Principled { two_sided, .. } = &mut sheet {
+            *two_sided = false;
+        }
+        let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
+        let scene = prepared(vec![shape], vec![object], vec![sheet], Environment::Black);
+        assert!(scene.tables.cutouts[0].as_ref().is_some_and(|cutout| !cutout.has_back));
+        let (mut rays, mut hits, mut met, mut occluded) = <(RayBatch, HitBatch, HitBatch, Vec<bool>)>::default();
+        for i in 0..4000 {
+            let number = |k: usize| (hash_u32(hash_combine(i, k as u32)) >> 8) as f32 / (1 << 24) as f32;
+            let [origin, end] = [0, 3].map(|first| Vec3::from_array(std::array::from_fn(|k| number(first + k))));
+            rays.push(&Ray { origin, dir: end - origin, t_max: f32::INFINITY });
+        }
+        scene.geometry.tree.closest_hits(&rays, RayClass::Incoherent, &mut hits);
+        scene.closest_hits(&rays, RayClass::Incoherent, &mut met);
+        scene.any_hits(&rays, RayClass::Incoherent, &mut occluded);
+        let mut n_turned = 0;
+        for i in 0..rays.len() {
+            let (first, hit) = (hits.get(i), met.get(i));
+            assert_eq!(
+                (first.map(|hit| (hit.t, hit.prim % n)), first.is_some()),
+                (hit.map(|hit| (hit.t, hit.prim % n)), occluded[i])
+            );
+            let Some(hit) = hit else { continue };
+            n_turned += u32::from(first.is_some_and(|first| first.prim != hit.prim));
+            let ray = rays.get(i);
+            let unit = Ray { dir: ray.dir.normalize(), ..ray };
+            let at = |hit: &Hit| scene.geometry.tree.surface_point(&unit, &Hit { t: hit.t * ray.dir.length(), ..*hit });
+            let point = at(&hit);
+            assert!(point.geometric_normal.dot(ray.dir) < 1e-5);
+            assert!((point.position - at(&first.expect("it hits")).position).length() < 1e-6);
+        }
+        assert!(n_turned > 200, "{n_turned}");
     }
 }
