@@ -75,6 +75,9 @@ pub(crate) struct PlacedMaterial {
     pub two_sided: bool,
 }
 
+/// The index of a BSDF, that of an emitter, and whether a shape without a BSDF is the border of a medium.
+pub(crate) type MaterialKey = (Option<usize>, Option<usize>, bool);
+
 /// A scene while it is converted.
 pub(crate) struct Converter<'a> {
     pub graph: &'a Graph,
@@ -102,8 +105,7 @@ pub(crate) struct Converter<'a> {
     pub n_shapes: usize,
     /// Number of their parameters and nested objects.
     pub n_parts: usize,
-    /// By BSDF and emitter.
-    pub materials: HashMap<(Option<usize>, Option<usize>), Option<PlacedMaterial>>,
+    pub materials: HashMap<MaterialKey, Option<PlacedMaterial>>,
     /// Meshes to be made, by their number in the scene.
     pub requests: HashMap<MeshRequest, u32>,
     /// Objects of meshes from files whose back is black in Mitsuba.

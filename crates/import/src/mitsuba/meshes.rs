@@ -13,7 +13,7 @@ use firstlight_files::warnings::Warnings;
 use firstlight_format::model_format::ModelFormat;
 use firstlight_mesh::{Mesh, NormalWeight, procedural};
 use glam::DVec3;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
 /// Segments around a disk or a cylinder: its edge is off by 2·10⁻⁵ of the radius.
@@ -29,6 +29,8 @@ pub(crate) enum Geometry {
     Rectangle,
     /// About +Z, from 0 to 1, radius 1, open.
     Cylinder,
+    /// Of radius 1 about the origin.
+    Sphere,
 }
 
 impl Geometry {
@@ -36,7 +38,7 @@ impl Geometry {
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Model(_, path) | Self::Serialized(path, _) => Some(path),
-            Self::Cube | Self::Disk | Self::Rectangle | Self::Cylinder => None,
+            Self::Cube | Self::Disk | Self::Rectangle | Self::Cylinder | Self::Sphere => None,
         }
     }
 }
@@ -110,6 +112,7 @@ impl MeshRequest {
             Geometry::Disk => disk(),
             Geometry::Rectangle => rectangle(),
             Geometry::Cylinder => cylinder(),
+            Geometry::Sphere => sphere(),
         };
         if self.flip_v {
             mesh.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
@@ -187,6 +190,34 @@ fn cylinder() -> Mesh {
     made_mesh(&vertices, triangles)
 }
 
+/// Facing outwards; u is the angle about +Z, and v that from +Z.
+fn sphere() -> Mesh {
+    const SECTORS: u32 = 128;
+    const RINGS: u32 = SECTORS / 2;
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for k in 0..=RINGS {
+        let v = f64::from(k) / f64::from(RINGS);
+        let (across, up) = (PI * v).sin_cos();
+        for i in 0..=SECTORS {
+            // A corner at a pole belongs to one segment: its angle is that of the segment.
+            let is_pole = k == 0 || k == RINGS;
+            let u = (f64::from(i) + if is_pole { 0.5 } else { 0.0 }) / f64::from(SECTORS);
+            let (sin, cos) = (TAU * f64::from(i % SECTORS) / f64::from(SECTORS)).sin_cos();
+            let at = if is_pole { DVec3::Z * up.signum() } else { DVec3::new(across * cos, across * sin, up) };
+            vertices.push((at, at, [u, v]));
+        }
+    }
+    for k in 0..RINGS {
+        for i in 0..SECTORS {
+            let a = k * (SECTORS + 1) + i;
+            let [b, c, d] = [a + 1, a + SECTORS + 1, a + SECTORS + 2];
+            triangles.extend((k > 0).then_some([a, d, b]));
+            triangles.extend((k + 1 < RINGS).then_some([a, c, d]));
+        }
+    }
+    made_mesh(&vertices, triangles)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -196,6 +227,9 @@ mod tests {
 
     #[test]
     fn shapes_have_their_sizes_and_face_outwards() {
+        let ball = sphere();
+        assert!(Topology::of(&ball).is_closed());
+        assert!((ball.signed_volume() / (4.0 / 3.0 * PI) - 1.0).abs() < 2e-3, "{}", ball.signed_volume());
         let cube = cube();
         assert!(Topology::of(&cube).is_closed());
         assert!((cube.signed_volume() - 8.0).abs() < 1e-6);

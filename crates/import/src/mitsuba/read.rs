@@ -202,7 +202,14 @@ impl Reader<'_> {
                     let tag = printable::name(tag);
                     return Err(self.graph.error(place, format!("`<{tag}>` is not known")));
                 };
-                let name = self.required(element, place, "name")?;
+                let name = match element.attribute("name") {
+                    // All transforms but those of textures are of this name.
+                    None if tag == "transform" => {
+                        self.graph.tell(place, "a `<transform>` without a name: it is `to_world`", self.warnings);
+                        "to_world".to_owned()
+                    }
+                    _ => self.required(element, place, "name")?,
+                };
                 let name = self.spelt(&name);
                 self.graph.objects[parent].parameters.push(Parameter::new(name, value, place));
             }

@@ -221,10 +221,14 @@ impl Converter<'_> {
         material: PlacedMaterial,
     ) -> Result<(), SceneError> {
         let (center, radius) = (node.vector("center")?.unwrap_or(DVec3::ZERO), node.float_or("radius", 1.0)?);
+        let placed = own * DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
         if is_flipped != (own.determinant() * self.world.determinant() < 0.0) {
+            if !node.children("emitter")?.is_empty() {
+                // As around a scene that it lights.
+                return self.mesh(node, Geometry::Sphere, placed, true, name, material);
+            }
             self.tell(node, "a sphere whose normals point inwards is not modelled: they point outwards");
         }
-        let placed = own * DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
         // Mitsuba takes the radius along X for all.
         let radius = placed.x_axis.truncate().length();
         let is_even = |axis: DVec4| (axis.truncate().length() / radius - 1.0).abs() < 1e-5;
@@ -300,7 +304,8 @@ impl Converter<'_> {
 
     /// The material of a shape; `None` for a surface that light passes.
     fn material_of(&mut self, node: Node) -> Result<Option<PlacedMaterial>, SceneError> {
-        for medium in node.children("medium")? {
+        let media = node.children("medium")?;
+        for medium in &media {
             self.tell(node, "media are not modelled: the inside of the shape is empty");
             medium.skip();
         }
@@ -310,13 +315,16 @@ impl Converter<'_> {
         }
         let bsdf = node.children("bsdf")?.first().copied();
         let emitter = node.children("emitter")?.first().copied();
-        let key = (bsdf.map(|node| node.index), emitter.map(|node| node.index));
+        let is_border = !media.is_empty() && node.object().is_old;
+        let key = (bsdf.map(|node| node.index), emitter.map(|node| node.index), is_border);
         if let Some(known) = self.materials.get(&key) {
             return Ok(known.clone());
         }
         let surface = match bsdf {
             Some(bsdf) => self.surface(bsdf, 0)?,
             None if emitter.is_some() => Some(black()),
+            // The border of a medium: version 0.x shows no surface there.
+            None if is_border => None,
             None => Some(Surface { part: grey(), two_sided: false }),
         };
         let surface = match emitter {

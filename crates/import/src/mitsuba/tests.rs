@@ -283,6 +283,33 @@ fn a_mirrored_sphere_is_told() {
 }
 
 #[test]
+fn a_dome_that_is_a_light_shines_inwards() {
+    let light = "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1\"/></emitter>";
+    let flipped = "<boolean name=\"flip_normals\" value=\"true\"/><float name=\"radius\" value=\"9\"/>";
+    let scene = read("3.0.0", &format!("<shape type=\"sphere\">{flipped}{light}</shape>"));
+    assert_eq!(told(&scene), Vec::<String>::new());
+    let [(_, mesh)] = &scene.parts.iter().collect::<Vec<_>>()[..] else { panic!("a mesh") };
+    let volume = mesh.signed_volume() / (4.0 / 3.0 * std::f64::consts::PI);
+    assert!((volume + 1.0).abs() < 0.003, "its front is inside: {volume}");
+    assert!(matches!(part(&scene, 0), MaterialPart::Emissive { .. }));
+}
+
+/// Version 0.x has no surface there; version 3 has a grey one.
+#[test]
+fn the_border_of_a_medium_is_no_surface_in_old_scenes() {
+    let medium = "<medium type=\"homogeneous\" name=\"interior\"/>";
+    let body = format!("<shape type=\"sphere\">{medium}</shape><shape type=\"sphere\"/>");
+    assert_eq!(["0.5.0", "3.0.0"].map(|version| read(version, &body).file.objects.len()), [1, 2]);
+}
+
+#[test]
+fn a_transform_without_a_name_is_that_of_the_shape() {
+    let scene = read("2.0.0", "<shape type=\"sphere\"><transform><translate x=\"2\"/></transform></shape>");
+    tells_only(&scene, &["`<transform>` without a name: it is `to_world`"]);
+    assert!(matches!(scene.file.objects[0], ObjectPart::Sphere { center, .. } if center.x.abs() == 2.0));
+}
+
+#[test]
 fn old_colours_and_animations_open() {
     let spectrum = |value: &str| format!("<spectrum name=\"reflectance\" value=\"{value}\"/>");
     let body = |value: &str| {

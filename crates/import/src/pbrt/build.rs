@@ -15,7 +15,6 @@ use firstlight_files::printable;
 use firstlight_files::relative::path_to_text;
 use firstlight_files::stamp::Stamp;
 use firstlight_files::warnings::Warnings;
-use firstlight_format::error::SceneError;
 use firstlight_format::names::Names;
 use firstlight_format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::{EnvironmentSource, MeshShading, MeshSource, TextureCoordinates, TextureSource};
@@ -59,6 +58,9 @@ pub(super) struct Item {
 /// Why a scene cannot be read on.
 pub(crate) struct TooMany;
 
+/// Of several things of one name.
+pub(super) const FIRST_COUNTS: &str = "the first counts";
+
 /// Everything with a name that a scene describes.
 pub(crate) struct Known {
     named: HashMap<String, Rc<Described>>,
@@ -93,6 +95,8 @@ pub(crate) struct Builder<'a> {
     pub(super) missing: HashSet<String>,
     /// What this reading has defined: its kind and its name.
     pub(super) defined: HashSet<(&'static str, String)>,
+    /// Names of materials that it has defined more than once.
+    pub(super) redefined: HashSet<String>,
     /// Absorption of the media without scattering, per metre.
     pub(super) media: HashMap<String, Option<Vec3>>,
     pub(super) definitions: HashMap<String, Vec<Item>>,
@@ -149,6 +153,7 @@ impl<'a> Builder<'a> {
             is_known: false,
             missing: HashSet::new(),
             defined: HashSet::new(),
+            redefined: HashSet::new(),
             media: HashMap::new(),
             definitions: HashMap::new(),
             early: Vec::new(),
@@ -179,7 +184,9 @@ impl<'a> Builder<'a> {
         if !self.missing.iter().any(is_there) {
             return None;
         }
-        let (named, media, textures) = (std::mem::take(named), std::mem::take(media), std::mem::take(textures));
+        let (mut named, media, textures) = (std::mem::take(named), std::mem::take(media), std::mem::take(textures));
+        // Which of them counts depends on where it is used.
+        named.retain(|name, _| !self.redefined.contains(name));
         Some(Known { named, media, textures, n_described: self.n_described })
     }
 
@@ -398,16 +405,6 @@ impl<'a> Builder<'a> {
             }
         }
         self.materials.retain(|(name, _)| used.contains(name));
-    }
-
-    /// An error if nothing was described that can be seen.
-    pub(crate) fn check_any(&self) -> Result<(), SceneError> {
-        if !self.objects.is_empty() || self.environment != EnvironmentSource::Black {
-            return Ok(());
-        }
-        let mut left_out = self.warnings.iter().filter(|warning| warning.contains("left out"));
-        let first = left_out.next().map_or_else(String::new, |first| format!(": {}", &**first));
-        Err(SceneError::in_file(self.path, format!("has no shape that can be shown{first}")))
     }
 }
 

@@ -112,7 +112,8 @@ impl<'a> Cursor<'a> {
                 Some(Token { kind: TokenKind::Word(word), .. }) => word,
                 _ => return Err(self.unexpected(token, &format!("{N} numbers"))),
             };
-            *number = (word.parse().ok().filter(|number: &f64| number.is_finite()))
+            *number = self::number(word)
+                .filter(|number| number.is_finite())
                 .ok_or_else(|| self.unexpected(token, &format!("{N} finite numbers")))?;
         }
         if is_open {
@@ -220,11 +221,16 @@ impl<'a> Cursor<'a> {
         match (values, kind) {
             (Values::Strings(strings), TokenKind::Quoted(text)) => strings.push(unescaped(text)),
             (Values::Bools(flags), TokenKind::Word(word @ ("true" | "false"))) => flags.push(word == "true"),
-            (Values::Numbers(numbers), TokenKind::Word(word)) => numbers.push(word.parse().map_err(|_| wrong())?),
+            (Values::Numbers(numbers), TokenKind::Word(word)) => numbers.push(number(word).ok_or_else(wrong)?),
             _ => return Err(wrong()),
         }
         Ok(())
     }
+}
+
+/// A number. Version 3 ignores what follows it: there are files with commas.
+fn number(word: &str) -> Option<f64> {
+    word.trim_end_matches(',').parse().ok()
 }
 
 #[cfg(test)]

@@ -354,7 +354,11 @@ impl<'a> Reader<'a> {
                 let params = cursor.params()?.with_attributes("material", &self.state.attributes);
                 self.builder.describe_material(&material, params);
             }
-            "NamedMaterial" => self.state.material = MaterialRef::Named(cut(&cursor.string()?).to_owned()),
+            "NamedMaterial" => {
+                let name = cut(&cursor.string()?).to_owned();
+                let known = self.builder.named.get(&name).cloned();
+                self.state.material = known.map_or(MaterialRef::Named(name), MaterialRef::Own);
+            }
             "MakeNamedMedium" => {
                 let medium = cursor.string()?;
                 let params = cursor.params()?.with_attributes("medium", &self.state.attributes);

@@ -2,7 +2,7 @@
 
 use crate::model::foreign::MAX_OBJECTS;
 use crate::model::foreign::cut;
-use crate::pbrt::build::{Builder, TooMany};
+use crate::pbrt::build::{Builder, FIRST_COUNTS, TooMany};
 use firstlight_files::printable;
 use glam::DAffine3;
 
@@ -18,7 +18,7 @@ impl Builder<'_> {
 
     pub(crate) fn end_object(&mut self) -> Result<(), &'static str> {
         let (name, items) = self.open.take().ok_or("there is no object definition to end")?;
-        if self.is_first("object", &name) {
+        if self.is_first("object", &name, FIRST_COUNTS) {
             self.definitions.insert(name, items);
         }
         self.strands.part();

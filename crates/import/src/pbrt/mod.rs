@@ -49,7 +49,6 @@ pub(crate) fn read(path: &Path, options: &ForeignOptions) -> Result<ForeignScene
     let (view, mut builder, mut files) = Reader::read(path, options)?.finish()?;
     builder.finish_strands();
     builder.add_missing_uvs();
-    builder.check_any()?;
     builder.keep_used_materials();
     files.extend(builder.files);
     let file = SceneFile {

@@ -46,7 +46,9 @@ pub(crate) fn subdivided(params: &Params, most_triangles: usize) -> Result<Index
         return Err("each of its triangles has one vertex twice".to_owned());
     }
     let most = MAX_TRIANGLES.max(surface.triangles.len().saturating_mul(MAX_FACTOR));
-    for _ in 0..params.count("levels").unwrap_or(3) {
+    // Version 2 says `nlevels`, which version 3 reads too.
+    let levels = params.count("levels").or_else(|| params.count("nlevels"));
+    for _ in 0..levels.unwrap_or(3) {
         // What is finer than this looks the same.
         if surface.triangles.len() > most / 4 {
             break;

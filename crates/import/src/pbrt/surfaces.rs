@@ -1,7 +1,7 @@
 //! Materials and textures of a scene: described under their names, and converted when a shape has them.
 
 use crate::model::foreign::{LIGHT_SHARE, cut, tinted, told_of_long};
-use crate::pbrt::build::Builder;
+use crate::pbrt::build::{Builder, FIRST_COUNTS};
 use crate::pbrt::material_inputs::{MaterialScope, principled};
 use crate::pbrt::materials::{material, with_layers, with_normals};
 use crate::pbrt::params::Params;
@@ -27,12 +27,17 @@ const MAX_DEPTH: u32 = 32;
 /// Textures of numbers and of colours have names of their own.
 const TEXTURE_KINDS: [&str; 2] = ["texture of colours", "texture of numbers"];
 
+/// As in version 3.
+const EACH_COUNTS: &str = "each counts for what follows it";
+
 impl Builder<'_> {
-    /// Whether nothing of this kind has this name before; tells of the second, which pbrt refuses.
-    pub(super) fn is_first(&mut self, kind: &'static str, name: &str) -> bool {
+    /// Whether nothing of this kind has this name before; tells of the second, which version 4 refuses.
+    ///
+    /// - `counts`: which one counts.
+    pub(super) fn is_first(&mut self, kind: &'static str, name: &str, counts: &str) -> bool {
         let is_first = self.defined.insert((kind, cut(name).to_owned()));
         if !is_first {
-            self.tell(format!("{kind} `{}` is defined more than once: the first counts", printable::name(name)));
+            self.tell(format!("{kind} `{}` is defined more than once: {counts}", printable::name(name)));
         }
         is_first
     }
@@ -49,9 +54,7 @@ impl Builder<'_> {
                 self.missing.insert(cut(part).to_owned());
             }
         }
-        if !self.is_first(TEXTURE_KINDS[usize::from(is_number)], name) {
-            return;
-        }
+        self.is_first(TEXTURE_KINDS[usize::from(is_number)], name, EACH_COUNTS);
         let mut told = Vec::new();
         let mut textures = std::mem::take(&mut self.textures);
         textures.define(cut(name), is_number, class, params, |name| self.named_file(name), |what| told.push(what));
@@ -64,8 +67,10 @@ impl Builder<'_> {
     /// Describes a material with a name.
     pub(crate) fn describe_material(&mut self, name: &str, params: Params) {
         told_of_long(name).into_iter().for_each(|what| self.tell(what));
-        if !self.is_first("material", name) || self.is_known && self.named.contains_key(cut(name)) {
-            return;
+        match self.is_first("material", name, EACH_COUNTS) {
+            true if self.is_known && self.named.contains_key(cut(name)) => return,
+            true => {}
+            false => drop(self.redefined.insert(cut(name).to_owned())),
         }
         let kind = params.string("type").unwrap_or("diffuse").to_owned();
         let described = self.described(cut(name), kind, params);
@@ -80,7 +85,7 @@ impl Builder<'_> {
 
     /// A medium: only one that absorbs and does not scatter is modelled, inside of glass.
     pub(crate) fn describe_medium(&mut self, name: &str, params: &Params) {
-        if !self.is_first("medium", name) {
+        if !self.is_first("medium", name, FIRST_COUNTS) {
             return;
         }
         let quantity = |name: &str| params.spectrum(name).and_then(|spectrum| spectrum.quantity().ok());

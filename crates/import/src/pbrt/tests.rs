@@ -391,7 +391,19 @@ fn instances_may_stand_before_their_object() {
 }
 
 #[test]
-fn of_two_definitions_of_a_name_the_first_counts() {
+fn words_and_commas_of_older_versions_are_read() {
+    let corners = "\"point3 P\" [1 0 0, 0 1 0, 0 0 1, -1 0 0] \"integer indices\" [0 1 2 0, 2, 3]";
+    for (levels, n) in [("\"integer nlevels\" [1]", 8), ("\"integer levels\" [0]", 2)] {
+        let scene = read(&format!("Shape \"loopsubdiv\" {corners} {levels}\n"));
+        assert_eq!(told(&scene), Vec::<String>::new());
+        assert_eq!(scene.parts.values().next().unwrap().triangles.len(), n);
+    }
+    let [commas, none] = [", ", " "].map(|gap| read(&format!("Translate 1{gap}2{gap}3\n{SQUARE}")).file.objects);
+    assert_eq!(commas, none);
+}
+
+#[test]
+fn a_name_that_is_defined_again_counts_for_what_follows() {
     let red = "\"rgb reflectance\" [1 0 0]";
     let twice = |more: &str| {
         read(&format!(
@@ -403,7 +415,7 @@ fn of_two_definitions_of_a_name_the_first_counts() {
     for more in ["", "MakeNamedMaterial \"n\" \"string type\" \"diffuse\"\n"] {
         let early = if more.is_empty() { String::new() } else { format!("NamedMaterial \"n\"\n{SQUARE}") };
         let scene = twice(&format!("{early}{more}"));
-        tells_only(&scene, &["material `m` is defined more than once: the first counts"]);
+        tells_only(&scene, &["material `m` is defined more than once: each counts for what follows it"]);
         let MaterialPart::Diffuse { albedo: ColorValue::Rgb(color) } = named(&scene, "m") else { panic!() };
         assert_eq!(*color, Vec3::X);
     }
@@ -415,7 +427,13 @@ fn of_two_definitions_of_a_name_the_first_counts() {
     let scene = read(&format!("{color}{}{shown}", texture("spectrum", "\"rgb value\" [0 1 0]")));
     tells_only(&scene, &["`t` is defined more than once"]);
     let MaterialPart::Diffuse { albedo: ColorValue::Rgb(color) } = part(&scene) else { panic!() };
-    assert_eq!(*color, Vec3::X);
+    assert_eq!(*color, Vec3::Y);
+    // What stands before the second keeps the first.
+    let [red, green] = ["1 0 0", "0 1 0"].map(|rgb| texture("spectrum", &format!("\"rgb value\" [{rgb}]")));
+    let scene = read(&format!("{red}{shown}{green}{shown}"));
+    let colors: Vec<&MaterialPart> = scene.file.materials.iter().map(|(_, part)| part).collect();
+    let is = |part: &MaterialPart, wanted| matches!(part, MaterialPart::Diffuse { albedo } if *albedo == ColorValue::Rgb(wanted));
+    assert!(colors.len() == 2 && is(colors[0], Vec3::X) && is(colors[1], Vec3::Y), "{colors:?}");
     let object = |shape: &str| format!("ObjectBegin \"o\"\n{shape}ObjectEnd\n");
     let scene = read(&format!("{}{}ObjectInstance \"o\"\n", object(SQUARE), object("Shape \"sphere\"\n")));
     tells_only(&scene, &["object `o` is defined more than once"]);
