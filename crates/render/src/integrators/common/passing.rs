@@ -18,7 +18,7 @@ use crate::shading::scatter::Scatter;
 use crate::shading::surface::{blend_at, lobe_at};
 use crate::shading::vertex::{Vertex, material_of, mesh_texture_point};
 use firstlight_kdtree::geometry::{Ray, robust};
-use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, SurfacePoint};
 use glam::Vec3;
 
 /// What a ray does where it hits something.
@@ -197,11 +197,21 @@ impl Prepared {
             if is_there {
                 return Passing::Met(*hit);
             }
-        } else if let Some(twin) = self.tables.twins.facing(&self.geometry, hit) {
+        } else if let Some(twin) = self.twin_of(&unit, hit, &point) {
             return self.past_cutout_of(ray, &twin, true);
         }
         let origin = robust::offset_ray_origin(point.position, point.error, point.geometric_normal, ray.dir);
         Passing::Past(from_behind(origin, ray))
+    }
+
+    /// The hit of a triangle that lies where this one does, as far as both are known, and faces the ray.
+    fn twin_of(&self, unit: &Ray, hit: &Hit, point: &SurfacePoint) -> Option<Hit> {
+        self.tables.twins.opposite(&self.geometry, hit).find(|other| {
+            let other = self.geometry.tree.surface_point(unit, other);
+            let normal = other.geometric_normal;
+            let apart = (other.position - point.position).dot(normal).abs();
+            normal.dot(unit.dir) < 0.0 && apart <= (other.error + point.error).dot(normal.abs())
+        })
     }
 
     /// A ray goes on behind cutouts and panes. The second is the share of light that passes.
@@ -333,52 +343,55 @@ mod tests {
         }
     }
 
-    /// A sheet of one-sided triangles, each with one that faces the other way.
+    /// Sheets of one-sided triangles, each with others that face the other way: the same, or the other halves of squares.
     #[test]
     fn no_ray_passes_one_sided_triangles_that_lie_back_to_back() {
-        let mut mesh = firstlight_mesh::procedural::icosphere(6);
-        let backs = mesh.triangles.iter().map(|[a, b, c]| [*c, *b, *a]).collect::<Vec<_>>();
-        let n = backs.len() as u32;
-        mesh.triangles.extend(backs);
-        let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
-        let world_from_object = Affine3A::from_scale_rotation_translation(
-            Vec3::new(0.3, -0.4, 0.5),
-            Quat::from_rotation_x(0.7),
-            Vec3::splat(0.5),
-        );
-        let shape = Shape::Mesh { tree, world_from_object, space: Default::default() };
+        let mut ball = firstlight_mesh::procedural::icosphere(6);
+        ball.triangles.extend(ball.triangles.clone().iter().map(|[a, b, c]| [*c, *b, *a]));
+        let mut cube = firstlight_mesh::procedural::cube();
+        for first in (0..6).map(|side| 4 * side) {
+            let is_right = cube.triangles[first as usize / 2] == [first, first + 1, first + 2];
+            for [a, b, c] in [[3, 1, 0], [3, 2, 1]].map(|corners| corners.map(|corner: u32| first + corner)) {
+                cube.triangles.push(if is_right { [a, b, c] } else { [a, c, b] });
+            }
+        }
         let mut sheet = Material::of_kind(MaterialKind::Principled, Vec3::ONE.into()).expect("no blend");
         if let Material::Principled { two_sided, .. } = &mut sheet {
             *two_sided = false;
         }
-        let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
-        let scene = prepared(vec![shape], vec![object], vec![sheet], Environment::Black);
-        assert!(scene.tables.cutouts[0].as_ref().is_some_and(|cutout| !cutout.has_back));
-        let (mut rays, mut hits, mut met, mut occluded) = <(RayBatch, HitBatch, HitBatch, Vec<bool>)>::default();
-        for i in 0..4000 {
-            let number = |k: usize| (hash_u32(hash_combine(i, k as u32)) >> 8) as f32 / (1 << 24) as f32;
-            let [origin, end] = [0, 3].map(|first| Vec3::from_array(std::array::from_fn(|k| number(first + k))));
-            rays.push(&Ray { origin, dir: end - origin, t_max: f32::INFINITY });
+        let size = Vec3::new(0.3, -0.4, 0.5);
+        let world_from_object =
+            Affine3A::from_scale_rotation_translation(size, Quat::from_rotation_x(0.7), Vec3::splat(0.5));
+        for mesh in [ball, cube] {
+            let n = mesh.triangles.len() as u32 / 2;
+            let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
+            let shape = Shape::Mesh { tree, world_from_object, space: Default::default() };
+            let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
+            let scene = prepared(vec![shape], vec![object], vec![sheet.clone()], Environment::Black);
+            let (mut rays, mut hits, mut met, mut occluded) = <(RayBatch, HitBatch, HitBatch, Vec<bool>)>::default();
+            for i in 0..4000 {
+                let number = |k: usize| (hash_u32(hash_combine(i, k as u32)) >> 8) as f32 / (1 << 24) as f32;
+                let [origin, end] = [0, 3].map(|first| Vec3::from_array(std::array::from_fn(|k| number(first + k))));
+                rays.push(&Ray { origin, dir: end - origin, t_max: f32::INFINITY });
+            }
+            scene.geometry.tree.closest_hits(&rays, RayClass::Incoherent, &mut hits);
+            scene.closest_hits(&rays, RayClass::Incoherent, &mut met);
+            scene.any_hits(&rays, RayClass::Incoherent, &mut occluded);
+            let mut n_turned = 0;
+            for i in 0..rays.len() {
+                let (first, hit, ray) = (hits.get(i), met.get(i), rays.get(i));
+                assert_eq!((first.map(|hit| hit.t), first.is_some()), (hit.map(|hit| hit.t), occluded[i]));
+                let (Some(first), Some(hit)) = (first, hit) else { continue };
+                n_turned += u32::from(first.prim / n != hit.prim / n);
+                let unit = Ray { dir: ray.dir.normalize(), ..ray };
+                let at = |hit: &Hit| {
+                    let of_unit = Hit { t: hit.t * ray.dir.length(), ..*hit };
+                    scene.geometry.tree.surface_point(&unit, &of_unit)
+                };
+                assert!(at(&hit).geometric_normal.dot(ray.dir) < 1e-5);
+                assert!((at(&hit).position - at(&first).position).length() < 1e-6);
+            }
+            assert!(n_turned > 200, "{n_turned}");
         }
-        scene.geometry.tree.closest_hits(&rays, RayClass::Incoherent, &mut hits);
-        scene.closest_hits(&rays, RayClass::Incoherent, &mut met);
-        scene.any_hits(&rays, RayClass::Incoherent, &mut occluded);
-        let mut n_turned = 0;
-        for i in 0..rays.len() {
-            let (first, hit) = (hits.get(i), met.get(i));
-            assert_eq!(
-                (first.map(|hit| (hit.t, hit.prim % n)), first.is_some()),
-                (hit.map(|hit| (hit.t, hit.prim % n)), occluded[i])
-            );
-            let Some(hit) = hit else { continue };
-            n_turned += u32::from(first.is_some_and(|first| first.prim != hit.prim));
-            let ray = rays.get(i);
-            let unit = Ray { dir: ray.dir.normalize(), ..ray };
-            let at = |hit: &Hit| scene.geometry.tree.surface_point(&unit, &Hit { t: hit.t * ray.dir.length(), ..*hit });
-            let point = at(&hit);
-            assert!(point.geometric_normal.dot(ray.dir) < 1e-5);
-            assert!((point.position - at(&first.expect("it hits")).position).length() < 1e-6);
-        }
-        assert!(n_turned > 200, "{n_turned}");
     }
 }
