@@ -88,7 +88,8 @@ fn add_light(world: &mut World, new: &NewThing, at: [f64; 2]) -> Option<Entity> 
     let (way, distance) = (spot.way(), spot.way().length());
     let direction = way.try_normalize().unwrap_or(DVec3::NEG_Y);
     let irradiance = NEW_IRRADIANCE / f64::from(world.resource::<DisplaySettings>().0.exposure_stops).exp2();
-    let reach = spot::room_around(world, spot.place).map_or(distance, |room| distance.min(room));
+    let front = matches!(new, AreaLight | Spot).then_some(direction);
+    let reach = spot::room_around(world, spot.place, front).map_or(distance, |room| distance.min(room));
     let intensity = Vec3::splat((irradiance * reach * reach) as f32);
     let placement = Placement::at(spot.place);
     Some(match new {

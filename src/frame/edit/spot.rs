@@ -125,7 +125,7 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
             let thing = picked.and_then(|picked| ball_around(world, &[picked.entity])).filter(is_thing);
             let ceiling = picked.filter(|picked| thing.is_none() && picked.normal.y < -0.5);
             if let Some(Picked { normal, .. }) = ceiling {
-                return below(world, place, normal, radius);
+                return below(world, place, normal, radius, shows_front);
             }
             thing.unwrap_or((place, radius))
         }
@@ -164,13 +164,18 @@ pub fn find_for_light(world: &mut World, shows_front: bool, at: [f64; 2]) -> Lig
 }
 
 /// A position below a point of a ceiling, for a light that shines away from it.
-fn below(world: &World, ceiling: DVec3, normal: DVec3, radius: f64) -> LightSpot {
+///
+/// - `is_flat`: it is a square, which hangs close to it.
+fn below(world: &World, ceiling: DVec3, normal: DVec3, radius: f64, is_flat: bool) -> LightSpot {
     /// Relative to the size of what is lit.
     const DISTANCE: f64 = 0.1;
-    let place = ceiling + DISTANCE * radius * normal;
+    /// Of the way to what is below.
+    const PENDANT: f64 = 0.25;
+    let close = ceiling + DISTANCE * radius * normal;
     let scene = world.resource::<RenderState>().extraction.as_ref();
-    let free = scene.and_then(|scene| distance(scene, place, normal)).unwrap_or(radius);
-    LightSpot { place, subject: place + free * normal, radius }
+    let free = scene.and_then(|scene| distance(scene, close, normal)).unwrap_or(radius);
+    let place = close + if is_flat { 0.0 } else { PENDANT * free } * normal;
+    LightSpot { place, subject: close + free * normal, radius }
 }
 
 /// The longest edge, metres, of a square about a place that no surface cuts.
@@ -184,14 +189,17 @@ pub fn free_edge(world: &World, place: DVec3, [u, v]: [DVec3; 2], most: f64) -> 
     free.map(|free| 2.0 * TOUCH * free).fold(most, f64::min)
 }
 
-/// The distance of the nearest quarter of what is around a place; `None` in the open.
-pub fn room_around(world: &World, place: DVec3) -> Option<f64> {
+/// The distance of the nearest quarter of what a light at a place in a room shines on; `None` in the open.
+///
+/// - `front`: where it shines; in all directions without.
+pub fn room_around(world: &World, place: DVec3, front: Option<DVec3>) -> Option<f64> {
     let scene = world.resource::<RenderState>().extraction.as_ref()?;
-    let mut around: Vec<f64> =
-        directions(RAYS, -1.0).filter_map(|direction| distance(scene, place, direction)).collect();
-    around.sort_by(f64::total_cmp);
-    let quarter = RAYS as usize / 4;
-    (around.len() >= 3 * quarter).then(|| around[quarter])
+    let around: Vec<(DVec3, f64)> =
+        directions(RAYS, -1.0).filter_map(|direction| Some((direction, distance(scene, place, direction)?))).collect();
+    let is_lit = |(direction, _): &&(DVec3, f64)| front.is_none_or(|front| front.dot(*direction) > 0.0);
+    let mut lit: Vec<f64> = around.iter().filter(is_lit).map(|(_, distance)| *distance).collect();
+    lit.sort_by(f64::total_cmp);
+    lit.get(lit.len() / 4).copied().filter(|_| around.len() >= RAYS as usize * 3 / 4)
 }
 
 /// Centre and radius of a ball around the boxes of objects that are to be lit; `None` without any that has an end. An
