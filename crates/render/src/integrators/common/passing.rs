@@ -378,9 +378,9 @@ mod tests {
             scene.closest_hits(&rays, RayClass::Incoherent, &mut met);
             scene.any_hits(&rays, RayClass::Incoherent, &mut occluded);
             let mut n_turned = 0;
-            for i in 0..rays.len() {
+            for (i, is_occluded) in occluded.into_iter().enumerate() {
                 let (first, hit, ray) = (hits.get(i), met.get(i), rays.get(i));
-                assert_eq!((first.map(|hit| hit.t), first.is_some()), (hit.map(|hit| hit.t), occluded[i]));
+                assert_eq!((first.map(|hit| hit.t), first.is_some()), (hit.map(|hit| hit.t), is_occluded));
                 let (Some(first), Some(hit)) = (first, hit) else { continue };
                 n_turned += u32::from(first.prim / n != hit.prim / n);
                 let unit = Ray { dir: ray.dir.normalize(), ..ray };
