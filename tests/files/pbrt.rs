@@ -263,6 +263,11 @@ fn errors_name_the_file_the_line_and_the_column() {
         ("WorldBegin\nInclude \"c.pbrt\"", "c.pbrt:1:1: files include one another more than 32 deep"),
         ("Include \"d.pbrt\"", "has no `WorldBegin`"),
         ("WorldBegin", "has no shape that can be shown"),
+        // Its environment alone would look as if that were the scene.
+        (
+            "WorldBegin\nLightSource \"infinite\"\nShape \"plymesh\" \"string filename\" \"../far.ply\"",
+            "has no shape that can be shown: ",
+        ),
         ("WorldBegin\nShape \"curve\"", "make no curve of degree 3"),
     ] {
         let (_folder, path) =
@@ -270,6 +275,25 @@ fn errors_name_the_file_the_line_and_the_column() {
         let error = load(&SceneSource::parse(&path).unwrap(), &LoadOptions::default()).unwrap_err().to_string();
         assert!(error.contains(expected), "{text}: {error}");
     }
+}
+
+/// As in version 3.
+#[test]
+fn a_material_that_is_described_again_counts_for_what_names_it_then() {
+    let described = |rgb: &str| {
+        format!(
+            "MakeNamedMaterial \"m\" \"string type\" \"diffuse\" \"rgb reflectance\" [{rgb}]\n\
+             NamedMaterial \"m\"\nShape \"sphere\"\n"
+        )
+    };
+    let scene = with(&format!("{}{}", described("1 0 0"), described("0 1 0")));
+    let albedos = scene.file.objects[..2].iter().map(|object| {
+        let Some(MaterialPart::Diffuse { albedo }) = scene.file.materials.get(object.material().unwrap()) else {
+            panic!("a diffuse material")
+        };
+        albedo.clone()
+    });
+    assert_eq!(albedos.collect::<Vec<_>>(), [Vec3::X, Vec3::Y].map(ColorValue::Rgb));
 }
 
 #[test]

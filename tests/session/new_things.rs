@@ -2,6 +2,7 @@
 
 use crate::driver::{Drive, Driver};
 use crate::random::Random;
+use bevy_ecs::entity::Entity;
 use firstlight::frame::{Command, Edit, NewThing, Projector};
 use firstlight::scene::{
     ColorParam, Material, MaterialSlots, Placement, PointLight, SceneSource, Shape, SurfaceMaterial,
@@ -19,6 +20,28 @@ fn opened(folder: &std::path::Path, camera: &str, objects: &str) -> Driver {
     Driver::opened(SceneSource::Scene(path))
 }
 
+/// Corners of the room, metres.
+const ROOM: [DVec3; 2] = [DVec3::new(-3.0, 0.0, -3.0), DVec3::new(3.0, 2.6, 3.0)];
+
+fn room(folder: &std::path::Path) -> Driver {
+    let objects = "
+        quad(corner: (-3, 0, -3), edge_u: (0, 0, 6), edge_v: (6, 0, 0)),
+        quad(name: \"ceiling\", corner: (-3, 2.6, -3), edge_u: (6, 0, 0), edge_v: (0, 0, 6)),
+        quad(name: \"wall\", corner: (-3, 0, -3), edge_u: (6, 0, 0), edge_v: (0, 2.6, 0)),
+        quad(corner: (-3, 0, 3), edge_u: (0, 2.6, 0), edge_v: (6, 0, 0)),
+        quad(corner: (-3, 0, -3), edge_u: (0, 2.6, 0), edge_v: (0, 0, 6)),
+        quad(corner: (3, 0, -3), edge_u: (0, 0, 6), edge_v: (0, 2.6, 0)),";
+    opened(folder, "eye: (0, 1.4, 2.8), look_at: (0, 1.3, 0), vfov: 70", objects)
+}
+
+/// What is seen where a point is in the image.
+fn seen_at(driver: &Driver, point: DVec3) -> Option<Entity> {
+    let rig = driver.session.status().rig;
+    let aspect = f64::from(driver.session.picture().width) / f64::from(driver.session.picture().height);
+    let at = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(point).expect("it is in front of the camera");
+    driver.session.entity_at(at.x / aspect, at.y)
+}
+
 /// The floor between a table and the wall behind it is in the middle of the image, but what stands there is hidden.
 #[test]
 fn a_new_object_is_seen_where_it_stands() {
@@ -31,29 +54,19 @@ fn a_new_object_is_seen_where_it_stands() {
     driver.edit([Edit::Add(NewThing::Sphere)]);
     driver.settle();
     let (center, radius) = (driver.get::<Placement>("ball").translation, driver.get::<Shape>("ball"));
-    let rig = driver.session.status().rig;
-    let aspect = f64::from(driver.session.picture().width) / f64::from(driver.session.picture().height);
-    let at = Projector::new(&rig, DVec2::new(aspect, 1.0)).place(center).expect("it is in front of the camera");
-    assert_eq!(driver.session.entity_at(at.x / aspect, at.y), Some(driver.named("ball")), "{center} {radius:?}");
+    assert_eq!(seen_at(&driver, center), Some(driver.named("ball")), "{center} {radius:?}");
 }
 
 /// A light for a large object is far from it, and bright; in a room, most walls are nearer.
 #[test]
 fn a_new_light_burns_no_more_than_a_quarter_of_a_room() {
     let folder = tempfile::tempdir().unwrap();
-    let (low, high) = (DVec3::new(-3.0, 0.0, -3.0), DVec3::new(3.0, 2.6, 3.0));
-    let objects = "
-        quad(corner: (-3, 0, -3), edge_u: (0, 0, 6), edge_v: (6, 0, 0)),
-        quad(corner: (-3, 2.6, -3), edge_u: (6, 0, 0), edge_v: (0, 0, 6)),
-        quad(name: \"wall\", corner: (-3, 0, -3), edge_u: (6, 0, 0), edge_v: (0, 2.6, 0)),
-        quad(corner: (-3, 0, 3), edge_u: (0, 2.6, 0), edge_v: (6, 0, 0)),
-        quad(corner: (-3, 0, -3), edge_u: (0, 2.6, 0), edge_v: (0, 0, 6)),
-        quad(corner: (3, 0, -3), edge_u: (0, 0, 6), edge_v: (0, 2.6, 0)),";
-    let mut driver = opened(folder.path(), "eye: (0, 1.4, 2.8), look_at: (0, 1.3, 0), vfov: 70", objects);
+    let mut driver = room(folder.path());
     driver.select("wall");
     driver.edit([Edit::Add(NewThing::PointLight)]);
     driver.session.send(Command::FrameAll);
     driver.settle();
+    let [low, high] = ROOM;
     let (light, place) = (driver.get::<PointLight>("point light"), driver.get::<Placement>("point light").translation);
     assert!(place.cmpgt(low).all() && place.cmplt(high).all(), "{place}");
     let mut random = Random(7);
@@ -72,14 +85,7 @@ fn a_new_light_burns_no_more_than_a_quarter_of_a_room() {
 #[test]
 fn a_new_area_light_hangs_from_the_ceiling_or_stays_in_the_room() {
     let folder = tempfile::tempdir().unwrap();
-    let (low, high) = (DVec3::new(-3.0, 0.0, -3.0), DVec3::new(3.0, 2.6, 3.0));
-    let objects = "
-        quad(corner: (-3, 0, -3), edge_u: (0, 0, 6), edge_v: (6, 0, 0)),
-        quad(name: \"ceiling\", corner: (-3, 2.6, -3), edge_u: (6, 0, 0), edge_v: (0, 0, 6)),
-        quad(corner: (-3, 0, -3), edge_u: (6, 0, 0), edge_v: (0, 2.6, 0)),
-        quad(corner: (-3, 0, 3), edge_u: (0, 2.6, 0), edge_v: (6, 0, 0)),
-        quad(corner: (-3, 0, -3), edge_u: (0, 2.6, 0), edge_v: (0, 0, 6)),
-        quad(corner: (3, 0, -3), edge_u: (0, 0, 6), edge_v: (0, 2.6, 0)),";
+    let [low, high] = ROOM;
     for (selected, [x, y], hangs) in [
         (None, [0.5, 0.15], true),
         (Some("ceiling"), [0.3, 0.2], true),
@@ -87,7 +93,7 @@ fn a_new_area_light_hangs_from_the_ceiling_or_stays_in_the_room() {
         (None, [0.2, 0.9], false),
         (None, [0.95, 0.6], false),
     ] {
-        let mut driver = opened(folder.path(), "eye: (0, 1.4, 2.8), look_at: (0, 1.3, 0), vfov: 70", objects);
+        let mut driver = room(folder.path());
         if let Some(name) = selected {
             driver.select(name);
         }
@@ -100,6 +106,8 @@ fn a_new_area_light_hangs_from_the_ceiling_or_stays_in_the_room() {
         let faces_down = edge_u.cross(edge_v).normalize().y < -0.999;
         assert!(are_inside && edge_u.length() > 0.2, "[{x}, {y}]: {corners:?}");
         assert_eq!(faces_down && corner.y > 2.3, hangs, "[{x}, {y}]: {corners:?}");
+        let is_seen = seen_at(&driver, corner + 0.5 * (edge_u + edge_v));
+        assert_eq!(is_seen, Some(driver.named("area light")), "[{x}, {y}]: {corners:?}");
         let material = driver.get::<MaterialSlots>("area light").0[0];
         let material = &driver.session.world().get::<SurfaceMaterial>(material).unwrap().0;
         let Material::Emissive { radiance: ColorParam::Rgb(radiance) } = material else { panic!("it emits") };
