@@ -96,6 +96,15 @@ const RING_STEPS: usize = 48;
 /// Cosine of the angle between view and axis below which a ring is too narrow to follow the mouse around it: a pixel
 /// across it would be many degrees.
 const EDGE_ON: f64 = 0.35;
+/// Sine of the angle between view and axis below which it points at the viewer: a pixel along it would be far, so it
+/// cannot be grabbed.
+const HEAD_ON: f64 = 0.3;
+/// The same below which movement along it is that of the mouse in the image, because a few pixels further the exact one
+/// would be at the horizon; and the least sine that counts where an axis is chosen by a key.
+const OBLIQUE: f64 = 0.6;
+const LEAST_SINE: f64 = 0.1;
+/// Cosine of the angle between view and normal below which a square is seen too obliquely to be grabbed.
+const GRAZING: f64 = 0.2;
 /// Steps of a snapped drag in degrees.
 const SNAP_DEG: f64 = 15.0;
 
@@ -109,6 +118,7 @@ impl Gizmo {
     /// Everything to draw, the least important first.
     pub fn marks(&self, projector: &Projector) -> Vec<Mark> {
         let mut marks = Vec::new();
+        let Some(view) = projector.towards(self.center) else { return marks };
         let mut add = |handle, filled, points: &mut dyn Iterator<Item = DVec3>| {
             let line: Option<Vec<DVec2>> = points.map(|point| projector.place(point)).collect();
             if let Some(line) = line {
@@ -126,15 +136,17 @@ impl Gizmo {
                     add(Handle::Axis(i), false, &mut (0..=RING_STEPS).map(at));
                 }
                 Mode::Move | Mode::Scale => {
-                    if self.mode == Mode::Move {
+                    if self.mode == Mode::Move && view.dot(self.axes[i]).abs() > GRAZING {
                         let (a, b) = SQUARE;
                         let corner = |s: f64, t: f64| self.center + self.size * (s * u + t * v);
                         let corners = [corner(a, a), corner(b, a), corner(b, b), corner(a, b)];
                         add(Handle::Plane(i), true, &mut corners.into_iter());
                     }
-                    let end = self.center + self.size * self.axes[i];
-                    let start = self.center + 0.12 * self.size * self.axes[i];
-                    add(Handle::Axis(i), false, &mut [start, end].into_iter());
+                    if view.cross(self.axes[i]).length() > HEAD_ON {
+                        let end = self.center + self.size * self.axes[i];
+                        let start = self.center + 0.12 * self.size * self.axes[i];
+                        add(Handle::Axis(i), false, &mut [start, end].into_iter());
+                    }
                 }
             }
         }
@@ -183,7 +195,14 @@ impl Gizmo {
         match (self.mode, handle) {
             (Mode::Move, Handle::Axis(i)) => {
                 let axis = self.axes[i];
-                let by = along(axis, to)? - along(axis, from)?;
+                let sine = view.cross(axis).length();
+                let by = if sine < OBLIQUE {
+                    let next = self.center + 0.01 * self.size * axis;
+                    let way = (projector.place(next)? - projector.place(self.center)?).try_normalize()?;
+                    (to - from).dot(way) * self.size / LENGTH / sine.max(LEAST_SINE)
+                } else {
+                    along(axis, to)? - along(axis, from)?
+                };
                 Some(Drag::Move(step(by, grid) * axis))
             }
             (Mode::Move, Handle::Plane(i)) => {
@@ -282,6 +301,32 @@ mod tests {
             panic!()
         };
         assert!((by - (to - from)).length() < 1e-9, "{by}");
+    }
+
+    /// As in a room, with an axis along the view: its arrow is a dot beside the middle.
+    #[test]
+    fn an_axis_that_points_at_the_viewer_throws_nothing_away() {
+        let seen_from = |eye: DVec3| {
+            let view = View::look_at(eye, DVec3::ZERO, DVec3::Y).unwrap();
+            let projector = Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+            (Gizmo::at(DVec3::ZERO, Mode::Move, DVec3::AXES, &projector).unwrap(), projector)
+        };
+        let (along_z, projector) = seen_from(DVec3::new(0.3, 0.2, 3.0));
+        let handles: Vec<Handle> = along_z.marks(&projector).iter().map(|mark| mark.handle).collect();
+        assert!(!handles.contains(&Handle::Axis(2)) && handles.contains(&Handle::Axis(0)), "{handles:?}");
+        assert!(!handles.contains(&Handle::Plane(1)) && handles.contains(&Handle::Plane(2)), "{handles:?}");
+        // Some 25 degrees from the view, beyond its vanishing point.
+        let (oblique, projector) = seen_from(DVec3::new(1.3, 0.5, 2.6));
+        let middle = projector.place(DVec3::ZERO).unwrap();
+        let way = (projector.place(DVec3::Z * 0.01).unwrap() - middle).normalize();
+        for pixels in [-300.0, -140.0, 5.0, 140.0, 300.0] {
+            let Some(Drag::Move(by)) = oblique.drag(Handle::Axis(2), middle, middle + pixels * way, &projector, false)
+            else {
+                panic!("{pixels} pixels")
+            };
+            let (metres, across) = (by.dot(DVec3::Z), by.cross(DVec3::Z).length());
+            assert!(across == 0.0 && metres * pixels > 0.0 && metres.abs() < 0.02 * pixels.abs(), "{pixels}: {by}");
+        }
     }
 
     #[test]

@@ -43,6 +43,7 @@ mod watch;
 pub(crate) mod worker;
 
 pub use crate::frame::core::denoising::{DenoiseFilter, Denoising};
+pub use crate::frame::core::exposure::usual_exposure;
 pub use crate::frame::core::latency::LatencyHistogram;
 pub use crate::frame::core::offline::{
     OfflineReport, Progress, Target, render_measured_until, render_offline, render_offline_until, render_region_until,

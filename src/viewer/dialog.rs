@@ -81,7 +81,7 @@ impl DialogPurpose {
     }
 
     /// Whether the file becomes a part of the open scene.
-    fn adds(self) -> bool {
+    pub fn adds(self) -> bool {
         !self.saves() && self != Self::Open
     }
 
@@ -131,27 +131,27 @@ pub struct Dialog {
     open: Arc<AtomicBool>,
     sender: Sender<DialogAnswer>,
     receiver: Receiver<DialogAnswer>,
-    /// The folder of what was added to a scene last.
-    added_from: Option<PathBuf>,
+    /// The folders of what was opened and of what was added to a scene last.
+    chosen_from: [Option<PathBuf>; 2],
 }
 
 impl Dialog {
     /// Creates the dialogs; `waker` is called when there is an answer.
     pub fn new(waker: Waker) -> Self {
         let (sender, receiver) = channel();
-        Self { waker, open: Arc::default(), sender, receiver, added_from: None }
+        Self { waker, open: Arc::default(), sender, receiver, chosen_from: [None, None] }
     }
 
-    /// A file was chosen: what is added next probably lies beside it.
+    /// A file was chosen: the next one of its kind probably lies beside it.
     pub fn remember(&mut self, purpose: DialogPurpose, path: &Path) {
-        if purpose.adds() {
-            self.added_from = path.parent().map(Path::to_path_buf);
+        if !purpose.saves() {
+            self.chosen_from[usize::from(purpose.adds())] = path.parent().map(Path::to_path_buf);
         }
     }
 
-    /// The folder of what was added to a scene last, for files that become a part of it.
-    pub fn added_from(&self, purpose: DialogPurpose) -> Option<PathBuf> {
-        self.added_from.clone().filter(|_| purpose.adds())
+    /// The folder of what was opened, or added to a scene, last.
+    pub fn chosen_from(&self, purpose: DialogPurpose) -> Option<PathBuf> {
+        self.chosen_from[usize::from(purpose.adds())].clone().filter(|_| !purpose.saves())
     }
 
     /// Shows a dialog that starts in `folder`; returns false if this system has none.

@@ -1,11 +1,12 @@
 //! The form of "Save image …" and "Render frames …": size, quality, format and place of what is to be rendered.
 
-use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Target, ViewMode, has_left_camera};
+use crate::frame::{DenoiseFilter, Denoising, PictureFormat, Session, Status, Target, ViewMode, has_left_camera};
 use crate::scene::FilmSize;
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::form_preview::FormPreview;
 use crate::viewer::order::Order;
 use crate::viewer::saver::{new_file, new_folder};
+use crate::viewer::status;
 use crate::viewer::time_line::Strip;
 use egui::{
     Align2, Button, ComboBox, Context, DragValue, Grid, Key, Modifiers, RichText, TextureHandle, Ui, Vec2, Window,
@@ -56,6 +57,18 @@ impl Ending {
             Limit::Error => Target { error: Some(self.error / 100.0), ..Target::default() },
             Limit::Samples => Target { spp: Some(self.spp), ..Target::default() },
             Limit::Time => Target { seconds: Some(self.seconds), ..Target::default() },
+        }
+    }
+
+    /// What to expect of a limit of time or of samples.
+    ///
+    /// - `pace`: samples per pixel and second.
+    fn expected(&self, pace: f64) -> Option<String> {
+        match self.limit {
+            Limit::Error => None,
+            Limit::Samples => Some(format!("about {}", status::about(f64::from(self.spp) / pace))),
+            Limit::Time if self.seconds * pace < 1.0 => Some("too short for one sample per pixel".to_owned()),
+            Limit::Time => Some(format!("about {:.0} samples per pixel", self.seconds * pace)),
         }
     }
 
@@ -184,8 +197,8 @@ impl OrderForm {
             }
         };
         // A saved image is no worse than what is seen, unless that has been chosen.
-        let status = session.status();
-        let seen = status.known_denoised_error().or(status.estimated_error).map_or(NOISE, |error| 100.0 * error);
+        let told = session.status();
+        let seen = told.known_denoised_error().or(told.estimated_error).map_or(NOISE, |error| 100.0 * error);
         if !frames && self.is_usual {
             self.of_image.error = (seen.clamp(0.25, NOISE) * 100.0).floor() / 100.0;
         }
@@ -269,7 +282,7 @@ impl OrderForm {
                 ui.allocate_ui_with_layout(room, egui::Layout::centered_and_justified(egui::Direction::TopDown), frame);
                 ui.add_space(4.0);
                 Grid::new("order").num_columns(2).spacing([14.0, 7.0]).show(ui, |ui| {
-                    self.rows(ui, window, &mut wish);
+                    self.rows(ui, window, pace_of(session.status()), &mut wish);
                 });
                 ui.add_space(6.0);
                 if let Some(problem) = &self.problem {
@@ -298,7 +311,8 @@ impl OrderForm {
         wish
     }
 
-    fn rows(&mut self, ui: &mut Ui, window: (u32, u32), wish: &mut Option<Wish>) {
+    /// - `pace`: samples of a pixel per second, if known.
+    fn rows(&mut self, ui: &mut Ui, window: (u32, u32), pace: Option<f64>, wish: &mut Option<Wish>) {
         ui.label("size");
         ui.horizontal(|ui| {
             let before = self.size;
@@ -337,6 +351,12 @@ impl OrderForm {
             self.is_usual &= self.of_image == before;
         });
         ui.end_row();
+        let n_pixels = f64::from(self.size.0) * f64::from(self.size.1);
+        if let Some(expected) = pace.and_then(|pace| self.ending().expected(pace / n_pixels)) {
+            ui.label("");
+            ui.weak(expected);
+            ui.end_row();
+        }
         ui.label("denoised");
         ui.checkbox(&mut self.denoised, "").on_hover_text("filter what noise is left");
         ui.end_row();
@@ -398,6 +418,13 @@ impl OrderForm {
         });
         ui.end_row();
     }
+}
+
+/// Samples of a pixel per second that the window takes, once it has taken some.
+fn pace_of(status: &Status) -> Option<f64> {
+    let n_pixels = f64::from(status.film_width) * f64::from(status.film_height);
+    let pace = n_pixels * f64::from(status.spp) / status.seconds;
+    (status.spp > 0 && pace.is_finite() && pace > 0.0).then_some(pace)
 }
 
 fn as_text((width, height): (u32, u32)) -> String {

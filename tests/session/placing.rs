@@ -261,7 +261,6 @@ fn numbers_turn_an_object_about_its_middle_as_handles_do() {
     let before = middle(&mut driver);
     let set = |property, value| Edit::Set { id, property: Property::Object(property), value };
     driver.edit([set(ObjectProperty::Rotate, DVec3::new(0.0, 0.0, 90.0))]);
-    driver.edit([set(ObjectProperty::Scale, DVec3::splat(3.0))]);
     driver.edit([Edit::Begin, Edit::Turn { axis: DVec3::X, angle_deg: 50.0 }]);
     assert!(middle(&mut driver).abs_diff_eq(before, 1e-12));
     // So the position is what it was, and a saved scene opens with the same placement.
@@ -280,16 +279,46 @@ fn numbers_turn_an_object_about_its_middle_as_handles_do() {
     assert_eq!(again.get::<Placement>("model"), turned);
 }
 
+/// Height of the lowest point of the model.
+fn lowest(driver: &Driver) -> f64 {
+    let Shape::Mesh(mesh) = driver.get::<Shape>("model") else { panic!("a mesh") };
+    let world = driver.get::<Placement>("model").affine();
+    let points = mesh.positions.iter().map(|point| world.transform_point3(mesh.center + point.as_dvec3()).y);
+    points.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn what_is_scaled_stays_standing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 1.0);
+    let id = driver.select("model");
+    let set = |property, value| Edit::Set { id, property: Property::Object(property), value };
+    // Leaning, where neither its box nor its origin is on the ground.
+    driver.edit([set(ObjectProperty::Rotate, DVec3::new(20.0, 30.0, 40.0))]);
+    let before = lowest(&driver);
+    for edit in [
+        set(ObjectProperty::Scale, DVec3::splat(3.0)),
+        set(ObjectProperty::Scale, DVec3::new(0.5, 2.0, 1.0)),
+        Edit::Scale { factors: DVec3::splat(0.3) },
+        Edit::Scale { factors: DVec3::new(1.0, 4.0, 1.0) },
+    ] {
+        let middle = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
+        driver.edit([Edit::Begin, edit, Edit::End]);
+        let moved = driver.session.box_of(Entity::from_bits(id)).unwrap().middle() - middle;
+        assert!((lowest(&driver) - before).abs() < 1e-9, "{} was {before}", lowest(&driver));
+        assert!(moved.with_y(0.0).length() < 1e-9 && moved.y.abs() > 0.01, "{moved}");
+    }
+}
+
 #[test]
 fn between_its_keys_an_object_turns_about_its_middle() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = model(folder.path(), 1.0);
     let id = driver.select("model");
-    let before = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
-    let key = Edit::SetKeys { camera: false };
     let [rotate, scale] = [ObjectProperty::Rotate, ObjectProperty::Scale].map(Property::Object);
     driver.edit([Edit::Set { id, property: scale, value: DVec3::splat(0.5) }]);
-    assert_eq!(driver.session.box_of(Entity::from_bits(id)).unwrap().middle(), before);
+    let before = driver.session.box_of(Entity::from_bits(id)).unwrap().middle();
+    let key = Edit::SetKeys { camera: false };
     driver.edit([key.clone()]);
     driver.session.send(Command::SetMoment { seconds: Some(2.0) });
     driver.settle();
@@ -308,12 +337,7 @@ fn what_lies_is_turned_upright_and_stands_on_the_ground() {
     let mut driver = model(folder.path(), 1.0);
     let id = driver.select("model");
     let ground = driver.get::<Placement>("ground").translation.y;
-    let lowest = |driver: &Driver| {
-        let Shape::Mesh(mesh) = driver.get::<Shape>("model") else { panic!("a mesh") };
-        let world = driver.get::<Placement>("model").affine();
-        let points = mesh.positions.iter().map(|point| world.transform_point3(mesh.center + point.as_dvec3()).y);
-        points.fold(f64::INFINITY, f64::min) - ground
-    };
+    let lowest = |driver: &Driver| lowest(driver) - ground;
     let before: Placement = driver.get("model");
     driver.edit([Edit::Move { by: DVec3::new(0.5, 3.0, 0.0) }, Edit::StandOnGround]);
     assert!(lowest(&driver) > 0.0 && lowest(&driver) < 1e-3, "{}", lowest(&driver));

@@ -97,10 +97,10 @@ fn an_object_is_selected_dressed_copied_deleted_and_saved_by_mouse() {
     };
     let [focus, copy, delete, material] = [1, 5, 6, 13];
     let undo = || click(&program, 1, (75, HEIGHT - 13));
-    // Gold, the first of the ready materials: their menu ends beside its line.
+    // Gold, the first of the ready materials: their menu ends at the lower edge of the window.
     open(&program, 3, ball, frame);
     open(&program, 1, place(material), (620, 128));
-    choose(&program, (555, 32), frame);
+    choose(&program, (595, 54), frame);
     title_is(&program, "*room.ron");
     here(focus);
     let file = saved(&program, &path);

@@ -36,4 +36,5 @@ pub use error::{ModelError, ModelProblem, Place};
 pub use firstlight_files::reference::Outside;
 pub use firstlight_format::model_format::ModelFormat;
 pub use load_model::load_model;
+pub use model::cie::color_of_temperature;
 pub use model::imported::{ImportedModel, ModelNormals, ModelOptions};

@@ -161,8 +161,8 @@ pub enum Edit {
         /// Counter-clockwise about the axis, degrees.
         angle_deg: f64,
     },
-    /// Scale the selection about the centre of the active entity: along its own axes if it is single, uniformly for
-    /// several entities or a sphere.
+    /// Scale the selection about the centre of the active entity, its lowest point kept at its height: along its own axes
+    /// if it is single, uniformly for several entities or a sphere.
     Scale {
         /// Factor per axis, above 0; 1 keeps the size.
         factors: DVec3,

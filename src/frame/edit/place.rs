@@ -6,7 +6,7 @@
 use crate::format::placement::tidy_degrees;
 use crate::frame::state::history::History;
 use crate::frame::state::selection::{OwnBox, Selection, box_of};
-use crate::scene::{Animation, Linear, Placement, Shape};
+use crate::scene::{Animation, Linear, Placement, Shape, lowest_point};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DQuat, DVec3, EulerRot};
 
@@ -42,10 +42,16 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let is_alone = before.len() == 1;
     let own_box = box_of(world, active).map(|own| OwnBox { world_from_box: last.affine(), ..own });
     let change = change(own_box.map_or(last.translation, |own| own.middle()));
-    for (entity, placement) in before {
+    let mut after = Vec::new();
+    for (entity, placement) in &before {
         let turns = is_alone && !matches!(change, Change::Move(_));
-        let placement = if turns { about_middle(world, entity, &placement) } else { placement };
-        let changed = changed(&placement, &change, evenly);
+        let placement = if turns { about_middle(world, *entity, placement) } else { *placement };
+        after.push((*entity, changed(&placement, &change, evenly)));
+    }
+    if matches!(change, Change::Scale { .. }) {
+        stay_standing(world, &before, &mut after);
+    }
+    for (entity, changed) in after {
         // Compared first: a mutable borrow alone would mark a change. What no scene file could have stays as it was.
         if changed.check().is_ok() && world.get::<Placement>(entity) != Some(&changed) {
             world.entity_mut(entity).insert(changed);
@@ -53,16 +59,31 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     }
 }
 
+/// Moves what was scaled up or down, so that its lowest point stays where it was: what stands on a table stays there.
+pub fn stay_standing(world: &World, before: &[(Entity, Placement)], after: &mut [(Entity, Placement)]) {
+    let lowest = |placed: &[(Entity, Placement)]| {
+        let low = |(entity, placement): &(Entity, Placement)| lowest_point(world.get(*entity)?, placement);
+        placed.iter().filter_map(low).min_by(f64::total_cmp)
+    };
+    if let (Some(was), Some(is)) = (lowest(before), lowest(after)) {
+        after.iter_mut().for_each(|(_, placement)| placement.translation.y += was - is);
+    }
+}
+
 /// The same placement, with the middle of the object as its pivot, unless keys have its position.
 pub fn about_middle(world: &mut World, entity: Entity, placement: &Placement) -> Placement {
-    let has_keys = |animation: &Animation| animation.tracks.iter().any(|track| track.channel.entity() == Some(entity));
-    let is_moved = world.get_resource::<Animation>().is_some_and(has_keys);
     match box_of(world, entity) {
-        Some(own) if !is_moved && matches!(placement.linear, Linear::Turned { .. }) => {
+        Some(own) if !is_moved_by_keys(world, entity) && matches!(placement.linear, Linear::Turned { .. }) => {
             placement.with_pivot(0.5 * own.min + 0.5 * own.max)
         }
         _ => *placement,
     }
+}
+
+/// Whether the entity has keys.
+pub fn is_moved_by_keys(world: &World, entity: Entity) -> bool {
+    let has_keys = |animation: &Animation| animation.tracks.iter().any(|track| track.channel.entity() == Some(entity));
+    world.get_resource::<Animation>().is_some_and(has_keys)
 }
 
 /// Returns the changed placement; with `evenly`, scales by the factor that differs most from 1.

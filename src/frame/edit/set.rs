@@ -2,7 +2,7 @@
 //! [`crate::frame::edit::keys`].
 
 use crate::format::bounds::check_size;
-use crate::frame::edit::place::about_middle;
+use crate::frame::edit::place::{about_middle, is_moved_by_keys, stay_standing};
 use crate::frame::edit::property::Property;
 use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
@@ -35,7 +35,11 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             }
             // As its handles do.
             let old = if property == ObjectProperty::Translate { old } else { about_middle(world, entity, &old) };
-            let placement = property.set(old, value);
+            let mut placed = [(entity, property.set(old, value))];
+            if property == ObjectProperty::Scale && !is_moved_by_keys(world, entity) {
+                stay_standing(world, &[(entity, old)], &mut placed);
+            }
+            let [(_, placement)] = placed;
             placement.check()?;
             set_if_different(world, entity, placement);
         }

@@ -32,6 +32,8 @@ pub struct ObjectEntry {
     pub label: String,
     /// Kind of its shape, as in [`Shape::kind`], or of the light, as in [`LightKind::name`](crate::format::light::LightKind::name).
     pub kind: &'static str,
+    /// The name of its material, if it has a single one: it tells what `Mesh018` is.
+    pub material: Option<String>,
 }
 
 /// An entry of the list of materials.
@@ -82,13 +84,17 @@ impl Inventory {
                     lights.push(LightEntry { entity, label, kind, material: Some(material) });
                 }
             }
-            objects.push(ObjectEntry { entity: object.entity, label, kind });
+            let material = match object.slots[..] {
+                [slot] => world.get::<Name>(slot).and_then(|name| shown(&Some(name.to_string()))),
+                _ => None,
+            };
+            objects.push(ObjectEntry { entity: object.entity, label, kind, material });
         }
         for (i, light) in inputs.lights.iter().enumerate() {
             let (entity, kind) = (light.entity, light.light.name());
             let label = shown(&light.name).unwrap_or_else(|| format!("{kind} {i}"));
             lights.push(LightEntry { entity, label: label.clone(), kind, material: None });
-            objects.push(ObjectEntry { entity, label, kind });
+            objects.push(ObjectEntry { entity, label, kind, material: None });
         }
         let labels: BTreeMap<Entity, &str> = objects.iter().map(|entry| (entry.entity, entry.label.as_str())).collect();
         let mut blends: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();

@@ -183,6 +183,7 @@ impl App {
                 commands.into_iter().for_each(|command| self.session.send(command));
                 self.toasts.end(LEFT);
             }
+            Action::AutoExposure => self.set_exposure(now),
             Action::Explain => self.session.send(Command::ExplainAt { x, y }),
             Action::FocusHere => {
                 self.session.send(Command::FocusAt { x, y });
@@ -351,7 +352,9 @@ impl App {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
         // A file name alone is in the folder in which the program runs.
         let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
-        let folder = self.dialog.added_from(purpose).or(folder).or_else(|| self.memory.last_folder());
+        let chosen = self.dialog.chosen_from(purpose);
+        let folder = if purpose.adds() { chosen.or(folder) } else { folder.or(chosen) };
+        let folder = folder.or_else(|| self.memory.last_folder());
         let folder = folder.unwrap_or_else(|| self.options.folder.clone());
         match self.dialog.ask(purpose, &folder) {
             Ok(true) => {}

@@ -13,12 +13,14 @@
 //! | `events` | window events |
 //! | `draw` | drawing of the image and the overlays |
 //! | `act` | actions of keys and of the panel |
+//! | `brightness` | the exposure by the brightness of the image |
 //! | `grabbing` | changes of the selection that follow the mouse |
 //! | `orders` | images and frames that are rendered to files |
 //! | `leave` | unsaved edits: questions, storage, recovery |
 //! | `memory` | state kept between runs |
 
 mod act;
+mod brightness;
 mod draw;
 mod events;
 mod grabbing;
@@ -34,6 +36,7 @@ use crate::frame::{
     Command, Explaining, Focus, FocusTarget, Picture, Projector, Session, SessionOptions, Status, Target, Waker,
 };
 use crate::render::{ErrorMetric, Inspection, SampleAllocation};
+use crate::scene::EnvironmentSource;
 use crate::viewer::app::leaving::Leaving;
 use crate::viewer::app::memory::Memory;
 use crate::viewer::app::options::{ViewerError, ViewerOptions, size_to_keep};
@@ -61,6 +64,7 @@ use crate::viewer::time_line::Strip;
 use crate::viewer::toasts::{Toasts, Tone};
 use bevy_ecs::prelude::Entity;
 use glam::DVec2;
+use std::mem::Discriminant;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -168,6 +172,8 @@ struct App {
     /// A scene was opened, and whether its camera begins in a room is not known yet.
     asks_for_room: bool,
     last_draw: Option<Instant>,
+    /// The scene, and the kind of its environment, of which the brightness was judged last.
+    judged: Option<(u64, Discriminant<EnvironmentSource>)>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
     /// When the overlays are to be repainted.
@@ -270,6 +276,7 @@ impl App {
             loading_since: None,
             last_tick: None,
             last_draw: None,
+            judged: None,
             wake_at: None,
             repaint_at: None,
             failure: None,

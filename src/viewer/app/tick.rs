@@ -100,6 +100,7 @@ impl App {
             self.report_saved(saved);
         }
         self.keep_thumbnail(false);
+        self.follow_brightness(now);
         self.follow_renders(now);
         self.follow_outlines(now);
         self.tell_selection(now);

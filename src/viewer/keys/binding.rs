@@ -123,6 +123,8 @@ pub enum Action {
     ReturnTo(Box<LeftView>),
     /// Toggles between this inspection and the image.
     Inspect(Inspection),
+    /// Sets the exposure by the brightness of the image.
+    AutoExposure,
     /// Explains the pixel under the mouse.
     Explain,
     /// Focuses on what is under the mouse, and moves the pivot there.

@@ -63,7 +63,7 @@ pub const EDIT: KeyGroup = KeyGroup {
         ),
         row!(
             "put the selection on what is below its middle: a table, or the floor",
-            edit_item("Stand on the ground", &[Menu::Edit, Menu::Here], Edit::StandOnGround)
+            edit_item("Drop onto what is below", &[Menu::Edit, Menu::Here], Edit::StandOnGround)
         ),
         row!(
             "turn the selection upright, if its up is Z, and put it on what is below",

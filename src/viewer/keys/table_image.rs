@@ -55,6 +55,10 @@ pub const IMAGE: KeyGroup = KeyGroup {
             send_item("Darker", &[Menu::Image], Command::AdjustExposure { stops: -EXPOSURE_STEP })
         ),
         row!(
+            "set the exposure by the brightness of the image, so that half of it is darker than a medium grey",
+            item("Set the exposure automatically", &[Menu::Image], Action::AutoExposure)
+        ),
+        row!(
             "next tone curve",
             send("m", Command::NextToneCurve),
             send_item("Next tone curve", &[Menu::Image], Command::NextToneCurve)

@@ -13,11 +13,12 @@ use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::list::{Listed, Which, list};
 use crate::viewer::panel::selected::property_row;
 use crate::viewer::panel::state::{Asked, PanelState};
+use crate::viewer::panel::sun::{DAYS, SunPlace, SunTime, TILT, date_of, date_text, hour_of, hour_text};
 use crate::viewer::panel::widgets::{
     RADIANCE, color, number, row, row_with_hint, rows, selectable, short_color, strength_drag,
 };
 use bevy_ecs::prelude::Entity;
-use egui::{RichText, Ui};
+use egui::{DragValue, RichText, Ui};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 
@@ -122,6 +123,49 @@ fn color_row(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: 
     });
 }
 
+/// The rows of a clear sky that set its sun by the time.
+fn sun_rows(ui: &mut Ui, place: &mut SunPlace, sky: &EnvironmentSource, asked: &mut Asked) {
+    let (Some(elevation), Some(azimuth)) = (SkyProperty::Elevation.get(sky), SkyProperty::Azimuth.get(sky)) else {
+        return;
+    };
+    let now = SunTime::of([elevation, azimuth], place.latitude);
+    let mut new = now;
+    row(ui, "time of day", |ui| {
+        let half = now.half_day(place.latitude);
+        // Clamped by the field, it would be an edit that nobody made.
+        let mut hour = now.hour.clamp(12.0 - half, 12.0 + half);
+        let drag = DragValue::new(&mut hour).speed(0.02).range(12.0 - half..=12.0 + half);
+        let drag = drag.custom_formatter(|hour, _| hour_text(hour)).custom_parser(hour_of);
+        if ui.add(drag.update_while_editing(false)).changed() {
+            new.hour = hour;
+        }
+    });
+    row(ui, "date", |ui| {
+        let mut day = place.day_of(now.declination).clamp(1.0, DAYS);
+        let drag = DragValue::new(&mut day).speed(0.5).range(1.0..=DAYS).max_decimals(0);
+        let drag = drag.custom_formatter(|day, _| date_text(day)).custom_parser(date_of);
+        if ui.add(drag.update_while_editing(false)).changed() {
+            new.declination = place.go_to(day);
+        }
+    });
+    let mut latitude = place.latitude;
+    row(ui, "latitude", |ui| {
+        latitude = number(ui, latitude, 0.2, -89.0..=89.0, "°").unwrap_or(latitude);
+    });
+    if new == now && latitude == place.latitude {
+        return;
+    }
+    place.latitude = latitude;
+    // A sun that was set by its angles may be where it never is.
+    new.declination = new.declination.clamp(-TILT, TILT);
+    let half = new.half_day(latitude);
+    new.hour = new.hour.clamp(12.0 - half, 12.0 + half);
+    let [elevation, azimuth] = new.direction(latitude);
+    for (property, value) in [(SkyProperty::Elevation, elevation.max(0.0)), (SkyProperty::Azimuth, azimuth)] {
+        asked.edit(Edit::Set { id: 0, property: Property::ClearSky(property), value: DVec3::splat(value) });
+    }
+}
+
 /// Strength of a clear sky with which white in full sun is the white of the display.
 const IN_THE_SUN: f64 = 2.0;
 
@@ -131,7 +175,7 @@ fn azimuth_of(direction: DVec3) -> f64 {
 }
 
 /// The colours of the environment one by one, or its image.
-pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+pub fn sky(ui: &mut Ui, sun: &mut SunPlace, session: &Session, asked: &mut Asked) {
     let environment = &session.inputs().environment;
     rows(ui, "sky", |ui| match &environment.light {
         Environment::Black => one_color(ui, asked, "radiance", Vec3::ZERO, Property::Sky),
@@ -147,6 +191,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                     let value = property.get(&environment.part).map(DVec3::splat);
                     property_row(ui, 0, Property::ClearSky(*property), property.info(), value, asked);
                 }
+                sun_rows(ui, sun, &environment.part, asked);
                 strength_row(ui, asked, *scale);
                 return color_row(ui, asked, "ground", ground.0, Property::Ground, None);
             }

@@ -9,7 +9,7 @@ use egui::{CursorIcon, Pos2, Rect, Sense, Ui, Vec2, vec2};
 
 /// An item that a list can show.
 pub trait Listed {
-    /// Its entity, its label, and its kind, which is searched as well.
+    /// Its entity, its label, and its material or kind, which is searched as well.
     fn listed(&self) -> (Entity, &str, &str);
 }
 

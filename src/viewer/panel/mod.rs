@@ -16,7 +16,8 @@
 //! | `statistics`, `messages` | figures; what was said |
 //! | `sections` | their titles |
 //! | `state` | what it remembers, shows and asks for |
-//! | `list`, `swatch`, `widgets`, `hints` | building blocks |
+//! | `sun` | the sun by the time of day |
+//! | `list`, `swatch`, `temperature`, `widgets`, `hints` | building blocks |
 
 mod animation;
 mod camera;
@@ -34,7 +35,9 @@ mod sections;
 mod selected;
 mod state;
 mod statistics;
+mod sun;
 mod swatch;
+mod temperature;
 mod texture;
 mod widgets;
 
@@ -92,10 +95,10 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             let [.., objects, materials, lights, sky, open, statistics, messages] = SECTIONS;
             section(ui, objects, true, &mut |ui| scene::objects(ui, state, session, asked));
             section(ui, materials, false, &mut |ui| materials::materials(ui, state, session, asked));
-            section(ui, lights, false, &mut |ui| lights::lights(ui, state, session, asked));
-            section(ui, sky, false, &mut |ui| lights::sky(ui, session, asked));
+            section(ui, lights, true, &mut |ui| lights::lights(ui, state, session, asked));
+            section(ui, sky, true, &mut |ui| lights::sky(ui, &mut state.sun, session, asked));
             section(ui, open, false, &mut |ui| scene::open(ui, session, around, asked));
-            section(ui, statistics, true, &mut |ui| statistics::statistics(ui, session, around));
+            section(ui, statistics, false, &mut |ui| statistics::statistics(ui, session, around));
             section(ui, messages, true, &mut |ui| messages::messages(ui, session));
             state.open = open_now;
         });

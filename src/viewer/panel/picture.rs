@@ -140,9 +140,15 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let display = session.status().display;
     rows(ui, "display", |ui| {
         row(ui, "exposure", |ui| {
-            if let Some(stops) = slider(ui, f64::from(display.exposure_stops), -8.0..=8.0, false) {
-                asked.send(Command::SetExposure { stops: stops as f32 });
-            }
+            ui.horizontal(|ui| {
+                ui.spacing_mut().slider_width = 84.0;
+                if let Some(stops) = slider(ui, f64::from(display.exposure_stops), -8.0..=8.0, false) {
+                    asked.send(Command::SetExposure { stops: stops as f32 });
+                }
+                if ui.button("auto").on_hover_text("by the brightness of the image").clicked() {
+                    asked.action = Some(Action::AutoExposure);
+                }
+            });
         });
         row(ui, "tone curve", |ui| {
             ui.horizontal(|ui| {

@@ -13,7 +13,7 @@ use egui::Ui;
 
 impl Listed for ObjectEntry {
     fn listed(&self) -> (Entity, &str, &str) {
-        (self.entity, &self.label, self.kind)
+        (self.entity, &self.label, self.material.as_deref().unwrap_or(self.kind))
     }
 }
 

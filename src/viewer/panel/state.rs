@@ -8,6 +8,7 @@ use crate::viewer::keys::Action;
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::list::ListState;
 use crate::viewer::panel::sections::SECTIONS;
+use crate::viewer::panel::sun::SunPlace;
 use crate::viewer::previews::Previews;
 use crate::viewer::reaction::Reaction;
 use bevy_ecs::prelude::Entity;
@@ -35,6 +36,7 @@ pub struct PanelState {
     pub object_list: ListState,
     pub material_list: ListState,
     pub light_list: ListState,
+    pub sun: SunPlace,
     pub previews: Previews,
     /// The material whose editor is open in the list.
     pub material: Option<Entity>,

@@ -9,6 +9,7 @@ use crate::scene::Hidden;
 use crate::viewer::panel::hints::hint_of;
 use crate::viewer::panel::list::Listed;
 use crate::viewer::panel::state::Asked;
+use crate::viewer::panel::temperature::kelvins;
 use crate::viewer::status;
 use bevy_ecs::prelude::World;
 use egui::text::{CCursor, CCursorRange};
@@ -206,7 +207,12 @@ fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> O
         true => ui.horizontal(|ui| pick(ui).or(hex_field(ui, hue))).inner,
         false => pick(ui),
     };
-    let new_strength = unit.and_then(|unit| strength_drag(ui, f64::from(strength), unit));
+    let strength_of = |ui: &mut Ui| unit.and_then(|unit| strength_drag(ui, f64::from(strength), unit));
+    let (new_strength, of_light) = match unit {
+        Some(_) if has_code => ui.horizontal(|ui| (strength_of(ui), kelvins(ui, hue))).inner,
+        _ => (strength_of(ui), None),
+    };
+    let new_hue = new_hue.or(of_light);
     if new_hue.is_none() && new_strength.is_none() {
         return None;
     }
@@ -334,6 +340,12 @@ mod tests {
     #[test]
     fn numbers_have_about_four_digits() {
         assert_eq!([32.9123, 6.2776, 0.134, 1234.5, 120.0, -45.25].map(decimals), [2, 3, 4, 0, 1, 2]);
+    }
+
+    /// It fails an assertion of emath, which the profile for development leaves out.
+    #[test]
+    fn a_drag_across_a_power_of_ten_is_no_fault() {
+        let _ = egui::emath::smart_aim::best_in_range_f64(9.9, 9.999_999_999_999_996);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Source: <https://mitsuba.readthedocs.io/en/stable/src/generated/plugins_spectra.html>
 
 use crate::mitsuba::graph::Spectrum;
-use crate::model::cie::{daylight, rgb_of_xyz, xyz_of};
+use crate::model::cie::{GREEN, daylight, planck, rgb_of_xyz, xyz_of};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_format::error::SceneError;
 use glam::DVec3;
@@ -65,10 +65,9 @@ pub(crate) fn read_file(path: &Path) -> Result<Spectrum, SceneError> {
 
 /// Planck's law, W·m⁻²·sr⁻¹·nm⁻¹.
 pub(crate) fn blackbody(kelvin: f64) -> Spectrum {
-    /// First and second radiation constants with wavelengths in nm.
+    /// First radiation constant, with the wavelength of [`planck`]'s unit in nm.
     const C1: f64 = 1.191_042_972e20;
-    const C2: f64 = 1.438_776_877e7;
-    let radiance = |nm: f64| C1 / nm.powi(5) / ((C2 / (nm * kelvin)).exp() - 1.0);
+    let radiance = |nm: f64| C1 / GREEN.powi(5) * planck(nm, kelvin);
     Spectrum::Sampled((360..=830).map(f64::from).map(|nm| (nm, radiance(nm))).collect())
 }
 

@@ -40,6 +40,25 @@ pub(crate) fn rgb_of_xyz(DVec3 { x, y, z }: DVec3) -> DVec3 {
     )
 }
 
+/// The wavelength that [`planck`] is relative to, nm.
+pub(crate) const GREEN: f64 = 555.0;
+
+/// Spectral radiance of a black body (Planck's law) at a wavelength in nm, without the first radiation constant, which
+/// keeps the numbers in range.
+pub(crate) fn planck(nm: f64, kelvins: f64) -> f64 {
+    /// Second radiation constant, nm·K (CODATA 2018).
+    const C2: f64 = 1.438_776_877e7;
+    (GREEN / nm).powi(5) / (C2 / (nm * kelvins)).exp_m1()
+}
+
+/// Linear Rec. 709 of a black body, the largest channel 1: the colour of a light.
+///
+/// - `kelvins`: at least 500.
+pub fn color_of_temperature(kelvins: f64) -> DVec3 {
+    let rgb = rgb_of_xyz(xyz_of(|nm| planck(nm, kelvins))).max(DVec3::ZERO);
+    rgb / rgb.max_element()
+}
+
 /// x̄, ȳ, z̄, D65.
 #[rustfmt::skip]
 const TABLE: [[f64; 4]; 95] = [

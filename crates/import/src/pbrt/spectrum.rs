@@ -5,7 +5,7 @@
 //! `blackbody L 6500` and `spectrum L "stdillum-D65"` all have luminance 1; and its film (`sensor "cie1931"`) shows
 //! luminance 1 as 1.
 
-use crate::model::cie::{daylight, rgb_of_xyz, xyz_of};
+use crate::model::cie::{daylight, planck, rgb_of_xyz, xyz_of};
 use crate::pbrt::named_spectra::{conductor_data, glass_data};
 use glam::DVec3;
 
@@ -139,15 +139,6 @@ fn albedo_of(reflectance: impl Fn(f64) -> f64) -> DVec3 {
 fn light_of(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     let xyz = xyz_of(spectrum);
     if xyz.y > 0.0 { rgb_of_xyz(xyz / xyz.y).max(DVec3::ZERO) } else { DVec3::ZERO }
-}
-
-/// Spectral radiance of a black body, in any unit (Planck's law).
-fn planck(nm: f64, kelvins: f64) -> f64 {
-    /// Second radiation constant, nm·K (CODATA 2018).
-    const C2: f64 = 1.438_776_877e7;
-    /// Keeps the numbers in range; the unit does not matter.
-    const GREEN: f64 = 555.0;
-    (GREEN / nm).powi(5) / (C2 / (nm * kelvins)).exp_m1()
 }
 
 /// Luminance of a black body whose spectrum has a peak of 1, beside one that is 1 everywhere.
