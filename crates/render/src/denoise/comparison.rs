@@ -5,6 +5,11 @@
 //! is far above the deviation that such a mean has. Else grains of noise would remain wherever it is large at random:
 //! without samples that show a bias, blur is better.
 //!
+//! The variance may be too small by all that samples that are spread evenly gain, which is known for the whole image only.
+//! The product of the differences of two neighbouring pixels does not depend on it: their noise is independent, and their
+//! bias is not. So a bias that neighbours share in some direction, as along an edge, is found by such pairs, and one of
+//! single pixels once it is several times larger than that gain.
+//!
 //! A pixel that has a bright sample in both halves at random looks like detail: its variance is small, and its difference
 //! large. By how much pixels scatter at random follows from the variances around. For significance no pixel counts for
 //! much more than that: what only one of them shows is noise.
@@ -20,9 +25,13 @@ const SIGNIFICANCE: f32 = 3.0;
 
 /// Mean square of what the squared difference exceeds the variance by, over that of the variance, for normal noise.
 const SQUARE_OF_EXCESS: f32 = 4.0 / 3.0;
-/// How much of what samples that are spread evenly gain may not be there, relative to the variance: it is known for the
-/// whole image only, and little where few samples are bright.
-const UNCERTAIN_GAIN: f32 = 0.5;
+/// How many times as large as the gain of samples that are spread evenly a bias must be to be found without pairs.
+const UNCERTAIN_GAIN: f32 = 4.0;
+/// Directions of pairs, columns and rows.
+const DIRECTIONS: [[isize; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
+/// Standard deviation of the mean product of pairs in one direction, relative to that of squared differences: that of a
+/// square of normal noise is 4/3 in three channels, and that of a product 1.
+const DEVIATION_OF_PAIRS: f32 = 0.9;
 /// What the excess of one pixel counts for significance, at most: multiples of the root mean square of the variances
 /// around, but at least this square of a level.
 const LARGEST_EXCESS: f32 = 4.0;
@@ -59,13 +68,19 @@ impl Comparison {
         let squares_around = pooled.wide(&|i| weight[i].dot(noise.variance[i]).powi(2), stop)?;
         let scatter = each(n, stop, |i| squares_around[i].max(0.0).sqrt())?;
         let off = |i: usize| filtered.color[i] - input.color[i];
+        let usual_off = each(n, stop, |i| off(i) + noise.excess[i])?;
         let own_of_all = each(n, stop, |i| excess_of(off(i), noise.variance[i], i))?;
-        let own_of_usual = each(n, stop, |i| excess_of(off(i) + noise.excess[i], noise.usual(i), i))?;
+        let own_of_usual = each(n, stop, |i| excess_of(usual_off[i], noise.usual(i), i))?;
         let of_all = narrow(&|i| own_of_all[i])?;
         let of_usual = narrow(&|i| own_of_usual[i])?;
         let limit = |own: f32, i: usize| own.min((LARGEST_EXCESS * scatter[i]).max(LEAST_LIMIT));
         let limited_of_all = narrow(&|i| limit(own_of_all[i], i))?;
         let limited_of_usual = narrow(&|i| limit(own_of_usual[i], i))?;
+        let of_pairs = |direction: &[isize; 2]| {
+            let product = |i: usize| usual_off[i] * mean_beside(&usual_off, input.width, i, *direction);
+            narrow(&|i| limit(weight[i].dot(product(i) + filtered.covariance[i]), i))
+        };
+        let of_pairs = DIRECTIONS.iter().map(of_pairs).collect::<Option<Vec<_>>>()?;
         let squares = pooled.mean(&|i| weight[i].dot(noise.usual(i)).powi(2), stop)?;
         let variance = pooled.wide(&|i| weight[i].dot(noise.variance[i]), stop)?;
         let uncertainty = VARIANCE_UNCERTAINTY.max(UNCERTAIN_GAIN * (noise.independent - 1.0));
@@ -76,7 +91,10 @@ impl Comparison {
             let deviation = SIGNIFICANCE * (square / n_averaged(RADIUS)).sqrt();
             let limited = limited_of_all[i].min(limited_of_usual[i]).max(0.0);
             let doubt = 1.0 + DOUBT * noise.doubt[i];
-            let ratio = limited / (doubt * deviation.hypot(uncertainty * variance[i])).max(1e-30);
+            let of_squares = limited / deviation.hypot(uncertainty * variance[i]).max(1e-30);
+            let most = of_pairs.iter().map(|of_direction| of_direction[i]).fold(0.0, f32::max);
+            let of_pairs = most / (DEVIATION_OF_PAIRS * deviation).max(1e-30);
+            let ratio = of_squares.max(of_pairs) / doubt;
             excess - excess / (1.0 + ratio.powi(4))
         })?;
         Some(Self {
@@ -86,6 +104,20 @@ impl Comparison {
             variance,
             bias,
         })
+    }
+}
+
+/// Returns the mean of the values on either side of a pixel in a direction; zero if neither is in the image.
+fn mean_beside(values: &[Vec3], width: usize, i: usize, [columns, rows]: [isize; 2]) -> Vec3 {
+    let (x, y) = ((i % width) as isize, (i / width) as isize);
+    let at = |sign: isize| {
+        let (x, y) = (x + sign * columns, y + sign * rows);
+        let is_inside = (0..width as isize).contains(&x) && y >= 0;
+        is_inside.then(|| values.get(y as usize * width + x as usize).copied()).flatten()
+    };
+    match (at(-1), at(1)) {
+        (Some(before), Some(after)) => 0.5 * (before + after),
+        (one, other) => one.or(other).unwrap_or(Vec3::ZERO),
     }
 }
 

@@ -191,6 +191,23 @@ mod tests {
         assert!(left < 0.25 * raw, "{left} of {raw}");
     }
 
+    /// As on a surface that gains nothing from evenly spread samples, where the rest of the image does.
+    #[test]
+    fn a_gain_that_is_not_there_leaves_no_grains_and_hides_no_edge() {
+        let without_gain = |scene: &Scene, spp: u32| {
+            let mut rendered = scene.render(spp, 0.4);
+            rendered.halves.calibration = 0.3;
+            let found = scene.denoise(&rendered, true);
+            scene.relative_mse(&found.color) / scene.relative_mse(&rendered.color)
+        };
+        for spp in [4, 16, 64] {
+            let [even, edge] = [&floor(), &shadow()].map(|scene| without_gain(scene, spp));
+            assert!(even < 0.2 && edge < 0.5, "{spp} samples: {even}, {edge} of the raw error");
+        }
+        let edge = without_gain(&shadow(), 4096);
+        assert!(edge < 1.2, "{edge} of the raw error");
+    }
+
     #[test]
     fn the_edge_of_a_shadow_stays_where_it_is() {
         let scene = shadow();
