@@ -35,7 +35,7 @@ use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::LightTexture;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -207,12 +207,15 @@ impl<'a> Writer<'a> {
         let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
         let sources: HashMap<&str, &TextureSource> =
             known.textures.iter().map(|(name, source, _)| (name.as_str(), source)).collect();
-        let could_be_had = |name: &str| match sources.get(name) {
-            Some(TextureSource::Image { file, .. }) => loaded.pictures.contains_key(file),
-            source => source.is_some(),
+        let lost = |name: &str| match sources.get(name) {
+            Some(source @ TextureSource::Image { file, .. }) => {
+                (!loaded.pictures.contains_key(file)).then(|| source.factor())
+            }
+            Some(_) => None,
+            None => Some(Vec3::ONE),
         };
         let same = |written: &MaterialPart, now: &Material| {
-            without_lost_textures(written, could_be_had) == now.map(&mut ByTextureName(&sources))
+            without_lost_textures(written, lost) == now.map(&mut ByTextureName(&sources))
         };
         known.slots.len() == slots.len()
             && known.slots.iter().zip(slots).all(|((name, part), slot)| {

@@ -46,7 +46,7 @@ impl ReadyMaterial {
                 let texture = SurfaceTexture { name: name.clone(), part: part.clone(), texture };
                 textures.insert(name.as_str(), Arc::new(texture));
             }
-            material(&self.part, &textures, &HashMap::new())
+            material(&self.part, &textures, &HashMap::new(), &HashMap::new())
         })
     }
 }

@@ -15,7 +15,8 @@ use crate::render::ImageTexture;
 use crate::scene::load::LoadOptions;
 use crate::scene::load_stage::LoadStage;
 use crate::scene::loaded::LoadedScene;
-use std::collections::HashSet;
+use glam::Vec3;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 /// Bytes per pixel of an environment, to be sampled.
@@ -117,10 +118,13 @@ impl LoadedScene {
         if !file.textures.iter().any(|(_, source)| is_lost(source)) {
             return;
         }
+        let gone = file.textures.iter().filter(|(_, source)| is_lost(source));
+        let gone: HashMap<String, Vec3> = gone.map(|(name, source)| (name.to_owned(), source.factor())).collect();
         file.textures.0.retain(|_, source| !is_lost(source));
         let names: HashSet<&str> = file.textures.names().collect();
         for (_, part) in &mut file.materials.0 {
-            *part = without_lost_textures(part, |name| names.contains(name));
+            let factor = |name: &str| gone.get(name).copied().unwrap_or(Vec3::ONE);
+            *part = without_lost_textures(part, |name| (!names.contains(name)).then(|| factor(name)));
         }
         for light in &mut file.lights {
             if let LightPart::Spot { texture, .. } = light {

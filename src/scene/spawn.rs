@@ -26,7 +26,7 @@ use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::{LightTexture, WithLight, put_light};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
-use glam::{DVec2, DVec3, Mat2, Vec2};
+use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -106,12 +106,14 @@ impl LoadedScene {
         mut materials: HashMap<&'a str, Entity>,
         next: &mut impl FnMut() -> Ordinal,
     ) -> (Entities<'a>, Vec<Entity>) {
-        let mut textures: HashMap<&str, Arc<SurfaceTexture>> = HashMap::new();
+        let (mut textures, mut lost): (HashMap<&str, Arc<SurfaceTexture>>, HashMap<&str, Vec3>) = Default::default();
         let own_textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
         for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part, _)| (name.as_str(), part))) {
             if let Some(texture) = texture_of(part, |file| self.pictures.get(file).cloned()) {
                 let texture = SurfaceTexture { name: name.to_owned(), part: part.clone(), texture };
                 textures.entry(name).or_insert_with(|| Arc::new(texture));
+            } else {
+                lost.insert(name, part.factor());
             }
         }
 
@@ -121,7 +123,7 @@ impl LoadedScene {
             materials.insert(name, world.spawn((Name::new((*name).to_owned()), next())).id());
         }
         for (name, part) in added {
-            world.entity_mut(materials[name]).insert(material(part, &textures, &materials));
+            world.entity_mut(materials[name]).insert(material(part, &textures, &lost, &materials));
         }
 
         let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
@@ -137,7 +139,7 @@ impl LoadedScene {
                     .entry(Arc::as_ptr(&mesh.mesh) as usize)
                     .or_insert_with(|| {
                         let spawn = |(name, part): &(String, MaterialPart)| {
-                            let material = material(part, &textures, &materials);
+                            let material = material(part, &textures, &lost, &materials);
                             world.spawn((Name::new(name.clone()), next(), material)).id()
                         };
                         mesh.slots.iter().map(spawn).collect()
@@ -356,12 +358,16 @@ fn clear(world: &mut World) {
 }
 
 /// Converts a material of a scene file for the world.
+///
+/// - `lost`: the factors of textures that are missing, white for none.
 pub(super) fn material(
     part: &MaterialPart,
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
+    lost: &HashMap<&str, Vec3>,
     materials: &HashMap<&str, Entity>,
 ) -> SurfaceMaterial {
-    let part = without_lost_textures(part, |name| textures.contains_key(name));
+    let lost = |name: &str| lost.get(name).copied().unwrap_or(Vec3::ONE);
+    let part = without_lost_textures(part, |name| (!textures.contains_key(name)).then(|| lost(name)));
     SurfaceMaterial(part.map(&mut FileToWorld { textures, materials }))
 }
 

@@ -112,6 +112,34 @@ fn normals_of_length_zero_count_as_missing() {
     assert!(!mixed.normals_from_file);
 }
 
+/// As without any normals in the file: the edges of a box are sharp.
+#[test]
+fn what_has_no_normals_has_creases_beside_faces_that_have_some() {
+    let v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 -1\nv 1 1 -1\nv 0 2 0\nv 1 2 0\n";
+    let model = load_text(&format!("{v}vn 0 0 2\nf 4//1 3//1 8//1 7//1\nf 1 2 3 4\nf 2 5 6 3\n"));
+    for corners in &model.mesh.triangles {
+        let [a, b, c] = corners.map(|vertex| model.mesh.positions[vertex as usize]);
+        for vertex in corners {
+            let off = model.mesh.normals[*vertex as usize] - (b - a).cross(c - a).normalize();
+            assert!(off.length() < 1e-6, "{off}");
+        }
+    }
+}
+
+#[test]
+fn names_may_be_followed_by_comments_or_look_like_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.obj");
+    let libraries = [("my paint.mtl", "newmtl red\nKd 1 0 0\n"), ("b #2.mtl", "newmtl blue #1\nKd 0 0 1\n")];
+    libraries.iter().for_each(|(name, text)| std::fs::write(folder.path().join(name), text).unwrap());
+    let obj = "mtllib my paint.mtl # the paint\nmtllib b #2.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n\
+               usemtl red # as blood\nf 1 2 3\nusemtl blue #1\nf 1 2 3\n";
+    std::fs::write(&path, obj).unwrap();
+    let model = load_obj(&path).unwrap();
+    assert_eq!(model.materials.iter().map(|it| it.diffuse).collect::<Vec<_>>(), [Some(Vec3::X), Some(Vec3::Z)]);
+    assert!(model.material_warnings.is_empty(), "{:?}", model.material_warnings);
+}
+
 #[test]
 fn corners_without_texture_coordinates_do_not_shift_the_others() {
     let model = load_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt .1 .2\nvt .3 .4\nf 1 2/1 3\nf 2/1 4/2 3\n");

@@ -485,6 +485,10 @@ fn odd_stl_files_are_read_with_a_word_about_it() {
                 endloop\nendfacet\nendsolid\n";
     let two = stl(format!("{quad}{text}").as_bytes());
     assert_eq!((two.mesh.triangles.len(), two.polygons), (6, 1));
+    // As viewers accept it: comments, and a facet without a normal.
+    let loose = quad.replace(" normal 0 0 1", "");
+    let loose = stl(format!("# of a program\n# with solid parts\n{loose}# more\n{text}").as_bytes());
+    assert_eq!(loose.mesh.triangles, two.mesh.triangles);
 }
 
 #[test]

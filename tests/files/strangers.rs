@@ -4,8 +4,8 @@
 use super::gltf_writer::{Writer, f32s, quad};
 use firstlight::scene::file::MaterialPart;
 use firstlight::scene::{
-    ColorValue, Limits, LoadOptions, LoadedScene, Material, ModelChoice, ObjectInput, ScalarParam, ScalarValue,
-    SceneInputs, SceneSource, Shape, load, read_picture_within, save_scene,
+    ColorParam, ColorValue, Limits, LoadOptions, LoadedScene, Material, ModelChoice, ObjectInput, ScalarParam,
+    ScalarValue, SceneInputs, SceneSource, Shape, SurfaceMaterial, load, read_picture_within, save_scene,
 };
 use glam::Vec3;
 use serde_json::{Value, json};
@@ -310,6 +310,45 @@ fn models_with_broken_images_can_be_saved() {
             assert_eq!(n_triangles(&again), 1);
             assert_eq!(again.content_fingerprint(), scene.content_fingerprint(), "{file}");
         }
+    }
+}
+
+/// The colour of the first material in the world, and what it emits.
+fn first_colors(scene: &LoadedScene) -> [ColorParam; 2] {
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    let inputs = SceneInputs::of(&mut world);
+    let material = &world.get::<SurfaceMaterial>(inputs.objects[0].slots[0]).unwrap().0;
+    let emission = match material {
+        Material::Principled { emission, .. } => emission.clone(),
+        _ => ColorParam::Rgb(Vec3::ZERO),
+    };
+    [material.color().unwrap().clone(), emission]
+}
+
+#[test]
+fn where_an_image_is_missing_the_colour_beside_it_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let orange = Vec3::new(1.0, 0.5, 0.25);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("a.mtl", "newmtl a\nKd 1 0.5 0.25\nmap_Kd none.png\n");
+    write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+    let scene = open(&folder.path().join("a.obj")).unwrap();
+    assert_eq!(first_colors(&scene)[0], ColorParam::Rgb(orange));
+    assert!(scene.warnings.iter().any(|told| told.contains("the colour beside it")), "{:?}", scene.warnings);
+    let path = folder.path().join("a.glb");
+    for is_unlit in [false, true] {
+        let mut writer = two_squares();
+        writer.json["images"] = json!([{ "uri": "none.png" }]);
+        writer.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 0.5, 0.25, 1.0]);
+        if is_unlit {
+            writer.json["extensionsUsed"] = json!(["KHR_materials_unlit"]);
+            writer.json["materials"][0]["extensions"] = json!({ "KHR_materials_unlit": {} });
+        }
+        std::fs::write(&path, writer.glb()).unwrap();
+        let [color, emission] = first_colors(&open(&path).unwrap());
+        let [shown, black] = if is_unlit { [emission, color] } else { [color, emission] };
+        assert_eq!([shown, black], [ColorParam::Rgb(orange), ColorParam::Rgb(Vec3::ZERO)], "unlit: {is_unlit}");
     }
 }
 

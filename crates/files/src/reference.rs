@@ -123,7 +123,13 @@ impl References {
                 _ => refused(why),
             };
         }
-        self.without_link(base, self.existing(base, &spellings), name)
+        let found = self.existing(base, &spellings);
+        // Of a folder that was not passed on with the model, the file may lie beside it.
+        let beside = last.file_name().map(PathBuf::from).filter(|file| file != last && base.join(file).is_file());
+        match beside.filter(|_| !base.join(&found.path).exists()) {
+            Some(file) => self.without_link(base, file.into(), name),
+            None => self.without_link(base, found, name),
+        }
     }
 
     /// Why a path is not one in the folder of the model, by its text.
@@ -346,7 +352,10 @@ mod tests {
         let at = |name: &str| resolve(&model, &inner, name, false);
         assert_eq!(at("maps\\wood.png"), Ok("Maps/Wood.PNG".to_owned()));
         assert!(References::of(&model, false).resolve(&inner, "MOVED.png").unwrap().is_renamed);
-        assert_eq!(at("/elsewhere/moved.png"), Ok("moved.png".to_owned()));
+        for name in ["/elsewhere/moved.png", "textures/moved.png", "textures\\moved.png"] {
+            assert_eq!(at(name), Ok("moved.png".to_owned()), "{name}");
+        }
+        assert_eq!(at("textures/link.png"), Err("a link out of the folder"));
         assert_eq!(at(outer.path().join("moved.png").to_str().unwrap()), Ok("moved.png".to_owned()));
         assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));
         assert_eq!(at(".\\moved.png"), Ok("./moved.png".to_owned()));

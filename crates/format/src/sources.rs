@@ -224,6 +224,14 @@ impl TextureSource {
             relief: None,
         }
     }
+
+    /// The factor of its colours; white if it has none.
+    pub fn factor(&self) -> Vec3 {
+        match self {
+            Self::Image { tint, .. } => tint.0,
+            _ => Vec3::ONE,
+        }
+    }
 }
 
 /// The source of a mesh.

@@ -254,7 +254,13 @@ fn read_file(
         .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
         .collect();
     let (slots, textures) = (Vec::new(), Vec::new());
-    let (warnings, material_warnings) = (imported.warnings, imported.material_warnings);
+    let (warnings, mut material_warnings) = (imported.warnings, imported.material_warnings);
+    for material in &mut imported.materials {
+        if let Some(path) = material.take_lost_image() {
+            let path = path.display();
+            material_warnings.push(format!("{path}: cannot be read: no such file; the colour beside it is shown"));
+        }
+    }
     let beside = imported.materials.iter().flat_map(|material| material.beside.iter().cloned()).collect();
     let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files, beside };
     // If the file has no materials, the slots stay empty.

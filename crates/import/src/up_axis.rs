@@ -9,7 +9,9 @@ use glam::{DVec2, DVec3};
 pub fn guess_up(source: &MeshSource, mesh: &Mesh) -> UpAxis {
     match source {
         MeshSource::Obj(_) => guess_up_of_obj(mesh),
-        MeshSource::Ply(_) | MeshSource::Stl(_) => guess_up_of_either(mesh),
+        MeshSource::Ply(_) => guess_up_of_either(mesh),
+        MeshSource::Stl(_) if is_plate(mesh) => UpAxis::Z,
+        MeshSource::Stl(_) => guess_up_of_either(mesh),
         MeshSource::Gltf { .. } | MeshSource::Part { .. } | MeshSource::Builtin(_) => UpAxis::Y,
     }
 }
@@ -22,6 +24,15 @@ fn guess_up_of_either(mesh: &Mesh) -> UpAxis {
     let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
     let (on_y, on_z) = (model.stand(1, Side::Lower), model.stand(2, Side::Lower));
     if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// Whether a model lies flat on its lower Z side: of the programs that write STL, those for printers, machines and robots
+/// have Z up.
+fn is_plate(mesh: &Mesh) -> bool {
+    const FLAT: f64 = 0.25;
+    let Some(model) = Stands::of(mesh) else { return false };
+    let size = model.max - model.min;
+    size.z <= FLAT * size.x.min(size.y) && model.stand(2, Side::Lower).stable
 }
 
 /// For OBJ, a format of Y up: Z only for a model with a broad base that would tip over on all other sides along Y and Z,
@@ -141,6 +152,16 @@ fn contains(hull: &[DVec2], point: DVec2) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plate_of_stl_lies_and_a_model_of_any_other_format_stands_as_before() {
+        let of = |size: DVec3| firstlight_mesh::procedural::cuboid(size);
+        assert!(is_plate(&of(DVec3::new(0.25, 0.21, 0.003))) && !is_plate(&of(DVec3::new(1.0, 1.0, 0.5))));
+        assert!(!is_plate(&of(DVec3::new(0.25, 0.003, 0.21))), "a plate that lies with Y up");
+        let plate = of(DVec3::new(0.25, 0.21, 0.003));
+        assert_eq!(guess_up(&MeshSource::of_file("bed.stl".to_owned()), &plate), UpAxis::Z);
+        assert_eq!(guess_up(&MeshSource::of_file("bed.obj".to_owned()), &plate), UpAxis::Y);
+    }
 
     /// A table: a top and four legs, standing along +Z or +Y.
     fn table(up: UpAxis) -> Mesh {

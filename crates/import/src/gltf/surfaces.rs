@@ -242,7 +242,7 @@ impl Document {
             });
             let mut notes = material.notes.clone();
             let part = surface(&mut textures, &material, colored.contains(&number), &mut notes);
-            let part = without_lost_textures(&part, |texture| texture != LOST);
+            let part = without_lost_textures(&part, |texture| (texture == LOST).then_some(Vec3::ONE));
             materials.push(Surface {
                 name: names.free(&wanted),
                 part,

@@ -81,11 +81,13 @@ pub(crate) fn with_normals(mesh: Mesh, from_file: &[Vec3], crease_angle: f32) ->
     if missing == 0 {
         return (Mesh { normals: from_file.to_vec(), ..mesh }, true);
     }
-    // A crease would split vertices that have a normal from the file.
-    let mut mesh = mesh.with_smooth_normals(NormalWeight::Angle, None);
-    for (normal, &given) in mesh.normals.iter_mut().zip(from_file) {
+    let corners = mesh.triangles.clone();
+    let mut mesh = mesh.with_smooth_normals(NormalWeight::Angle, Some(crease_angle));
+    // Creases split vertices, also those that have a normal from the file.
+    for (now, before) in mesh.triangles.iter().flatten().zip(corners.iter().flatten()) {
+        let given = from_file[*before as usize];
         if given != Vec3::ZERO {
-            *normal = given;
+            mesh.normals[*now as usize] = given;
         }
     }
     (mesh, false)

@@ -73,6 +73,13 @@ pub struct PbrMaterial {
 }
 
 impl ImportedMaterial {
+    /// Takes away an image that does not exist, if there is a colour beside it; black and white say nothing of an image
+    /// that replaces them.
+    pub(crate) fn take_lost_image(&mut self) -> Option<PathBuf> {
+        let has_color = self.diffuse.is_some_and(|diffuse| diffuse != Vec3::ZERO && diffuse != Vec3::ONE);
+        self.diffuse_texture.take_if(|map| has_color && !map.path.exists()).map(|map| map.path)
+    }
+
     /// Whether the values are a set that Blender writes: all of them, greys, and the `illum` that follows from them.
     pub fn is_of_blender(&self) -> bool {
         let is_grey = |color: Vec3| color.x == color.y && color.y == color.z;

@@ -261,9 +261,12 @@ fn find_materials(
     let files = References::of(path, options.allow_outside);
     let (mut seen, mut has_materials, mut n_names) = (HashSet::new(), Vec::new(), 0);
     for line in &parsed.libraries {
-        // A name may contain spaces, and a line may contain several names.
-        let is_one = files.resolve(folder, line).is_ok_and(|file| folder.join(file.path).exists());
-        let names: Vec<&str> = if is_one { vec![line] } else { line.split_whitespace().collect() };
+        // A name may contain spaces, and a line may contain several names, and a comment.
+        let is_file = |name: &&str| files.resolve(folder, name).is_ok_and(|file| folder.join(file.path).exists());
+        let names: Vec<&str> = match [line, before_comment(line)].into_iter().find(is_file) {
+            Some(name) => vec![name],
+            None => before_comment(line).split_whitespace().collect(),
+        };
         for name in names {
             n_names += 1;
             if n_names > MAX_LIBRARIES {
@@ -296,6 +299,11 @@ fn find_materials(
     with_materials(path, parsed, known, has_materials, warnings)
 }
 
+/// What is before a comment at the end of a line, which names of 3ds Max look like: `Mat #1`.
+fn before_comment(text: &str) -> &str {
+    text.split_once(" #").map_or(text, |(before, _)| before.trim_end())
+}
+
 /// The materials of the faces, as far as the libraries have them.
 fn with_materials(
     path: &Path,
@@ -305,7 +313,7 @@ fn with_materials(
     warnings: &mut Warnings,
 ) -> (Vec<ImportedMaterial>, Vec<PathBuf>) {
     let mut missing = Vec::new();
-    let mut find = |name: String| match known.get(&name) {
+    let mut find = |name: String| match known.get(&name).or_else(|| known.get(before_comment(&name))) {
         Some(material) => material.clone(),
         None => {
             if !name.is_empty() {
@@ -317,12 +325,12 @@ fn with_materials(
     let materials = parsed.materials.into_iter().map(&mut find).collect();
     if !missing.is_empty() {
         let more = if missing.len() > 3 { ", …" } else { "" };
-        warnings.push(format!(
-            "{}: {} materials were not found and use default values: {}{more}",
-            path.display(),
-            missing.len(),
-            missing[..missing.len().min(3)].join(", ")
-        ));
+        let names = missing[..missing.len().min(3)].join(", ");
+        let what = match missing.len() {
+            1 => "1 material was not found and uses default values".to_owned(),
+            n => format!("{n} materials were not found and use default values"),
+        };
+        warnings.push(format!("{}: {what}: {names}{more}", path.display()));
     }
     (materials, libraries)
 }

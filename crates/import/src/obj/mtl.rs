@@ -145,13 +145,22 @@ pub(crate) fn load_library(
     // Some are meant, as those of shapes for collisions; but nobody stores a model that cannot be seen.
     if !materials.is_empty() && materials.iter().all(is_unseen) {
         warn("every material has `d 0`, so nothing would be seen: they are shown opaque".to_owned());
-        materials.iter_mut().for_each(|material| material.opacity = None);
+        for material in &mut materials {
+            material.opacity = None;
+            // Nor is it glass, by an `illum` that only says so, where it has a colour of its own.
+            if material.diffuse.is_some_and(|diffuse| diffuse.max_element() > GLASS_AT_MOST) {
+                material.illumination_model = None;
+            }
+        }
     }
     if !unused.is_empty() {
         warn(format!("not modelled and ignored: {}", unused.into_iter().collect::<Vec<_>>().join(", ")));
     }
     materials
 }
+
+/// Diffuse colour of what may be glass, at most.
+const GLASS_AT_MOST: f32 = 0.2;
 
 /// Only the lines that are valid, as tobj reads them: one that it cannot read would lose the whole file.
 ///
@@ -381,6 +390,11 @@ mod tests {
         let (hidden, warnings) = parse("newmtl skin\nd 0\nKd 0.8 0.8 0.8\nnewmtl eyes\nd 0.0\n");
         assert_eq!(hidden.iter().map(|it| it.opacity).collect::<Vec<_>>(), [None, None]);
         assert!(warnings.len() == 1 && warnings[0].contains("shown opaque"), "{warnings:?}");
+        // By Blender's `illum` of what is transparent.
+        let (hidden, _) = parse("newmtl skin\nd 0\nKd 0.8 0.8 0.8\nNi 1.45\nillum 9\n");
+        assert_eq!((hidden[0].opacity, hidden[0].illumination_model), (None, None));
+        let (glass, _) = parse("newmtl glass\nd 0\nKd 0 0 0\nNi 1.5\nillum 7\n");
+        assert_eq!(glass[0].illumination_model, Some(7));
         for seen in ["newmtl box\nd 0\nnewmtl floor\nd 1\n", "newmtl leaf\nd 0\nmap_d leaf.png\n"] {
             let (materials, warnings) = parse(seen);
             assert!(materials[0].opacity == Some(0.0) && warnings.is_empty(), "{seen}: {warnings:?}");

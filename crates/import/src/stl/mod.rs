@@ -69,7 +69,11 @@ fn is_text(bytes: &[u8]) -> bool {
     if binary::has_right_length(bytes) {
         return false;
     }
-    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let mut start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    while start.starts_with(b"#") {
+        let end = start.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(start.len());
+        start = start[end..].trim_ascii_start();
+    }
     let begins_with = |word: &[u8]| start.get(..word.len()).is_some_and(|first| first.eq_ignore_ascii_case(word));
     (begins_with(b"solid") || begins_with(b"facet")) && bytes.iter().take(1024).all(is_plain)
 }
@@ -88,6 +92,7 @@ mod tests {
         binary.pop();
         assert!(!is_text(&binary), "a truncated file is still binary");
         assert!(is_text(b"solid a\nendsolid a\n") && is_text(b" SOLID\n") && is_text(b"facet normal 0 0 1"));
+        assert!(is_text(b"# of a program\n# a part\nsolid a\nendsolid a\n"));
         assert!(!is_text(b"") && !is_text(b"ply\n"));
     }
 }

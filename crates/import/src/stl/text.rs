@@ -82,6 +82,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
             triangulate(&corners, &mut cut);
             soup.corners.extend(cut.iter().flatten().map(|&corner| corners[corner]));
             soup.polygons += usize::from(corners.len() > 3);
+        } else if word.starts_with(b"#") {
+            words.skip_line();
         } else if word.is_empty() {
             break;
         } else {
@@ -96,13 +98,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
 
 /// Parses a facet after the word `facet`, up to `endfacet`.
 fn facet(words: &mut StlWords, corners: &mut Vec<DVec3>) -> Result<(), Located> {
-    let word = words.next();
-    if !word.eq_ignore_ascii_case(b"normal") {
+    let is_outer = |word: &[u8]| word.eq_ignore_ascii_case(b"outer");
+    let mut word = words.next();
+    if word.eq_ignore_ascii_case(b"normal") {
+        word = words.next();
+    } else if !is_outer(word) {
         return Err(words.wrong(word, "`normal`"));
     }
     // The normal is not used; some programs write none.
-    let is_outer = |word: &[u8]| word.eq_ignore_ascii_case(b"outer");
-    let mut word = words.next();
     for _ in 0..3 {
         word = if is_outer(word) { word } else { words.next() };
     }
