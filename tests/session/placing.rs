@@ -310,6 +310,26 @@ fn what_is_scaled_stays_standing() {
     }
 }
 
+/// As an added model of another unit: its origin is far from its middle.
+#[test]
+fn the_position_of_a_scaled_model_does_not_jump_when_it_gets_a_pivot() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = model(folder.path(), 100.0);
+    let id = driver.select("model");
+    let set = |property, value| Edit::Set { id, property: Property::Object(property), value };
+    driver.edit([set(ObjectProperty::Translate, DVec3::new(3.0, 0.0, 2.0))]);
+    driver.edit([set(ObjectProperty::Scale, DVec3::splat(0.01))]);
+    let scaled: Placement = driver.get("model");
+    // What is set to the value that it has is no edit.
+    driver.edit([set(ObjectProperty::Scale, DVec3::splat(0.01)), set(ObjectProperty::Rotate, DVec3::ZERO)]);
+    assert_eq!(driver.get::<Placement>("model"), scaled);
+    let bare = scaled.with_pivot(DVec3::ZERO);
+    assert!((bare.translation - scaled.translation).length() > 10.0);
+    assert!(bare.position().abs_diff_eq(scaled.position(), 1e-9) && bare.position() == bare.translation);
+    driver.edit([set(ObjectProperty::Rotate, DVec3::new(0.0, 40.0, 20.0))]);
+    assert!(driver.get::<Placement>("model").position().abs_diff_eq(scaled.position(), 1e-9));
+}
+
 #[test]
 fn between_its_keys_an_object_turns_about_its_middle() {
     let folder = tempfile::tempdir().unwrap();

@@ -152,6 +152,15 @@ impl Placement {
         DAffine3 { matrix3, translation: self.translation + by_pivot }
     }
 
+    /// Where the origin of the object is, or would be if it were not rotated, metres. Unlike the translation, it stays as it
+    /// is when an object that is not rotated gets another pivot, and when one turns about its pivot.
+    pub fn position(&self) -> DVec3 {
+        match self.linear {
+            Linear::Turned { scale, .. } => self.translation + self.pivot - scale * self.pivot,
+            Linear::Matrix(_) => self.translation,
+        }
+    }
+
     /// The same placement with another pivot.
     pub fn with_pivot(&self, pivot: DVec3) -> Self {
         if pivot == self.pivot {

@@ -1,11 +1,11 @@
-//! Texture coordinates for meshes that have none, when they get a texture.
+//! Texture coordinates for meshes that have none, when they get a texture, or a surface that is brushed along them.
 
 use crate::frame::core::status::{MessageKind, Status};
 use crate::frame::state::resources::Clock;
 use crate::mesh::Mesh;
 use crate::scene::{
-    MeshOptions, MeshOrigin, MeshSource, Shape, SurfaceMaterial, SurfaceTexture, TextureCoordinates, TextureSource,
-    textures_of,
+    Material, MeshOptions, MeshOrigin, MeshSource, ScalarParam, Shape, SurfaceMaterial, SurfaceTexture,
+    TextureCoordinates, TextureSource, textures_of,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
@@ -13,11 +13,15 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Gives those of the objects whose meshes have no texture coordinates those of box projection, if the material has a
-/// texture that needs some, and says so.
+/// texture that needs some, or highlights that are stretched along them, and says so.
 pub fn project_bare(world: &mut World, material: Entity, objects: &[Entity]) {
     let needs_coordinates = |texture: &Arc<SurfaceTexture>| !matches!(texture.part, TextureSource::VertexColors { .. });
-    let material = world.get::<SurfaceMaterial>(material);
-    if !material.is_some_and(|material| textures_of(&material.0).any(needs_coordinates)) {
+    let Some(SurfaceMaterial(material)) = world.get(material) else { return };
+    let is_brushed = match material {
+        Material::Principled { anisotropy, .. } => *anisotropy != ScalarParam::Number(0.0),
+        _ => false,
+    };
+    if !is_brushed && !textures_of(material).any(needs_coordinates) {
         return;
     }
     // Objects that share a mesh go on to share it.
@@ -54,12 +58,12 @@ pub fn project_bare(world: &mut World, material: Entity, objects: &[Entity]) {
             world,
             MessageKind::Note,
             object,
-            "has no texture coordinates: the image is projected from six sides (panel, Mesh)",
+            "has no texture coordinates: they are projected from six sides (panel, Mesh)",
         ),
         [object, ..] => {
             let others = projected.len() - 1;
             let what = format!(
-                "and {others} more have no texture coordinates: the image is projected from six sides (panel, Mesh)"
+                "and {others} more have no texture coordinates: they are projected from six sides (panel, Mesh)"
             );
             say(world, MessageKind::Note, object, &what);
         }

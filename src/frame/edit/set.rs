@@ -33,6 +33,9 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             if property == ObjectProperty::Scale && !(value.min_element() > 0.0) {
                 return Err("scale factors must be above 0".to_owned());
             }
+            if property.get(&old) == Some(value) {
+                return Ok(());
+            }
             // As its handles do.
             let old = if property == ObjectProperty::Translate { old } else { about_middle(world, entity, &old) };
             let mut placed = [(entity, property.set(old, value))];

@@ -53,8 +53,16 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, around: 
     if let Some(object) = object {
         rows(ui, "place", |ui| {
             for &property in ObjectProperty::ALL {
-                let value = property.get(&object.placement);
-                property_row(ui, id, Property::Object(property), property.info(), value, asked);
+                // The translation is relative to the pivot, which edits move to the middle.
+                let by_pivot = match property {
+                    ObjectProperty::Translate => object.placement.position() - object.placement.translation,
+                    _ => DVec3::ZERO,
+                };
+                let value = property.get(&object.placement).map(|value| value + by_pivot);
+                if let Some(value) = property_field(ui, property.info(), value) {
+                    let property = Property::Object(property);
+                    asked.edit(Edit::Set { id, property, value: value - by_pivot });
+                }
             }
             if let Shape::Sphere { radius } = object.shape {
                 row(ui, "radius", |ui| {
@@ -92,10 +100,20 @@ pub fn property_row(
     value: Option<DVec3>,
     asked: &mut Asked,
 ) {
+    if let Some(value) = property_field(ui, info, value) {
+        asked.edit(Edit::Set { id, property, value });
+    }
+}
+
+/// The row of a property; the value that was set.
+fn property_field(ui: &mut Ui, info: &PropertyInfo, value: Option<DVec3>) -> Option<DVec3> {
     row_with_hint(ui, info.label, info.help, |ui| {
-        let Some(value) = value else { return drop(ui.weak("a matrix with shear")) };
+        let Some(value) = value else {
+            ui.weak("a matrix with shear");
+            return None;
+        };
         let [least, most] = info.range;
-        let new = match info.quantity {
+        match info.quantity {
             Quantity::Position | Quantity::Direction => vector(ui, value, 0.01),
             Quantity::Rotation => vector(ui, value, 0.5),
             // A uniform scale stays uniform: for spheres it must, and for most objects it should.
@@ -108,9 +126,6 @@ pub fn property_row(
                 let speed = if info.unit == "°" { 0.2 } else { proportional(value.x) };
                 number(ui, value.x, speed, least..=most, info.unit).map(DVec3::splat)
             }
-        };
-        if let Some(value) = new {
-            asked.edit(Edit::Set { id, property, value });
         }
-    });
+    })
 }
