@@ -209,7 +209,8 @@ fn color_with(ui: &mut Ui, value: Vec3, unit: Option<&str>, has_code: bool) -> O
     };
     let strength_of = |ui: &mut Ui| unit.and_then(|unit| strength_drag(ui, f64::from(strength), unit));
     let (new_strength, of_light) = match unit {
-        Some(_) if has_code => ui.horizontal(|ui| (strength_of(ui), kelvins(ui, hue))).inner,
+        // What has no unit is no light.
+        Some(unit) if has_code && !unit.is_empty() => ui.horizontal(|ui| (strength_of(ui), kelvins(ui, hue))).inner,
         _ => (strength_of(ui), None),
     };
     let new_hue = new_hue.or(of_light);
