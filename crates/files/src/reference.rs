@@ -123,13 +123,7 @@ impl References {
                 _ => refused(why),
             };
         }
-        let found = self.existing(base, &spellings);
-        // Of a folder that was not passed on with the model, the file may lie beside it.
-        let beside = last.file_name().map(PathBuf::from).filter(|file| file != last && base.join(file).is_file());
-        match beside.filter(|_| !base.join(&found.path).exists()) {
-            Some(file) => self.without_link(base, file.into(), name),
-            None => self.without_link(base, found, name),
-        }
+        self.without_link(base, self.existing(base, &spellings), name)
     }
 
     /// Why a path is not one in the folder of the model, by its text.
@@ -175,7 +169,7 @@ impl References {
     }
 
     /// The first of these paths that exists, where a folder that is not there may be left out (`missing/../a.png`), or
-    /// what differs from the last one by case.
+    /// what differs from the last one by case, or the file of its name beside the model, if its folder was not passed on.
     fn existing(&self, base: &Path, spellings: &[PathBuf; 4]) -> Referred {
         let last = &spellings[2];
         let direct = direct(last);
@@ -183,7 +177,10 @@ impl References {
             Some(path) => path.clone().into(),
             None => match self.in_any_case(base, &direct) {
                 Some(path) => Referred { path, is_renamed: true },
-                None => last.clone().into(),
+                None => {
+                    let beside = last.file_name().map(PathBuf::from).filter(|file| base.join(file).is_file());
+                    beside.unwrap_or_else(|| last.clone()).into()
+                }
             },
         }
     }
@@ -355,6 +352,7 @@ mod tests {
         for name in ["/elsewhere/moved.png", "textures/moved.png", "textures\\moved.png"] {
             assert_eq!(at(name), Ok("moved.png".to_owned()), "{name}");
         }
+        assert_eq!(resolve(&model, &inner, "/elsewhere/moved.png", true), Ok("moved.png".to_owned()));
         assert_eq!(at("textures/link.png"), Err("a link out of the folder"));
         assert_eq!(at(outer.path().join("moved.png").to_str().unwrap()), Ok("moved.png".to_owned()));
         assert_eq!(at("100%25.png"), Ok("100%25.png".to_owned()));

@@ -18,6 +18,7 @@ mod test_statistics;
 
 pub use crate::core::camera::{Camera, CameraError};
 pub use crate::core::caustic_plan::{CausticChoice, CausticPlan};
+pub use crate::core::color::luminance;
 pub use crate::core::counts::RayCounts;
 pub use crate::core::delta_light::{Cone, DeltaLight, Falloff, LightImage};
 pub use crate::core::environment::Environment;

@@ -1,20 +1,19 @@
 //! The exposure of an image by its brightness.
 
-use crate::render::Film;
-use glam::Vec3;
-
-/// Of linear Rec. 709.
-const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+use crate::render::{Film, luminance};
 
 /// Radiance that half of the image is darker than, as the display shows it: a medium grey.
 const GREY: f32 = 0.18;
 
 /// Exposure in stops, to a third, with which the median of what is lit is a medium grey; `None` if nothing is lit.
 pub fn usual_exposure(film: &Film) -> Option<f32> {
-    let lit = film.means().into_iter().map(|radiance| radiance.dot(LUMINANCE)).filter(|level| *level > 0.0);
-    let mut lit: Vec<f32> = lit.filter(|level| level.is_finite()).collect();
+    let levels = film.means().into_iter().map(luminance);
+    let mut lit: Vec<f32> = levels.filter(|level| *level > 0.0 && level.is_finite()).collect();
+    if lit.is_empty() {
+        return None;
+    }
     let middle = lit.len() / 2;
-    let median = *lit.get_mut(..).filter(|lit| !lit.is_empty())?.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let median = *lit.select_nth_unstable_by(middle, f32::total_cmp).1;
     Some((3.0 * (GREY / median).log2()).round() / 3.0)
 }
 

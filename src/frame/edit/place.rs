@@ -60,7 +60,11 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
 }
 
 /// Moves what was scaled up or down, so that its lowest point stays where it was: what stands on a table stays there.
+/// What has keys stays, so that no position becomes a key.
 pub fn stay_standing(world: &World, before: &[(Entity, Placement)], after: &mut [(Entity, Placement)]) {
+    if before.iter().any(|(entity, _)| has_keys(world, *entity)) {
+        return;
+    }
     let lowest = |placed: &[(Entity, Placement)]| {
         let low = |(entity, placement): &(Entity, Placement)| lowest_point(world.get(*entity)?, placement);
         placed.iter().filter_map(low).min_by(f64::total_cmp)
@@ -73,17 +77,16 @@ pub fn stay_standing(world: &World, before: &[(Entity, Placement)], after: &mut 
 /// The same placement, with the middle of the object as its pivot, unless keys have its position.
 pub fn about_middle(world: &mut World, entity: Entity, placement: &Placement) -> Placement {
     match box_of(world, entity) {
-        Some(own) if !is_moved_by_keys(world, entity) && matches!(placement.linear, Linear::Turned { .. }) => {
+        Some(own) if !has_keys(world, entity) && matches!(placement.linear, Linear::Turned { .. }) => {
             placement.with_pivot(0.5 * own.min + 0.5 * own.max)
         }
         _ => *placement,
     }
 }
 
-/// Whether the entity has keys.
-pub fn is_moved_by_keys(world: &World, entity: Entity) -> bool {
-    let has_keys = |animation: &Animation| animation.tracks.iter().any(|track| track.channel.entity() == Some(entity));
-    world.get_resource::<Animation>().is_some_and(has_keys)
+fn has_keys(world: &World, entity: Entity) -> bool {
+    let is_moved = |animation: &Animation| animation.tracks.iter().any(|track| track.channel.entity() == Some(entity));
+    world.get_resource::<Animation>().is_some_and(is_moved)
 }
 
 /// Returns the changed placement; with `evenly`, scales by the factor that differs most from 1.

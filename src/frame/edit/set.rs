@@ -2,7 +2,7 @@
 //! [`crate::frame::edit::keys`].
 
 use crate::format::bounds::check_size;
-use crate::frame::edit::place::{about_middle, is_moved_by_keys, stay_standing};
+use crate::frame::edit::place::{about_middle, stay_standing};
 use crate::frame::edit::property::Property;
 use crate::frame::edit::{keys, sky};
 use crate::render::MaterialKind;
@@ -39,7 +39,7 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
             // As its handles do.
             let old = if property == ObjectProperty::Translate { old } else { about_middle(world, entity, &old) };
             let mut placed = [(entity, property.set(old, value))];
-            if property == ObjectProperty::Scale && !is_moved_by_keys(world, entity) {
+            if property == ObjectProperty::Scale {
                 stay_standing(world, &[(entity, old)], &mut placed);
             }
             let [(_, placement)] = placed;

@@ -28,9 +28,9 @@ impl App {
         if self.judged == Some(scene) || !is_ready {
             return;
         }
+        let Some(film) = self.session.film_snapshot() else { return };
         self.judged = Some(scene);
-        let usual = self.session.film_snapshot().and_then(|film| usual_exposure(&film));
-        let off = usual.map_or(0.0, |usual| usual - status.display.exposure_stops);
+        let off = usual_exposure(&film).map_or(0.0, |usual| usual - status.display.exposure_stops);
         let (text, button) = match off {
             off if off >= FAR => ("the image is very dark", "Brighten it"),
             off if off <= -FAR => ("the image is very bright", "Darken it"),

@@ -3,9 +3,9 @@
 use firstlight_simd::{Real, Vector3};
 use glam::Vec3;
 
-/// Relative luminance.
+/// Relative luminance of linear Rec. 709.
 #[inline]
-pub(crate) fn luminance(color: Vec3) -> f32 {
+pub fn luminance(color: Vec3) -> f32 {
     luminance_of(color.into())
 }
 

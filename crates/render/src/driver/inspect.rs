@@ -3,6 +3,7 @@
 //! Views of the scene need one ray per pixel, through the centre of the pixel and of the lens, and stay the same while
 //! samples are added; views of the film are computed from its sums. Start reading at [`inspect`].
 
+use crate::core::color::luminance;
 use crate::core::material::MaterialId;
 use crate::core::settings::RenderSettings;
 use crate::driver::single::mean_bounces;
@@ -170,14 +171,11 @@ pub fn inspect(
             scaled(values, (0.0, high.max(1.0)), "")
         }
         Inspection::Luminance => {
-            let values = film_values(film, |film, x, y| film.mean(x, y).dot(REC_709).max(1e-9).log2());
+            let values = film_values(film, |film, x, y| luminance(film.mean(x, y)).max(1e-9).log2());
             scaled(values, (-8.0, 6.0), "stops")
         }
     })
 }
-
-/// Luminance of linear Rec. 709.
-const REC_709: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// Returns the relative error of each pixel, row by row from the top, from its last doubling of samples: the mean over
 /// 5 × 5 pixels, scaled so that the root mean square over the image is the estimated error of the whole image. `None`
