@@ -243,15 +243,16 @@ fn extraction(scene: &LoadedScene) -> Extraction {
     Extraction::new(&inputs, &scene.trees)
 }
 
-/// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects.
+/// Measures the light of a scene, of which nothing has been drawn yet; `None` if its camera sees no surface that reflects
+/// enough to tell.
 fn measure(scene: &LoadedScene) -> Option<ModelLight> {
     /// Pixels of the image.
     const PIXELS: f64 = 1024.0;
     const SAMPLES: u32 = 4;
     /// Segments of paths: light that was reflected three times.
     const DEPTH: u32 = 5;
-    /// What is darker may be noise of its texture.
-    const LEAST_ALBEDO: f32 = 0.05;
+    /// Black surfaces look the same in any light.
+    const LEAST_ALBEDO: f32 = 0.02;
 
     let of_meshes =
         scene.meshes.iter().flatten().flat_map(|mesh| mesh.slots.iter().map(|(name, part)| (&**name, part)));
@@ -274,11 +275,11 @@ fn measure(scene: &LoadedScene) -> Option<ModelLight> {
     let emitted = if has_emission { image(1) } else { vec![Vec3::ZERO; all.len()] };
     let surfaces = gather_features(&scene, &settings(DEPTH), size, SAMPLES, &|| false)?;
     let level = |color: Vec3| color.element_sum() / 3.0;
-    let reflects = |&i: &usize| surfaces.coverage[i] == 1.0 && level(emitted[i]) == 0.0;
-    let mut levels: Vec<f32> = (0..all.len())
-        .filter(reflects)
-        .map(|i| level(all[i] - emitted[i]).max(0.0) / level(surfaces.albedo[i]).max(LEAST_ALBEDO))
-        .collect();
+    let is_told_by = |&i: &usize| {
+        surfaces.coverage[i] == 1.0 && level(emitted[i]) == 0.0 && level(surfaces.albedo[i]) >= LEAST_ALBEDO
+    };
+    let told = (0..all.len()).filter(is_told_by);
+    let mut levels: Vec<f32> = told.map(|i| level(all[i] - emitted[i]).max(0.0) / level(surfaces.albedo[i])).collect();
     levels.sort_by(f32::total_cmp);
     (!levels.is_empty()).then_some(ModelLight(levels))
 }

@@ -134,6 +134,15 @@ fn a_closed_room_is_lit_inside() {
     assert!(opened("a.glb", &with_part(&json!({}), 0.5), None).file.lights.is_empty());
 }
 
+/// Black is black in any light, with a few parts that are shaded too.
+#[test]
+fn a_black_model_is_not_taken_for_a_closed_room() {
+    let black = json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorFactor": [0, 0, 0, 1] } });
+    let scene = opened("a.glb", &with_part(&black, 8.0), None);
+    assert!(generated(&scene).is_some() && scene.file.lights.is_empty() && scene.file.display.exposure == 0.0);
+    assert!(!says(&scene, "hardly any light"), "{:?}", scene.warnings);
+}
+
 /// Its floor would be at the same place, and rays would find either.
 #[test]
 fn the_ground_is_below_the_floor_of_the_model() {

@@ -132,6 +132,15 @@ fn names_may_be_followed_by_comments_or_look_like_them() {
     let path = folder.path().join("model.obj");
     let libraries = [("my paint.mtl", "newmtl red\nKd 1 0 0\n"), ("b #2.mtl", "newmtl blue #1\nKd 0 0 1\n")];
     libraries.iter().for_each(|(name, text)| std::fs::write(folder.path().join(name), text).unwrap());
+    std::fs::write(folder.path().join("c.mtl"), "newmtl green\nKd 0 1 0\n").unwrap();
+    for (obj, wanted) in [
+        ("usemtl green\nf 1 2 3\nmtllib none.mtl my paint.mtl c.mtl\nusemtl red\nf 1 2 3\n", [Vec3::Y, Vec3::X]),
+        ("mtllib c.mtl my\\ paint.mtl\nusemtl red\nf 1 2 3\nusemtl green\nf 1 2 3\n", [Vec3::X, Vec3::Y]),
+    ] {
+        std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}")).unwrap();
+        let materials = load_obj(&path).unwrap().materials;
+        assert_eq!(materials.iter().filter_map(|it| it.diffuse).collect::<Vec<_>>(), wanted, "{obj}");
+    }
     let obj = "mtllib my paint.mtl # the paint\nmtllib b #2.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n\
                usemtl red # as blood\nf 1 2 3\nusemtl blue #1\nf 1 2 3\n";
     std::fs::write(&path, obj).unwrap();

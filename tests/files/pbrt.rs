@@ -255,7 +255,6 @@ fn errors_name_the_file_the_line_and_the_column() {
         ),
         ("WorldBegin\nShape \"sphere\" \"radius\" 1", "a.pbrt:2:16: expected a type and a name"),
         ("Translate 1 2\nWorldBegin", "a.pbrt:2:1: expected 3 finite numbers, found `WorldBegin`"),
-        ("WorldBegin\nObjectBegin \"a\"\nAttributeEnd", "a.pbrt:3:1: there is no `AttributeBegin` that this could end"),
         ("Shape \"sphere\"", "a.pbrt:1:1: `Shape` stands before `WorldBegin`"),
         ("WorldBegin\nCamera \"perspective\"", "a.pbrt:2:1: `Camera` stands after `WorldBegin`"),
         ("WorldBegin \"", "a.pbrt:1:12: the string does not end"),

@@ -7,7 +7,7 @@ use crate::mitsuba::converter::{Converter, Surface};
 use crate::mitsuba::graph::{Node, Value};
 use crate::mitsuba::spectrum::Use;
 use crate::mitsuba::words::numbers;
-use crate::model::foreign::{grey, n_lobes, tinted};
+use crate::model::foreign::{grey, n_lobes, tinted, tinted_glass};
 use crate::model::ior;
 use firstlight_files::printable;
 use firstlight_format::error::{SceneError, suggestion};
@@ -91,7 +91,18 @@ impl Converter<'_> {
             "bumpmap" => return self.bump_map(node, depth),
             "null" => return Ok(None),
             plugin => {
+                // Variants of other people have such names: roughconductorGGX.
+                let known = ["roughconductor", "roughdielectric", "roughplastic"];
+                let known = known.into_iter().find(|known| plugin.starts_with(known));
                 let plugin = printable::name(plugin).into_owned();
+                if let Some(known) = known {
+                    self.tell(node, &format!("BSDFs of type {plugin} are not modelled: it is a {known}"));
+                    return Ok(Some(match known {
+                        "roughconductor" => self.conductor(node)?,
+                        "roughdielectric" => self.dielectric(node)?,
+                        _ => self.plastic(node)?,
+                    }));
+                }
                 self.tell(node, &format!("BSDFs of type {plugin} are not modelled: the surface is grey and diffuse"));
                 node.skip();
                 Surface::two_sided(grey())
@@ -122,18 +133,6 @@ impl Converter<'_> {
     fn relative_ior(&mut self, node: Node, default: &str) -> Result<f32, SceneError> {
         let inside = self.ior(node, "int_ior", default)?;
         Ok((inside / self.ior(node, "ext_ior", "air")?) as f32)
-    }
-
-    /// Tells of factors that are not 1: ours conserve energy.
-    fn factors(&mut self, node: Node, names: &[&str]) -> Result<(), SceneError> {
-        for name in names {
-            match self.given_color(node, name, Use::Factor)? {
-                None => {}
-                Some(ColorValue::Rgb(rgb)) if rgb == Vec3::ONE => {}
-                Some(_) => self.tell(node, &format!("{name} is not modelled: it is 1")),
-            }
-        }
-        Ok(())
     }
 
     /// Microfacets of a rough surface.
@@ -172,15 +171,22 @@ impl Converter<'_> {
 
     fn dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {
         let ior = self.relative_ior(node, "bk7")?;
-        self.factors(node, &["specular_reflectance", "specular_transmittance"])?;
+        let transmittance = self.color(node, "specular_transmittance", 1.0, Use::Reflectance)?;
+        let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
         let (absorption, dispersion) = (Vec3::ZERO.into(), 0.0);
-        Ok(Surface::two_sided(match node.plugin() {
+        let clear = match node.plugin() {
             "dielectric" => Material::Glass { ior, absorption, dispersion },
             _ => {
                 let (alpha, beckmann) = self.isotropic(node)?;
+                if matches!(alpha, ScalarValue::Texture(_))
+                    && [&transmittance, &reflectance] != [&ColorValue::grey(1.0); 2]
+                {
+                    self.tell(node, "the colours of glass of textured roughness are not modelled: it is clear");
+                }
                 Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann }
             }
-        }))
+        };
+        Ok(Surface::two_sided(tinted_glass(&clear, transmittance, reflectance).unwrap_or(clear)))
     }
 
     fn thin_dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {
@@ -213,6 +219,8 @@ impl Converter<'_> {
         } else {
             (self.constant_color(node, "eta", 0.0, Use::Factor)?, self.constant_color(node, "k", 1.0, Use::Factor)?)
         };
+        let outside = if node.has("ext_eta") { self.ior(node, "ext_eta", "air")? as f32 } else { 1.0 };
+        let (eta, k) = (eta / outside, k / outside);
         let Microfacets { u, v, beckmann } = match node.plugin() {
             // Without a real part everything is reflected at every angle.
             "conductor" if eta == Vec3::ZERO => return Ok(Surface::one_sided(Material::Mirror { reflectance })),

@@ -304,18 +304,23 @@ impl Converter<'_> {
 
     /// The material of a shape; `None` for a surface that light passes.
     fn material_of(&mut self, node: Node) -> Result<Option<PlacedMaterial>, SceneError> {
+        let bsdf = node.children("bsdf")?.first().copied();
+        let emitter = node.children("emitter")?.first().copied();
         let media = node.children("medium")?;
+        // The border of a medium: version 0.x shows no surface there.
+        let is_border = !media.is_empty() && node.object().is_old;
         for medium in &media {
-            self.tell(node, "media are not modelled: the inside of the shape is empty");
+            let what = match is_border && bsdf.is_none() && emitter.is_none() {
+                true => "a shape without a BSDF is left out",
+                false => "the inside of the shape is empty",
+            };
+            self.tell(node, &format!("media are not modelled: {what}"));
             medium.skip();
         }
         for scattering in node.children("subsurface")? {
             self.tell(node, "subsurface scattering is not modelled: the surface is its BSDF alone");
             scattering.skip();
         }
-        let bsdf = node.children("bsdf")?.first().copied();
-        let emitter = node.children("emitter")?.first().copied();
-        let is_border = !media.is_empty() && node.object().is_old;
         let key = (bsdf.map(|node| node.index), emitter.map(|node| node.index), is_border);
         if let Some(known) = self.materials.get(&key) {
             return Ok(known.clone());
@@ -323,7 +328,6 @@ impl Converter<'_> {
         let surface = match bsdf {
             Some(bsdf) => self.surface(bsdf, 0)?,
             None if emitter.is_some() => Some(black()),
-            // The border of a medium: version 0.x shows no surface there.
             None if is_border => None,
             None => Some(Surface { part: grey(), two_sided: false }),
         };

@@ -299,7 +299,49 @@ fn a_dome_that_is_a_light_shines_inwards() {
 fn the_border_of_a_medium_is_no_surface_in_old_scenes() {
     let medium = "<medium type=\"homogeneous\" name=\"interior\"/>";
     let body = format!("<shape type=\"sphere\">{medium}</shape><shape type=\"sphere\"/>");
-    assert_eq!(["0.5.0", "3.0.0"].map(|version| read(version, &body).file.objects.len()), [1, 2]);
+    let scenes = ["0.5.0", "3.0.0"].map(|version| read(version, &body));
+    assert_eq!(scenes.each_ref().map(|scene| scene.file.objects.len()), [1, 2]);
+    // That of a scene in which nothing else is, too.
+    tells_only(&scenes[0], &["media are not modelled", "left out"]);
+}
+
+#[test]
+fn glass_has_its_colours_and_unknown_variants_are_what_they_begin_with() {
+    let colour = |name: &str| format!("<rgb name=\"{name}\" value=\"0.75 0.5 0.25\"/>");
+    let read_as = |bsdf: String| read("0.6.0", &format!("<shape type=\"sphere\">{bsdf}</shape>"));
+    let expected = ColorValue::Rgb(Vec3::new(0.75, 0.5, 0.25));
+    let alpha = "<float name=\"alpha\" value=\"0.25\"/>";
+    for (plugin, name, width) in [
+        ("dielectric", "specularTransmittance", 0.0),
+        ("roughdielectric", "specularTransmittance", 0.5),
+        ("dielectric", "specularReflectance", 0.0),
+    ] {
+        let alpha = if width > 0.0 { alpha } else { "" };
+        let scene = read_as(format!("<bsdf type=\"{plugin}\">{}{alpha}</bsdf>", colour(name)));
+        assert_eq!(told(&scene), Vec::<String>::new());
+        let Material::Principled { base_color, transmission, roughness, ior, specular_color, .. } = part(&scene, 0)
+        else {
+            panic!("{:?}", part(&scene, 0))
+        };
+        let white = ColorValue::grey(1.0);
+        let [through, reflected] = [("specularTransmittance", base_color), ("specularReflectance", specular_color)]
+            .map(|(of, color)| *color == if of == name { expected.clone() } else { white.clone() });
+        assert!(through && reflected, "{base_color:?} {specular_color:?}");
+        assert_eq!([transmission, roughness], [&1.0.into(), &width.into()]);
+        assert!((ior - 1.5046).abs() < 1e-3);
+    }
+    let variant = read_as(format!("<bsdf type=\"roughconductorGGX\">{alpha}</bsdf>"));
+    tells_only(&variant, &["roughconductorggx", "it is a roughconductor"]);
+    let usual = |more: &str| {
+        let scene = read_as(format!("<bsdf type=\"roughconductor\">{alpha}{more}</bsdf>"));
+        assert_eq!(told(&scene), Vec::<String>::new());
+        part(&scene, 0).clone()
+    };
+    assert_eq!(part(&variant, 0), &usual(""));
+    let (in_air, in_water) =
+        (usual("<float name=\"extEta\" value=\"1\"/>"), usual("<float name=\"extEta\" value=\"2\"/>"));
+    let [Material::Conductor { k, .. }, Material::Conductor { k: half, .. }] = [&in_air, &in_water] else { panic!() };
+    assert_eq!((k.0, &in_air), (2.0 * half.0, &usual("")));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use firstlight_files::warnings::Warnings;
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::TextureSource;
-use firstlight_format::value::ColorValue;
+use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_mesh::Mesh;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -42,6 +42,44 @@ pub(crate) const MAX_OBJECTS: usize = 1 << 20;
 /// What stands for a surface that is not modelled.
 pub(crate) fn grey() -> MaterialPart {
     MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) }
+}
+
+/// Glass whose surface colours the light that it lets through and reflects, as `principled`; what is reflected less
+/// passes. `None` if both are white, and for glass with a texture of its width, which `principled` has as a root.
+pub(crate) fn tinted_glass(
+    glass: &MaterialPart,
+    transmittance: ColorValue,
+    reflectance: ColorValue,
+) -> Option<MaterialPart> {
+    let white = ColorValue::grey(1.0);
+    let (width, index, inside, dispersed) = match glass {
+        MaterialPart::Glass { ior, absorption, dispersion } => (0.0, ior, absorption, dispersion),
+        MaterialPart::RoughGlass { alpha: ScalarValue::Number(alpha), ior, absorption, dispersion, .. } => {
+            (*alpha, ior, absorption, dispersion)
+        }
+        _ => return None,
+    };
+    if transmittance == white && reflectance == white {
+        return None;
+    }
+    let mut part = MaterialPart::principled(transmittance);
+    if let MaterialPart::Principled {
+        transmission,
+        roughness,
+        ior,
+        absorption,
+        dispersion,
+        specular,
+        specular_color,
+        ..
+    } = &mut part
+    {
+        (*transmission, *roughness) = (1.0.into(), width.sqrt().into());
+        (*ior, *absorption, *dispersion) = (*index, *inside, *dispersed);
+        *specular = if reflectance == ColorValue::grey(0.0) { 0.0 } else { 1.0 }.into();
+        *specular_color = reflectance;
+    }
+    Some(part)
 }
 
 /// Number of lobes of a material with all of its parts.

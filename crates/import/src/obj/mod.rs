@@ -27,6 +27,9 @@ use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+/// Words of a name among several in an `mtllib` line.
+const MOST_WORDS: usize = 8;
+
 /// Further names in `mtllib` lines are ignored, with a warning.
 const MAX_LIBRARIES: usize = 256;
 
@@ -262,12 +265,12 @@ fn find_materials(
     let (mut seen, mut has_materials, mut n_names) = (HashSet::new(), Vec::new(), 0);
     for line in &parsed.libraries {
         // A name may contain spaces, and a line may contain several names, and a comment.
-        let is_file = |name: &&str| files.resolve(folder, name).is_ok_and(|file| folder.join(file.path).exists());
-        let names: Vec<&str> = match [line, before_comment(line)].into_iter().find(is_file) {
-            Some(name) => vec![name],
-            None => before_comment(line).split_whitespace().collect(),
+        let is_file = |name: &str| files.resolve(folder, name).is_ok_and(|file| folder.join(file.path).exists());
+        let names = match [line, before_comment(line)].into_iter().find(|name| is_file(name)) {
+            Some(name) => vec![name.to_owned()],
+            None => names_of(before_comment(line), is_file),
         };
-        for name in names {
+        for name in &names {
             n_names += 1;
             if n_names > MAX_LIBRARIES {
                 warnings.push(format!(
@@ -297,6 +300,20 @@ fn find_materials(
         }
     }
     with_materials(path, parsed, known, has_materials, warnings)
+}
+
+/// Several names, separated by spaces, which they may have too: the longest that are files. A space may follow a
+/// backslash.
+fn names_of(line: &str, is_file: impl Fn(&str) -> bool) -> Vec<String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (mut names, mut rest) = (Vec::new(), &words[..]);
+    while !rest.is_empty() && names.len() <= MAX_LIBRARIES {
+        let name = |n: usize| rest[..n].join(" ").replace("\\ ", " ");
+        let n = (2..=rest.len().min(MOST_WORDS)).rev().find(|n| is_file(&name(*n))).unwrap_or(1);
+        names.push(name(n));
+        rest = &rest[n..];
+    }
+    names
 }
 
 /// What is before a comment at the end of a line, which names of 3ds Max look like: `Mat #1`.

@@ -77,19 +77,12 @@ const MORE_THAN_SHOWN: &str = "the scene has more objects than can be shown: use
 /// Textures may consist of later ones to this depth.
 const MOST_READINGS: u32 = 4;
 
-/// What ends a saved state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Saved {
-    Attributes,
-    Object,
-}
-
 /// Reads directives, one after the other.
 pub(crate) struct Reader<'a> {
     path: &'a Path,
     folder: &'a Path,
     state: State,
-    stack: Vec<(Saved, State)>,
+    stack: Vec<State>,
     systems: HashMap<String, DAffine3>,
     before_world: ViewOptions,
     /// Known from `WorldBegin` on.
@@ -141,7 +134,7 @@ impl<'a> Reader<'a> {
         let source = self.text(self.path)?;
         self.run(&source, 0)?;
         self.builder.finish_instances().map_err(|TooMany| SceneError::in_file(self.path, MORE_THAN_SHOWN))?;
-        if self.stack.iter().any(|(saved, _)| *saved == Saved::Object) {
+        if self.builder.is_in_object() {
             self.builder.tell("`ObjectBegin` is not ended: what follows it is not shown; is the file cut off?");
         } else if !self.stack.is_empty() {
             self.builder.tell("`AttributeBegin` is not ended: is the file cut off?");
@@ -275,16 +268,16 @@ impl<'a> Reader<'a> {
             }
             "ReverseOrientation" => self.state.is_reversed = !self.state.is_reversed,
             // The latter names are those of version 3, and mean the same in version 4.
-            "AttributeBegin" | "TransformBegin" => self.save(cursor, at, Saved::Attributes)?,
-            "AttributeEnd" | "TransformEnd" => self.restore(cursor, at, Saved::Attributes)?,
+            "AttributeBegin" | "TransformBegin" => self.save(cursor, at)?,
+            "AttributeEnd" | "TransformEnd" => self.restore(cursor, at),
             "ObjectBegin" => {
                 let object = cursor.string()?;
-                self.save(cursor, at, Saved::Object)?;
+                self.save(cursor, at)?;
                 self.builder.begin_object(&object).map_err(|message| cursor.wrong(at, message))?;
             }
             "ObjectEnd" => {
                 self.builder.end_object().map_err(|message| cursor.wrong(at, message))?;
-                self.restore(cursor, at, Saved::Object)?;
+                self.restore(cursor, at);
             }
             "ObjectInstance" => {
                 let object = cursor.string()?;
@@ -411,30 +404,22 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn save(&mut self, cursor: &Cursor, at: usize, what: Saved) -> Result<(), SceneError> {
+    fn save(&mut self, cursor: &Cursor, at: usize) -> Result<(), SceneError> {
         if self.stack.len() >= MAX_STATES {
             return Err(cursor.wrong(at, format!("more than {MAX_STATES} attributes are open: end some of them")));
         }
-        self.stack.push((what, self.state.clone()));
+        self.stack.push(self.state.clone());
         Ok(())
     }
 
-    fn restore(&mut self, cursor: &Cursor, at: usize, what: Saved) -> Result<(), SceneError> {
-        let name = match what {
-            Saved::Attributes => "AttributeBegin",
-            Saved::Object => "ObjectBegin",
-        };
+    /// Ends what was begun last: in version 3, objects and attributes may end in any order.
+    fn restore(&mut self, cursor: &Cursor, at: usize) {
         match self.stack.pop() {
-            Some((saved, state)) if saved == what => {
-                self.state = state;
-                Ok(())
-            }
-            None if what == Saved::Attributes => {
+            Some(state) => self.state = state,
+            None => {
                 let place = cursor.place(at);
-                self.builder.warnings.push(format!("{place}: there is no `{name}` that this could end: it is ignored"));
-                Ok(())
+                self.builder.warnings.push(format!("{place}: nothing was begun that this could end: it is ignored"));
             }
-            _ => Err(cursor.wrong(at, format!("there is no `{name}` that this could end"))),
         }
     }
 

@@ -25,6 +25,11 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Whether an object definition is not ended.
+    pub(crate) fn is_in_object(&self) -> bool {
+        self.open.is_some()
+    }
+
     /// An instance of an object definition, which may follow.
     pub(crate) fn instance(&mut self, name: &str, ctm: &DAffine3) -> Result<(), TooMany> {
         if self.open.is_some() {

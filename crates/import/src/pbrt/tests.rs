@@ -3,11 +3,12 @@
 use crate::model::foreign::{ForeignOptions, ForeignScene, LIGHT_SHARE};
 use crate::model::projection::LightImages;
 use firstlight_format::parts::{MaterialPart, ObjectPart};
+use firstlight_format::placement::Placement;
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, ScalarValue};
 use firstlight_render::Encoding;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -316,8 +317,18 @@ fn options_have_no_type_and_an_end_too_many_is_told() {
     let options = "Option \"seed\" 42 Option \"disablepixeljitter\" true Option \"msereferenceout\" \"x\"\n";
     assert_eq!(told(&read(&format!("{options}{SQUARE}"))), Vec::<String>::new());
     let scene = read(&format!("AttributeEnd\n{SQUARE}"));
-    tells_only(&scene, &["a.pbrt:2: ", "no `AttributeBegin`"]);
+    tells_only(&scene, &["a.pbrt:2: ", "nothing was begun"]);
     assert_eq!(scene.file.objects.len(), 1);
+}
+
+/// One list, as in version 3.
+#[test]
+fn attributes_and_objects_may_end_in_any_order() {
+    let object = format!("AttributeBegin\nTranslate 5 0 0\nObjectBegin \"o\"\nAttributeBegin\n{SQUARE}AttributeEnd\n");
+    let scene = read(&format!("{object}AttributeEnd\nObjectEnd\nTranslate 0 7 0\nObjectInstance \"o\"\n{SQUARE}"));
+    assert_eq!(told(&scene), Vec::<String>::new());
+    let places = scene.file.objects.iter().map(|object| Placement::from_part(object.transform()).affine().translation);
+    assert_eq!(places.collect::<Vec<_>>(), [DVec3::new(5.0, 7.0, 0.0), DVec3::new(0.0, 7.0, 0.0)]);
 }
 
 #[test]

@@ -13,6 +13,7 @@
 //!
 //! Source: "pbrt-v3 Input File Format", and Pharr, Jakob and Humphreys 2016, "Physically Based Rendering", third edition.
 
+use crate::model::foreign::tinted_glass;
 use crate::pbrt::material_inputs::{
     Conductor, MaterialScope, Widths, alpha, color, conductor, dielectric, of_conductor, principled, roughness,
 };
@@ -52,7 +53,8 @@ pub(super) fn material(
         "plastic" => layered(scope, params, 0.25, 1.5),
         // Nothing but smooth reflection and transmission.
         "uber" if params.has("Kd") && is_black(scope, params, "Kd") && !is_black(scope, params, "Kt") => {
-            dielectric(scope, params, index_name(params), absorption, &SMOOTH)
+            let clear = dielectric(scope, params, index_name(params), absorption, &SMOOTH);
+            tinted_glass(&clear, color(scope, params, "Kt", 1.0), ColorValue::grey(1.0)).unwrap_or(clear)
         }
         "uber" => uber(scope, params),
         "substrate" => substrate(scope, params),
@@ -66,13 +68,12 @@ pub(super) fn material(
         }
         "mirror" => MaterialPart::Mirror { reflectance: color(scope, params, "Kr", 0.9) },
         "glass" => {
-            if ["Kr", "Kt"].iter().any(|name| color(scope, params, name, 1.0) != ColorValue::grey(1.0)) {
-                scope.tell("the colours `Kr` and `Kt` of glass are not modelled: it is clear");
-            }
+            let [reflectance, transmittance] = ["Kr", "Kt"].map(|name| color(scope, params, name, 1.0));
             // Without any roughness the surface is smooth, which the fit is not.
             let is_smooth = ["roughness", "uroughness", "vroughness"].iter().all(|name| is_black(scope, params, name));
             let widths = if is_smooth { &SMOOTH } else { &widths(0.0) };
-            dielectric(scope, params, index_name(params), absorption, widths)
+            let clear = dielectric(scope, params, index_name(params), absorption, widths);
+            tinted_glass(&clear, transmittance, reflectance).unwrap_or(clear)
         }
         "translucent" => {
             let base = scope.color(params, "Kd").unwrap_or(Texture::Constant(Vec3::splat(0.25)));
@@ -258,6 +259,9 @@ mod tests {
         assert!(matches!(shown("Material \"glass\" \"float index\" [1.33]"), MaterialPart::Glass { ior: 1.33, .. }));
         let pane = "Material \"uber\" \"color Kd\" [0 0 0] \"color Kt\" [1 1 1]";
         assert!(matches!(shown(pane), MaterialPart::Glass { ior: 1.5, .. }));
+        let green = shown("Material \"glass\" \"color Kt\" [0.2 0.8 0.3] \"color Kr\" [0 0 0]");
+        let MaterialPart::Principled { base_color, specular, .. } = green else { panic!("{green:?}") };
+        assert_eq!((base_color, specular), (ColorValue::Rgb(Vec3::new(0.2, 0.8, 0.3)), 0.0.into()));
         let frosted = shown("Material \"glass\" \"float uroughness\" [0.1] \"float vroughness\" [0.1]");
         let MaterialPart::RoughGlass { alpha: ScalarValue::Number(alpha), ior, .. } = frosted else { panic!() };
         assert!((alpha - 0.4618).abs() < 1e-3 && ior == 1.5);

@@ -5,7 +5,7 @@
 //! | `lambert` | `diffuse` |
 //! | `oren_nayar`, `phong` | `diffuse`, told |
 //! | `plastic`, `rough_plastic` | `plastic` |
-//! | `dielectric`, `rough_dielectric` | `glass`, `rough_glass` |
+//! | `dielectric`, `rough_dielectric` | `glass`, `rough_glass`, or with an albedo `principled` |
 //! | `thinsheet` | `thin_glass` |
 //! | `conductor`, `rough_conductor` | `conductor` |
 //! | `mirror` | `mirror` |
@@ -18,7 +18,7 @@
 //!
 //! Reflections are the same on both sides, and roughness is α.
 
-use crate::model::foreign::{cut, grey, n_lobes, tinted};
+use crate::model::foreign::{cut, grey, n_lobes, tinted, tinted_glass};
 use crate::model::ior;
 use crate::tungsten::converter::{Converter, Reads};
 use crate::tungsten::fields::Fields;
@@ -104,16 +104,15 @@ impl<'a> Converter<'a> {
                 if of.flag("enable_refraction") == Some(false) {
                     of.tell("glass without refraction is not modelled: light passes it");
                 }
-                if !matches!(self.albedo(of), ColorValue::Rgb(Vec3::ONE)) {
-                    of.tell("the albedo of glass is not modelled: it is white");
-                }
-                match of.kind() {
+                let clear = match of.kind() {
                     "dielectric" => Material::Glass { ior, absorption, dispersion },
                     _ => {
                         let (alpha, beckmann) = self.roughness(of, 0.1);
                         Material::RoughGlass { alpha, ior, absorption, dispersion, compensate, beckmann }
                     }
-                }
+                };
+                let albedo = self.albedo(of);
+                tinted_glass(&clear, albedo.clone(), albedo).unwrap_or(clear)
             }
             "thinsheet" => {
                 if of.flag("enable_interference") == Some(true) {
