@@ -477,6 +477,23 @@ fn odd_stl_files_are_read_with_a_word_about_it() {
     let mut coloured = binary_stl(b"", &tetrahedron());
     *coloured.last_mut().unwrap() = 0x80;
     assert!(stl(&coloured).warnings[0].contains("attributes of triangles"));
+    // Magics: that of the file, red, and green twice.
+    let colours = |header: &[u8], attributes: [u16; 4]| {
+        let mut file = binary_stl(header, &tetrahedron());
+        for (i, attribute) in attributes.iter().enumerate() {
+            file[84 + 50 * i + 48..][..2].copy_from_slice(&attribute.to_le_bytes());
+        }
+        let model = stl(&file);
+        assert_eq!(model.warnings.len(), 0, "{:?}", model.warnings);
+        let diffuse: Vec<Vec3> = model.materials.iter().filter_map(|material| material.diffuse).collect();
+        (diffuse, model.mesh.slots)
+    };
+    let blue = b"COLOR=\x00\x00\xff\xff";
+    assert_eq!(colours(blue, [0x8000, 0x001f, 0x03e0, 0x03e0]), (vec![Vec3::Z, Vec3::Y, Vec3::X], vec![0, 2, 1, 1]));
+    assert_eq!(colours(blue, [0; 4]), (vec![Vec3::Z], Vec::new()));
+    assert_eq!(colours(blue, [0x7fff; 4]), (vec![Vec3::ONE], Vec::new()));
+    // A material without a name would be none.
+    assert_eq!(stl(&binary_stl(blue, &tetrahedron())).materials[0].name, "#0000ff");
     let text = text_stl(&tetrahedron());
     let open = stl(text.strip_suffix("endsolid facet of a test\n").unwrap().as_bytes());
     assert!(open.warnings[0].contains("no `endsolid`"));

@@ -1,9 +1,14 @@
 //! Binary STL: a header of 80 bytes, the number of triangles, and 50 bytes per triangle, little-endian.
+//!
+//! Colours are those of Materialise Magics, which other programs write as well: `COLOR=` and red, green, blue and alpha in
+//! the header, and after each triangle its own, 5 bits for each channel from red up. Its highest bit says that it has
+//! that of the header.
 
 use crate::error::Place;
 use crate::error::stl::StlProblem;
 use crate::stl::soup::{Located, Soup, is_plain};
 use glam::DVec3;
+use std::collections::BTreeSet;
 
 const HEADER: usize = 80;
 const START: usize = 84;
@@ -42,7 +47,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
         ));
     }
     soup.corners.reserve_exact(3 * count);
-    let mut has_attributes = false;
+    let mut attributes = Vec::with_capacity(count);
     for record in records.chunks_exact(TRIANGLE).take(count) {
         let number = |at: usize| {
             let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
@@ -52,17 +57,50 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
         let corners = [12, 24, 36].map(|at| DVec3::new(number(at), number(at + 4), number(at + 8)));
         if corners.iter().all(|corner| corner.is_finite()) {
             soup.corners.extend(corners);
+            attributes.push(u16::from_le_bytes([record[48], record[49]]));
         } else {
             soup.left_out += 1;
         }
-        has_attributes |= record[48..] != [0, 0];
     }
     let rest = records.len() - count * TRIANGLE;
     if rest > 0 {
         soup.notes.push(format!("{rest} bytes after the last of {count} triangles were ignored"));
     }
-    if has_attributes {
-        soup.notes.push("attributes of triangles (colours of some programs) are not modelled and were ignored".into());
+    let has_own = attributes.iter().any(|attribute| *attribute != 0);
+    match color_of_file(bytes) {
+        Some(whole) if has_own => (soup.colors, soup.slots) = colors(&attributes, whole),
+        // Who colours nothing writes zeros.
+        Some(whole) if whole != [0; 3] => soup.colors = vec![whole],
+        None if has_own => soup.notes.push("attributes of triangles are ignored: the header has no `COLOR=`".into()),
+        _ => {}
     }
     Ok(soup)
+}
+
+/// Red, green and blue of the header, sRGB.
+fn color_of_file(bytes: &[u8]) -> Option<[u8; 3]> {
+    const KEY: &[u8] = b"COLOR=";
+    let header = &bytes[..HEADER];
+    let at = header.windows(KEY.len()).position(|part| part == KEY)? + KEY.len();
+    header[at..].first_chunk().copied()
+}
+
+/// The different colours of triangles, and which of them each one has; fewer bits count if there are too many.
+fn colors(attributes: &[u16], whole: [u8; 3]) -> (Vec<[u8; 3]>, Vec<u16>) {
+    const OF_FILE: u16 = 0x8000;
+    const MOST: usize = 65;
+    let color = |attribute: u16, bits: u16| match attribute & OF_FILE {
+        0 => [0, 5, 10].map(|shift| {
+            let least = 1 << (5 - bits);
+            (u32::from((attribute >> shift & 31) / least * least) * 255 / 31) as u8
+        }),
+        _ => whole,
+    };
+    let colors_of = |bits| attributes.iter().map(|attribute| color(*attribute, bits)).collect::<BTreeSet<_>>();
+    let few = (2..=5).rev().map(|bits| (bits, colors_of(bits))).find(|(_, colors)| colors.len() <= MOST);
+    let (bits, colors) = few.expect("two bits for each channel have 64 values");
+    let colors: Vec<[u8; 3]> = colors.into_iter().collect();
+    let slot = |attribute: &u16| colors.binary_search(&color(*attribute, bits)).expect("one of them") as u16;
+    let slots = if colors.len() > 1 { attributes.iter().map(slot).collect() } else { Vec::new() };
+    (colors, slots)
 }

@@ -17,6 +17,7 @@ use crate::stl::soup::{Soup, is_plain};
 use firstlight_files::input_file::{FileKind, InputFile};
 use firstlight_files::warnings::Warnings;
 use firstlight_mesh::Welding;
+use firstlight_render::decode_srgb;
 use std::path::Path;
 
 /// Loads all solids of an STL file as one mesh; detects from the contents whether it is text or binary.
@@ -28,7 +29,7 @@ pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         .and_then(InputFile::bytes)
         .map_err(|error| ModelError::of(path, Place::File, error))?;
     let parsed = if is_text(&bytes) { text::parse(&bytes) } else { binary::parse(&bytes) };
-    let Soup { corners, polygons, left_out, notes } =
+    let Soup { corners, slots, colors, polygons, left_out, notes } =
         parsed.map_err(|(place, problem)| ModelError::of(path, place, problem))?;
     drop(bytes);
     let failed = |problem: StlProblem| ModelError::of(path, Place::File, ModelProblem::Stl(problem));
@@ -48,19 +49,31 @@ pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
     let model = Indexed {
         positions: welding.first.iter().map(|&corner| corners[corner as usize]).collect(),
         triangles: welding.place.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
+        slots,
         ..Indexed::default()
     };
     drop((corners, welding));
+    let material = |color: &[u8; 3]| ImportedMaterial {
+        name: hex(*color),
+        diffuse: Some(color.map(|byte| decode_srgb(f64::from(byte) / 255.0) as f32).into()),
+        ..ImportedMaterial::default()
+    };
+    let materials =
+        if colors.is_empty() { vec![ImportedMaterial::default()] } else { colors.iter().map(material).collect() };
     let (mesh, normals_from_file) = assemble(path, model, options, &mut warnings)?;
     Ok(ImportedModel {
         mesh,
-        materials: vec![ImportedMaterial::default()],
+        materials,
         libraries: Vec::new(),
         normals_from_file,
         polygons,
         warnings,
         material_warnings: Warnings::default(),
     })
+}
+
+fn hex([r, g, b]: [u8; 3]) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// Text begins with `solid`, but so do the headers of many binary files: those are detected by their length, or by

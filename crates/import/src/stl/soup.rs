@@ -9,6 +9,10 @@ use glam::DVec3;
 pub(super) struct Soup {
     /// Finite.
     pub corners: Vec<DVec3>,
+    /// Colour of each triangle, as an index; empty if there is one or none.
+    pub slots: Vec<u16>,
+    /// Red, green and blue, sRGB.
+    pub colors: Vec<[u8; 3]>,
     /// Number of facets with more than three vertices.
     pub polygons: usize,
     /// Number of facets that are no triangles or polygons of finite size.
