@@ -124,16 +124,22 @@ fn materials_are_what_they_stand_for() {
         r#"{"name": "mixed", "type": "mixed", "bsdf0": "a", "bsdf1": "b", "ratio": 0.25},
         {"name": "a", "type": "plastic", "ior": 1.4, "albedo": [0.5, 0.25, 0.125]}, {"name": "b", "type": "conductor"},
         {"name": "lace", "type": "transparency", "base": "a", "alpha": 0.5},
+        {"name": "bottle", "type": "dielectric", "ior": 1.4, "albedo": [0.5, 0.25, 0.125]},
         {"name": "leaf", "type": "diffuse_transmission", "albedo": 0.5, "transmittance": 0.25},
         {"name": "loop", "type": "mixed", "bsdf0": "loop", "bsdf1": "a"}"#,
         r#"{"type": "quad", "bsdf": "mixed"}, {"type": "quad", "bsdf": "lace"}, {"type": "quad", "bsdf": "leaf"},
-        {"type": "quad", "bsdf": "loop"}, {"type": "quad", "bsdf": "gone"}, {"type": "quad", "bsdf": {"type": "forward"}},
+        {"type": "quad", "bsdf": "bottle"}, {"type": "quad", "bsdf": "loop"}, {"type": "quad", "bsdf": "gone"}, {"type": "quad", "bsdf": {"type": "forward"}},
         {"type": "infinite_sphere_cap", "cap_angle": 1, "power": 2}"#,
     );
     // The ratio is the share of the first, ours that of the second.
     let expected = Material::blend(0.25.into(), "b".to_owned(), "a".to_owned());
     assert_eq!(material(&scene, "mixed"), expected);
-    assert_eq!(scene.file.objects.len(), 5, "light passes a forward BSDF");
+    let Material::Principled { base_color, specular_color, transmission, ior, .. } = material(&scene, "bottle") else {
+        panic!()
+    };
+    let amber = ColorValue::rgb(0.5, 0.25, 0.125);
+    assert_eq!((base_color, specular_color, transmission, ior), (amber.clone(), amber, 1.0.into(), 1.4));
+    assert_eq!(scene.file.objects.len(), 6, "light passes a forward BSDF");
     let Material::Blend { opacity, .. } = material(&scene, "lace") else { panic!() };
     assert_eq!(opacity, 0.5.into());
     let Material::Translucent { reflectance, transmittance } = material(&scene, "leaf") else { panic!() };

@@ -178,15 +178,11 @@ impl Converter<'_> {
             "dielectric" => Material::Glass { ior, absorption, dispersion },
             _ => {
                 let (alpha, beckmann) = self.isotropic(node)?;
-                if matches!(alpha, ScalarValue::Texture(_))
-                    && [&transmittance, &reflectance] != [&ColorValue::grey(1.0); 2]
-                {
-                    self.tell(node, "the colours of glass of textured roughness are not modelled: it is clear");
-                }
                 Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann }
             }
         };
-        Ok(Surface::two_sided(tinted_glass(&clear, transmittance, reflectance).unwrap_or(clear)))
+        let part = tinted_glass(clear, transmittance, reflectance, |why| self.tell(node, why));
+        Ok(Surface::two_sided(part))
     }
 
     fn thin_dielectric(&mut self, node: Node) -> Result<Surface, SceneError> {

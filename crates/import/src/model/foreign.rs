@@ -45,23 +45,29 @@ pub(crate) fn grey() -> MaterialPart {
 }
 
 /// Glass whose surface colours the light that it lets through and reflects, as `principled`; what is reflected less
-/// passes. `None` if both are white, and for glass with a texture of its width, which `principled` has as a root.
+/// passes.
+///
+/// - `tell`: receives why it stays clear.
 pub(crate) fn tinted_glass(
-    glass: &MaterialPart,
+    clear: MaterialPart,
     transmittance: ColorValue,
     reflectance: ColorValue,
-) -> Option<MaterialPart> {
-    let white = ColorValue::grey(1.0);
-    let (width, index, inside, dispersed) = match glass {
-        MaterialPart::Glass { ior, absorption, dispersion } => (0.0, ior, absorption, dispersion),
-        MaterialPart::RoughGlass { alpha: ScalarValue::Number(alpha), ior, absorption, dispersion, .. } => {
-            (*alpha, ior, absorption, dispersion)
-        }
-        _ => return None,
-    };
-    if transmittance == white && reflectance == white {
-        return None;
+    tell: impl FnOnce(&str),
+) -> MaterialPart {
+    if [&transmittance, &reflectance] == [&ColorValue::grey(1.0); 2] {
+        return clear;
     }
+    let (width, index, inside, dispersed) = match &clear {
+        MaterialPart::Glass { ior, absorption, dispersion } => (0.0, *ior, *absorption, *dispersion),
+        MaterialPart::RoughGlass { alpha: ScalarValue::Number(alpha), ior, absorption, dispersion, .. } => {
+            (*alpha, *ior, *absorption, *dispersion)
+        }
+        // `principled` has the root of the width.
+        _ => {
+            tell("the colours of glass of textured roughness are not modelled: it is clear");
+            return clear;
+        }
+    };
     let mut part = MaterialPart::principled(transmittance);
     if let MaterialPart::Principled {
         transmission,
@@ -75,11 +81,11 @@ pub(crate) fn tinted_glass(
     } = &mut part
     {
         (*transmission, *roughness) = (1.0.into(), width.sqrt().into());
-        (*ior, *absorption, *dispersion) = (*index, *inside, *dispersed);
+        (*ior, *absorption, *dispersion) = (index, inside, dispersed);
         *specular = if reflectance == ColorValue::grey(0.0) { 0.0 } else { 1.0 }.into();
         *specular_color = reflectance;
     }
-    Some(part)
+    part
 }
 
 /// Number of lobes of a material with all of its parts.

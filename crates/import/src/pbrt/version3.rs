@@ -54,7 +54,8 @@ pub(super) fn material(
         // Nothing but smooth reflection and transmission.
         "uber" if params.has("Kd") && is_black(scope, params, "Kd") && !is_black(scope, params, "Kt") => {
             let clear = dielectric(scope, params, index_name(params), absorption, &SMOOTH);
-            tinted_glass(&clear, color(scope, params, "Kt", 1.0), ColorValue::grey(1.0)).unwrap_or(clear)
+            let transmittance = color(scope, params, "Kt", 1.0);
+            tinted_glass(clear, transmittance, ColorValue::grey(1.0), |why| scope.tell(why))
         }
         "uber" => uber(scope, params),
         "substrate" => substrate(scope, params),
@@ -73,7 +74,7 @@ pub(super) fn material(
             let is_smooth = ["roughness", "uroughness", "vroughness"].iter().all(|name| is_black(scope, params, name));
             let widths = if is_smooth { &SMOOTH } else { &widths(0.0) };
             let clear = dielectric(scope, params, index_name(params), absorption, widths);
-            tinted_glass(&clear, transmittance, reflectance).unwrap_or(clear)
+            tinted_glass(clear, transmittance, reflectance, |why| scope.tell(why))
         }
         "translucent" => {
             let base = scope.color(params, "Kd").unwrap_or(Texture::Constant(Vec3::splat(0.25)));

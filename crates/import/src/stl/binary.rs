@@ -91,8 +91,8 @@ fn colors(attributes: &[u16], whole: [u8; 3]) -> (Vec<[u8; 3]>, Vec<u16>) {
     const MOST: usize = 65;
     let color = |attribute: u16, bits: u16| match attribute & OF_FILE {
         0 => [0, 5, 10].map(|shift| {
-            let least = 1 << (5 - bits);
-            (u32::from((attribute >> shift & 31) / least * least) * 255 / 31) as u8
+            let level = u32::from((attribute >> shift & 31) >> (5 - bits));
+            (level * 255 / ((1 << bits) - 1)) as u8
         }),
         _ => whole,
     };
@@ -103,4 +103,24 @@ fn colors(attributes: &[u16], whole: [u8; 3]) -> (Vec<[u8; 3]>, Vec<u16>) {
     let slot = |attribute: &u16| colors.binary_search(&color(*attribute, bits)).expect("one of them") as u16;
     let slots = if colors.len() > 1 { attributes.iter().map(slot).collect() } else { Vec::new() };
     (colors, slots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_colours_become_few_that_are_near() {
+        let attributes: Vec<u16> = (0..=0x8000).collect();
+        let (palette, slots) = colors(&attributes, [1, 2, 3]);
+        assert!(palette.len() <= 65 && palette.contains(&[0; 3]) && palette.contains(&[255; 3]));
+        assert_eq!(palette[usize::from(slots[0x8000])], [1, 2, 3]);
+        for attribute in 0..0x8000_u16 {
+            for (channel, byte) in palette[usize::from(slots[usize::from(attribute)])].into_iter().enumerate() {
+                let wanted = f64::from(attribute >> (5 * channel) & 31) / 31.0;
+                assert!((f64::from(byte) / 255.0 - wanted).abs() < 0.25, "{attribute:#x}");
+            }
+        }
+        assert_eq!(colors(&[0x7fff, 0x7fff], [1, 2, 3]), (vec![[255; 3]], Vec::new()));
+    }
 }

@@ -112,7 +112,7 @@ impl<'a> Converter<'a> {
                     }
                 };
                 let albedo = self.albedo(of);
-                tinted_glass(&clear, albedo.clone(), albedo).unwrap_or(clear)
+                tinted_glass(clear, albedo.clone(), albedo, |why| of.tell(why))
             }
             "thinsheet" => {
                 if of.flag("enable_interference") == Some(true) {
