@@ -168,7 +168,8 @@ fn nothing_is_measured_for_a_preview() {
     film.set_preview(true);
     assert!(advance(&scene, &settings, &mut film, 1, &|| false).completed);
     assert_eq!(known_caustic_choice(&scene, &settings, SIZE), None);
-    assert_eq!(film.caustic_plan(), Some(CausticPlan::UNKNOWN));
+    // Guiding would wait for its own paths.
+    assert_eq!(film.caustic_plan(), Some(CausticPlan { guided: false, ..CausticPlan::UNKNOWN }));
     // What was found out of another view will do.
     let (wide, _) = render(&large_light(), &settings, SIZE.0, SIZE.1, 1);
     assert_eq!(wide.caustic_plan(), Some(CausticPlan::NONE));
@@ -178,4 +179,12 @@ fn nothing_is_measured_for_a_preview() {
     film.set_preview(true);
     assert!(advance(&scene, &settings, &mut film, 1, &|| false).completed);
     assert_eq!(film.caustic_plan(), Some(CausticPlan::NONE));
+    // And so will what was found out before a change of the scene.
+    let moved = scene.with_snapshot((*small_light()).clone());
+    let changed = moved.with_snapshot((*moved).clone());
+    let mut film = Film::new(12, 9);
+    film.set_preview(true);
+    assert!(advance(&changed, &settings, &mut film, 1, &|| false).completed);
+    assert_eq!(film.caustic_plan(), Some(CausticPlan::NONE));
+    assert_eq!(known_caustic_choice(&changed, &settings, SIZE), None);
 }

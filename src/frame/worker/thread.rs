@@ -32,6 +32,11 @@ const LATE: f64 = 2.0;
 /// many.
 pub(super) const MOST_IMAGES: f32 = 12.0;
 
+/// Tiles per thread below which a film has smaller ones, in pixels along a side: the last tiles of a preview keep one
+/// thread busy, and all others wait. Smaller still, and the batches of rays would be too small.
+const FEWEST_TILES: usize = 4;
+const SMALL_TILE: u32 = 16;
+
 /// State of the render thread.
 pub struct Loop<'a> {
     pub(super) shared: &'a Shared,
@@ -268,7 +273,7 @@ impl<'a> Loop<'a> {
                     }
                     film
                 }
-                None => match Film::try_new(size.0, size.1) {
+                None => match Film::try_with_tile_size(size.0, size.1, tile_size(size, self.stats.threads)) {
                     Ok(film) => film,
                     Err(error) => return self.give_up(error.to_string()),
                 },
@@ -471,4 +476,10 @@ impl<'a> Loop<'a> {
             waker();
         }
     }
+}
+
+/// Side of the tiles of a film of this size in pixels.
+fn tile_size((width, height): (u32, u32), n_threads: usize) -> u32 {
+    let n_tiles = width.div_ceil(Film::TILE_SIZE) * height.div_ceil(Film::TILE_SIZE);
+    if (n_tiles as usize) < FEWEST_TILES * n_threads { SMALL_TILE } else { Film::TILE_SIZE }
 }

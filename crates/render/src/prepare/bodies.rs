@@ -15,7 +15,9 @@ use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::geometry::robust::offset_ray_origin;
 use firstlight_kdtree::{Hit, SceneTree, Shape};
 use glam::{DVec3, Vec3};
+use rustc_hash::FxHashMap;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// See the [module](self).
 #[derive(Debug, Default)]
@@ -24,6 +26,26 @@ pub(crate) struct Bodies {
     /// Bodies of each object.
     of_object: Vec<BodySurface>,
     deepest: u32,
+    /// What the triangles of a mesh with one of its transparent materials enclose, by object and material.
+    meshes: FxHashMap<(u32, MaterialId), Enclosed>,
+}
+
+/// The bodies of another scene, which may have some of the same objects at the same indices.
+pub(crate) struct BodiesBefore<'a> {
+    pub geometry: &'a Geometry,
+    pub bodies: &'a Bodies,
+}
+
+impl BodiesBefore<'_> {
+    /// Returns what a part of a mesh encloses, if it is known and the object is the same in both scenes.
+    fn enclosed(&self, geometry: &Geometry, object: u32, material: MaterialId) -> Option<Enclosed> {
+        let known = self.bodies.meshes.get(&(object, material))?;
+        let i = object as usize;
+        let (now, then) = (&geometry.objects[i], &self.geometry.objects[i]);
+        let has_same_mesh = now.mesh.as_ref().zip(then.mesh.as_ref()).is_some_and(|(a, b)| Arc::ptr_eq(a, b));
+        let is_same = has_same_mesh && now.materials == then.materials;
+        (is_same && geometry.tree.shapes()[i].is_same(&self.geometry.tree.shapes()[i])).then_some(*known)
+    }
 }
 
 /// One transparent part of one body.
@@ -63,6 +85,13 @@ pub(crate) struct Boundary {
 /// A body without rows so far.
 struct BodyCandidate {
     material: MaterialId,
+    enclosed: Enclosed,
+    of: BodyPart,
+}
+
+/// What the surface of a body encloses.
+#[derive(Clone, Copy, Debug)]
+struct Enclosed {
     /// Volume in cubic metres; infinite for a half-space.
     volume: f64,
     /// Area of its faces, and the sum of their area vectors, square metres; zero for spheres and planes.
@@ -70,7 +99,6 @@ struct BodyCandidate {
     area_vector: DVec3,
     low: DVec3,
     high: DVec3,
-    of: BodyPart,
 }
 
 /// Area of the holes of a surface, as far as they face one way, over that of its faces, above which it counts as open:
@@ -92,19 +120,25 @@ const N_LARGEST: usize = 256;
 const MOST_HITS: usize = 4096;
 
 impl Bodies {
-    pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
+    /// - `before`: what is the same there is not computed again.
+    pub fn build(geometry: &Geometry, materials: &[Material], before: Option<BodiesBefore>) -> Self {
         let n_leaves: Vec<u32> = (0..materials.len() as u32).map(|id| leaves_of(materials, id).len() as u32).collect();
         let mut of_object = vec![BodySurface::Opaque; geometry.objects.len()];
         if n_leaves.iter().all(|&n| n == 0) {
-            return Self { rows: Vec::new(), of_object, deepest: 0 };
+            return Self { of_object, ..Self::default() };
         }
-        let mut candidates = candidates(geometry, &n_leaves);
+        let mut candidates = candidates(geometry, &n_leaves, before.as_ref());
+        let of_mesh = |body: &BodyCandidate| match body.of {
+            BodyPart::Slot(object) => Some(((object, body.material), body.enclosed)),
+            _ => None,
+        };
+        let meshes = candidates.iter().filter_map(of_mesh).collect();
         // Of equally large bodies the later one counts, as if it had been entered last.
-        candidates.sort_by(|a, b| b.volume.total_cmp(&a.volume));
+        candidates.sort_by(|a, b| b.enclosed.size().total_cmp(&a.enclosed.size()));
         let mut rows = Vec::new();
         for candidate in &candidates {
-            let (BodyCandidate { material, of, .. }, is_open) = (candidate, candidate.is_open());
-            let first = rows.len() as u32;
+            let (BodyCandidate { material, enclosed, of }, first) = (candidate, rows.len() as u32);
+            let is_open = enclosed.is_open();
             let leaves = leaves_of(materials, *material);
             let n_leaves = leaves.len() as u32;
             rows.extend(leaves.into_iter().map(|leaf| BodyRow { n_leaves, is_open, ..leaf }));
@@ -130,7 +164,7 @@ impl Bodies {
             }
         }
         let deepest = deepest(&candidates);
-        Self { rows, of_object, deepest }
+        Self { rows, of_object, deepest, meshes }
     }
 
     /// Maximum nesting of bodies, judged by their bounding boxes.
@@ -296,7 +330,7 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<BodyRow> {
 }
 
 /// All bodies, in the order of objects and primitives.
-fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
+fn candidates(geometry: &Geometry, n_leaves: &[u32], before: Option<&BodiesBefore>) -> Vec<BodyCandidate> {
     let mut bodies = Vec::new();
     let mut faces: Vec<BodyCandidate> = Vec::new();
     for (i, (object, shape)) in (0..).zip(geometry.objects.iter().zip(geometry.tree.shapes())) {
@@ -306,11 +340,12 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
         }
         let of_sphere = |material, center: DVec3, radius: f64, of| BodyCandidate {
             material,
-            volume: 4.0 / 3.0 * PI * radius.powi(3),
-            area: 0.0,
-            area_vector: DVec3::ZERO,
-            low: center - radius,
-            high: center + radius,
+            enclosed: Enclosed {
+                volume: 4.0 / 3.0 * PI * radius.powi(3),
+                low: center - radius,
+                high: center + radius,
+                ..Enclosed::NOTHING
+            },
             of,
         };
         let material = object.materials[0];
@@ -333,48 +368,55 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<BodyCandidate> {
                 let mut distinct = object.materials.clone();
                 distinct.sort_unstable();
                 distinct.dedup();
-                for material in distinct.into_iter().filter(|&id| is_clear(id)) {
-                    let mut body = BodyCandidate::empty(material, BodyPart::Slot(i));
-                    for prim in (0..tree.n_triangles() as u32).filter(|&prim| object.material_of(prim) == material) {
-                        body.add(tree.vertices(prim).map(|p| map * p.as_dvec3() + offset));
-                    }
-                    bodies.push(body);
-                }
+                bodies.extend(distinct.into_iter().filter(|&id| is_clear(id)).map(|material| {
+                    let measure = || {
+                        let mut enclosed = Enclosed::NOTHING;
+                        for prim in (0..tree.n_triangles() as u32).filter(|&prim| object.material_of(prim) == material)
+                        {
+                            enclosed.add(tree.vertices(prim).map(|p| map * p.as_dvec3() + offset));
+                        }
+                        enclosed
+                    };
+                    let known = before.and_then(|before| before.enclosed(geometry, i, material));
+                    BodyCandidate { material, enclosed: known.unwrap_or_else(measure), of: BodyPart::Slot(i) }
+                }));
             }
             Shape::Plane { .. } | Shape::Quad { .. } | Shape::Triangle { .. } => {
                 let at = faces.iter().position(|body| body.material == material).unwrap_or_else(|| {
-                    faces.push(BodyCandidate::empty(material, BodyPart::Faces(Vec::new())));
+                    let of = BodyPart::Faces(Vec::new());
+                    faces.push(BodyCandidate { material, enclosed: Enclosed::NOTHING, of });
                     faces.len() - 1
                 });
-                let body = &mut faces[at];
-                if let BodyPart::Faces(objects) = &mut body.of {
+                let BodyCandidate { enclosed, of, .. } = &mut faces[at];
+                if let BodyPart::Faces(objects) = of {
                     objects.push(i);
                 }
                 match shape {
-                    Shape::Triangle { vertices } => body.add(vertices.map(|p| p.as_dvec3())),
+                    Shape::Triangle { vertices } => enclosed.add(vertices.map(|p| p.as_dvec3())),
                     Shape::Quad { corner, edge_u, edge_v } => {
                         let [a, u, v] = [corner, edge_u, edge_v].map(|p| p.as_dvec3());
-                        body.add([a, a + u, a + u + v]);
-                        body.add([a, a + u + v, a + v]);
+                        enclosed.add([a, a + u, a + u + v]);
+                        enclosed.add([a, a + u + v, a + v]);
                     }
                     _ => {
-                        (body.volume, body.area) = (f64::INFINITY, f64::INFINITY);
-                        (body.low, body.high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+                        (enclosed.volume, enclosed.area) = (f64::INFINITY, f64::INFINITY);
+                        (enclosed.low, enclosed.high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
                     }
                 }
             }
         }
     }
     bodies.extend(faces);
-    // What has no volume contains everything else.
-    bodies.iter_mut().for_each(|body| body.volume = if body.is_open() { f64::INFINITY } else { body.volume.abs() });
     bodies
 }
 
-impl BodyCandidate {
-    fn empty(material: MaterialId, of: BodyPart) -> Self {
-        let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        Self { material, volume: 0.0, area: 0.0, area_vector: DVec3::ZERO, low, high, of }
+impl Enclosed {
+    const NOTHING: Self =
+        Self { volume: 0.0, area: 0.0, area_vector: DVec3::ZERO, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+
+    /// Volume in cubic metres; what has no volume contains everything else.
+    fn size(&self) -> f64 {
+        if self.is_open() { f64::INFINITY } else { self.volume.abs() }
     }
 
     fn is_open(&self) -> bool {
@@ -393,8 +435,55 @@ impl BodyCandidate {
 }
 
 fn deepest(bodies: &[BodyCandidate]) -> u32 {
-    let holds = |a: &BodyCandidate, b: &BodyCandidate| a.low.cmple(b.low).all() && b.high.cmple(a.high).all();
+    let holds = |a: &Enclosed, b: &Enclosed| a.low.cmple(b.low).all() && b.high.cmple(a.high).all();
     let largest = &bodies[..bodies.len().min(N_LARGEST)];
-    let depth = |b: &BodyCandidate| largest.iter().filter(|a| !std::ptr::eq(*a, b) && holds(a, b)).count() as u32 + 1;
+    let depth = |b: &BodyCandidate| {
+        let holds_it = |a: &&BodyCandidate| !std::ptr::eq(*a, b) && holds(&a.enclosed, &b.enclosed);
+        largest.iter().filter(holds_it).count() as u32 + 1
+    };
     bodies.iter().map(depth).max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::material::MaterialKind;
+    use crate::core::snapshot::Object;
+    use firstlight_kdtree::{BuildPreset, HitSpace, MeshTree};
+    use firstlight_mesh::{Mesh, procedural};
+    use glam::Affine3A;
+
+    /// Boxes in a row, with the materials of their parts.
+    fn boxes(mesh: &Arc<Mesh>, tree: &Arc<MeshTree>, placed: &[(f32, &[MaterialId])]) -> Geometry {
+        let shape = |&(x, _): &(f32, &[MaterialId])| Shape::Mesh {
+            tree: tree.clone(),
+            world_from_object: Affine3A::from_translation(Vec3::new(x, 0.0, 0.0)),
+            space: HitSpace::Object,
+        };
+        let object = |&(_, materials): &(f32, &[MaterialId])| Object {
+            mesh: Some(mesh.clone()),
+            materials: materials.to_vec(),
+            ..Object::default()
+        };
+        Geometry::build(placed.iter().map(shape).collect(), placed.iter().map(object).collect())
+    }
+
+    #[test]
+    fn bodies_after_changes_are_those_of_a_new_scene() {
+        let materials = [MaterialKind::Glass, MaterialKind::Glass, MaterialKind::Diffuse]
+            .map(|kind| Material::of_kind(kind, Vec3::ONE.into()).expect("no blend"));
+        let mut mesh = procedural::cuboid(DVec3::ONE).flat();
+        mesh.slots = (0..mesh.triangles.len()).map(|i| (i % 2) as u16).collect();
+        let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
+        let mesh = Arc::new(mesh);
+        let before = boxes(&mesh, &tree, &[(0.0, &[0]), (2.0, &[0, 2]), (4.0, &[0]), (6.0, &[2])]);
+        let bodies = Bodies::build(&before, &materials, None);
+        // The first stays, the second has other parts, the third has moved, the fourth becomes glass.
+        let after = boxes(&mesh, &tree, &[(0.0, &[0]), (2.0, &[2, 0]), (5.0, &[0]), (6.0, &[1])]);
+        let known = || BodiesBefore { geometry: &before, bodies: &bodies };
+        let is_known = |i| known().enclosed(&after, i, 0).is_some();
+        assert_eq!([0, 1, 2, 3].map(is_known), [true, false, false, false]);
+        let changed = Bodies::build(&after, &materials, Some(known()));
+        assert_eq!(format!("{changed:?}"), format!("{:?}", Bodies::build(&after, &materials, None)));
+    }
 }

@@ -8,6 +8,12 @@ use std::sync::OnceLock;
 /// Rows of a coat of textured width, uniform in the root of the width.
 pub(crate) const N_WIDTHS: usize = 17;
 
+/// Entries by angle, uniform in the root of the cosine.
+pub(crate) const N_COS: usize = 64;
+/// Entries of a row: the transmitted share of light from outside, by angle; its mean for uniform light; the share of
+/// uniform light from inside that is reflected.
+pub(crate) const ROW: usize = N_COS + 2;
+
 /// Coats by material, and what is tabulated for each of their rows.
 #[derive(Debug, Default)]
 pub(crate) struct CoatTable {
@@ -15,6 +21,8 @@ pub(crate) struct CoatTable {
     pub first: Vec<f32>,
     pub n_more: Vec<f32>,
     pub rows: Vec<CoatRow>,
+    /// Per row: its entries, if the scene before has such a coat too.
+    pub known: Vec<Option<[f32; ROW]>>,
     /// The entries of all rows, computed when first needed; see `shading/coat.rs`.
     pub entries: OnceLock<Vec<f32>>,
 }
@@ -29,7 +37,8 @@ pub(crate) struct CoatRow {
 }
 
 impl CoatTable {
-    pub fn build(materials: &[Material]) -> Self {
+    /// - `before`: of a scene that may have some of the same coats.
+    pub fn build(materials: &[Material], before: Option<&Self>) -> Self {
         let mut table = Self::default();
         let mut known = HashMap::new();
         for material in materials.iter().map(|material| material.scattering(materials)) {
@@ -47,6 +56,13 @@ impl CoatTable {
             table.first.push(first as f32);
             table.n_more.push(n_more as f32);
         }
-        Self { first: padded(table.first), n_more: padded(table.n_more), ..table }
+        let known = table.rows.iter().map(|row| before?.entries_of(row)).collect();
+        Self { first: padded(table.first), n_more: padded(table.n_more), known, ..table }
+    }
+
+    fn entries_of(&self, row: &CoatRow) -> Option<[f32; ROW]> {
+        let at = self.rows.iter().position(|known| known == row)?;
+        let computed = self.entries.get().and_then(|entries| entries.as_chunks().0.get(at).copied());
+        computed.or(self.known[at])
     }
 }

@@ -272,7 +272,7 @@ mod tests {
                 .map(|kind| Material::of_kind(kind, Vec3::ONE.into()).expect("no blend"));
             let contacts = Contacts::build(&geometry, &materials, None);
             prop_assume!(!contacts.of_object.is_empty());
-            let bodies = Bodies::build(&geometry, &materials);
+            let bodies = Bodies::build(&geometry, &materials, None);
             let touched = ContactScene { geometry: &geometry, materials: &materials, bodies: &bodies };
             for (from, to) in rays {
                 let (from, to) = (Vec3::from(from), Vec3::from(to));

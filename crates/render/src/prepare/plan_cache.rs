@@ -4,7 +4,7 @@ use crate::core::camera::Camera;
 use crate::core::caustic_plan::CausticChoice;
 use crate::core::settings::RenderSettings;
 use glam::UVec2;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Number of entries: the views and sizes between which a user switches.
 const MOST: usize = 4;
@@ -19,7 +19,11 @@ pub(crate) struct PlanKey {
 
 /// See the head of this file.
 #[derive(Debug, Default)]
-pub(crate) struct PlanCache(Mutex<Vec<(PlanKey, CausticChoice)>>);
+pub(crate) struct PlanCache {
+    kept: Mutex<Vec<(PlanKey, CausticChoice)>>,
+    /// The newest choice in the scene before a change.
+    before: Option<CausticChoice>,
+}
 
 impl PlanKey {
     pub fn new(camera: &Camera, settings: &RenderSettings, size: UVec2) -> Self {
@@ -29,23 +33,30 @@ impl PlanKey {
 }
 
 impl PlanCache {
-    pub fn find(&self, key: &PlanKey) -> Option<CausticChoice> {
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.iter().find(|(of, _)| of == key).map(|(_, choice)| *choice)
+    /// An empty cache for a changed scene.
+    pub fn after(before: &Self) -> Self {
+        Self { kept: Mutex::default(), before: before.newest() }
     }
 
-    /// The newest choice, of any view.
+    pub fn find(&self, key: &PlanKey) -> Option<CausticChoice> {
+        self.locked().iter().find(|(of, _)| of == key).map(|(_, choice)| *choice)
+    }
+
+    /// The newest choice, of any view; that of the scene before a change if there is none yet.
     pub fn newest(&self) -> Option<CausticChoice> {
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.last().map(|(_, choice)| *choice)
+        self.locked().last().map(|(_, choice)| *choice).or(self.before)
     }
 
     pub fn keep(&self, key: PlanKey, choice: CausticChoice) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.locked();
         kept.retain(|(of, _)| *of != key);
         if kept.len() == MOST {
             kept.remove(0);
         }
         kept.push((key, choice));
+    }
+
+    fn locked(&self) -> MutexGuard<'_, Vec<(PlanKey, CausticChoice)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

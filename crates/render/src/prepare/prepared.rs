@@ -6,7 +6,7 @@ use crate::core::material::Material;
 use crate::core::material_queries::{Cutout, Emission};
 use crate::core::snapshot::{Geometry, Shading, Snapshot};
 use crate::prepare::ambient::AmbientLight;
-use crate::prepare::bodies::{Bodies, Boundary};
+use crate::prepare::bodies::{Bodies, BodiesBefore, Boundary};
 use crate::prepare::bound::radiance_bound;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
@@ -17,6 +17,7 @@ use crate::prepare::large_textures::LargeTextures;
 use crate::prepare::light::{LightTable, reach_of};
 use crate::prepare::material_table::MaterialTable;
 use crate::prepare::occluders::Occluders;
+use crate::prepare::plan_cache::PlanCache;
 use crate::prepare::portals::Portals;
 use crate::prepare::radiance_unit::radiance_unit;
 use crate::prepare::surface_table::SurfaceTable;
@@ -286,17 +287,24 @@ impl Tables {
             materials: &before.shading.materials,
             contacts: &before.tables.contacts,
         });
+        let bodies_before =
+            before.map(|before| BodiesBefore { geometry: &before.geometry, bodies: &before.tables.bodies });
         let twins = Twins::of(geometry, before.map(|before| (&*before.geometry, &before.tables.twins)));
         let portals = before.and_then(|before| before.tables.last_portals());
+        let coats = CoatTable::build(materials, before.map(|before| &before.tables.coats));
+        let casters_before = before.and_then(|before| before.tables.casters.as_ref());
         let before = before.filter(|before| is_same(&before.shading.environment, environment));
         let (ambient, environment_sampler) = match before.map(|before| &before.tables) {
             Some(tables) => (tables.ambient.clone(), tables.environment_sampler.clone()),
             None => (AmbientLight::of(environment), EnvironmentSampler::build(environment).map(Arc::new)),
         };
-        let bodies = Bodies::build(geometry, materials);
+        let bodies = Bodies::build(geometry, materials, bodies_before);
         let contacts = Contacts::build(geometry, materials, contacts_before);
         let environment_lines = EnvironmentLines::of(environment, environment_sampler.as_ref());
         let mut casters = CasterTable::build(geometry, materials, &lights, environment_lines);
+        if let (Some(casters), Some(before)) = (&mut casters, casters_before) {
+            casters.plans = PlanCache::after(&before.plans);
+        }
         if !delta_lights.is_empty() {
             casters = casters.map(|casters| casters.with_media(geometry, &bodies, &lights));
         }
@@ -317,7 +325,7 @@ impl Tables {
             large_textures: LargeTextures::build(materials, textures),
             cutouts: materials.iter().map(Material::cutout).collect(),
             panes: materials.iter().map(|material| material.is_pane(materials)).collect(),
-            coats: CoatTable::build(materials),
+            coats,
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())
                 .then(|| radiance_bound(environment, &emission, materials))

@@ -4,19 +4,13 @@
 //! parameters of a coat are constant over its surface, but its width may be textured.
 
 use crate::core::material::{MaterialId, SMALLEST_ALPHA};
-use crate::prepare::coat_table::{CoatRow, CoatTable};
+use crate::prepare::coat_table::{CoatRow, CoatTable, N_COS, ROW};
 use crate::shading::dielectric::fresnel;
 use crate::shading::glass_loss::scattered_once;
 use crate::shading::integral_table::Between;
 use crate::shading::microfacets::Microfacets;
 use firstlight_simd::{Real, Truth, select};
 use rayon::prelude::*;
-
-/// Entries by angle, uniform in the root of the cosine.
-const N_COS: usize = 64;
-/// Entries of a row: the transmitted share of light from outside, by angle; its mean for uniform light; the share of
-/// uniform light from inside that is reflected.
-const ROW: usize = N_COS + 2;
 
 /// The coat of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,13 +92,13 @@ impl<'a, R: Real> Coat<'a, R> {
 
 /// Returns the entries of all coats; computes them on this thread if there are none yet.
 pub(crate) fn entries(table: &CoatTable) -> &[f32] {
-    table.entries.get_or_init(|| padded(table.rows.iter().flat_map(row).collect()))
+    table.entries.get_or_init(|| padded(table.rows.iter().zip(&table.known).flat_map(known_or_new).collect()))
 }
 
 /// Computes the entries of all coats on all threads.
 pub(crate) fn compute(table: &CoatTable) {
     if table.entries.get().is_none() {
-        let rows = table.rows.par_iter().flat_map_iter(row).collect();
+        let rows = table.rows.par_iter().zip(&table.known).flat_map_iter(known_or_new).collect();
         // Another thread may have set them first, to the same values.
         let _ = table.entries.set(padded(rows));
     }
@@ -114,6 +108,10 @@ pub(crate) fn compute(table: &CoatTable) {
 fn padded(mut rows: Vec<f32>) -> Vec<f32> {
     rows.extend([0.0; ROW]);
     rows
+}
+
+fn known_or_new((of, known): (&CoatRow, &Option<[f32; ROW]>)) -> [f32; ROW] {
+    known.unwrap_or_else(|| row(of))
 }
 
 fn row(&CoatRow { ior, alpha, beckmann }: &CoatRow) -> [f32; ROW] {
@@ -141,4 +139,38 @@ fn row(&CoatRow { ior, alpha, beckmann }: &CoatRow) -> [f32; ROW] {
         i if i > N_COS => mean(ior, |(_, reflected)| reflected).min(1.0 - f32::EPSILON),
         i => passed(shares((i as f32 / (N_COS - 1) as f32).powi(2), 1.0 / ior)) as f32,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::material::Material;
+    use glam::Vec3;
+
+    fn plastics(coats: &[(f32, f32)]) -> Vec<Material> {
+        let plastic = |&(ior, alpha): &(f32, f32)| Material::Plastic {
+            diffuse: Vec3::splat(0.5).into(),
+            alpha: alpha.into(),
+            ior,
+            specular: 1.0.into(),
+            nonlinear: false,
+            beckmann: false,
+        };
+        coats.iter().map(plastic).collect()
+    }
+
+    #[test]
+    fn coats_of_the_scene_before_are_taken_over_and_others_computed() {
+        let before = CoatTable::build(&plastics(&[(1.5, 0.1), (1.3, 0.2), (1.5, 0.3)]), None);
+        compute(&before);
+        let materials = plastics(&[(1.5, 0.3), (1.5, 0.2), (1.5, 0.1)]);
+        let after = CoatTable::build(&materials, Some(&before));
+        assert_eq!(after.known.iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, true]);
+        // Taken over once more before they were needed.
+        let later = CoatTable::build(&materials, Some(&after));
+        let new = CoatTable::build(&materials, None);
+        compute(&after);
+        assert_eq!(entries(&after), entries(&new));
+        assert_eq!(entries(&later), entries(&new));
+    }
 }

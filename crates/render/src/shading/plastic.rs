@@ -150,14 +150,17 @@ mod tests {
 
     /// The tables of one coat.
     fn table_of(ior: f32, alpha: ScalarInput) -> CoatTable {
-        CoatTable::build(&[Material::Plastic {
-            diffuse: ColorInput::Constant(Vec3::ONE),
-            alpha,
-            ior,
-            specular: 1.0.into(),
-            nonlinear: true,
-            beckmann: false,
-        }])
+        CoatTable::build(
+            &[Material::Plastic {
+                diffuse: ColorInput::Constant(Vec3::ONE),
+                alpha,
+                ior,
+                specular: 1.0.into(),
+                nonlinear: true,
+                beckmann: false,
+            }],
+            None,
+        )
     }
 
     fn plastic(table: &CoatTable, albedo: Vec3, nonlinear: bool, specular: f32, alpha: f32) -> Plastic<'_> {

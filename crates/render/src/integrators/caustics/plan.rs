@@ -100,11 +100,17 @@ pub(crate) fn known(scene: &Prepared, settings: &RenderSettings, size: UVec2) ->
         .or_else(|| casters.plans.find(&PlanKey::new(&scene.camera, settings, size)))
 }
 
-/// Returns a plan for previews, which must not be delayed: that of the last view of the scene that has one.
+/// Returns a plan for previews, which must not be delayed: that of the last view that has one, of this scene or of the
+/// one before its last change, and guiding only if its cache is there.
 pub(crate) fn for_preview(scene: &Prepared, settings: &RenderSettings) -> CausticPlan {
     let Some(casters) = casters_of(scene, settings) else { return CausticPlan::NONE };
-    let given = settings.techniques.caustic_plan;
-    given.or(casters.plans.newest().map(|choice| choice.plan)).unwrap_or(CausticPlan::UNKNOWN)
+    if let Some(given) = settings.techniques.caustic_plan {
+        return given;
+    }
+    let newest = casters.plans.newest().map(|choice| choice.plan);
+    let plan = newest.filter(|plan| plan.has_light_paths() || !scene.tables.lights.has_delta());
+    let plan = plan.unwrap_or(CausticPlan::UNKNOWN);
+    CausticPlan { guided: plan.guided && casters.guide.get().is_some(), ..plan }
 }
 
 /// A part of the image, represented by one pilot pixel.
