@@ -100,7 +100,7 @@ fn is_complete(
     }
     let Ok(there) = ImageMetadata::read(path) else { return Ok(false) };
     let samples = ImageSamples { first: 0, spp: there.spp, uneven: there.uneven };
-    let note = job.draft.note(path, job.size, samples, job.display.into());
+    let note = job.draft.note(path, job.size, samples, job.display);
     let ours = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
     let ours = ImageMetadata { denoised: args.denoise.denoise.then(|| args.denoise.name()), ..ours };
     if ours != there || target.spp.is_some_and(|spp| spp != there.spp) || !is_whole_picture(path) {

@@ -20,8 +20,8 @@ use std::sync::{Mutex, PoisonError};
 /// The scene to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron, .pbrt, .xml, .json), model (.obj, .ply, .stl, .glb, .gltf), image rendered by
-    /// firstlight (.png, .exr), or archive of `firstlight pack` (.zip).
+    /// Built-in scene, scene file (.ron, .pbrt, .xml, .json), model (.obj, .ply, .stl, .glb, .gltf, .vrm), image
+    /// rendered by firstlight (.png, .exr), or archive of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
@@ -31,8 +31,8 @@ pub struct SceneArgs {
 /// Several scenes to open with the same options.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron, .pbrt, .xml, .json), models (.obj, .ply, .stl, .glb, .gltf), images rendered
-    /// by firstlight (.png, .exr), or archives of `firstlight pack` (.zip).
+    /// Built-in scenes, scene files (.ron, .pbrt, .xml, .json), models (.obj, .ply, .stl, .glb, .gltf, .vrm), images
+    /// rendered by firstlight (.png, .exr), or archives of `firstlight pack` (.zip).
     #[arg(value_name = "SCENE|MODEL|IMAGE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]

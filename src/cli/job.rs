@@ -9,19 +9,18 @@ use crate::cli::sequence::DEFAULT_FPS;
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
-    FeatureLayers, FeatureNames, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until, scene_at,
+    FeatureLayers, FeatureNames, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_region_until, scene_at,
 };
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
     Denoised, Display, ErrorMetric, FEATURE_SAMPLES, Film, GuideGatherer, Purpose, RenderSettings, Room,
-    SampleAllocation, guide_samples,
+    SampleAllocation,
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     Animation, DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft,
     Moment, Rendering, SceneInputs, SnapshotPart,
 };
-use glam::UVec2;
 use std::path::Path;
 use std::time::Instant;
 
@@ -164,7 +163,7 @@ impl RenderJob {
     /// Renders a complete image.
     pub fn picture(&self, args: &RenderArgs, target: Target) -> Result<Film, Failure> {
         let mut film = self.new_film(&purposes(args))?;
-        render_offline_until(&self.extraction.prepared, &self.settings, &mut film, target, &|| false, |_| true);
+        render_region_until(&self.extraction.prepared, &self.settings, &mut film, None, target, &|| false, |_| true);
         Ok(film)
     }
 
@@ -206,11 +205,7 @@ impl RenderJob {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Denoised>, Failure> {
         let Some(denoiser) = &self.denoiser else { return Ok(None) };
-        if guides.samples() == 0 {
-            guides.start(UVec2::new(film.width(), film.height()));
-        }
-        let (scene, settings) = (&self.extraction.prepared, &self.settings);
-        if !guides.gather(scene, settings, guide_samples(film.spp()), stop) {
+        if !guides.gather_for(&self.extraction.prepared, &self.settings, film, stop) {
             return Ok(None);
         }
         denoiser.denoise(film, guides.guides(), stop)
@@ -250,7 +245,7 @@ impl RenderJob {
     /// The metadata of an image of this film at `path`.
     pub fn note(&self, film: &Film, path: &Path) -> String {
         let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
-        self.draft.note(path, self.size, samples, self.display.into())
+        self.draft.note(path, self.size, samples, self.display)
     }
 
     /// An empty film, or the one that is resumed.

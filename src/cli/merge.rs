@@ -148,7 +148,7 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         let filter = denoiser.as_ref().map(FilmDenoiser::name);
         let shown = shot.clone().denoised_by(filter, !args.layers.is_empty());
         let (size, note) = ((film.width(), film.height()), note_of(&film, shown, &first, path));
-        let display = shot.display.into();
+        let display = shot.display;
         let denoised = denoised.as_ref().map(|denoised| &denoised.color[..]);
         if args.layers.is_empty() {
             Print { film: &film, display: &display, size, note: Some(&note), denoised }.write(path, files.replace())?;

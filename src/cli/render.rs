@@ -14,8 +14,8 @@ use crate::cli::sequence::Sequence;
 use crate::cli::stop::Stop;
 use crate::cli::video;
 use firstlight::frame::{
-    OfflineReport, Progress as Measured, Target, read_film_file, render_measured_until, render_offline_until,
-    render_region_until, write_errors, write_film_with_features,
+    OfflineReport, Progress as Measured, Target, read_film_file, render_measured_until, render_region_until,
+    write_errors, write_film_with_features,
 };
 use firstlight::render::{BadSample, Denoised, Film, GuideGatherer, Region, worker_threads};
 use firstlight::report::cpu_seconds;
@@ -245,7 +245,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if region.is_some() && film.spp() == 0 {
         // Pixels without samples would be black.
         let once = Target { spp: Some(1), ..Target::default() };
-        render_offline_until(&job.extraction.prepared, &job.settings, &mut film, once, &asked, |_| true);
+        render_region_until(&job.extraction.prepared, &job.settings, &mut film, None, once, &asked, |_| true);
     }
     let region = region.as_ref();
     let RenderJob { extraction, settings, .. } = &*job;

@@ -40,7 +40,7 @@ const DEFAULT_PIXELS: f64 = 50_000.0;
 
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// Built-in scenes, scene files (.ron, .pbrt, .xml, .json) or models (.obj, .ply, .stl, .glb, .gltf)
+    /// Built-in scenes, scene files (.ron, .pbrt, .xml, .json) or models (.obj, .ply, .stl, .glb, .gltf, .vrm)
     /// [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,

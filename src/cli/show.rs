@@ -135,7 +135,7 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let (film, display) = (&played.film, played.display());
     let size = (film.width(), film.height());
     let samples = ImageSamples { first: 0, spp: film.spp(), uneven: false };
-    let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
+    let note = played.session.shot_draft().note(&args.output, size, samples, display);
     let print = Print { film: &played.film, display: &display, size, note: Some(&note), denoised: None };
     print.write(&args.output, files.replace())?;
     let (output, (width, height), replaced) = (args.output.display(), size, replaced(files.replaced()));

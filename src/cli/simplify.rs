@@ -25,7 +25,7 @@ Examples:
 #[derive(Args, Clone, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct SimplifyArgs {
-    /// Model (.obj, .ply, .stl, .glb, .gltf).
+    /// Model (.obj, .ply, .stl, .glb, .gltf, .vrm).
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// Output file; an existing file is replaced.

@@ -163,7 +163,7 @@ fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> R
     let set = FilmSet::read(films)?;
     let FilmFile { film, shot, .. } = set.add_up(&|_, _| ())?;
     let note = note_of(&film, shot.clone(), &set.films[0], path);
-    let (size, display) = ((film.width(), film.height()), shot.display.into());
+    let (size, display) = ((film.width(), film.height()), shot.display);
     Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
         .write(path, Replace::AllButFilms)?;
     let error = film.error_estimate().map(|error| format!(", estimated error {}", percent(error.relative)));

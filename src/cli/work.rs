@@ -202,7 +202,7 @@ impl WorkOrder {
         }
         let picture = self.folder.join(ALL[1]);
         let (size, note) = ((film.width(), film.height()), note_of(&film, shot.clone(), first, &picture));
-        let display = shot.display.into();
+        let display = shot.display;
         Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
             .write(&picture, Replace::AllButFilms)?;
         let estimate = film.error_estimate();

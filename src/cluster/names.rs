@@ -93,15 +93,6 @@ pub(super) fn place_in(folder: &Path, name: &str) -> Option<String> {
     Some(path_to_text(&place))
 }
 
-/// How to get from one place in a package to another.
-pub(super) fn relative_to(folder: &Path, place: &Path) -> String {
-    let (from, to): (Vec<_>, Vec<_>) = (folder.components().collect(), place.components().collect());
-    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    let up = std::iter::repeat_n("..".to_owned(), from.len() - shared);
-    let down = to[shared..].iter().map(|part| path_to_text(part.as_ref()));
-    up.chain(down).collect::<Vec<_>>().join("/")
-}
-
 /// A folder, as it is named and where it really lies.
 #[derive(Clone)]
 struct Folder {
@@ -236,8 +227,6 @@ mod tests {
         let places = ["/a/b/c.ron", "/a/d/e.obj", "/a/b/f/g.png"].map(PathBuf::from);
         assert_eq!(common_folder(places.iter()), Path::new("/a"));
         assert_eq!(common_folder(places[..1].iter()), Path::new("/a/b"));
-        assert_eq!(relative_to(Path::new("a/b"), Path::new("a/d/e")), "../d/e");
-        assert_eq!(relative_to(Path::new(""), Path::new("c/d")), "c/d");
         assert_eq!(place_in(Path::new("a"), "../b/./c"), Some("b/c".to_owned()));
         for (name, turns) in
             [("a.png", false), ("../../b/a.png", false), ("./a", false), ("b/../a", true), ("../b/../a", true)]

@@ -9,9 +9,10 @@
 
 use crate::cluster::names::{
     ArchiveNames, NotUtf8, OUTSIDE, checksum_line, common_folder, is_portable, place, place_behind_link, place_in,
-    relative_to, turns_back,
+    turns_back,
 };
 use crate::files::printable;
+use crate::files::relative::relative_by_name;
 use crate::files::whole_file::{WholeFile, unwritable, write_whole};
 use crate::format::SceneFile;
 use crate::format::choice::{ModelChoice, UpAxis};
@@ -417,7 +418,7 @@ fn renamed(
                 format!("{OUTSIDE}/{}", last.unwrap_or_default())
             }
         };
-        let renamed = relative_to(folder, Path::new(&inside)) + &name[path.len()..];
+        let renamed = relative_by_name(folder, Path::new(&inside)) + &name[path.len()..];
         *name = renamed;
         has_changed = true;
     });

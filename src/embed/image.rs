@@ -131,7 +131,7 @@ impl Image {
         let size = (self.width(), self.height());
         let uneven = self.film.is_uneven();
         let samples = ImageSamples { first: self.film.first_sample(), spp: self.film.spp(), uneven };
-        let mut note = self.metadata.note(path, size, samples, self.display.into());
+        let mut note = self.metadata.note(path, size, samples, self.display);
         let is_layered = self.features.is_some() && PictureFormat::of(path)? == PictureFormat::Exr;
         if self.denoised.is_some() {
             let raw = ImageMetadata::from_note(&note).map_err(|error| WriteError::Encode(error.to_string().into()))?;

@@ -2,7 +2,7 @@
 
 use crate::embed::threads::threads;
 use crate::embed::{Error, Image, RenderOptions};
-use crate::frame::{FeatureLayers, FeatureNames, check_film_source, compare, render_offline_until, set_by_name};
+use crate::frame::{FeatureLayers, FeatureNames, check_film_source, compare, render_region_until, set_by_name};
 use crate::render::{FEATURE_SAMPLES, Film, GuideGatherer, NoRoom, denoise_film, guide_samples};
 use crate::scene::hit_spaces::StaticJob;
 use crate::scene::{
@@ -51,8 +51,8 @@ struct Rendered {
 }
 
 impl Scene {
-    /// Opens a model (`.obj`, `.ply`, `.stl`, `.glb`, `.gltf`), a scene file (`.ron`), an image that firstlight saved
-    /// (`.png`, `.exr`), or a built-in scene by its name.
+    /// Opens a model (`.obj`, `.ply`, `.stl`, `.glb`, `.gltf`, `.vrm`), a scene file (`.ron`), an image that firstlight
+    /// saved (`.png`, `.exr`), or a built-in scene by its name.
     ///
     /// # Errors
     /// If there is no such file or scene, or it is not valid.
@@ -156,7 +156,7 @@ impl Scene {
             FeatureLayers::gather(&prepared, names, &settings, (width, height), FEATURE_SAMPLES, &stop)
         });
         let progress = |now| options.progress(&now);
-        let report = render_offline_until(&prepared, &settings, &mut film, options.target(), &stop, progress);
+        let report = render_region_until(&prepared, &settings, &mut film, None, options.target(), &stop, progress);
         let denoised = (options.denoise && film.spp() > 0).then(|| {
             let mut guides = GuideGatherer::default();
             guides.start(UVec2::new(width, height));

@@ -19,8 +19,8 @@ use crate::frame::state::selection::{Picked, Selection, pick};
 use crate::frame::steer::steer;
 use crate::frame::views::{Bookmarks, ViewTrail};
 use crate::frame::walls::{around_walls, before_wall, frame_in_sight, is_in_room, within_walls};
-use crate::frame::{Command, Projector};
-use crate::render::{Inspection, ToneCurve};
+use crate::frame::{Command, Projector, ViewOptions};
+use crate::render::{Display, Inspection, RenderSettings, ToneCurve};
 use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -166,25 +166,20 @@ impl CommandParams<'_, '_> {
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetWindowHidden { hidden } => drop(self.hidden.set_if_neq(WindowHidden(hidden))),
             Command::SetInspection(inspection) => {
-                let look = crate::frame::ViewOptions { inspection, ..self.view_mode.0 };
-                self.view_mode.set_if_neq(ViewMode(look));
+                self.set_view(ViewOptions { inspection, ..self.view_mode.0 });
             }
             Command::SetDenoising(denoising) => {
-                let look = crate::frame::ViewOptions { denoising, ..self.view_mode.0 };
-                self.view_mode.set_if_neq(ViewMode(look));
+                self.set_view(ViewOptions { denoising, ..self.view_mode.0 });
             }
             Command::SetDenoiseFilter(filter) => {
-                let look = crate::frame::ViewOptions { filter, ..self.view_mode.0 };
-                self.view_mode.set_if_neq(ViewMode(look));
+                self.set_view(ViewOptions { filter, ..self.view_mode.0 });
             }
             Command::NextDenoising => {
                 let denoising = self.view_mode.0.denoising.next();
-                let look = crate::frame::ViewOptions { inspection: Inspection::Picture, denoising, ..self.view_mode.0 };
-                self.view_mode.set_if_neq(ViewMode(look));
+                self.set_view(ViewOptions { inspection: Inspection::Picture, denoising, ..self.view_mode.0 });
             }
             Command::SetSharpZone { shown } => {
-                let look = crate::frame::ViewOptions { sharp_zone: shown, ..self.view_mode.0 };
-                self.view_mode.set_if_neq(ViewMode(look));
+                self.set_view(ViewOptions { sharp_zone: shown, ..self.view_mode.0 });
             }
             Command::ExplainAt { x, y } => self.explaining.wanted = Some((x, y)),
             Command::ForgetExplanation => self.explaining.forget(),
@@ -244,12 +239,10 @@ impl CommandParams<'_, '_> {
             Command::Resume => drop(self.paused.set_if_neq(Paused(false))),
             Command::Restart => self.shown.restart = Some("requested"),
             Command::SetIntegrator(integrator) => {
-                let settings = crate::render::RenderSettings { integrator, ..self.rendering.0 };
-                self.rendering.set_if_neq(Rendering(settings));
+                self.set_rendering(RenderSettings { integrator, ..self.rendering.0 });
             }
             Command::SetAllocation(allocation) => {
-                let settings = crate::render::RenderSettings { allocation, ..self.rendering.0 };
-                self.rendering.set_if_neq(Rendering(settings));
+                self.set_rendering(RenderSettings { allocation, ..self.rendering.0 });
             }
             Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(MAX_THREADS)))),
             Command::Open { path } => match SceneSource::parse(&path) {
@@ -324,16 +317,24 @@ impl CommandParams<'_, '_> {
         }
     }
 
+    fn set_view(&mut self, options: ViewOptions) {
+        self.view_mode.set_if_neq(ViewMode(options));
+    }
+
+    fn set_rendering(&mut self, settings: RenderSettings) {
+        self.rendering.set_if_neq(Rendering(settings));
+    }
+
     fn set_exposure(&mut self, stops: f32) {
         if !stops.is_nan() {
             let exposure_stops = stops.clamp(-MOST_STOPS, MOST_STOPS);
-            let display = crate::render::Display { exposure_stops, ..self.display_settings.0 };
+            let display = Display { exposure_stops, ..self.display_settings.0 };
             self.display_settings.set_if_neq(DisplaySettings(display));
         }
     }
 
     fn set_tone_curve(&mut self, tone_curve: ToneCurve) {
-        let display = crate::render::Display { tone_curve, ..self.display_settings.0 };
+        let display = Display { tone_curve, ..self.display_settings.0 };
         self.display_settings.set_if_neq(DisplaySettings(display));
     }
 

@@ -1,7 +1,7 @@
 //! An image of a sphere of one material of a scene, in front of the backdrop of the ready materials: what a list of
 //! materials shows. Made on any thread; knows no window.
 
-use crate::frame::core::offline::{Target, render_offline_until};
+use crate::frame::core::offline::{Target, render_region_until};
 use crate::render::{Display, Film, RenderSettings, develop};
 use crate::scene::{
     Extraction, LoadOptions, Material, MaterialSlots, SceneInputs, Shape, SurfaceMaterial, Trees, library_stage,
@@ -63,7 +63,7 @@ impl MaterialPreview {
         let mut film = Film::new(side, side);
         let target = Target { spp: Some(SPP), ..Target::default() };
         let settings = RenderSettings::default();
-        render_offline_until(&extraction.prepared, &settings, &mut film, target, stop, |_| true);
+        render_region_until(&extraction.prepared, &settings, &mut film, None, target, stop, |_| true);
         if stop() {
             return None;
         }

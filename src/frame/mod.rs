@@ -46,11 +46,11 @@ pub use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 pub use crate::frame::core::exposure::usual_exposure;
 pub use crate::frame::core::latency::LatencyHistogram;
 pub use crate::frame::core::offline::{
-    OfflineReport, Progress, Target, render_measured_until, render_offline, render_offline_until, render_region_until,
+    OfflineReport, Progress, Target, render_measured_until, render_offline, render_region_until,
 };
 pub use crate::frame::core::reset::{Change, Changes, Level, compare, compare_settings};
 pub use crate::frame::core::scheduler::{RenderStep, Scheduler, StepReport};
-pub use crate::frame::core::status::{Message, MessageKind, Picture, Status};
+pub use crate::frame::core::status::{Message, MessageKind, Picture, RenderProgress, Status};
 pub use crate::frame::edit::remesh::wanted_mesh;
 pub use crate::frame::image::feature_layers::{FeatureLayers, FeatureNames};
 pub use crate::frame::image::film_file::{

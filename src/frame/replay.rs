@@ -1,7 +1,7 @@
 //! Recording and replaying sessions.
 
 use crate::files::whole_file::{Replace, WholeFile, unwritable};
-use crate::frame::core::offline::{Target, render_offline_until};
+use crate::frame::core::offline::{Target, render_region_until};
 use crate::frame::core::status::MessageKind;
 use crate::frame::input::ModelUp;
 use crate::frame::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
@@ -197,7 +197,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     let mut film = Film::try_new(width, height).map_err(|error| failed(error.to_string()))?;
     let target = Target { spp: Some(spp.max(1)), ..Target::default() };
     let pool = session.pool();
-    pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, stop, |_| true));
+    pool.install(|| render_region_until(&prepared, &settings, &mut film, None, target, stop, |_| true));
     Ok(Replayed { session, film, warnings, frames: last, commands })
 }
 

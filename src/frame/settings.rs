@@ -2,9 +2,10 @@
 //! that cannot be read is renamed and reported, and never stops the program.
 
 use crate::files::whole_file::write_whole;
-use crate::format::DisplayPart;
+use crate::format::bounds::check_stops;
 use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 use crate::frame::core::rig::Rig;
+use crate::render::Display;
 use crate::scene::{
     BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, WriteError, absolute, check_film_size,
     path_to_text, unpacked_folder,
@@ -21,7 +22,7 @@ pub struct Settings {
     /// Size of the window in logical pixels.
     pub window: Option<(u32, u32)>,
     /// Exposure and tone curve for scenes without their own, such as models.
-    pub display: Option<DisplayPart>,
+    pub display: Option<Display>,
     /// Recently opened scenes, the latest first: built-in names and absolute paths.
     pub recent: Vec<String>,
     /// Key bindings and gestures.
@@ -117,7 +118,7 @@ pub struct LeftView {
     /// The camera.
     pub rig: Rig,
     /// Exposure and tone curve.
-    pub display: DisplayPart,
+    pub display: Display,
 }
 
 /// Data of files that users may have edited.
@@ -128,14 +129,14 @@ trait KeptSettings {
 impl KeptSettings for Settings {
     fn check(&self) -> Result<(), BadValue> {
         self.window.map_or(Ok(()), |(width, height)| check_film_size(width, height))?;
-        self.display.as_ref().map_or(Ok(()), DisplayPart::check)
+        self.display.map_or(Ok(()), |display| check_stops(display.exposure_stops))
     }
 }
 
 impl KeptSettings for SceneBookmarks {
     fn check(&self) -> Result<(), BadValue> {
         self.views.values().try_for_each(Rig::check)?;
-        self.left.map_or(Ok(()), |LeftView { rig, display }| rig.check().and(display.check()))
+        self.left.map_or(Ok(()), |LeftView { rig, display }| rig.check().and(check_stops(display.exposure_stops)))
     }
 }
 
@@ -274,7 +275,7 @@ mod tests {
         let store = SettingsStore::in_folder(&folder.path().join("new/firstlight"));
         assert_eq!(store.settings(), (Settings::default(), None));
         let mut settings = Settings { window: Some((800, 600)), ..Settings::default() };
-        settings.display = Some(DisplayPart { exposure: -0.1, ..DisplayPart::default() });
+        settings.display = Some(Display { exposure_stops: -0.1, ..Display::default() });
         for i in 0..20 {
             settings.remember(&SceneSource::Builtin(format!("scene {i}")));
         }

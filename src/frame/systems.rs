@@ -458,24 +458,10 @@ pub fn present(
     {
         status.say(clock.0, MessageKind::Error, failure.clone());
     }
-    status.spp = stats.spp;
-    status.region = stats.region;
-    status.seconds = stats.seconds;
-    (status.rays, status.elapsed) = (stats.rays, stats.elapsed);
-    status.estimated_error = stats.error;
-    (status.caustics, status.n_portals) = (stats.caustics, stats.n_portals);
-    (status.denoising, status.denoised_error) = (stats.denoising, stats.denoised_error);
-    (status.denoised_spp, status.mixes_raw) = (stats.denoised_spp, stats.mixes_raw);
-    status.denoised_by = stats.denoised_by;
-    status.awaits_denoised = stats.awaits_denoised;
     status.camera_mrays = per_second(stats.recent_rays.camera);
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);
-    (status.film_width, status.film_height, status.divider) = (stats.film_width, stats.film_height, stats.divider);
-    status.n_bad = stats.n_bad;
-    status.bad = stats.bad;
-    status.n_above = stats.n_above;
-    status.threads = stats.threads;
+    status.progress = stats.progress;
     if let Some(CameraInput { view, projection, lens, .. }) = shown.inputs.camera {
         status.rig = navigation::Rig { view, projection, lens };
     }

@@ -1,12 +1,13 @@
 //! What a model gets that is opened by itself: a camera that frames it, ground, environment, key light.
 
 use crate::format::bounds;
+use crate::format::camera::camera;
 use crate::format::choice::UpAxis;
 use crate::format::parts::{LightPart, MaterialPart, ObjectPart, TransformPart};
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshSource};
 use crate::format::value::{ColorValue, Rgb};
-use crate::import::framing::Framing;
+use crate::import::framing::{AWAY, Framing};
 use crate::import::meshes::LoadedMesh;
 use crate::import::model::placing::corners_of;
 use crate::import::orientation::faces_away;
@@ -59,26 +60,41 @@ fn within(point: DVec3) -> DVec3 {
     point.clamp(DVec3::splat(-bounds::MAX_COORDINATE), DVec3::splat(bounds::MAX_COORDINATE))
 }
 
+/// Centre and radius of the key light.
+///
 /// - `side`: signs of the direction of the front.
-fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> ObjectPart {
+fn key_sphere((min, max): (DVec3, DVec3), side: DVec3) -> (DVec3, f64) {
     let center = 0.5 * (min + max);
     let radius = (0.5 * (max - min).length()).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE);
-    ObjectPart::Sphere {
-        name: Some(KEY_LIGHT.to_owned()),
-        hidden: false,
-        center: within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()),
-        radius,
-        material,
-        transform: TransformPart::default(),
-    }
+    (within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()), radius)
+}
+
+/// The first side from which the key light is not in the image, as it may be in that of a camera of the file.
+fn unseen_side(file: &SceneFile, bounds: (DVec3, DVec3), side: DVec3) -> DVec3 {
+    let (view, projection, _) = camera(&file.camera);
+    let aspect = f64::from(file.film.width) / f64::from(file.film.height);
+    let is_seen = |side: &DVec3| {
+        let (center, radius) = key_sphere(bounds, *side);
+        let offset = center - view.eye;
+        let depth = offset.dot(view.forward);
+        // The edges of the image may be oblique.
+        let half_height = projection.half_height(depth.max(0.0)) + 2.0 * radius;
+        depth > -radius
+            && offset.dot(view.up).abs() <= half_height
+            && offset.dot(view.right()).abs() <= half_height * aspect.max(1.0)
+    };
+    let sides = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(x, z)| side * DVec3::new(x, 1.0, z));
+    sides.into_iter().find(|side| !is_seen(side)).unwrap_or(side)
 }
 
 /// Adds an environment and a key light to a scene.
 ///
 /// - `side`: signs of the direction of the front; `share`: of the usual light.
 pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3), side: DVec3, share: f32) {
-    let name = new_material(file, KEY_LIGHT, key_material(share));
-    file.objects.push(key_light(name, bounds, side));
+    let material = new_material(file, KEY_LIGHT, key_material(share));
+    let (center, radius) = key_sphere(bounds, unseen_side(file, bounds, side));
+    let (name, transform) = (Some(KEY_LIGHT.to_owned()), TransformPart::default());
+    file.objects.push(ObjectPart::Sphere { name, hidden: false, center, radius, material, transform });
     file.environment = sky(share);
 }
 
@@ -122,17 +138,11 @@ fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> S
     name
 }
 
-/// The scene of a model that is opened by itself, still without light and ground, and the signs of the direction of its
-/// front.
+/// The scene of a model that is opened by itself, still without light and ground, and what its camera frames.
 ///
 /// All sizes derive from the bounding box of the model, so that the unit of the model does not matter. The camera
 /// stands in front of it.
-pub fn around(
-    loaded: &LoadedMesh,
-    source: &MeshSource,
-    up: Option<UpAxis>,
-    aspect: f64,
-) -> (SceneFile, Framing, DVec3) {
+pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspect: f64) -> (SceneFile, Framing) {
     let up = up.unwrap_or_else(|| guess_up(source, &loaded.mesh));
     let (transform, world) = match up {
         UpAxis::Y => (TransformPart::default(), DAffine3::IDENTITY),
@@ -145,7 +155,7 @@ pub fn around(
     let clay = MaterialPart::Diffuse { albedo: ColorValue::rgb(0.72, 0.56, 0.45) };
     let has_materials = !loaded.slots.is_empty();
     // Rotated half a turn about the vertical axis if the model faces the other way.
-    let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
+    let side = if faces_away(&loaded.mesh, up) { AWAY } else { DVec3::ONE };
     let mut framing = Framing::new(side, aspect);
     framing.add(&loaded.mesh, corners_of(&loaded.mesh), &world);
     let material = (!has_materials).then(|| CLAY.to_owned());
@@ -155,5 +165,5 @@ pub fn around(
         objects: vec![model],
         ..SceneFile::new(framing.camera())
     };
-    (file, framing, side)
+    (file, framing)
 }

@@ -10,9 +10,7 @@ use crate::format::camera::{camera, camera_part};
 use crate::format::film_size::FilmSize;
 use crate::format::material_textures::without_lost_textures;
 use crate::format::names::Names;
-use crate::format::parts::{
-    DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, TransformPart,
-};
+use crate::format::parts::{FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, TransformPart};
 use crate::format::placement::Placement;
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshOptions, MeshSource, TextureSource};
@@ -33,6 +31,7 @@ use crate::scene::world::components::{
 };
 use crate::scene::world::inputs::SceneInputs;
 use crate::scene::world::lights::LightTexture;
+use crate::scene::world::trees::address;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
@@ -114,7 +113,7 @@ impl Description {
             film: FilmPart { width, height, filter: rendering.filter },
             integrator: rendering.integrator,
             max_depth: (rendering.max_depth < u32::MAX).then_some(rendering.max_depth),
-            display: DisplayPart { exposure: display.exposure_stops, tone_curve: display.tone_curve },
+            display,
             environment,
             air: Rgb(inputs.environment.air),
             textures: writer.textures(),
@@ -321,38 +320,25 @@ impl<'a> Writer<'a> {
         part
     }
 
-    fn environment(&mut self, environment: &SceneEnvironment) -> EnvironmentSource {
-        match (&environment.light, &environment.part) {
-            (Environment::Black, part @ EnvironmentSource::Image { .. }) => part.clone(),
-            (Environment::Black, _) => EnvironmentSource::Black,
-            (Environment::Constant(radiance), _) => EnvironmentSource::Constant(Rgb(*radiance)),
-            (Environment::Gradient { zenith, horizon, ground }, _) => {
-                EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
-            }
-            (
-                Environment::Image { scale, rotation, .. },
-                EnvironmentSource::Image { file, rotate, layout, axes, .. },
-            ) => {
-                let kept = radians(*rotate) == *rotation;
-                let rotate = if kept { *rotate } else { f64::from(*rotation).to_degrees() };
-                let (file, scale) = (file.clone(), Rgb(*scale));
-                EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
-            }
-            (Environment::Image { scale, rotation, .. }, part @ EnvironmentSource::Sky { .. }) => {
-                let mut part = part.clone();
-                if let EnvironmentSource::Sky { azimuth, scale: factor, .. } = &mut part {
-                    *factor = Rgb(*scale);
-                    if -radians(*azimuth) != *rotation {
-                        *azimuth = -f64::from(*rotation).to_degrees();
-                    }
-                }
-                part
-            }
-            (Environment::Image { .. }, _) => {
+    fn environment(&mut self, SceneEnvironment { light, part, .. }: &SceneEnvironment) -> EnvironmentSource {
+        let written = match part {
+            EnvironmentSource::Image { rotate, .. } => Some(*rotate),
+            EnvironmentSource::Sky { azimuth, .. } => Some(-azimuth),
+            _ => None,
+        };
+        let angle_deg = match light {
+            // The image was not found.
+            Environment::Black if matches!(part, EnvironmentSource::Image { .. }) => return part.clone(),
+            Environment::Image { .. } if written.is_none() => {
                 self.losses.push("the image around the scene came from no file and is left out".to_owned());
-                EnvironmentSource::Black
+                return EnvironmentSource::Black;
             }
-        }
+            Environment::Image { rotation, .. } if written.map(radians) != Some(*rotation) => {
+                Some(f64::from(*rotation).to_degrees())
+            }
+            _ => None,
+        };
+        environment_part(light, part, angle_deg)
     }
 
     fn object(&mut self, item: &DescribedItem) -> ObjectPart {
@@ -468,10 +454,33 @@ impl MapParams<InWorld, InFile> for Writer<'_> {
     }
 }
 
-fn is_hidden(world: &World, entity: Entity) -> bool {
-    world.get::<Hidden>(entity).is_some()
+/// Describes the environment for a scene file; an image keeps its file, and its rotation as written unless there is a
+/// new one.
+pub(crate) fn environment_part(
+    light: &Environment,
+    old: &EnvironmentSource,
+    angle_deg: Option<f64>,
+) -> EnvironmentSource {
+    match (light, old) {
+        (Environment::Black, _) => EnvironmentSource::Black,
+        (Environment::Constant(radiance), _) => EnvironmentSource::Constant(Rgb(*radiance)),
+        (Environment::Gradient { zenith, horizon, ground }, _) => {
+            EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
+        }
+        (Environment::Image { scale, .. }, EnvironmentSource::Image { file, rotate, layout, axes, .. }) => {
+            let (file, scale, rotate) = (file.clone(), Rgb(*scale), angle_deg.unwrap_or(*rotate));
+            EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
+        }
+        (Environment::Image { scale, .. }, old) => {
+            let mut part = old.clone();
+            if let EnvironmentSource::Sky { azimuth, scale: factor, .. } = &mut part {
+                (*factor, *azimuth) = (Rgb(*scale), angle_deg.map_or(*azimuth, |angle| -angle));
+            }
+            part
+        }
+    }
 }
 
-fn address<T>(shared: &Arc<T>) -> usize {
-    Arc::as_ptr(shared) as usize
+fn is_hidden(world: &World, entity: Entity) -> bool {
+    world.get::<Hidden>(entity).is_some()
 }

@@ -17,6 +17,7 @@ use crate::scene::animation::Animation;
 use crate::scene::hit_spaces::{about, hit_spaces, sound_affine};
 use crate::scene::world::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
 use crate::scene::world::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
+use crate::scene::world::inventory::emits;
 use crate::scene::world::lights::LightTexture;
 use crate::scene::world::trees::{Trees, address};
 use bevy_ecs::prelude::Entity;
@@ -466,22 +467,13 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
             }
             Some(Some(plain)) => {
                 lobes += plain.n_lobes();
-                glowing += u32::from(shines(plain));
+                glowing += u32::from(emits(plain));
             }
             Some(None) => lobes += 1,
             None => break,
         }
     }
     open.is_empty() && lobes <= MAX_LOBES && (glowing == 0 || glowing == 1 && !textured)
-}
-
-/// Whether a plain material is emissive.
-fn shines(material: &Material) -> bool {
-    match material {
-        Material::Emissive { .. } => true,
-        Material::Principled { emission, .. } => *emission != ColorParam::Rgb(Vec3::ZERO),
-        _ => false,
-    }
 }
 
 /// Each texture once, however many materials use it.

@@ -3,12 +3,12 @@
 use crate::files::hash::Fingerprint;
 use crate::format::animation::AnimationPart;
 use crate::format::camera::CameraPart;
-use crate::format::parts::{DisplayPart, FilmPart, ObjectPart};
+use crate::format::parts::{FilmPart, ObjectPart};
 use crate::format::scene_file::SceneFile;
 use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::import::gltf_motion::GltfMotion;
 use crate::mesh::Mesh;
-use crate::render::{Environment, ImageTexture, Integrator, Texels, TexturePattern};
+use crate::render::{Display, Environment, ImageTexture, Integrator, Texels, TexturePattern};
 use crate::scene::animation::Animation;
 use crate::scene::describe::Description;
 use crate::scene::loaded::LoadedScene;
@@ -104,7 +104,7 @@ impl SceneContent {
             (file.camera.look_at, file.camera.forward) = (look_at, forward);
         }
         (file.cameras, file.animation.edited.camera) = Default::default();
-        (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
+        (file.film, file.display) = (FilmPart::default(), Display::default());
         (file.integrator, file.max_depth) = (Integrator::default(), None);
         for object in &mut file.objects {
             // The format does not count either.

@@ -9,13 +9,13 @@ use crate::files::input_file::{FileKind, InputFile, ReadError};
 use crate::files::limits::Limits;
 use crate::files::relative::{absolute, relative_path, text_to_path};
 use crate::files::write_error::WriteError;
-use crate::format::bounds::{check_film_size, check_max_depth};
+use crate::format::bounds::{check_film_size, check_max_depth, check_stops};
 use crate::format::camera::CameraPart;
 use crate::format::camera::camera;
 use crate::format::choice::UpAxis;
-use crate::format::parts::{DisplayPart, FilmPart};
+use crate::format::parts::FilmPart;
 use crate::format::scene_file::SceneFile;
-use crate::render::{Film, Integrator, SampleAllocation};
+use crate::render::{Display, Film, Integrator, SampleAllocation};
 use crate::scene::animation::edited::show_camera;
 use crate::scene::source::SceneSource;
 use exr::meta::attribute::{AttributeValue, Text};
@@ -102,7 +102,7 @@ pub struct ImageMetadata {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
     /// Exposure and tone curve.
-    pub display: DisplayPart,
+    pub display: Display,
     /// Seed of the random numbers.
     pub seed: u32,
     /// Index of the first sample of each pixel.
@@ -226,7 +226,7 @@ impl ImageMetadata {
         }
         check_film_size(self.film.width, self.film.height)?;
         check_max_depth(self.max_depth)?;
-        self.display.check()?;
+        check_stops(self.display.exposure_stops)?;
         if self.first_sample.checked_add(self.spp).is_none_or(|end| end > Film::MAX_SAMPLES) {
             let (first, spp) = (self.first_sample, self.spp);
             return Err(format!("{spp} samples from {first} on: sample numbers must be below {}", Film::MAX_SAMPLES));

@@ -135,8 +135,8 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.warnings.append(&of_objects);
             scene.facts = Some(made.facts);
             scene.motion = made.motion.map(Arc::new);
-            let (bounds, has_camera) = (made.framing.bounds(), made.has_camera);
-            model = Some(Model { bounds, side: DVec3::ONE, emits: made.emits, has_camera });
+            let (bounds, side) = (made.framing.bounds(), made.framing.side());
+            model = Some(Model { bounds, side, emits: made.emits, has_camera: made.has_camera });
             scene
         }
         SceneSource::Model(path) => {
@@ -145,9 +145,9 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mesh_source = MeshSource::of_file(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
             let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshOptions::default(), &folder, &documents), Ok)?;
-            let (file, framing, side) = default_scene::around(&mesh, &mesh_source, options.up, options.aspect());
+            let (file, framing) = default_scene::around(&mesh, &mesh_source, options.up, options.aspect());
             let emits = mesh.slots.iter().any(|(_, part)| emits(part));
-            let bounds = framing.bounds();
+            let (bounds, side) = (framing.bounds(), framing.side());
             model = Some(Model { bounds, side, emits, has_camera: false });
             let mut scene = around_mesh(source, file, folder, mesh, options, &documents);
             scene.up = options.up;

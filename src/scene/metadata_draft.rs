@@ -3,7 +3,7 @@
 use crate::files::hash::Fingerprint;
 use crate::files::relative::{absolute, relative_path};
 use crate::format::choice::UpAxis;
-use crate::format::parts::{DisplayPart, FilmPart};
+use crate::format::parts::FilmPart;
 use crate::format::scene_file::SceneFile;
 use crate::render::{Display, SampleAllocation};
 use crate::scene::animation::edited::shown_camera;
@@ -60,8 +60,7 @@ impl MetadataDraft {
 
     /// How the scene is to be displayed.
     pub fn display(&self) -> Display {
-        let DisplayPart { exposure, tone_curve } = self.description.file.display;
-        Display { exposure_stops: exposure, tone_curve }
+        self.description.file.display
     }
 
     /// Computes the slow part of [`note`](Self::note) now.
@@ -76,7 +75,7 @@ impl MetadataDraft {
     }
 
     /// The metadata of an image at `path`, with a film of this size (width, height; pixels) and these samples.
-    pub fn note(&self, path: &Path, size: (u32, u32), samples: ImageSamples, display: DisplayPart) -> String {
+    pub fn note(&self, path: &Path, size: (u32, u32), samples: ImageSamples, display: Display) -> String {
         let folder = absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
         let relative = |path: &Path| relative_path(&folder, path);
         let scene = match &self.source {

@@ -66,7 +66,7 @@ pub use crate::format::sources::{
     TextureCoordinates, TextureSource,
 };
 pub use crate::format::value::{ColorValue, Rgb, ScalarValue};
-pub use crate::format::view::{Lens, Projection, View, ViewError};
+pub use crate::format::view::{Lens, Projection, View};
 pub use crate::import::meshes::MeshBase;
 pub use crate::import::picture::{PictureError, read_picture, read_picture_within};
 #[cfg(feature = "cli")]
@@ -90,6 +90,7 @@ pub use crate::scene::world::trees::Trees;
 pub use animation::{Animation, Moment, camera_follows, show_moment, show_moment_from_here};
 pub use builtin::{BUILTIN_SCENES, SCENES_IMAGE, builtin_text};
 pub use describe::Description;
+pub(crate) use describe::environment_part;
 pub(crate) use extract::origin_of;
 pub use extract::{Extraction, SnapshotPart, origin_for};
 pub use fingerprint::SceneContent;

@@ -9,13 +9,13 @@ use crate::files::warnings::Warning;
 use crate::format::bounds::MOST_STOPS;
 use crate::format::camera::CameraPart;
 use crate::format::material_textures::emits;
-use crate::format::parts::{DisplayPart, LightPart, MaterialPart, ObjectPart};
+use crate::format::parts::{LightPart, MaterialPart, ObjectPart};
 use crate::format::placement::Placement;
 use crate::format::sources::EnvironmentSource;
 use crate::import::framing::Framing;
 use crate::import::meshes::LoadedMesh;
 use crate::import::model::placing::corners_of;
-use crate::render::{Film, RenderSettings, Techniques, advance, gather_features};
+use crate::render::{Display, Film, RenderSettings, Techniques, advance, gather_features};
 use crate::scene::default_scene;
 use crate::scene::default_scene::{is_inner, is_key_light};
 use crate::scene::extract::Extraction;
@@ -63,6 +63,10 @@ impl ModelLight {
     const BRIGHT: f64 = 0.35;
     const SHADED: f64 = 0.15;
 
+    /// Level that is black beside a lit surface, and share of such surfaces that is a room without light.
+    const DARK: f32 = 0.02;
+    const MOST_DARK: f64 = 0.25;
+
     /// Those that get any light.
     fn lit(&self) -> &[f32] {
         &self.0[self.0.partition_point(|level| *level == 0.0)..]
@@ -75,6 +79,16 @@ impl ModelLight {
 
     fn reaches(&self) -> bool {
         self.reached() >= Self::REACHED
+    }
+
+    /// Share of the surfaces that are shown black or nearly.
+    fn dark(&self) -> f64 {
+        self.0.partition_point(|level| *level < Self::DARK) as f64 / self.0.len() as f64
+    }
+
+    /// Whether a part of what the camera sees lies in the dark.
+    fn is_lacking(&self) -> bool {
+        self.mean(0.0) < Self::SHADED || self.dark() >= Self::MOST_DARK
     }
 
     /// Mean of what the display shows of a white surface, at an exposure in stops.
@@ -200,11 +214,11 @@ fn light_as_measured(scene: &mut LoadedScene, model: &Model) {
         }
         return;
     };
-    // Only what is added may be too little here.
-    if !is_enough && light.mean(0.0) < ModelLight::SHADED {
+    // Only what is added may be too little here, for all of it or for the inside of a room that is seen through its walls.
+    if !is_enough && light.is_lacking() {
         let place = middle_of_room(&extraction(scene));
         let added = place.map(|place| default_scene::light_inside(&mut scene.file, &place));
-        match added.and_then(|()| measure(scene)).filter(|inside| inside.reached() > light.reached()) {
+        match added.and_then(|()| measure(scene)).filter(|inside| inside.dark() < light.dark()) {
             Some(inside) => {
                 light = inside;
                 let text = format!("{title}: hardly any light gets into it: a light is added inside");
@@ -230,7 +244,7 @@ fn light_as_measured(scene: &mut LoadedScene, model: &Model) {
     if exposure != 0.0 {
         let text = format!("{title}: the exposure is set to {exposure:+} stops, for the level of its light");
         scene.warnings.push(Warning::notice(text));
-        scene.file.display = DisplayPart { exposure: exposure as f32, ..scene.file.display };
+        scene.file.display = Display { exposure_stops: exposure as f32, ..scene.file.display };
     }
 }
 

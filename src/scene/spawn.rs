@@ -11,7 +11,7 @@ use crate::format::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::format::units::radians;
 use crate::format::value::{ColorValue, ScalarValue};
 use crate::format::view::View;
-use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
+use crate::render::{Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
 use crate::scene::animation::Animation;
 use crate::scene::animation::edited::Edited;
 use crate::scene::animation::edited::shown_camera;
@@ -239,8 +239,7 @@ impl LoadedScene {
             allocation,
             ..RenderSettings::default()
         }));
-        let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve };
-        world.insert_resource(DisplaySettings(display));
+        world.insert_resource(DisplaySettings(file.display));
     }
 
     fn environment(&self) -> Environment {

@@ -247,7 +247,7 @@ mod tests {
         assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
         assert_eq!(
             words(DialogKind::Kdialog, DialogPurpose::AddMesh { at: None }),
-            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl *.glb *.gltf"]
+            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl *.glb *.gltf *.vrm"]
         );
     }
 

@@ -1,13 +1,11 @@
 //! A small image of what the form would save: all of it, in its proportions, also what the window or the panel cuts off.
 
 use crate::frame::navigation::Rig;
-use crate::frame::{Session, Target, Waker, render_offline_until};
-use crate::render::{Display, Film, Prepared, RenderSettings, develop, worker_threads};
+use crate::frame::{Session, Target, Waker, render_region_until};
+use crate::render::{Display, Film, Prepared, RenderSettings, develop};
 use crate::scene::DisplaySettings;
+use crate::viewer::image_job::ImageJob;
 use egui::{ColorImage, Context, TextureHandle, TextureOptions};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
 
 /// Most pixels along each side.
 const MOST: (u32, u32) = (240, 150);
@@ -26,13 +24,7 @@ struct Content {
 pub struct FormPreview {
     waker: Waker,
     shown: Option<(Content, TextureHandle)>,
-    rendering: Option<Rendering>,
-}
-
-struct Rendering {
-    content: Content,
-    stop: Arc<AtomicBool>,
-    receiver: Receiver<Option<Vec<u8>>>,
+    rendering: Option<(Content, ImageJob)>,
 }
 
 impl FormPreview {
@@ -54,8 +46,8 @@ impl FormPreview {
         file: (u32, u32),
         is_moving: bool,
     ) -> Option<TextureHandle> {
-        if let Some(image) = self.rendering.as_ref().and_then(|rendering| rendering.receiver.try_recv().ok())
-            && let Some(Rendering { content, .. }) = self.rendering.take()
+        if let Some(image) = self.rendering.as_ref().and_then(|(_, job)| job.ended())
+            && let Some((content, _)) = self.rendering.take()
             && let Some(image) = image
         {
             let image = ColorImage::from_rgb([content.size.0 as usize, content.size.1 as usize], &image);
@@ -66,11 +58,10 @@ impl FormPreview {
         let content = Content { size: small(file), revision, rig, display };
         let is_shown = self.shown.as_ref().is_some_and(|(shown, _)| *shown == content);
         match &self.rendering {
-            Some(rendering) if is_moving || rendering.content != content => {
-                rendering.stop.store(true, Ordering::Relaxed);
-            }
+            Some((of, job)) if is_moving || *of != content => job.stop(),
             None if !is_shown && !is_moving => {
-                self.rendering = session.rendered().and_then(|of| render(content, of, self.waker.clone()));
+                let job = session.rendered().and_then(|of| render(content, of, self.waker.clone()));
+                self.rendering = job.map(|job| (content, job));
             }
             _ => {}
         }
@@ -79,10 +70,7 @@ impl FormPreview {
 
     /// Forgets the image, when the form is closed.
     pub fn close(&mut self) {
-        self.shown = None;
-        if let Some(rendering) = self.rendering.take() {
-            rendering.stop.store(true, Ordering::Relaxed);
-        }
+        (self.shown, self.rendering) = (None, None);
     }
 }
 
@@ -93,27 +81,17 @@ fn small((width, height): (u32, u32)) -> (u32, u32) {
     (side(width), side(height))
 }
 
-fn render(content: Content, (scene, settings): (Prepared, RenderSettings), waker: Waker) -> Option<Rendering> {
-    let ((sender, receiver), stop) = (channel(), Arc::new(AtomicBool::default()));
-    let stopped = stop.clone();
-    let (width, height) = content.size;
-    let work = move || {
-        let stop = || stopped.load(Ordering::Relaxed);
-        let image = worker_threads().num_threads(1).build().ok().and_then(|pool| {
-            let mut film = Film::try_new(width, height).ok()?;
-            let target = Target { spp: Some(SPP), ..Target::default() };
-            pool.install(|| render_offline_until(&scene, &settings, &mut film, target, &stop, |_| true));
-            let mut rgba = Vec::new();
-            develop(&film, &content.display, width, height, &mut rgba);
-            let rgb = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-            (!stop()).then_some(rgb)
-        });
-        // If the form was closed, nobody waits for it.
-        let _ = sender.send(image);
-        waker();
-    };
-    std::thread::Builder::new().name("form preview".to_owned()).spawn(work).ok()?;
-    Some(Rendering { content, stop, receiver })
+fn render(content: Content, (scene, settings): (Prepared, RenderSettings), waker: Waker) -> Option<ImageJob> {
+    ImageJob::start(waker, move |stop| {
+        let (width, height) = content.size;
+        let mut film = Film::try_new(width, height).ok()?;
+        let target = Target { spp: Some(SPP), ..Target::default() };
+        render_region_until(&scene, &settings, &mut film, None, target, stop, |_| true);
+        let mut rgba = Vec::new();
+        develop(&film, &content.display, width, height, &mut rgba);
+        let rgb = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        (!stop()).then_some(rgb)
+    })
 }
 
 #[cfg(test)]

@@ -41,6 +41,7 @@ mod grab;
 mod greeting;
 mod handles;
 mod help;
+mod image_job;
 mod input;
 pub mod keys;
 mod menu;

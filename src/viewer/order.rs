@@ -3,16 +3,14 @@
 //! The same functions as the command `render` uses: a target, the denoiser, and metadata with which the image opens again.
 
 use crate::format::check_film_size;
-use crate::frame::{
-    DenoiseFilter, PictureFormat, Print, Progress, Target, render_measured_until, render_offline_until,
-};
-use crate::render::{DenoiseSource, Film, GuideGatherer, Prepared, RenderSettings, guide_samples};
+use crate::frame::{DenoiseFilter, PictureFormat, Print, Progress, Target, render_measured_until, render_region_until};
+use crate::render::{DenoiseSource, Film, GuideGatherer, Prepared, RenderSettings};
 use crate::scene::whole_file::Replace;
 use crate::scene::{ImageMetadata, ImageSamples, MetadataDraft};
 use crate::viewer::saver::file_stem;
 use crate::viewer::status::{percent, samples};
 use crate::viewer::trend::{Outlook, Trend};
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -135,7 +133,7 @@ impl Order {
             };
             render_measured_until(scene, settings, &mut film, self.target, &mut error_of, stop, told);
         } else {
-            render_offline_until(scene, settings, &mut film, self.target, stop, told);
+            render_region_until(scene, settings, &mut film, None, self.target, stop, told);
         }
         // Rendering ends by the target, or by `stop`.
         let is_complete = !stop();
@@ -152,7 +150,7 @@ impl Order {
         let mut finished = Finished { path: self.path.clone(), spp: film.spp(), error, is_complete };
         let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
         let display = draft.display();
-        let mut note = draft.note(&self.path, self.size, samples, display.into());
+        let mut note = draft.note(&self.path, self.size, samples, display);
         if let Ok(raw) = ImageMetadata::from_note(&note) {
             let by = denoised.as_ref().map(|denoised| denoised.by.name().to_owned());
             let ended_early = (!is_complete).then(|| self.shortfall(&finished));
@@ -218,10 +216,7 @@ fn denoise(
     guides: &mut GuideGatherer,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Denoised> {
-    if guides.samples() == 0 {
-        guides.start(UVec2::new(film.width(), film.height()));
-    }
-    if !guides.gather(scene, settings, guide_samples(film.spp()), stop) {
+    if !guides.gather_for(scene, settings, film, stop) {
         return None;
     }
     let (by, denoised) = filter.denoise(&DenoiseSource::of(film), guides.guides(), stop)?;

@@ -1,13 +1,10 @@
 //! Spheres of the scene's materials for lists: rendered one after the other on a thread, while they are looked at.
 
 use crate::frame::{MaterialPreview, Session, Waker};
-use crate::render::worker_threads;
+use crate::viewer::image_job::ImageJob;
 use bevy_ecs::prelude::Entity;
 use egui::{ColorImage, Context, TextureHandle, TextureOptions};
 use std::collections::HashMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// Width of an image in pixels.
 const SIDE: u32 = 48;
@@ -34,8 +31,7 @@ struct Known {
 struct Rendering {
     entity: Entity,
     preview: MaterialPreview,
-    stop: Arc<AtomicBool>,
-    receiver: Receiver<Option<Vec<u8>>>,
+    job: ImageJob,
 }
 
 impl Previews {
@@ -48,18 +44,13 @@ impl Previews {
     pub fn set_moving(&mut self, moving: bool) {
         self.moving = moving;
         if let Some(rendering) = self.rendering.as_ref().filter(|_| moving) {
-            rendering.stop.store(true, Ordering::Relaxed);
+            rendering.job.stop();
         }
     }
 
     /// Takes an image that is ready; returns whether there is one, so that the list is to be drawn again.
     pub fn receive(&mut self, context: &Context) -> bool {
-        let Some(rendering) = &self.rendering else { return false };
-        let image = match rendering.receiver.try_recv() {
-            Err(TryRecvError::Empty) => return false,
-            Err(TryRecvError::Disconnected) => None,
-            Ok(image) => image,
-        };
+        let Some(image) = self.rendering.as_ref().and_then(|rendering| rendering.job.ended()) else { return false };
         let Some(Rendering { entity, preview, .. }) = self.rendering.take() else { return false };
         if let Some(image) = image {
             let image = ColorImage::from_rgb([SIDE as usize; 2], &image);
@@ -92,23 +83,12 @@ impl Previews {
 
     fn forget(&mut self) {
         self.known.clear();
-        if let Some(rendering) = self.rendering.take() {
-            rendering.stop.store(true, Ordering::Relaxed);
-        }
+        self.rendering = None;
     }
 }
 
 fn render(entity: Entity, preview: MaterialPreview, waker: Waker) -> Option<Rendering> {
-    let ((sender, receiver), stop) = (channel(), Arc::new(AtomicBool::default()));
-    let (of, stopped) = (preview.clone(), stop.clone());
-    let work = move || {
-        let stop = || stopped.load(Ordering::Relaxed);
-        let pool = worker_threads().num_threads(1).build();
-        let image = pool.ok().and_then(|pool| pool.install(|| of.render(SIDE, &stop)));
-        // If the window is gone, nobody waits for it.
-        let _ = sender.send(image);
-        waker();
-    };
-    std::thread::Builder::new().name("preview".to_owned()).spawn(work).ok()?;
-    Some(Rendering { entity, preview, stop, receiver })
+    let of = preview.clone();
+    let job = ImageJob::start(waker, move |stop| of.render(SIDE, stop))?;
+    Some(Rendering { entity, preview, job })
 }

@@ -221,7 +221,7 @@ fn metadata_of(
     let uneven = coarse || film.is_uneven();
     let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven };
     // Paths in the metadata are relative to the folder, whatever the name of the image will be.
-    (coarse, draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into())))
+    (coarse, draft.map(|draft| draft.note(&folder.join(stem), size, samples, *display)))
 }
 
 /// Returns an unused name of a file in `folder` for the open scene: `NAME-0001.ron`.

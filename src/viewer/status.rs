@@ -183,41 +183,43 @@ pub fn bytes(n: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::RenderProgress;
     use crate::render::Region;
     use crate::scene::Lens;
     use glam::UVec2;
 
     #[test]
     fn the_line_has_one_noise_that_of_what_is_shown() {
-        let mut status = Status { spp: 37, seconds: 10.0, divider: 4, ..Status::default() };
+        let progress = RenderProgress { spp: 37, seconds: 10.0, divider: 4, ..RenderProgress::default() };
+        let mut status = Status { progress, ..Status::default() };
         let target = Target { error: Some(0.005), ..Target::default() };
         let line = |status: &Status| line(status, target, true);
         assert_eq!(line(&status), "preview");
-        status.divider = 1;
+        status.progress.divider = 1;
         assert_eq!(line(&status), "first samples");
         // Twice the error takes four times the samples.
-        status.estimated_error = Some(0.01);
+        status.progress.estimated_error = Some(0.01);
         assert_eq!(line(&status), "noise 1.0 %, about 30 s to 0.50 %");
-        (status.denoising, status.awaits_denoised) = (Denoising::Denoised, true);
+        (status.progress.denoising, status.progress.awaits_denoised) = (Denoising::Denoised, true);
         assert_eq!(line(&status), "noise 1.0 %, denoising …, about 30 s to 0.50 %");
-        (status.awaits_denoised, status.denoised_error) = (false, Some(0.004));
+        (status.progress.awaits_denoised, status.progress.denoised_error) = (false, Some(0.004));
         assert_eq!(line(&status), "noise 0.40 %, denoised, about 30 s to go");
-        status.denoised_by = DenoiseFilter::Oidn;
+        status.progress.denoised_by = DenoiseFilter::Oidn;
         assert_eq!(line(&status), "noise 0.40 %, denoised by Open Image Denoise, about 30 s to go");
-        (status.denoised_by, status.denoising) = (DenoiseFilter::Own, Denoising::Split);
+        (status.progress.denoised_by, status.progress.denoising) = (DenoiseFilter::Own, Denoising::Split);
         assert_eq!(line(&status), "noise 1.0 % | denoised: 0.40 %, about 30 s to go");
         // Two halves of the samples may lack the same light, such as that of rare, bright paths.
-        status.estimated_error = Some(1.4);
+        status.progress.estimated_error = Some(1.4);
         assert_eq!(line(&status), "noise over 100 % | denoised: not known yet");
-        status.denoising = Denoising::Denoised;
+        status.progress.denoising = Denoising::Denoised;
         assert_eq!(line(&status), "denoised, few samples yet");
-        (status.estimated_error, status.denoising) = (Some(0.01), Denoising::Split);
+        (status.progress.estimated_error, status.progress.denoising) = (Some(0.01), Denoising::Split);
         // A denoised image that is there but not shown does not matter.
-        status.denoising = Denoising::Raw;
+        status.progress.denoising = Denoising::Raw;
         let region = Region { start: UVec2::ZERO, end: UVec2::splat(32) };
-        status.region = Some((region, 512));
+        status.progress.region = Some((region, 512));
         assert_eq!(line(&status), "noise 1.0 % in the region, about 30 s to 0.50 %");
-        (status.region, status.done) = (None, true);
+        (status.progress.region, status.done) = (None, true);
         assert_eq!(line(&status), "finished, noise 1.0 %");
         status.paused = true;
         assert_eq!(line(&status), "paused, noise 1.0 %");
@@ -230,7 +232,9 @@ mod tests {
 
     #[test]
     fn the_time_to_go_is_that_of_the_first_limit_to_be_reached() {
-        let status = Status { spp: 100, seconds: 50.0, estimated_error: Some(0.02), ..Status::default() };
+        let of = |progress: RenderProgress| Status { progress, ..Status::default() };
+        let none = RenderProgress::default;
+        let status = of(RenderProgress { spp: 100, seconds: 50.0, estimated_error: Some(0.02), ..none() });
         let target = |spp, seconds, error| time_to_go(&status, Target { spp, seconds, error });
         assert_eq!(target(None, None, Some(0.01)), Some(150.0));
         assert_eq!(target(Some(300), None, Some(0.01)), Some(100.0));
@@ -238,14 +242,18 @@ mod tests {
         assert_eq!(target(None, None, None), None);
         assert_eq!(target(None, None, Some(0.05)), None, "reached");
         let target = Target { error: Some(0.005), ..Target::default() };
-        let near = Status { spp: 9, seconds: 10.0, estimated_error: Some(0.05), ..Status::default() };
-        assert_eq!(line(&near, target, true), "noise 5.0 %, about 4 min to 1.0 %", "what most are content with");
-        let clean = Status { estimated_error: Some(0.009), ..near.clone() };
-        assert_eq!(line(&clean, target, true), "noise 0.90 %, about 20 s to 0.50 %");
-        let far = Status { estimated_error: Some(0.5), ..near };
-        assert_eq!(line(&far, target, true), "noise 50 %", "hours away");
-        let denoised = Status { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
-        assert_eq!(line(&denoised, target, true), "noise 5.0 %, denoised");
+        let near = RenderProgress { spp: 9, seconds: 10.0, estimated_error: Some(0.05), ..none() };
+        assert_eq!(
+            line(&of(near.clone()), target, true),
+            "noise 5.0 %, about 4 min to 1.0 %",
+            "what most are content with"
+        );
+        let clean = RenderProgress { estimated_error: Some(0.009), ..near.clone() };
+        assert_eq!(line(&of(clean), target, true), "noise 0.90 %, about 20 s to 0.50 %");
+        let far = RenderProgress { estimated_error: Some(0.5), ..near };
+        assert_eq!(line(&of(far.clone()), target, true), "noise 50 %", "hours away");
+        let denoised = RenderProgress { denoising: Denoising::Denoised, denoised_error: Some(0.05), ..far };
+        assert_eq!(line(&of(denoised), target, true), "noise 5.0 %, denoised");
         assert_eq!([0.2, 43.0, 200.0].map(about), ["about 1 s", "about 45 s", "about 3 min"]);
         assert_eq!([5000.0, 1e4, 1e6].map(about), ["about 83 min", "about 3 h", "about 12 days"]);
     }

@@ -436,7 +436,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     for (args, expected) in [
         (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
         (&["render", "none.obj", "-o", "a.png"], "no such file"),
-        (&["render", "notes.txt", "-o", "a.png"], "a model (.obj, .ply, .stl, .glb, .gltf)"),
+        (&["render", "notes.txt", "-o", "a.png"], "a model (.obj, .ply, .stl, .glb, .gltf, .vrm)"),
         (&["render", "cornell", "-o", "notes.txt/a.png"], "notes.txt is not a folder"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),

@@ -455,6 +455,35 @@ fn hidden_nodes_hide_what_is_below_them() {
 }
 
 #[test]
+fn what_is_invisible_is_not_framed_unless_all_is() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    let eye = |writer: &Writer| opened(&writer.glb()).file.camera.eye;
+    let alone = eye(&writer);
+    writer.json["materials"] =
+        json!([{ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0] } }]);
+    let mut hole = writer.json["meshes"][0].clone();
+    hole["primitives"][0]["material"] = json!(0);
+    writer.json["meshes"].as_array_mut().unwrap().push(hole);
+    writer.json["nodes"] = json!([{ "mesh": 0 }, { "mesh": 1, "scale": [900, 900, 900] }]);
+    writer.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    assert_eq!(eye(&writer), alone);
+    writer.json["scenes"] = json!([{ "nodes": [1] }]);
+    assert!(eye(&writer).length() > 100.0 * alone.length());
+}
+
+/// Those of version 0 of the format look along -Z.
+#[test]
+fn avatars_are_seen_from_the_front() {
+    let mut writer = Writer::default();
+    quad(&mut writer);
+    for (extension, is_away) in [("VRM", true), ("VRMC_vrm", false)] {
+        writer.json["extensionsUsed"] = json!([extension]);
+        assert_eq!(opened(&writer.glb()).file.camera.eye.z < 0.0, is_away, "{extension}");
+    }
+}
+
+#[test]
 fn variants_and_what_is_not_modelled_are_told() {
     let mut writer = Writer::default();
     quad(&mut writer);

@@ -58,7 +58,7 @@ fn says(scene: &LoadedScene, text: &str) -> bool {
 fn bare() -> f32 {
     let mut writer = Writer::default();
     let scene = opened("a.glb", &quad(&mut writer).glb(), None);
-    assert!(has_ground(&scene) && says(&scene, "has no light") && scene.file.display.exposure == 0.0);
+    assert!(has_ground(&scene) && says(&scene, "has no light") && scene.file.display.exposure_stops == 0.0);
     generated(&scene).unwrap()
 }
 
@@ -85,7 +85,12 @@ fn room(radiance: f64) -> Vec<u8> {
 
 /// The same, of which all reflection has this factor.
 fn room_of(radiance: f64, grey: f64) -> Vec<u8> {
-    let mut writer = Writer::default();
+    room_in(Writer::default(), radiance, grey)
+}
+
+/// The same beside what is there already.
+fn room_in(mut writer: Writer, radiance: f64, grey: f64) -> Vec<u8> {
+    let before = writer.json["nodes"].as_array().map_or(0, Vec::len);
     // The square of each wall is moved to the unit square about the origin, then turned to face inwards.
     let turns = [
         [0.0, 0.0, 0.0, 1.0],
@@ -101,7 +106,7 @@ fn room_of(radiance: f64, grey: f64) -> Vec<u8> {
         let position = writer.floats("VEC3", &corners);
         let indices = writer.indices(5123, &[0, 1, 2, 0, 2, 3]);
         writer.mesh(json!({ "attributes": { "POSITION": position }, "indices": indices, "material": i / 5 }));
-        writer.json["nodes"][i]["rotation"] = json!(turn);
+        writer.json["nodes"][before + i]["rotation"] = json!(turn);
     }
     let base = json!({ "metallicFactor": 0, "baseColorFactor": [grey, grey, grey, 1] });
     let specular = json!({ "specularFactor": grey });
@@ -118,22 +123,35 @@ fn room_of(radiance: f64, grey: f64) -> Vec<u8> {
 #[test]
 fn a_room_under_its_own_ceiling_gets_no_other_light() {
     let lit = opened("a.glb", &room(2.0), None);
-    assert!(generated(&lit).is_none() && !has_ground(&lit) && lit.file.display.exposure == 0.0, "{:?}", lit.warnings);
+    assert!(
+        generated(&lit).is_none() && !has_ground(&lit) && lit.file.display.exposure_stops == 0.0,
+        "{:?}",
+        lit.warnings
+    );
     let glaring = opened("a.glb", &room(2000.0), None);
-    assert!(generated(&glaring).is_none() && (-14.0..=-9.0).contains(&glaring.file.display.exposure));
+    assert!(generated(&glaring).is_none() && (-14.0..=-9.0).contains(&glaring.file.display.exposure_stops));
     assert!(says(&glaring, "exposure"));
 }
 
-/// Seen from its own camera, or from outside through the backs of its walls.
+/// The file without its camera.
+fn without_camera(mut file: Vec<u8>) -> Vec<u8> {
+    // The same length, so that the chunk stays whole.
+    let at = file.windows(10).position(|part| part == b"\"camera\":0").unwrap();
+    file[at..at + 10].copy_from_slice(b"\"kamera\":0");
+    file
+}
+
+/// Seen from its own camera, or from outside through the backs of its walls, alone or on a terrace in the light.
 #[test]
 fn a_closed_room_is_lit_inside() {
-    let mut json = room(0.0);
-    let inside = opened("a.glb", &json, None);
-    // The same length, so that the chunk stays whole.
-    let at = json.windows(10).position(|part| part == b"\"camera\":0").unwrap();
-    json[at..at + 10].copy_from_slice(b"\"kamera\":0");
-    let outside = opened("a.glb", &json, None);
-    for scene in [&inside, &outside] {
+    let inside = opened("a.glb", &room(0.0), None);
+    let outside = opened("a.glb", &without_camera(room(0.0)), None);
+    let mut writer = Writer::default();
+    let position = writer.floats("VEC3", &[-2.5, -1.1, 2.5, 2.5, -1.1, 2.5, 2.5, -1.1, -2.5, -2.5, -1.1, -2.5]);
+    let indices = writer.indices(5123, &[0, 1, 2, 0, 2, 3]);
+    writer.mesh(json!({ "attributes": { "POSITION": position }, "indices": indices, "material": 0 }));
+    let terrace = opened("a.glb", &without_camera(room_in(writer, 0.0, 1.0)), None);
+    for scene in [&inside, &outside, &terrace] {
         assert!(generated(scene).is_some() && says(scene, "a light is added inside"), "{:?}", scene.warnings);
         let [LightPart::Point { position, .. }] = &scene.file.lights[..] else { panic!("one light inside") };
         assert!(position.abs().max_element() < 0.9, "{position}");
@@ -143,11 +161,37 @@ fn a_closed_room_is_lit_inside() {
     assert!(opened("a.glb", &with_part(&json!({}), 0.5), None).file.lights.is_empty());
 }
 
+/// It would be a white disc in front of the model, or beside it.
+#[test]
+fn the_key_light_is_not_in_the_image_of_the_camera_of_the_file() {
+    let mut found = Vec::new();
+    for turn in [glam::DVec3::new(-0.55, 0.75, 0.6), glam::DVec3::NEG_Z] {
+        let forward = turn.normalize();
+        let (eye, rotation) =
+            (0.5 - 3.0 * forward, glam::DQuat::from_rotation_arc(glam::DVec3::NEG_Z, forward).to_array());
+        let mut writer = Writer::default();
+        quad(&mut writer);
+        writer.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1 } }]);
+        let camera = json!({ "camera": 0, "translation": eye.to_array(), "rotation": rotation });
+        writer.json["nodes"].as_array_mut().unwrap().push(camera);
+        let scene = opened("a.glb", &writer.glb(), None);
+        let key = scene.file.objects.iter().find_map(|object| match object {
+            ObjectPart::Sphere { center, radius, .. } => Some((*center, *radius)),
+            _ => None,
+        });
+        let (center, radius) = key.expect("a key light");
+        let away = (center - eye).angle_between(forward).to_degrees();
+        assert!(away > 30.0 + (radius / (center - eye).length()).asin().to_degrees(), "{away}° from {forward}");
+        found.push(center.x < 0.0 && center.z > 0.0);
+    }
+    assert_eq!(found, [false, true], "where it usually is, unless it is seen there");
+}
+
 /// Black is black in any light, and says nothing of it.
 #[test]
 fn a_black_model_is_not_taken_for_a_dark_room() {
     let scene = opened("a.glb", &room_of(0.0, 0.0), None);
-    assert!(generated(&scene).is_some() && scene.file.lights.is_empty() && scene.file.display.exposure == 0.0);
+    assert!(generated(&scene).is_some() && scene.file.lights.is_empty() && scene.file.display.exposure_stops == 0.0);
     assert!(!says(&scene, "hardly any light"), "{:?}", scene.warnings);
 }
 
@@ -168,17 +212,21 @@ fn the_ground_is_below_the_floor_of_the_model() {
 fn lights_are_exposed_for_their_level() {
     let sun = |lux: f64| opened("a.glb", &with_light(&json!({ "type": "directional", "intensity": lux })), None);
     let usual = sun(3.0);
-    assert!(generated(&usual).is_none() && !has_ground(&usual) && usual.file.display.exposure == 0.0);
+    assert!(generated(&usual).is_none() && !has_ground(&usual) && usual.file.display.exposure_stops == 0.0);
     assert!(!says(&usual, "exposure"));
     let physical = sun(100_000.0);
     // White reflects 100,000 / π, and is to be white.
     let stops = (std::f64::consts::PI / 100_000.0).log2();
-    assert!((f64::from(physical.file.display.exposure) - stops).abs() <= 0.5, "{}", physical.file.display.exposure);
-    let told = format!("the exposure is set to {:+} stops", physical.file.display.exposure);
+    assert!(
+        (f64::from(physical.file.display.exposure_stops) - stops).abs() <= 0.5,
+        "{}",
+        physical.file.display.exposure_stops
+    );
+    let told = format!("the exposure is set to {:+} stops", physical.file.display.exposure_stops);
     assert!(generated(&physical).is_none() && says(&physical, &told), "{:?}", physical.warnings);
-    assert!((2.0..=6.0).contains(&sun(0.05).file.display.exposure));
+    assert!((2.0..=6.0).contains(&sun(0.05).file.display.exposure_stops));
     let feeble = sun(1e-4);
-    assert!(generated(&feeble).is_some() && feeble.file.display.exposure == 0.0);
+    assert!(generated(&feeble).is_some() && feeble.file.display.exposure_stops == 0.0);
     // A spot that points away.
     let spot = json!({ "type": "spot", "intensity": 500.0, "spot": { "outerConeAngle": 0.3 } });
     let mut writer = Writer::default();

@@ -152,7 +152,7 @@ fn the_camera_sees_what_pbrt_says() {
     let lens =
         view((100, 100), "\"perspective\" \"float lensradius\" 0.1 \"float focaldistance\" 3", "Scale 0.5 0.5 0.5");
     let (radius, focus) = (lens.camera.lens_radius.unwrap(), lens.camera.focus_distance.unwrap());
-    assert!((radius - 0.2).abs() < 1e-12 && (focus - 6.0).abs() < 1e-12 && lens.display.exposure == 2.0);
+    assert!((radius - 0.2).abs() < 1e-12 && (focus - 6.0).abs() < 1e-12 && lens.display.exposure_stops == 2.0);
     let flat = view((200, 100), "\"orthographic\" \"float screenwindow\" [-6 6 -3 3]", look);
     assert_eq!(flat.camera.orthographic_height, Some(6.0));
     assert_eq!(flat.max_depth, Some(6));
@@ -303,7 +303,7 @@ fn what_is_not_shown_is_told_once_and_the_rest_is_shown() {
          Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"none.png\"\n\
          Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}\
          Material \"hair\"\n{SQUARE}LightSource \"goniometric\"\nLightSource \"point\" \"float scale\" [1 2]\n\
-         Include \"../outside.pbrt\"\nInclude \"none.pbrt\"\nMaterial \"interface\"\n{SQUARE}"
+         Include \"../outside.pbrt\"\nInclude \"none.pbrt\" \"float of\" 1\nInclude \"parts/a.pbrt\"\nMaterial \"interface\"\n{SQUARE}"
     );
     let scene = with(&world);
     let told = told(&scene);
@@ -318,10 +318,12 @@ fn what_is_not_shown_is_told_once_and_the_rest_is_shown() {
         "`float scale` is ignored: expected one number",
         "../outside.pbrt` is a path out of the folder",
         "none.pbrt: cannot be read: no such file; the included file is left out",
+        // The scene itself has this name.
+        "there is no `parts/a.pbrt`; the included file is left out",
     ] {
         assert_eq!(told.iter().filter(|text| text.contains(expected)).count(), 1, "{expected}: {told:#?}");
     }
-    assert_eq!(told.len(), 10, "{told:#?}");
+    assert_eq!(told.len(), 11, "{told:#?}");
     // Squares with a material, and the two objects whose files are missing.
     assert_eq!(scene.file.objects.len(), 5);
     let albedo = |name: &str| match scene.file.materials.get(name) {

@@ -249,7 +249,7 @@ fn check(driver: &mut Driver, folder: &Path, round: usize) -> Result<(), Box<dyn
 fn save_image(driver: &mut Driver, film: &Film, path: &Path) -> Result<(), Box<dyn Error>> {
     let display = driver.session.status().display;
     let samples = ImageSamples { first: 0, spp: film.spp(), uneven: film.is_uneven() };
-    let note = driver.session.shot_draft().note(path, SIZE, samples, display.into());
+    let note = driver.session.shot_draft().note(path, SIZE, samples, display);
     let print = Print { film, display: &display, size: SIZE, note: Some(&note), denoised: None };
     Ok(print.write(path, Replace::Anything)?)
 }

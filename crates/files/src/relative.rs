@@ -112,20 +112,32 @@ pub fn place(path: &Path) -> [PathBuf; 2] {
 /// `path` relative to `folder`, with `/` as separator; the absolute path if they have only the root in common.
 pub fn relative_path(folder: &Path, path: &Path) -> String {
     let (folder, path) = (absolute(folder), absolute(path));
-    let (from, to): (Vec<Component>, Vec<Component>) = (folder.components().collect(), path.components().collect());
-    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    let is_name = |component: &&Component| matches!(component, Component::Normal(_));
-    if !from[..shared].iter().any(|component| is_name(&component)) && !from[shared..].is_empty() {
+    let shared = || folder.components().zip(path.components()).take_while(|(a, b)| a == b);
+    let shares_name = shared().any(|(component, _)| matches!(component, Component::Normal(_)));
+    if !shares_name && folder.components().count() > shared().count() {
         return path_to_text(&path);
     }
+    relative_by_name(&folder, &path)
+}
+
+/// The way from a folder to a place, both relative or both absolute, by their names alone, with `/` as separator.
+pub fn relative_by_name(folder: &Path, place: &Path) -> String {
+    let (from, to): (Vec<_>, Vec<_>) = (folder.components().collect(), place.components().collect());
+    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
     let up = std::iter::repeat_n("..".to_owned(), from.len() - shared);
-    let down = to[shared..].iter().map(|component| path_to_text(component.as_ref()));
+    let down = to[shared..].iter().map(|part| path_to_text(part.as_ref()));
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_way_from_a_folder_is_told_by_names() {
+        assert_eq!(relative_by_name(Path::new("a/b"), Path::new("a/d/e")), "../d/e");
+        assert_eq!(relative_by_name(Path::new(""), Path::new("c/d")), "c/d");
+    }
 
     #[cfg(unix)]
     #[test]

@@ -1,6 +1,7 @@
 //! The section `animation` of a scene file.
 
 use crate::camera::CameraPart;
+use crate::defaults::is_default;
 use crate::key::{Interpolation, Key, KeyValue};
 use crate::material_property::MaterialProperty;
 use crate::property::{CameraProperty, LightProperty, ObjectProperty};
@@ -211,8 +212,4 @@ impl Serialize for KeyValue {
 
 fn default_fps() -> f64 {
     24.0
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }

@@ -3,8 +3,9 @@
 use crate::bad_value::BadValue;
 use crate::bounds;
 use crate::bounds::{check_point, check_size, number, triple};
-use crate::units::{LEAST_SINE, lens_radius_of, radians};
-use crate::view::{Lens, Projection, View, unit_direction};
+use crate::defaults::{default_up, is_default};
+use crate::units::{lens_radius_of, radians};
+use crate::view::{Lens, Projection, View, check_direction, check_not_parallel, same_point, unit_direction};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -174,23 +175,6 @@ pub fn render_camera(view: &View, projection: &Projection, lens: &Lens, origin: 
     }
 }
 
-/// The unit vector along `vector`, which may have any finite length but 0.
-fn check_direction(field: &'static str, vector: DVec3) -> Result<DVec3, BadValue> {
-    let unit = unit_direction(vector);
-    unit.ok_or_else(|| BadValue::out_of_range(field, triple(vector), "be finite and have a length"))
-}
-
-fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
-    if view.cross(up).length() >= LEAST_SINE {
-        return Ok(());
-    }
-    // What is across most views that go up or down, and up in all others.
-    let other = if view.y.abs() > 0.5 { "(0, 0, -1)" } else { "(0, 1, 0)" };
-    let message =
-        format!("`up` is parallel to the view direction (within {LEAST_SINE:e} rad): set it, such as `up: {other}`");
-    Err(BadValue::unfit("up", message))
-}
-
 impl CameraPart {
     /// The components that it describes.
     ///
@@ -206,8 +190,7 @@ impl CameraPart {
                 note(check_point("look_at", look_at));
                 let offset = look_at - self.eye;
                 if offset.is_finite() && !offset.abs().cmpge(DVec3::splat(bounds::MIN_SIZE)).any() {
-                    let problem = "`eye` and `look_at` are the same point: move one of them";
-                    note(Err(BadValue::unfit("look_at", problem)));
+                    note(Err(same_point()));
                     None
                 } else {
                     unit_direction(offset)
@@ -338,16 +321,8 @@ impl Lens {
     }
 }
 
-fn default_up() -> DVec3 {
-    DVec3::Y
-}
-
 fn default_vfov() -> f64 {
     40.0
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::bad_value::BadValue;
 use crate::bounds;
 use crate::bounds::{
-    check_cone, check_film_size, check_image_angle, check_light_radius, check_max_depth, coordinate_rule,
+    check_cone, check_film_size, check_image_angle, check_light_radius, check_max_depth, check_stops, coordinate_rule,
     is_coordinate, is_size, number, size_rule, triple,
 };
 use crate::camera::CameraPart;
@@ -98,7 +98,7 @@ impl Check<'_> {
         let checks = [
             ("film", check_film_size(self.file.film.width, self.file.film.height)),
             ("max_depth", check_max_depth(self.file.max_depth)),
-            ("display/exposure", self.file.display.check()),
+            ("display/exposure", check_stops(self.file.display.exposure_stops)),
         ];
         for (path, bad) in checks.into_iter().filter_map(|(path, result)| Some((path, result.err()?))) {
             self.wrong(path, bad);

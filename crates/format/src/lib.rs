@@ -11,6 +11,7 @@ pub mod camera;
 pub(crate) mod check;
 pub(crate) mod check_animation;
 pub mod choice;
+mod defaults;
 pub mod error;
 pub(crate) mod expected;
 pub mod film_size;
@@ -41,7 +42,7 @@ pub use animation::{AnimationPart, EditedPart, ModelMotionPart, TrackPart};
 pub use camera::CameraPart;
 pub use locate::locate;
 pub use parts::{
-    DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, TransformPart, ball_grid,
+    FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, TransformPart, ball_grid,
 };
 pub use scene_file::SceneFile;
 

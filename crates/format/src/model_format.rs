@@ -25,7 +25,7 @@ impl ModelFormat {
             Self::Obj => &["obj"],
             Self::Ply => &["ply"],
             Self::Stl => &["stl"],
-            Self::Gltf => &["glb", "gltf"],
+            Self::Gltf => &["glb", "gltf", "vrm"],
         }
     }
 
@@ -39,12 +39,12 @@ impl ModelFormat {
         Self::ALL.into_iter().find(has)
     }
 
-    /// List of extensions for messages: `.obj, .ply, .stl, .glb, .gltf`.
+    /// List of extensions for messages: `.obj, .ply, .stl, .glb, .gltf, .vrm`.
     pub fn extensions() -> String {
         Self::each(".").join(", ")
     }
 
-    /// List of shell patterns: `*.obj *.ply *.stl *.glb *.gltf`.
+    /// List of shell patterns: `*.obj *.ply *.stl *.glb *.gltf *.vrm`.
     pub fn patterns() -> String {
         Self::each("*.").join(" ")
     }
@@ -63,10 +63,11 @@ mod tests {
     fn names_tell_formats_whatever_their_case() {
         assert_eq!(ModelFormat::of(Path::new("a/b.PLY")), Some(ModelFormat::Ply));
         assert_eq!(ModelFormat::of(Path::new("a.gltf")), Some(ModelFormat::Gltf));
+        assert_eq!(ModelFormat::of(Path::new("avatar.vrm")), Some(ModelFormat::Gltf));
         assert_eq!(ModelFormat::of(Path::new("a/b.ply.gz")), Some(ModelFormat::Ply));
         assert_eq!(ModelFormat::of(Path::new("a.obj.gz")), None);
         assert_eq!(ModelFormat::of(Path::new("stl")), None);
-        assert_eq!(ModelFormat::extensions(), ".obj, .ply, .stl, .glb, .gltf");
-        assert_eq!(ModelFormat::patterns(), "*.obj *.ply *.stl *.glb *.gltf");
+        assert_eq!(ModelFormat::extensions(), ".obj, .ply, .stl, .glb, .gltf, .vrm");
+        assert_eq!(ModelFormat::patterns(), "*.obj *.ply *.stl *.glb *.gltf *.vrm");
     }
 }

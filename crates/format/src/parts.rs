@@ -1,11 +1,10 @@
 //! The parts of a scene file, as written. Values and limits are checked in `check`.
 
-use crate::bad_value::BadValue;
-use crate::bounds::check_stops;
+use crate::defaults::{default_up, is_default};
 use crate::key::KeyValue;
 use crate::sources::{MeshOptions, MeshShading, MeshSource, TextureCoordinates};
 use crate::value::{ColorValue, Rgb, ScalarValue};
-use firstlight_render::{Display, Falloff, Material, Params, PixelFilter, ToneCurve};
+use firstlight_render::{Falloff, Material, Params, PixelFilter};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -25,36 +24,6 @@ pub struct FilmPart {
 impl Default for FilmPart {
     fn default() -> Self {
         Self { width: 1280, height: 720, filter: PixelFilter::default() }
-    }
-}
-
-/// Display settings; samples do not depend on them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DisplayPart {
-    /// Exposure in stops (factors of two).
-    pub exposure: f32,
-    /// Map from radiance to the range of the display.
-    pub tone_curve: ToneCurve,
-}
-
-impl DisplayPart {
-    /// # Errors
-    /// If the exposure is out of range.
-    pub fn check(&self) -> Result<(), BadValue> {
-        check_stops(self.exposure)
-    }
-}
-
-impl From<DisplayPart> for Display {
-    fn from(part: DisplayPart) -> Self {
-        Self { exposure_stops: part.exposure, tone_curve: part.tone_curve }
-    }
-}
-
-impl From<Display> for DisplayPart {
-    fn from(display: Display) -> Self {
-        Self { exposure: display.exposure_stops, tone_curve: display.tone_curve }
     }
 }
 
@@ -471,14 +440,6 @@ pub(crate) fn default_outer_angle() -> f64 {
     45.0
 }
 
-fn default_up() -> DVec3 {
-    DVec3::Y
-}
-
 fn is_up(value: &DVec3) -> bool {
     *value == DVec3::Y
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }

@@ -3,10 +3,11 @@
 use crate::animation::AnimationPart;
 use crate::bounds::MAX_OBJECTS;
 use crate::camera::CameraPart;
-use crate::parts::{DisplayPart, FilmPart, LightPart, MaterialPart, ObjectPart};
+use crate::defaults::is_default;
+use crate::parts::{FilmPart, LightPart, MaterialPart, ObjectPart};
 use crate::sources::{EnvironmentSource, TextureSource};
 use crate::value::{Named, Rgb, list_within};
-use firstlight_render::Integrator;
+use firstlight_render::{Display, Integrator};
 use serde::{Deserialize, Serialize};
 
 /// The contents of a scene file. Only `camera` is required.
@@ -29,7 +30,7 @@ pub struct SceneFile {
     pub max_depth: Option<u32>,
     /// Exposure and tone curve.
     #[serde(default)]
-    pub display: DisplayPart,
+    pub display: Display,
     /// The environment: radiance from infinitely far away.
     #[serde(default)]
     pub environment: EnvironmentSource,
@@ -62,7 +63,7 @@ impl SceneFile {
             film: FilmPart::default(),
             integrator: Integrator::default(),
             max_depth: None,
-            display: DisplayPart::default(),
+            display: Display::default(),
             environment: EnvironmentSource::default(),
             air: Rgb::default(),
             textures: Named::default(),
@@ -72,8 +73,4 @@ impl SceneFile {
             animation: AnimationPart::default(),
         }
     }
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }

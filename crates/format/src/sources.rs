@@ -1,5 +1,6 @@
 //! Sources of textures, meshes and the environment: their description in scene files, which the world keeps for saving.
 
+use crate::defaults::{is_default, is_one, is_yes, one, yes};
 use crate::model_format::ModelFormat;
 use crate::value::Rgb;
 use firstlight_render::{Channel, Encoding, Wrap};
@@ -417,30 +418,10 @@ fn is_usual_sun_size(value: &f64) -> bool {
     *value == usual_sun_size()
 }
 
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
-}
-
-fn is_yes(value: &bool) -> bool {
-    *value
-}
-
 fn one_by_one() -> DVec2 {
     DVec2::ONE
 }
 
 fn is_one_by_one(value: &DVec2) -> bool {
     *value == DVec2::ONE
-}
-
-fn yes() -> bool {
-    true
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }

@@ -4,10 +4,11 @@
 //! right-handed, Y up) and `f64`, so that a camera far from the origin moves as smoothly as one at the origin. The
 //! interactive moves of a view are in `frame::navigation`; the camera of the renderer is `render::Camera`.
 
+use crate::bad_value::BadValue;
+use crate::bounds::triple;
 use crate::units::LEAST_SINE;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// The pose of a camera.
 ///
@@ -28,42 +29,6 @@ pub struct View {
     pub pivot_distance: f64,
 }
 
-/// Why a view is invalid.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-pub enum ViewError {
-    /// A vector has a NaN or infinite coordinate.
-    #[error("camera: `{name}` is {value}, but all three numbers must be finite")]
-    NotFinite {
-        /// Name of the argument.
-        name: &'static str,
-        /// Its value.
-        value: DVec3,
-    },
-    /// The camera and the point that it looks at are the same.
-    #[error(
-        "camera: `eye` and `look_at` are the same point {eye}; move one of them so that there is a direction to look in"
-    )]
-    NoDirection {
-        /// The point, metres.
-        eye: DVec3,
-    },
-    /// The up vector is zero.
-    #[error("camera: `up` is zero; give the direction that is up in the image, for example (0, 1, 0)")]
-    NoUp,
-    /// The up vector is parallel to the view direction.
-    #[error(
-        "camera: `up` {up} lies along the view direction {forward}; choose an `up` that points elsewhere, for example {suggestion}"
-    )]
-    UpAlongView {
-        /// The up vector.
-        up: DVec3,
-        /// View direction, unit vector.
-        forward: DVec3,
-        /// A valid axis.
-        suggestion: DVec3,
-    },
-}
-
 impl View {
     /// A view from `eye` with `look_at` in the centre of the image and as the pivot.
     ///
@@ -71,27 +36,23 @@ impl View {
     ///
     /// # Errors
     /// If a number is not finite, the two points are equal, or `up` is zero or parallel to the view direction.
-    pub fn look_at(eye: DVec3, look_at: DVec3, up: DVec3) -> Result<Self, ViewError> {
-        for (name, value) in [("eye", eye), ("look_at", look_at), ("up", up)] {
+    pub fn look_at(eye: DVec3, look_at: DVec3, up: DVec3) -> Result<Self, BadValue> {
+        for (field, value) in [("eye", eye), ("look_at", look_at), ("up", up)] {
             if !value.is_finite() {
-                return Err(ViewError::NotFinite { name, value });
+                return Err(BadValue::out_of_range(field, triple(value), "be three finite numbers"));
             }
         }
         let towards = look_at - eye;
         // Lengths are computed on a copy scaled to about 1, since squares of tiny or huge coordinates would leave the
         // range of `f64`.
-        let (forward, scale) = direction(towards).ok_or(ViewError::NoDirection { eye })?;
+        let (forward, scale) = direction(towards).ok_or_else(same_point)?;
         let pivot_distance = (towards / scale).length() * scale;
         if !pivot_distance.is_finite() {
-            return Err(ViewError::NotFinite { name: "look_at", value: look_at });
+            return Err(BadValue::out_of_range("look_at", triple(look_at), "be nearer to `eye`"));
         }
-        let (up_dir, _) = direction(up).ok_or(ViewError::NoUp)?;
-        if forward.cross(up_dir).length() < LEAST_SINE {
-            // The axis that is least parallel to the view direction, so that it is always valid.
-            let suggestion = if forward.y.abs() > forward.z.abs() { DVec3::Z } else { DVec3::Y };
-            return Err(ViewError::UpAlongView { up, forward, suggestion });
-        }
-        Ok(Self { eye, forward, up: up_dir, pivot_distance }.orthonormalized())
+        let up = check_direction("up", up)?;
+        check_not_parallel(forward, up)?;
+        Ok(Self { eye, forward, up, pivot_distance }.orthonormalized())
     }
 
     /// Unit vector to the right in the image.
@@ -140,6 +101,29 @@ fn direction(v: DVec3) -> Option<(DVec3, f64)> {
     let scale = v.abs().max_element();
     // `max_element` may ignore a NaN.
     (scale > 0.0 && v.is_finite()).then(|| ((v / scale).normalize(), scale))
+}
+
+/// Of a camera that has no direction to look in.
+pub(crate) fn same_point() -> BadValue {
+    BadValue::unfit("look_at", "`eye` and `look_at` are the same point: move one of them")
+}
+
+/// The unit vector along `vector`, which may have any finite length but 0.
+pub(crate) fn check_direction(field: &'static str, vector: DVec3) -> Result<DVec3, BadValue> {
+    let unit = unit_direction(vector);
+    unit.ok_or_else(|| BadValue::out_of_range(field, triple(vector), "be finite and have a length"))
+}
+
+/// Both are unit vectors.
+pub(crate) fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
+    if view.cross(up).length() >= LEAST_SINE {
+        return Ok(());
+    }
+    // What is across most views that go up or down, and up in all others.
+    let other = if view.y.abs() > 0.5 { "(0, 0, -1)" } else { "(0, 1, 0)" };
+    let message =
+        format!("`up` is parallel to the view direction (within {LEAST_SINE:e} rad): set it, such as `up: {other}`");
+    Err(BadValue::unfit("up", message))
 }
 
 impl Default for View {
@@ -297,16 +281,17 @@ mod tests {
     #[test]
     fn degenerate_cameras_are_refused_with_advice() {
         let p = DVec3::new(1.0, 2.0, 3.0);
-        let same = View::look_at(p, p, DVec3::Y).unwrap_err().to_string();
+        let problem = |eye, look_at, up| View::look_at(eye, look_at, up).unwrap_err().to_string();
+        let same = problem(p, p, DVec3::Y);
         assert!(same.contains("`eye` and `look_at` are the same point"), "{same}");
         for up in [DVec3::Y, DVec3::NEG_Y, DVec3::new(0.0, 1.0, 1e-9)] {
-            let along = View::look_at(p, p - DVec3::Y, up).unwrap_err();
-            let ViewError::UpAlongView { suggestion, .. } = along else { panic!("{along}") };
-            assert!(along.to_string().contains("lies along the view direction"));
-            assert!(View::look_at(p, p - DVec3::Y, suggestion).is_ok(), "the advice works");
+            let along = problem(p, p - DVec3::Y, up);
+            assert!(along.contains("parallel to the view direction") && along.contains("up: (0, 0, -1)"), "{along}");
+            assert!(View::look_at(p, p - DVec3::Y, DVec3::NEG_Z).is_ok(), "the advice works");
         }
-        assert_eq!(View::look_at(p, DVec3::ZERO, DVec3::ZERO), Err(ViewError::NoUp));
-        let nan = View::look_at(DVec3::new(f64::NAN, 0.0, 0.0), p, DVec3::Y).unwrap_err().to_string();
+        let none = problem(p, DVec3::ZERO, DVec3::ZERO);
+        assert!(none.contains("`up`") && none.contains("length"), "{none}");
+        let nan = problem(DVec3::new(f64::NAN, 0.0, 0.0), p, DVec3::Y);
         assert!(nan.contains("`eye`") && nan.contains("finite"), "{nan}");
     }
 }

@@ -15,9 +15,14 @@ const MARGIN: f64 = 1.12;
 /// Triangles of all objects together whose vertices are looked at; beyond it, boxes take the place of meshes.
 const MOST_TRIANGLES: usize = 4_000_000;
 
+/// Side of models whose front is at -Z.
+pub const AWAY: DVec3 = DVec3::new(-1.0, 1.0, -1.0);
+
 /// A three-quarter view from slightly above, and what it has to show.
 #[derive(Clone, Debug)]
 pub struct Framing {
+    /// Signs of the direction of the front.
+    side: DVec3,
     /// Unit vector from the model to the camera.
     back: DVec3,
     right: DVec3,
@@ -48,7 +53,17 @@ impl Framing {
             -up + tangents[1] * back,
         ];
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        Self { back, right, up, tangents, normals, reach: [f64::NEG_INFINITY; 4], bounds: nothing, triangles: 0 }
+        Self { side, back, right, up, tangents, normals, reach: [f64::NEG_INFINITY; 4], bounds: nothing, triangles: 0 }
+    }
+
+    /// Signs of the direction of the front.
+    pub fn side(&self) -> DVec3 {
+        self.side
+    }
+
+    /// Whether nothing was added.
+    pub fn is_empty(&self) -> bool {
+        self.triangles == 0
     }
 
     /// The box of everything so far, metres.

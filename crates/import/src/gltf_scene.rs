@@ -5,7 +5,7 @@
 
 use crate::documents::{Documents, Opened};
 use crate::error::gltf::{GltfProblem, Located};
-use crate::framing::Framing;
+use crate::framing::{AWAY, Framing};
 use crate::gltf::assembly::PlacedLight;
 use crate::gltf::facts::GltfFacts;
 use crate::gltf::mesh::BuiltMesh;
@@ -19,13 +19,13 @@ use firstlight_format::camera::CameraPart;
 use firstlight_format::choice::ModelChoice;
 use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::material_textures::texture_names;
-use firstlight_format::parts::{LightPart, ObjectPart};
+use firstlight_format::parts::{LightPart, MaterialPart, ObjectPart};
 use firstlight_format::scene_file::SceneFile;
 use firstlight_format::sources::{MeshSource, Seconds, TextureSource};
 use firstlight_format::value::Named;
 use glam::{DVec3, Vec3};
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -94,11 +94,14 @@ impl Maker<'_> {
             .collect();
         self.documents.make(&wanted);
 
-        let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
+        let (mut objects, mut used) = (Vec::new(), BTreeSet::new());
         let mut shown = Vec::new();
         // As for the moments of `GltfMotion`.
         let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let mut framing = Framing::new(DVec3::ONE, self.wish.aspect);
+        // Avatars look along -Z until version 1 of their format.
+        let side = if facts.extensions.iter().any(|name| name == "VRM") { AWAY } else { DVec3::ONE };
+        let mut framing = Framing::new(side, self.wish.aspect);
+        let mut of_invisible = framing.clone();
         let mut built: HashMap<_, Option<(Arc<BuiltMesh>, _)>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
             let at = placed.key.node.and(choice.at);
@@ -121,19 +124,20 @@ impl Maker<'_> {
                 document.omissions.tell(&format!("meshes {i}"), sentence);
                 continue;
             }
-            if !placed.is_hidden {
-                framing.add(&mesh.mesh, *corners, &placed.world);
-            }
             shown.push((i, *corners));
             extend(&mut bounds, *corners, &placed.world);
-            let names: Vec<String> = (mesh.keys.iter())
-                .map(|key| {
-                    let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
-                    let index = surfaces.index(material);
-                    used.insert(index, ());
-                    surfaces.materials[index].name.clone()
-                })
-                .collect();
+            let indices = mesh.keys.iter().map(|key| {
+                let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
+                surfaces.index(material)
+            });
+            let indices: Vec<usize> = indices.collect();
+            used.extend(indices.iter().copied());
+            let is_invisible = indices.iter().all(|&index| is_hole(&surfaces.materials[index].part));
+            if !placed.is_hidden {
+                let framing = if is_invisible { &mut of_invisible } else { &mut framing };
+                framing.add(&mesh.mesh, *corners, &placed.world);
+            }
+            let names: Vec<String> = indices.iter().map(|&index| surfaces.materials[index].name.clone()).collect();
             let is_one = names.iter().all(|name| *name == names[0]);
             let source = MeshSource::Gltf {
                 file: self.wish.file.to_owned(),
@@ -151,7 +155,10 @@ impl Maker<'_> {
         if objects.is_empty() {
             return Err(self.wrong(document.omissions.nothing_left()));
         }
-        let materials: Vec<_> = used.keys().map(|&index| &surfaces.materials[index]).collect();
+        if framing.is_empty() {
+            framing = of_invisible;
+        }
+        let materials: Vec<_> = used.iter().map(|&index| &surfaces.materials[index]).collect();
         let emits = materials.iter().any(|surface| surface.emits);
         let named: Named<_> = materials.iter().map(|surface| (surface.name.clone(), surface.part.clone())).collect();
         let textures = textures_of(&named, &surfaces.textures);
@@ -282,6 +289,11 @@ fn textures_of(
 ) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
     all.iter().filter(|(name, _)| names.contains(name)).cloned().collect()
+}
+
+/// Whether nothing of a surface is seen, as of boxes that bound or trigger something.
+fn is_hole(part: &MaterialPart) -> bool {
+    matches!(part, MaterialPart::Principled { opacity, .. } if *opacity == 0.0.into())
 }
 
 #[cfg(test)]

@@ -10,13 +10,14 @@ use glam::DVec3;
 
 /// Height of the head, as a fraction of the height of the model.
 const HEAD: f64 = 1.0 / 3.0;
-/// Smaller offsets, as a fraction of the depth, are ignored.
-const LEAN: f64 = 1.0 / 20.0;
+/// Smaller offsets, as a fraction of the depth, are ignored: upright figures, busts and skulls have up to 0.088 to their
+/// backs, the armadillo of Stanford 0.093 to its front.
+const LEAN: f64 = 1.0 / 11.0;
 
 /// Whether the front is at -Z once `up` points along +Y.
 ///
-/// True if the centroid of the surface of the upper third is offset from that of the whole surface by at least a
-/// twentieth of the depth towards -Z, and more towards -Z than to either side.
+/// True if the centroid of the surface of the upper third is offset from that of the whole surface by at least an
+/// eleventh of the depth towards -Z, and more towards -Z than to either side.
 pub fn faces_away(mesh: &Mesh, up: UpAxis) -> bool {
     let point = |vertex: u32| {
         let p = mesh.positions[vertex as usize].as_dvec3();

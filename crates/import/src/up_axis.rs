@@ -36,10 +36,12 @@ fn is_plate(mesh: &Mesh) -> bool {
 }
 
 /// For OBJ, a format of Y up: Z only for a model with a broad base that would tip over on all other sides along Y and Z,
-/// and is too high to be a relief with a flat back.
+/// and is too high to be a relief with a flat back; or for one that is longest along Y and stands on wheels there, as vehicles
+/// do, rather than at its end.
 fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
     const BROAD: f64 = 0.25;
     const HIGH: f64 = 0.5;
+    const HIGH_AS_A_CAR: f64 = 0.25;
     let Some(model) = Stands::of(mesh) else { return UpAxis::Y };
     let size = model.max - model.min;
     let base = model.stand(2, Side::Lower);
@@ -49,7 +51,13 @@ fn guess_up_of_obj(mesh: &Mesh) -> UpAxis {
         && !model.stand(2, Side::Upper).stable
         && !model.stand(1, Side::Lower).stable
         && !model.stand(1, Side::Upper).stable;
-    if is_sure { UpAxis::Z } else { UpAxis::Y }
+    let is_long = size.y >= size.x.max(size.z) && size.z >= HIGH_AS_A_CAR * size.y;
+    let is_vehicle = is_long
+        && base.stable
+        && base.support >= 2.0 * BROAD
+        && model.stand(1, Side::Lower).support < BROAD * base.support
+        && model.is_on_wheels();
+    if is_sure || is_vehicle { UpAxis::Z } else { UpAxis::Y }
 }
 
 /// What is needed to stand a model on its sides.
@@ -87,6 +95,23 @@ impl<'a> Stands<'a> {
         let corners = triangles(mesh).flatten();
         let (min, max) = corners.fold((center, center), |(min, max), corner| (min.min(corner), max.max(corner)));
         Some(Self { mesh, center, min, max })
+    }
+
+    /// Whether what touches the ground with Z up is in front and behind, and not the back of a relief or its rim.
+    fn is_on_wheels(&self) -> bool {
+        const BETWEEN: f64 = 0.3;
+        let (margin, length) = (0.02 * (self.max.z - self.min.z), self.max.y - self.min.y);
+        let is_lowest = |corner: &DVec3| corner.z <= self.min.z + margin;
+        let lowest = triangles(self.mesh).flatten().filter(is_lowest);
+        let mut along: Vec<f64> = lowest.map(|corner| corner.y).collect();
+        along.sort_by(f64::total_cmp);
+        let has_gap = along.windows(2).any(|pair| pair[1] - pair[0] >= BETWEEN * length);
+        // A flat back may have corners only at its ends.
+        let is_back = |corners: [DVec3; 3]| {
+            let [a, b, c] = corners.map(|corner| corner.y);
+            corners.iter().all(is_lowest) && a.max(b).max(c) - a.min(b).min(c) >= BETWEEN * length
+        };
+        has_gap && !triangles(self.mesh).any(is_back)
     }
 
     fn stand(&self, axis: usize, side: Side) -> Stand {
@@ -161,6 +186,39 @@ mod tests {
         let plate = of(DVec3::new(0.25, 0.21, 0.003));
         assert_eq!(guess_up(&MeshSource::of_file("bed.stl".to_owned()), &plate), UpAxis::Z);
         assert_eq!(guess_up(&MeshSource::of_file("bed.obj".to_owned()), &plate), UpAxis::Y);
+    }
+
+    #[test]
+    fn a_car_of_obj_stands_on_its_wheels_and_a_shelf_on_its_foot() {
+        let obj = MeshSource::of_file("a.obj".to_owned());
+        let blocks = |of: &[(DVec3, DVec3)]| {
+            let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+            for &(center, size) in of {
+                let block = firstlight_mesh::procedural::cuboid(size);
+                let first = positions.len() as u32;
+                positions.extend(block.positions.iter().map(|p| p.as_dvec3() + block.center + center));
+                triangles.extend(block.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+            }
+            Mesh::from_f64(&positions, triangles).unwrap()
+        };
+        // Along Y: a body, a cabin, a bumper in front and behind, four wheels.
+        let mut car = vec![
+            (DVec3::new(0.0, 0.0, 0.7), DVec3::new(1.7, 4.2, 0.6)),
+            (DVec3::new(0.0, 0.3, 1.25), DVec3::new(1.4, 2.0, 0.5)),
+            (DVec3::new(0.0, 0.0, 0.5), DVec3::new(1.4, 4.5, 0.15)),
+        ];
+        car.extend([(-0.75, -1.4), (0.75, -1.4), (-0.75, 1.4), (0.75, 1.4)].map(|(x, y)| {
+            let middle = DVec3::new(x, y, 0.3);
+            (middle, DVec3::new(0.2, 0.6, 0.6))
+        }));
+        assert_eq!(guess_up(&obj, &blocks(&car)), UpAxis::Z);
+        let upright: Vec<_> =
+            car.iter().map(|(p, s)| (DVec3::new(p.x, p.z, -p.y), DVec3::new(s.x, s.z, s.y))).collect();
+        assert_eq!(guess_up(&obj, &blocks(&upright)), UpAxis::Y);
+        // With a flat back; a mask, which is thin.
+        let shelf = blocks(&[(DVec3::ZERO, DVec3::new(0.8, 2.0, 0.5))]);
+        let mask = blocks(&[(DVec3::ZERO, DVec3::new(0.8, 1.0, 0.2)), (DVec3::NEG_Y, DVec3::new(0.1, 1.0, 0.1))]);
+        assert_eq!([shelf, mask].map(|mesh| guess_up(&obj, &mesh)), [UpAxis::Y; 2]);
     }
 
     /// A table: a top and four legs, standing along +Z or +Y.

@@ -85,24 +85,12 @@ pub fn render_offline<'a>(
     target: Target,
     progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    render_offline_until(scene, settings, film, target, &|| false, progress)
+    render_region_until(scene, settings, film, None, target, &|| false, progress)
 }
 
-/// Like [`render_offline`], ended within milliseconds by `stop`, which is called often by all workers; the film then
-/// may have a partial pass, or pixels without a sample.
-pub fn render_offline_until<'a>(
-    scene: impl Into<Exposed<'a>>,
-    settings: &RenderSettings,
-    film: &mut Film,
-    target: Target,
-    stop: &(dyn Fn() -> bool + Sync),
-    progress: impl FnMut(Progress) -> bool,
-) -> OfflineReport {
-    render_region_until(scene, settings, film, None, target, stop, progress)
-}
-
-/// Like [`render_offline_until`], for a region of the film, or all of it; samples, error and target are those of the
-/// region.
+/// Like [`render_offline`], for a region of the film, or all of it; samples, error and target are those of the region.
+/// Ended within milliseconds by `stop`, which is called often by all workers; the film then may have a partial pass, or
+/// pixels without a sample.
 pub fn render_region_until<'a>(
     scene: impl Into<Exposed<'a>>,
     settings: &RenderSettings,
@@ -115,7 +103,7 @@ pub fn render_region_until<'a>(
     render(scene.into(), settings, (film, region), target, None, stop, progress)
 }
 
-/// Like [`render_offline_until`], where the target error is that of another image made of the film, such as the denoised
+/// Like [`render_region_until`] for all of the film, where the target error is that of another image made of the film, such as the denoised
 /// one.
 ///
 /// - `error_of`: the error of that image, if known; called at 4 samples per pixel, then four times between

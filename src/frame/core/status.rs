@@ -8,6 +8,7 @@ use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, L
 use crate::scene::LoadStage;
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
+use std::ops::Deref;
 use std::time::Duration;
 
 /// A developed image, in the session's size at the time it was requested.
@@ -35,17 +36,9 @@ pub struct Picture {
     pub number: u64,
 }
 
-/// State of a session.
-#[derive(Resource, Clone, Debug, Default)]
-pub struct Status {
-    /// Name of the open scene.
-    pub scene: String,
-    /// The camera as controlled by commands.
-    pub rig: Rig,
-    /// Exposure and tone curve.
-    pub display: Display,
-    /// The integrator.
-    pub integrator: Integrator,
+/// Progress of the current image.
+#[derive(Clone, Debug, Default)]
+pub struct RenderProgress {
     /// Samples per pixel.
     pub spp: u32,
     /// Region that gets all samples, in pixels of the film, and its samples per pixel.
@@ -56,29 +49,23 @@ pub struct Status {
     pub rays: RayCounts,
     /// Wall time from the restart to the last of these rays, seconds.
     pub elapsed: f64,
-    /// Millions of camera rays per second, recently.
-    pub camera_mrays: f64,
-    /// Millions of bounce rays per second, recently.
-    pub bounce_mrays: f64,
-    /// Millions of shadow rays per second, recently.
-    pub shadow_mrays: f64,
-    /// Width of the film in pixels.
+    /// Width of the film that the image was developed from, in pixels.
     pub film_width: u32,
-    /// Height of the film in pixels.
+    /// Height of that film in pixels.
     pub film_height: u32,
     /// Divisor of the film's sides; 1 is full resolution.
     pub divider: u32,
     /// Relative error of the whole image, or of the region, once it is known.
     pub estimated_error: Option<f64>,
-    /// How caustics are rendered, if the scene may have any and it is known.
+    /// How caustics are rendered at full resolution, if the scene may have any and it is known.
     pub caustics: Option<CausticChoice>,
-    /// Number of portals through which the environment is sampled.
+    /// Number of portals through which the environment is sampled at full resolution.
     pub n_portals: usize,
     /// How the image is denoised.
     pub denoising: Denoising,
     /// The filter of the denoised image, if that is displayed.
     pub denoised_by: DenoiseFilter,
-    /// Relative error of the denoised image, if that is displayed.
+    /// Relative error of the denoised image, if that is displayed and known.
     pub denoised_error: Option<f64>,
     /// Samples per pixel of which it was made.
     pub denoised_spp: u32,
@@ -86,6 +73,35 @@ pub struct Status {
     pub mixes_raw: bool,
     /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
     pub awaits_denoised: bool,
+    /// Number of samples that were rejected because they were not finite.
+    pub n_bad: u64,
+    /// The first few of them.
+    pub bad: Vec<BadSample>,
+    /// Number of samples brighter than any radiance in the scene can be, which is a bug of the program.
+    pub n_above: u64,
+    /// Number of worker threads.
+    pub threads: usize,
+}
+
+/// State of a session; dereferences to the progress of its image.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Status {
+    /// Progress of the image.
+    pub progress: RenderProgress,
+    /// Name of the open scene.
+    pub scene: String,
+    /// The camera as controlled by commands.
+    pub rig: Rig,
+    /// Exposure and tone curve.
+    pub display: Display,
+    /// The integrator.
+    pub integrator: Integrator,
+    /// Millions of camera rays per second, recently.
+    pub camera_mrays: f64,
+    /// Millions of bounce rays per second, recently.
+    pub bounce_mrays: f64,
+    /// Millions of shadow rays per second, recently.
+    pub shadow_mrays: f64,
     /// Cause of the last restart.
     pub restart_cause: String,
     /// Number of restarts.
@@ -98,18 +114,18 @@ pub struct Status {
     pub messages: VecDeque<Message>,
     /// Texts of earlier messages that no longer apply, such as errors of a scene file that has been corrected.
     pub withdrawn: Vec<String>,
-    /// Number of samples that were rejected because they were not finite.
-    pub n_bad: u64,
-    /// The first few of them.
-    pub bad: Vec<BadSample>,
-    /// Number of samples brighter than any radiance in the scene can be, which is a bug of the program.
-    pub n_above: u64,
-    /// Number of worker threads.
-    pub threads: usize,
     /// Whether rendering is paused by a command.
     pub paused: bool,
     /// Whether the target is reached.
     pub done: bool,
+}
+
+impl Deref for Status {
+    type Target = RenderProgress;
+
+    fn deref(&self) -> &RenderProgress {
+        &self.progress
+    }
 }
 
 /// A message for the user.

@@ -6,7 +6,7 @@ use crate::format::units::radians;
 use crate::frame::edit::property::Property;
 use crate::import::sky::clear_sky;
 use crate::render::{Environment, ImageTexture};
-use crate::scene::{EnvironmentSource, GRADIENT, Rgb, SceneEnvironment, sky_light};
+use crate::scene::{EnvironmentSource, GRADIENT, Rgb, SceneEnvironment, environment_part, sky_light};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -34,7 +34,7 @@ pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), St
     };
     let light = light.ok_or_else(|| format!("this environment has no {property:?}"))?;
     let angle_deg = (property == Property::SkyRotation).then_some(value.x);
-    let changed = SceneEnvironment { part: part_of(&light, &sky.part, angle_deg), light, air: sky.air };
+    let changed = SceneEnvironment { part: environment_part(&light, &sky.part, angle_deg), light, air: sky.air };
     if changed != sky {
         world.insert_resource(changed);
     }
@@ -122,27 +122,4 @@ fn with_strength(sky: &Environment, wanted: f32) -> Option<Environment> {
 fn turned(sky: &Environment, angle: f32) -> Option<Environment> {
     let Environment::Image { image, scale, .. } = sky else { return None };
     Some(Environment::Image { image: image.clone(), scale: *scale, rotation: angle })
-}
-
-/// Describes the environment for a scene file; an image keeps its file, and its rotation as written unless there is a
-/// new one.
-fn part_of(light: &Environment, old: &EnvironmentSource, angle_deg: Option<f64>) -> EnvironmentSource {
-    match (light, old) {
-        (Environment::Black, _) => EnvironmentSource::Black,
-        (Environment::Constant(radiance), _) => EnvironmentSource::Constant(Rgb(*radiance)),
-        (Environment::Gradient { zenith, horizon, ground }, _) => {
-            EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
-        }
-        (Environment::Image { scale, .. }, EnvironmentSource::Image { file, rotate, layout, axes, .. }) => {
-            let (file, scale, rotate) = (file.clone(), Rgb(*scale), angle_deg.unwrap_or(*rotate));
-            EnvironmentSource::Image { file, scale, rotate, layout: *layout, axes: *axes }
-        }
-        (Environment::Image { scale, .. }, old) => {
-            let mut part = old.clone();
-            if let EnvironmentSource::Sky { azimuth, scale: factor, .. } = &mut part {
-                (*factor, *azimuth) = (Rgb(*scale), angle_deg.map_or(*azimuth, |angle| -angle));
-            }
-            part
-        }
-    }
 }

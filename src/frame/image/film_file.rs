@@ -492,7 +492,7 @@ mod tests {
         render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
         let samples = ImageSamples { first: 0, spp, uneven: false };
         let draft = MetadataDraft::of(&mut world, Some(&loaded));
-        let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default().into());
+        let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default());
         (film, note)
     }
 

@@ -230,7 +230,7 @@ impl Loop<'_> {
     /// Share of the raw image in a mix with one that was denoised from fewer samples; `None` unless the raw image has
     /// become the better one, as far as both errors are known. A busy machine may leave no time for denoising.
     fn raw_share(&self, settled: &Settled) -> Option<f32> {
-        let raw = self.stats.error.filter(|_| self.active_region().is_none())?;
+        let raw = self.stats.progress.estimated_error.filter(|_| self.active_region().is_none())?;
         share_of_better(raw, settled.denoised.error)
     }
 
@@ -239,7 +239,9 @@ impl Loop<'_> {
     ///
     /// - `spp`: samples per pixel now.
     fn is_nearly_overtaken(&self, settled: &Settled, spp: u32) -> bool {
-        let Some(raw) = self.stats.error.filter(|_| self.active_region().is_none()) else { return false };
+        let Some(raw) = self.stats.progress.estimated_error.filter(|_| self.active_region().is_none()) else {
+            return false;
+        };
         let left = time_until_overtaken(raw, settled.denoised.error, self.restarted_at.elapsed());
         2 * u64::from(spp) >= 3 * u64::from(settled.spp) && left <= SAMPLES_FIRST * settled.took
     }

@@ -219,10 +219,11 @@ mod tests {
         let job =
             Job { generation: 1, view: 1, prepared: prepared.clone(), settings, width: 48, height: 36, pace: None };
         worker.order(Orders { job: Some(job), ..Orders::default() });
-        next(&|stats| stats.denoised_error.is_some() && stats.asleep && stats.denoised_spp == 8);
+        let is_done = |stats: &Stats| stats.progress.denoised_error.is_some() && stats.progress.denoised_spp == 8;
+        next(&|stats| stats.asleep && is_done(stats));
         worker.set_prepared(1, prepared);
         worker.set_display(Display { exposure_stops: 1.0, ..Display::default() });
-        let after = next(&|_| true);
+        let after = next(&|_| true).progress;
         // With better guides, the same samples may have been denoised once more meanwhile.
         assert_eq!((after.denoised_error.is_some(), after.denoised_spp), (true, 8));
     }

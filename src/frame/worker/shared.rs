@@ -3,10 +3,9 @@
 use crate::frame::core::denoising::{DenoiseFilter, Denoising};
 use crate::frame::core::latency::LatencyHistogram;
 use crate::frame::core::offline::Target;
-use crate::frame::core::status::Picture;
+use crate::frame::core::status::{Picture, RenderProgress};
 use crate::render::{
-    BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
-    SeenSurface, worker_threads,
+    Display, Explanation, Film, Inspection, Prepared, RayCounts, RenderSettings, SeenSurface, worker_threads,
 };
 use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -77,49 +76,14 @@ pub struct Answer {
     pub seen: Option<SeenSurface>,
 }
 
-/// Progress of the current job.
+/// State of the current job.
 #[derive(Clone, Debug, Default)]
 pub struct Stats {
+    pub progress: RenderProgress,
     pub generation: u64,
-    /// Size of the film that the image was developed from.
-    pub film_width: u32,
-    pub film_height: u32,
-    pub divider: u32,
-    /// Minimum samples per pixel of that film.
-    pub spp: u32,
-    /// Region that gets all samples, in pixels of that film, and its samples per pixel.
-    pub region: Option<(Region, u32)>,
-    /// Render time since the restart, seconds.
-    pub seconds: f64,
-    /// Relative error of the whole image, or of the region, once it is known.
-    pub error: Option<f64>,
-    /// How caustics are rendered, if the scene may have any; for the film at full resolution.
-    pub caustics: Option<CausticChoice>,
-    /// Number of portals of the view; for the film at full resolution.
-    pub n_portals: usize,
-    /// How the displayed image is denoised.
-    pub denoising: Denoising,
-    /// The filter of the denoised image, if that is displayed.
-    pub denoised_by: DenoiseFilter,
-    /// Relative error of the denoised image, if that is displayed and known.
-    pub denoised_error: Option<f64>,
-    /// Samples per pixel of which it was made.
-    pub denoised_spp: u32,
-    /// Whether it is mixed with the raw image, which has more samples and the smaller error.
-    pub mixes_raw: bool,
-    /// Whether a denoised image is wanted at full resolution, and the first one is not there yet.
-    pub awaits_denoised: bool,
     /// Rays of the latest steps, and the time that they took in seconds.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,
-    /// Rays since the restart.
-    pub rays: RayCounts,
-    /// Wall time from the restart to the last of these rays, seconds.
-    pub elapsed: f64,
-    pub n_bad: u64,
-    pub bad: Vec<BadSample>,
-    pub n_above: u64,
-    pub threads: usize,
     /// Whether there is nothing left to do: the target is reached, or rendering is paused.
     pub asleep: bool,
     /// Whether the target is reached.

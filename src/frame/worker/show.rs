@@ -1,6 +1,7 @@
 //! From the film to the displayed image: developed or inspected, scaled to the window size, with overlays.
 
 use crate::frame::core::denoising::Denoising;
+use crate::frame::core::status::RenderProgress;
 use crate::frame::worker::denoised::Developed;
 use crate::frame::worker::shared::{Stats, lock};
 use crate::frame::worker::thread::{Loop, MOST_IMAGES};
@@ -21,22 +22,21 @@ impl Loop<'_> {
             inspection: self.look.inspection,
             size: UVec2::new(film.width(), film.height()),
         };
-        let stats = Stats {
+        let progress = RenderProgress {
             film_width: film.width(),
             film_height: film.height(),
             divider: *divider,
             spp: film.spp(),
             region: self.active_region().map(|region| (region, film.spp_in(Some(&region)))),
-            asleep: last,
-            done: self.scheduler.reached(),
-            ..self.stats.clone()
+            ..self.stats.progress.clone()
         };
+        let stats = Stats { progress, asleep: last, done: self.scheduler.reached(), ..self.stats.clone() };
         self.stats = stats.clone();
         {
             let mut outbox = lock(&self.shared.outbox);
             let waits = outbox.fresh && outbox.picture.generation == job.generation;
             outbox.stats = stats;
-            if waits && !last && !self.redraw && outbox.stats.divider == outbox.picture.divider {
+            if waits && !last && !self.redraw && outbox.stats.progress.divider == outbox.picture.divider {
                 return Duration::ZERO;
             }
         }
@@ -105,10 +105,11 @@ impl Loop<'_> {
         let divider = *divider;
         let awaits_denoised = divider == 1 && self.wanted_denoising() != Denoising::Raw && denoised_error.is_none();
         let denoised_by = self.views.settled.as_ref().map_or(self.look.filter, |settled| settled.by);
-        (self.stats.denoising, self.stats.denoised_by) = (denoising, denoised_by);
-        (self.stats.denoised_error, self.stats.mixes_raw) = (denoised_error, is_mixed);
-        self.stats.denoised_spp = settled.map_or(0, |settled| settled.spp);
-        self.stats.awaits_denoised = awaits_denoised;
+        let progress = &mut self.stats.progress;
+        (progress.denoising, progress.denoised_by) = (denoising, denoised_by);
+        (progress.denoised_error, progress.mixes_raw) = (denoised_error, is_mixed);
+        progress.denoised_spp = settled.map_or(0, |settled| settled.spp);
+        progress.awaits_denoised = awaits_denoised;
         if let Some(took) = smoothing {
             self.note_smoothing(divider, key, took);
         }
@@ -116,10 +117,7 @@ impl Loop<'_> {
             let mut outbox = lock(&self.shared.outbox);
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
-            (outbox.stats.denoising, outbox.stats.denoised_by) = (denoising, denoised_by);
-            (outbox.stats.denoised_error, outbox.stats.mixes_raw) = (denoised_error, is_mixed);
-            outbox.stats.denoised_spp = self.stats.denoised_spp;
-            outbox.stats.awaits_denoised = awaits_denoised;
+            outbox.stats.progress = self.stats.progress.clone();
         }
         tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;

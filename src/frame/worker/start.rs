@@ -1,6 +1,7 @@
 //! The start of a job: with an empty film, or with the samples of the same view that were set aside when the image got
 //! another size.
 
+use crate::frame::core::status::RenderProgress;
 use crate::frame::worker::aside::{SetAside, exchange};
 use crate::frame::worker::shared::{Job, Stats, lock};
 use crate::frame::worker::thread::Loop;
@@ -37,7 +38,8 @@ impl Loop<'_> {
         self.scheduler.resize(size.0, size.1, self.clock.elapsed());
         self.scheduler.set_region(None, 0, None);
         let threads = lock(&self.shared.pool).current_num_threads();
-        self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
+        let progress = RenderProgress { threads, ..RenderProgress::default() };
+        self.stats = Stats { progress, generation: job.generation, ..Stats::default() };
         self.restarted_at = Instant::now();
         self.redraw = false;
         self.job = Some(job);
@@ -47,9 +49,10 @@ impl Loop<'_> {
     }
 
     fn go_on_with(&mut self, SetAside { film, settled, stats, spent }: SetAside) {
-        let Stats { generation, threads, .. } = self.stats;
-        self.stats = Stats { generation, threads, asleep: false, ..stats };
-        self.restarted_at -= Duration::from_secs_f64(stats.elapsed);
+        let (generation, threads) = (self.stats.generation, self.stats.progress.threads);
+        self.restarted_at -= Duration::from_secs_f64(stats.progress.elapsed);
+        let progress = RenderProgress { threads, ..stats.progress };
+        self.stats = Stats { progress, generation, asleep: false, ..stats };
         self.views.settled = settled.map(|settled| Settled { key: ViewKey { generation, ..settled.key }, ..settled });
         self.views.settle_again = None;
         self.scheduler.go_on(film.spp(), spent);

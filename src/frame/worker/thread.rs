@@ -209,7 +209,7 @@ impl<'a> Loop<'a> {
         let region = self.active_region();
         let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
         let spp = film.spp_in(region.as_ref());
-        self.stats.error = error;
+        self.stats.progress.estimated_error = error;
         self.scheduler.set_region(region.map(|region| region.n_pixels()), spp, error);
     }
 
@@ -249,7 +249,7 @@ impl<'a> Loop<'a> {
             make_pool(threads, WORKERS, niceness).and_then(|pool| Ok((pool, make_pool(threads, BESIDE, niceness)?)));
         match pools {
             Ok((pool, beside)) => {
-                self.stats.threads = pool.current_num_threads();
+                self.stats.progress.threads = pool.current_num_threads();
                 *lock(&self.shared.pool) = pool;
                 *lock(&self.shared.beside) = beside;
                 self.scheduler.forget_speed();
@@ -273,7 +273,7 @@ impl<'a> Loop<'a> {
                     }
                     film
                 }
-                None => match Film::try_with_tile_size(size.0, size.1, tile_size(size, self.stats.threads)) {
+                None => match Film::try_with_tile_size(size.0, size.1, tile_size(size, self.stats.progress.threads)) {
                     Ok(film) => film,
                     Err(error) => return self.give_up(error.to_string()),
                 },
@@ -287,9 +287,9 @@ impl<'a> Loop<'a> {
                 Some(old) if old.1.spp() > 0 => self.previous = Some(old),
                 old => old.into_iter().for_each(|(_, film)| self.idle.keep(film)),
             }
-            self.stats.n_bad = 0;
-            self.stats.n_above = 0;
-            self.stats.bad.clear();
+            self.stats.progress.n_bad = 0;
+            self.stats.progress.n_above = 0;
+            self.stats.progress.bad.clear();
             self.is_uneven = false;
             // Guides are gathered beside the first samples.
             self.request_denoised(false);
@@ -334,21 +334,22 @@ impl<'a> Loop<'a> {
         }
         stats.recent_rays += pass.rays;
         stats.recent_seconds += seconds;
-        stats.rays += pass.rays;
-        stats.seconds += seconds;
-        stats.elapsed = self.restarted_at.elapsed().as_secs_f64();
-        stats.n_bad += pass.n_bad;
-        stats.n_above += pass.n_above;
-        stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
+        let progress = &mut stats.progress;
+        progress.rays += pass.rays;
+        progress.seconds += seconds;
+        progress.elapsed = self.restarted_at.elapsed().as_secs_f64();
+        progress.n_bad += pass.n_bad;
+        progress.n_above += pass.n_above;
+        progress.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(progress.bad.len())));
         let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
         let replaced = interrupted && lock(&self.shared.inbox).orders.job.is_some();
         let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
-        stats.error = error.filter(|_| divider == 1);
+        progress.estimated_error = error.filter(|_| divider == 1);
         if divider == 1 && job.prepared.features().caustics {
-            stats.caustics = known_caustic_choice(&job.prepared, &job.settings, (film.width(), film.height()));
+            progress.caustics = known_caustic_choice(&job.prepared, &job.settings, (film.width(), film.height()));
         }
         if divider == 1 {
-            stats.n_portals = known_portal_count(&job.prepared);
+            progress.n_portals = known_portal_count(&job.prepared);
         }
         let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
         let can_be_seen = film.spp() > 0;
@@ -440,7 +441,9 @@ impl<'a> Loop<'a> {
         self.request_denoised(true);
         let shown = {
             let stats = &lock(&self.shared.outbox).stats;
-            stats.asleep && (stats.generation, stats.threads) == (self.stats.generation, self.stats.threads)
+            stats.asleep
+                && stats.generation == self.stats.generation
+                && stats.progress.threads == self.stats.progress.threads
         };
         if self.film.is_some() && (!shown || self.redraw) {
             self.show(true);

@@ -129,7 +129,8 @@ pub(crate) fn is_emitter(world: &World, object: Entity) -> bool {
     materials.any(|material| SurfaceMaterial::of(world, material).is_some_and(emits))
 }
 
-fn emits(material: &Material) -> bool {
+/// Whether a plain material is emissive.
+pub(crate) fn emits(material: &Material) -> bool {
     match material {
         Material::Emissive { .. } => true,
         Material::Principled { emission, .. } => *emission != ColorParam::Rgb(Vec3::ZERO),

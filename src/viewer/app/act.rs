@@ -177,7 +177,7 @@ impl App {
                     Command::SetView(view),
                     Command::SetProjection(projection),
                     Command::SetLens(lens),
-                    Command::SetExposure { stops: display.exposure },
+                    Command::SetExposure { stops: display.exposure_stops },
                     Command::SetToneCurve(display.tone_curve),
                 ];
                 commands.into_iter().for_each(|command| self.session.send(command));

@@ -1,11 +1,9 @@
 //! State kept between runs: the bookmarks of each scene, recent files, the window's size, and its noise.
 
-use crate::format::DisplayPart;
 use crate::frame::{
     Bookmarks, Command, CurrentScene, DenoiseFilter, Denoising, LeftView, Navigation, Picture, Recovery, SavedAs,
-    SceneBookmarks, Session, SettingsStore, ViewMode, scene_name,
+    SceneBookmarks, Session, Settings, SettingsStore, ViewMode, scene_name,
 };
-use crate::render::Display;
 use crate::scene::{Animation, Fingerprint, SceneSource, builtin_text, text_to_path};
 use crate::viewer::openable::Recent;
 use crate::viewer::panel::PanelState;
@@ -228,11 +226,17 @@ impl Memory {
         !settings.greeted && settings.navigation == Navigation::default()
     }
 
+    /// Changes what is stored for the next window, if it is a change. Returns why it cannot be stored.
+    fn keep(&self, change: impl FnOnce(&mut Settings)) -> Option<String> {
+        let before = self.store.settings().0;
+        let mut settings = before.clone();
+        change(&mut settings);
+        (settings != before).then(|| self.store.keep_settings(&settings).err().map(String::from)).flatten()
+    }
+
     /// Stores keys and gestures for the next window; the user is not asked for them again.
     pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
-        let mut settings = self.store.settings().0;
-        (settings.navigation, settings.greeted) = (navigation, true);
-        self.store.keep_settings(&settings).err().map(String::from)
+        self.keep(|settings| (settings.navigation, settings.greeted) = (navigation, true))
     }
 
     /// The panel as the last window left it.
@@ -241,30 +245,22 @@ impl Memory {
         PanelState::remembered(settings.panel, &settings.sections)
     }
 
-    /// Stores which parts of the panel are open, if that has changed.
+    /// Stores which parts of the panel are open.
     pub fn keep_panel(&self, panel: &PanelState) -> Option<String> {
-        let mut settings = self.store.settings().0;
-        let before = settings.clone();
-        settings.panel = panel.shown;
-        settings.sections.extend(panel.open.iter().map(|(title, open)| ((*title).to_owned(), *open)));
-        if settings == before {
-            return None;
-        }
-        self.store.keep_settings(&settings).err().map(String::from)
+        self.keep(|settings| {
+            settings.panel = panel.shown;
+            settings.sections.extend(panel.open.iter().map(|(title, open)| ((*title).to_owned(), *open)));
+        })
     }
 
     /// Stores the noise of the image for the next window.
     fn keep_noise(&self) -> Option<String> {
-        let mut settings = self.store.settings().0;
-        (settings.denoising, settings.denoiser) = self.noise;
-        self.store.keep_settings(&settings).err().map(String::from)
+        self.keep(|settings| (settings.denoising, settings.denoiser) = self.noise)
     }
 
     /// Stores the window's size for the next window, logical pixels.
     pub fn keep_window(&self, size: (u32, u32)) -> Option<String> {
-        let mut settings = self.store.settings().0;
-        settings.window = Some(size);
-        self.store.keep_settings(&settings).err().map(String::from)
+        self.keep(|settings| settings.window = Some(size))
     }
 }
 
@@ -276,8 +272,7 @@ fn is_on_tracks(session: &Session) -> bool {
 /// What is on the screen.
 fn seen(session: &Session) -> LeftView {
     let status = session.status();
-    let Display { exposure_stops, tone_curve } = status.display;
-    LeftView { rig: status.rig, display: DisplayPart { exposure: exposure_stops, tone_curve } }
+    LeftView { rig: status.rig, display: status.display }
 }
 
 #[cfg(test)]
@@ -316,7 +311,7 @@ mod tests {
         session.update(Duration::ZERO);
         first.follow(&mut session);
         let left = seen(&session);
-        assert_eq!(left.display.exposure, 1.5);
+        assert_eq!(left.display.exposure_stops, 1.5);
         assert_eq!(first.leave(), None);
         // Who opens it and leaves it as it was loses nothing either.
         for _ in 0..2 {

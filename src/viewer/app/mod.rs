@@ -387,11 +387,13 @@ fn outlasts(restarts: u64, status: &Status, new: &Picture) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::RenderProgress;
 
     #[test]
     fn an_image_is_held_until_there_is_one_as_good_of_the_same_view() {
         let lasts = |restarts, awaits_denoised, divider| {
-            let status = Status { restarts, awaits_denoised, ..Status::default() };
+            let progress = RenderProgress { awaits_denoised, ..RenderProgress::default() };
+            let status = Status { progress, restarts, ..Status::default() };
             outlasts(3, &status, &Picture { divider, ..Picture::default() })
         };
         assert!(lasts(4, false, 3) && lasts(4, true, 1));

@@ -98,7 +98,7 @@ pub const FILES: KeyGroup = KeyGroup {
         row!("an empty scene", ctrl("n", Action::NewScene), item("New", &[Menu::File], Action::NewScene)),
         row!("choose a file to open", ctrl("o", Action::OpenDialog), item("Open …", &[Menu::File], Action::OpenDialog)),
         row!(
-            "open a scene (.ron, .pbrt, .xml, .json), a model (.obj, .ply, .stl, .glb, .gltf) or a saved image (.png, .exr)",
+            "open a scene (.ron, .pbrt, .xml, .json), a model (.obj, .ply, .stl, .glb, .gltf, .vrm) or a saved image (.png, .exr)",
             Trigger::Mouse("Drop a file")
         ),
         row!(

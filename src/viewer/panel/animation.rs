@@ -5,7 +5,7 @@ use crate::scene::animation::{Interpolation, Shutter, Track};
 use crate::scene::{Animation, Moment};
 use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
-use crate::viewer::panel::widgets::{number, row_with_hint, rows, slider};
+use crate::viewer::panel::widgets::{choices, number, row_with_hint, rows, slider};
 use egui::Ui;
 use glam::DVec3;
 
@@ -59,14 +59,9 @@ pub fn time_line(ui: &mut Ui, session: &Session, around: &Around, asked: &mut As
         });
         if of_model.is_some() {
             row_with_hint(ui, "pose", "of the animations at that time, or as the file stores it", |ui| {
-                ui.horizontal(|ui| {
-                    for (label, seconds) in [("stored", None), ("animated", Some(at))] {
-                        let is_chosen = is_stored_pose == seconds.is_none();
-                        if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
-                            asked.send(Command::SetMoment { seconds });
-                        }
-                    }
-                })
+                if let Some(stored) = choices(ui, Some(is_stored_pose), [(true, "stored"), (false, "animated")]) {
+                    asked.send(Command::SetMoment { seconds: (!stored).then_some(at) });
+                }
             });
         }
         keys(ui, session, around, animation, at, asked);
@@ -115,20 +110,14 @@ fn keys(ui: &mut Ui, session: &Session, around: &Around, animation: Option<&Anim
     let selected = &session.world().resource::<Selection>().0;
     let is_meant =
         |track: &&Track| selected.is_empty() || track.channel.entity().is_some_and(|entity| selected.contains(&entity));
-    let meant: Vec<Interpolation> =
-        animation.tracks.iter().filter(is_meant).map(|track| track.curve.interpolation).collect();
-    if meant.is_empty() {
-        return;
-    }
+    let mut meant = animation.tracks.iter().filter(is_meant).map(|track| track.curve.interpolation);
+    let Some(first) = meant.next() else { return };
+    let of_all = meant.all(|other| other == first).then_some(first);
     row_with_hint(ui, "between", hint, |ui| {
-        ui.horizontal(|ui| {
-            for how in [Interpolation::Linear, Interpolation::Smooth, Interpolation::Held] {
-                let is_chosen = meant.iter().all(|other| *other == how);
-                if ui.selectable_label(is_chosen, how.name()).clicked() && !is_chosen {
-                    asked.edit(Edit::Interpolate { how });
-                }
-            }
-        })
+        let all = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Held];
+        if let Some(how) = choices(ui, of_all, all.map(|how| (how, how.name()))) {
+            asked.edit(Edit::Interpolate { how });
+        }
     });
 }
 

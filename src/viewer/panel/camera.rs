@@ -9,7 +9,7 @@ use crate::scene::{Lens, Projection, View};
 use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
 use crate::viewer::panel::widgets::{
-    length, millimetres, number, proportional, row, row_with_hint, rows, slider, vector, whole,
+    choices, length, millimetres, number, proportional, row, row_with_hint, rows, slider, vector, whole,
 };
 use crate::viewer::status::metres;
 use egui::Ui;
@@ -31,15 +31,13 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             }
         });
         row(ui, "projection", |ui| {
-            ui.horizontal(|ui| {
+            let is_orthographic = rig.projection.orthographic_height.is_some();
+            let all = [(false, "perspective"), (true, "orthographic")];
+            if let Some(orthographic) = choices(ui, Some(is_orthographic), all) {
                 let height = 2.0 * rig.projection.half_height(rig.view.pivot_distance);
-                for (label, orthographic_height) in [("perspective", None), ("orthographic", Some(height))] {
-                    let is_chosen = rig.projection.orthographic_height.is_some() == orthographic_height.is_some();
-                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
-                        asked.send(Command::SetProjection(Projection { orthographic_height, ..rig.projection }));
-                    }
-                }
-            })
+                let orthographic_height = orthographic.then_some(height);
+                asked.send(Command::SetProjection(Projection { orthographic_height, ..rig.projection }));
+            }
         });
         match rig.projection.orthographic_height {
             None => {
@@ -67,24 +65,13 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
         };
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
         row_with_hint(ui, "drag", "what a drag with the left button does", |ui| {
-            ui.horizontal(|ui| {
-                for (label, orbits) in [("look around", false), ("orbit", true)] {
-                    let is_chosen = around.orbits == orbits;
-                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
-                        asked.action = Some(Action::ToggleDrag);
-                    }
-                }
-            })
+            if choices(ui, Some(around.orbits), [(false, "look around"), (true, "orbit")]).is_some() {
+                asked.action = Some(Action::ToggleDrag);
+            }
         });
         row_with_hint(ui, "navigation", "keys and mouse as in this program; H lists them", |ui| {
-            ui.horizontal(|ui| {
-                for navigation in Navigation::ALL {
-                    let is_chosen = around.navigation == navigation;
-                    if ui.selectable_label(is_chosen, navigation.label()).clicked() && !is_chosen {
-                        asked.navigation = Some(navigation);
-                    }
-                }
-            })
+            let all = Navigation::ALL.map(|navigation| (navigation, navigation.label()));
+            asked.navigation = choices(ui, Some(around.navigation), all);
         });
     });
 }

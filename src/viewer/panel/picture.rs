@@ -5,7 +5,7 @@ use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneC
 use crate::scene::Rendering;
 use crate::viewer::keys::{Action, with_key};
 use crate::viewer::panel::state::{Around, Asked};
-use crate::viewer::panel::widgets::{number, row, row_with_hint, rows, slider, whole};
+use crate::viewer::panel::widgets::{choices, number, row, row_with_hint, rows, slider, whole};
 use crate::viewer::status::tone_curve;
 use egui::Ui;
 
@@ -13,13 +13,10 @@ pub fn render(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
     let status = session.status();
     rows(ui, "render", |ui| {
         row(ui, "integrator", |ui| {
-            ui.horizontal(|ui| {
-                for (integrator, label) in [(Integrator::Path, "path tracing"), (Integrator::Phong, "Phong")] {
-                    if ui.selectable_label(status.integrator == integrator, label).clicked() {
-                        asked.send(Command::SetIntegrator(integrator));
-                    }
-                }
-            })
+            let all = [(Integrator::Path, "path tracing"), (Integrator::Phong, "Phong")];
+            if let Some(integrator) = choices(ui, Some(status.integrator), all) {
+                asked.send(Command::SetIntegrator(integrator));
+            }
         });
         let allocation = session.world().get_resource::<Rendering>().map(|of_scene| of_scene.0.allocation);
         let allocation = allocation.unwrap_or_default();
@@ -151,38 +148,23 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
             });
         });
         row(ui, "tone curve", |ui| {
-            ui.horizontal(|ui| {
-                for curve in [ToneCurve::Linear, ToneCurve::Neutral, ToneCurve::Filmic] {
-                    if ui.selectable_label(display.tone_curve == curve, tone_curve(curve)).clicked() {
-                        asked.send(Command::SetToneCurve(curve));
-                    }
-                }
-            })
+            let all = [ToneCurve::Linear, ToneCurve::Neutral, ToneCurve::Filmic];
+            if let Some(curve) = choices(ui, Some(display.tone_curve), all.map(|curve| (curve, tone_curve(curve)))) {
+                asked.send(Command::SetToneCurve(curve));
+            }
         });
         let view_mode = session.world().resource::<ViewMode>().0;
         row_with_hint(ui, "noise", "raw, denoised, or split: raw on the left; F2 goes through them", |ui| {
-            ui.horizontal(|ui| {
-                for denoising in Denoising::ALL {
-                    if ui.selectable_label(view_mode.denoising == denoising, denoising.label()).clicked() {
-                        asked.send(Command::SetDenoising(denoising));
-                    }
-                }
-            })
+            let all = Denoising::ALL.map(|denoising| (denoising, denoising.label()));
+            if let Some(denoising) = choices(ui, Some(view_mode.denoising), all) {
+                asked.send(Command::SetDenoising(denoising));
+            }
         });
-        row_with_hint(
-            ui,
-            "denoiser",
-            "of images at full resolution; OIDN is Open Image Denoise, where it is installed",
-            |ui| {
-                ui.horizontal(|ui| {
-                    for filter in DenoiseFilter::ALL {
-                        if ui.selectable_label(view_mode.filter == filter, filter.short_label()).clicked() {
-                            asked.filter = Some(filter);
-                        }
-                    }
-                })
-            },
-        );
+        let hint = "of images at full resolution; OIDN is Open Image Denoise, where it is installed";
+        row_with_hint(ui, "denoiser", hint, |ui| {
+            let all = DenoiseFilter::ALL.map(|filter| (filter, filter.short_label()));
+            asked.filter = choices(ui, Some(view_mode.filter), all);
+        });
         row(ui, "show", |ui| {
             let shown = view_mode.inspection;
             egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {

@@ -5,7 +5,7 @@ use crate::render::Wrap;
 use crate::scene::{ColorParam, Rgb, TextureSource};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::panel::state::Asked;
-use crate::viewer::panel::widgets::{color, number, row};
+use crate::viewer::panel::widgets::{choices, color, number, row};
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
@@ -66,14 +66,8 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
         TextureSource::Image { repeat, offset, rotate, wrap, smooth, .. } => {
             lie(ui, "repeat", repeat, offset, rotate);
             row(ui, "wrap", |ui| {
-                ui.horizontal(|ui| {
-                    let kinds = [(Wrap::Repeat, "repeat"), (Wrap::Mirror, "mirror"), (Wrap::Clamp, "clamp")];
-                    for (kind, label) in kinds {
-                        if ui.selectable_label(*wrap == kind, label).clicked() {
-                            *wrap = kind;
-                        }
-                    }
-                })
+                let all = [(Wrap::Repeat, "repeat"), (Wrap::Mirror, "mirror"), (Wrap::Clamp, "clamp")];
+                *wrap = choices(ui, Some(*wrap), all).unwrap_or(*wrap);
             });
             row(ui, "smooth", |ui| ui.checkbox(smooth, ""));
         }

@@ -64,6 +64,20 @@ pub fn choice(ui: &mut Ui, is_chosen: bool, text: impl Into<egui::WidgetText>) -
     .inner
 }
 
+/// Choices side by side; returns the one that is clicked, unless it is the chosen one.
+pub fn choices<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    chosen: Option<T>,
+    all: impl IntoIterator<Item = (T, &'static str)>,
+) -> Option<T> {
+    let is_new = |ui: &mut Ui, (value, label)| {
+        let is_chosen = chosen == Some(value);
+        (ui.selectable_label(is_chosen, label).clicked() && !is_chosen).then_some(value)
+    };
+    // All are drawn, whichever is clicked.
+    ui.horizontal(|ui| all.into_iter().filter_map(|choice| is_new(ui, choice)).last()).inner
+}
+
 /// A number that can be dragged or typed. Typing takes effect at the end, dragging at once.
 pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
     // Clamped by the field, a number outside of the range would be an edit that nobody made.

@@ -25,7 +25,7 @@ impl Writer<'_> {
         if file.air.0 != glam::Vec3::ZERO {
             self.warnings.push("the absorption of the air is left out");
         }
-        if file.display.exposure != 0.0 {
+        if file.display.exposure_stops != 0.0 {
             self.warnings.push("the exposure is left out: images of Mitsuba are linear");
         }
         self.sensor(&file.camera, "camera");

@@ -48,8 +48,8 @@ impl Writer<'_> {
         }
         self.text.directive("Camera", &[kind], list);
         let mut film = List::default().integer("xresolution", width).integer("yresolution", height);
-        if file.display.exposure != 0.0 {
-            film = film.float("iso", 100.0 * file.display.exposure.exp2());
+        if file.display.exposure_stops != 0.0 {
+            film = film.float("iso", 100.0 * file.display.exposure_stops.exp2());
         }
         self.text.directive("Film", &["rgb"], film.string("filename", image));
         let (filter, radius) = match file.film.filter {

@@ -35,6 +35,11 @@ pub(crate) fn place(list: &str, index: impl std::fmt::Display) -> String {
     format!("{list}[{index}]")
 }
 
+/// Returns the item of a list of a file that another part of it names.
+pub(crate) fn item<'a, T>(list: &'a [T], name: &'static str, index: u32) -> Result<&'a T, GltfProblem> {
+    list.get(index as usize).ok_or(GltfProblem::Index { list: name, index, count: list.len() })
+}
+
 /// A problem of a glTF file.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfProblem {

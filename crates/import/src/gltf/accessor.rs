@@ -5,7 +5,7 @@
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.6 (binary data storage).
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::json;
 
@@ -111,9 +111,7 @@ impl<'a> Elements<'a> {
 
 impl Document {
     pub(crate) fn accessor(&self, index: u32) -> Result<&json::Accessor, Located> {
-        let count = self.root.accessors.len();
-        let problem = GltfProblem::Index { list: "accessors", index, count };
-        self.root.accessors.get(index as usize).ok_or((place("accessors", index), problem))
+        item(&self.root.accessors, "accessors", index).map_err(|problem| (place("accessors", index), problem))
     }
 
     /// Number of components per element.

@@ -4,7 +4,7 @@
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.11 and appendix C (animation sampler interpolation modes).
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::json;
 use bytemuck::{bytes_of, cast_slice};
@@ -113,10 +113,7 @@ impl Document {
     ) -> Result<(), Located> {
         let Some(node) = channel.target.node else { return Ok(()) };
         let here = |problem| (String::new(), problem);
-        let index = channel.sampler;
-        let count = animation.samplers.len();
-        let problem = GltfProblem::Index { list: "samplers", index, count };
-        let sampler = animation.samplers.get(index as usize).ok_or_else(|| here(problem))?;
+        let sampler = item(&animation.samplers, "samplers", channel.sampler).map_err(here)?;
         self.node(node)?;
         let interpolation = match sampler.interpolation.as_deref() {
             None | Some("LINEAR") => SamplerInterpolation::Linear,

@@ -1,6 +1,6 @@
 //! The cameras of the scene, in the order of the nodes. A camera looks along −z of its node.
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::nodes::Tree;
 use firstlight_format::bounds;
@@ -59,9 +59,7 @@ impl Document {
     /// Name and projection of a camera.
     fn lens(&self, index: u32) -> Result<(&Option<String>, Lens), Located> {
         let here = |problem| (place("cameras", index), problem);
-        let count = self.root.cameras.len();
-        let camera = self.root.cameras.get(index as usize);
-        let camera = camera.ok_or_else(|| here(GltfProblem::Index { list: "cameras", index, count }))?;
+        let camera = item(&self.root.cameras, "cameras", index).map_err(here)?;
         let lens = match (camera.kind.as_str(), camera.perspective, camera.orthographic) {
             ("perspective", Some(perspective), _) => Lens::Perspective(perspective.yfov),
             ("orthographic", _, Some(orthographic)) => Lens::Orthographic(orthographic.ymag.abs()),

@@ -4,7 +4,7 @@
 //! request, by the modules beside this one. Broken parts are left out ([`crate::gltf::omissions`]). Start reading at
 //! [`Document::read`].
 
-use crate::error::gltf::{GltfError, GltfProblem, Located, place};
+use crate::error::gltf::{GltfError, GltfProblem, Located, item, place};
 use crate::gltf::container::chunks;
 use crate::gltf::json::{BufferView, Root, first_equal_images};
 use crate::gltf::lenient;
@@ -318,9 +318,7 @@ impl Document {
     /// The bytes of a view, and its stride if it has one.
     pub(crate) fn view(&self, index: u32) -> Result<(&[u8], Option<u64>), Located> {
         let here = |problem| (place("bufferViews", index), problem);
-        let view = self.root.buffer_views.get(index as usize);
-        let count = self.root.buffer_views.len();
-        let view = view.ok_or_else(|| here(GltfProblem::Index { list: "bufferViews", index, count }))?;
+        let view = item(&self.root.buffer_views, "bufferViews", index).map_err(here)?;
         let bytes = match self.decoded.get(&index) {
             Some(bytes) => bytes,
             None => self.slice(view).map_err(here)?,
@@ -330,9 +328,7 @@ impl Document {
     }
 
     fn slice(&self, view: &BufferView) -> Result<&[u8], GltfProblem> {
-        let count = self.buffers.len();
-        let buffer = self.buffers.get(view.buffer as usize);
-        let buffer = buffer.ok_or(GltfProblem::Index { list: "buffers", index: view.buffer, count })?;
+        let buffer = item(&self.buffers, "buffers", view.buffer)?;
         let buffer = buffer.as_ref().ok_or(GltfProblem::Missing("the data of its buffer"))?.get();
         let needed = u128::from(view.byte_offset) + u128::from(view.byte_length);
         if needed > buffer.len() as u128 {

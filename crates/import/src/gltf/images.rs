@@ -1,8 +1,9 @@
 //! Images inside a model: in a buffer view or a data URI.
 
-use crate::error::gltf::{GltfError, GltfProblem, Located, place};
+use crate::error::gltf::{GltfError, GltfProblem, Located, item, place};
 use crate::gltf::document::{Document, ReadOptions};
 use crate::gltf::uri::Uri;
+use firstlight_format::model_format::ModelFormat;
 use std::path::{Path, PathBuf};
 
 /// Model and image index of a path such as `model.glb#3`; `None` for other paths, and if a file of exactly that name
@@ -11,8 +12,7 @@ pub fn part_of_model(path: &Path) -> Option<(PathBuf, u32)> {
     let text = path.to_str()?;
     let (model, number) = text.rsplit_once('#')?;
     let number: u32 = number.parse().ok()?;
-    let extension = Path::new(model).extension()?;
-    let is_model = extension.eq_ignore_ascii_case("glb") || extension.eq_ignore_ascii_case("gltf");
+    let is_model = ModelFormat::of(Path::new(model)) == Some(ModelFormat::Gltf);
     (is_model && !path.exists()).then(|| (PathBuf::from(model), number))
 }
 
@@ -23,9 +23,7 @@ impl Document {
     /// If there is no such image, or it is a separate file.
     pub(crate) fn picture_bytes(&self, number: u32) -> Result<Vec<u8>, Located> {
         let here = |problem| (place("images", number), problem);
-        let count = self.root.images.len();
-        let image = self.root.images.get(number as usize);
-        let image = image.ok_or_else(|| here(GltfProblem::Index { list: "images", index: number, count }))?;
+        let image = item(&self.root.images, "images", number).map_err(here)?;
         if let Some(view) = image.buffer_view {
             return self.view(view).map(|(bytes, _)| bytes.to_vec());
         }

@@ -2,7 +2,7 @@
 //!
 //! Their axis is −z of the node. Photometric units are read as radiometric ones: candela as W·sr⁻¹, lux as W·m⁻².
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::json::shortened;
 use glam::Vec3;
@@ -42,8 +42,7 @@ impl Document {
         let list = self.root.extensions.get(NAME).and_then(|extension| extension.get("lights"));
         let list = list.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let index = number.as_u64().and_then(|number| u32::try_from(number).ok()).unwrap_or(u32::MAX);
-        let light = list.get(index as usize);
-        let light = light.ok_or_else(|| here(GltfProblem::Index { list: "lights", index, count: list.len() }))?;
+        let light = item(list, "lights", index).map_err(here)?;
         let at = || format!("extensions.{NAME}.lights[{index}]");
         let number = |object: &Value, name: &str, default: f64| {
             object.get(name).and_then(Value::as_f64).filter(|value| value.is_finite()).unwrap_or(default)

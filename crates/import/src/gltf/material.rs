@@ -2,7 +2,7 @@
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.9, and the `KHR_materials_*` and `KHR_texture_transform` extensions.
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::json::{Extensions, TextureRef};
 use crate::gltf::omissions::omission;
@@ -247,10 +247,9 @@ impl Document {
 
     /// `None` if the image format is not supported; a note is added then.
     fn texture_use(&self, reference: &TextureRef, notes: &mut Vec<String>) -> Result<Option<TextureUse>, Located> {
-        let missing = |list, index, count| (String::new(), GltfProblem::Index { list, index, count });
+        let here = |problem| (String::new(), problem);
         let index = reference.index;
-        let texture = self.root.textures.get(index as usize);
-        let texture = texture.ok_or_else(|| missing("textures", index, self.root.textures.len()))?;
+        let texture = item(&self.root.textures, "textures", index).map_err(here)?;
         let by_extension = |name: &str| {
             let source = texture.extensions.get(name).and_then(|extension| extension.get("source"));
             source.and_then(Value::as_u64).and_then(|image| u32::try_from(image).ok())
@@ -260,9 +259,7 @@ impl Document {
             notes.push(format!("textures[{index}] has no image in a format that is read, and is left out"));
             return Ok(None);
         };
-        if self.root.images.get(image as usize).is_none() {
-            return Err(missing("images", image, self.root.images.len()));
-        }
+        item(&self.root.images, "images", image).map_err(here)?;
         let default = crate::gltf::json::Sampler::default();
         let sampler = match texture.sampler {
             None => &default,

@@ -2,7 +2,7 @@
 //!
 //! Trees may be arbitrarily deep, so they are traversed with an explicit stack. Transforms are multiplied in `f64`.
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::animation::Pose;
 use crate::gltf::document::Document;
 use crate::gltf::json;
@@ -24,9 +24,7 @@ pub(crate) struct Tree {
 
 impl Document {
     pub(crate) fn node(&self, index: u32) -> Result<&json::Node, Located> {
-        let count = self.root.nodes.len();
-        let problem = GltfProblem::Index { list: "nodes", index, count };
-        self.root.nodes.get(index as usize).ok_or((place("nodes", index), problem))
+        item(&self.root.nodes, "nodes", index).map_err(|problem| (place("nodes", index), problem))
     }
 
     /// The roots of the displayed scene: those of the default scene, else of the first scene, else all nodes without a

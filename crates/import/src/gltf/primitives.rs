@@ -5,10 +5,11 @@
 //!
 //! Source: Khronos, "glTF 2.0 Specification", §3.7.2 (meshes).
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::json;
 use crate::gltf::vertices::{Deformation, NO_UV, Vertices};
+use crate::model::unused::{keep, renumber};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::collections::{BTreeMap, HashMap};
 
@@ -55,9 +56,7 @@ pub(crate) struct Triangles {
 
 impl Document {
     pub(crate) fn mesh(&self, index: u32) -> Result<&json::Mesh, Located> {
-        let count = self.root.meshes.len();
-        let problem = GltfProblem::Index { list: "meshes", index, count };
-        self.root.meshes.get(index as usize).ok_or((place("meshes", index), problem))
+        item(&self.root.meshes, "meshes", index).map_err(|problem| (place("meshes", index), problem))
     }
 
     /// Number of vertices and indices of a mesh, as its accessors state them: of those that are built, and of those that
@@ -238,31 +237,13 @@ impl Triangles {
 
     /// Removes unused vertices; the others keep their order.
     fn leave_out_unused(&mut self) {
-        let mut used = vec![false; self.positions.len()];
-        self.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
-        if used.iter().all(|&used| used) {
-            return;
-        }
-        fn keep<T>(list: &mut Vec<T>, used: &[bool]) {
-            let mut used = used.iter();
-            list.retain(|_| used.next().copied().unwrap_or(false));
-        }
+        let Some(used) = renumber(&mut self.triangles, self.positions.len()) else { return };
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
         keep(&mut self.uvs, &used);
         keep(&mut self.uvs2, &used);
         keep(&mut self.colors, &used);
         keep(&mut self.tangents, &used);
-        let mut next = 0;
-        let numbers: Vec<u32> = used
-            .iter()
-            .map(|&used| {
-                let number = next;
-                next += u32::from(used);
-                number
-            })
-            .collect();
-        self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = numbers[*vertex as usize]);
     }
 
     /// Duplicates the vertices of triangles with a missing normal and gives them the geometric normal; if all normals

@@ -3,7 +3,7 @@
 //! Source: Khronos, "glTF 2.0 Specification", §3.7.3 (skins). The transform of the node of a skinned mesh is ignored:
 //! joints transform to the world.
 
-use crate::error::gltf::{GltfProblem, Located, place};
+use crate::error::gltf::{GltfProblem, Located, item, place};
 use crate::gltf::document::Document;
 use crate::gltf::nodes::Tree;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
@@ -40,9 +40,7 @@ impl Document {
     /// - `worlds`: from each node of the file to the world.
     fn joints(&self, skin: u32, worlds: &[DAffine3]) -> Result<Vec<DAffine3>, Located> {
         let here = |problem| (place("skins", skin), problem);
-        let count = self.root.skins.len();
-        let json = self.root.skins.get(skin as usize);
-        let json = json.ok_or_else(|| here(GltfProblem::Index { list: "skins", index: skin, count }))?;
+        let json = item(&self.root.skins, "skins", skin).map_err(here)?;
         let inverse = match json.inverse_bind_matrices {
             Some(accessor) => self.first_floats::<16>(accessor, json.joints.len())?,
             None => Vec::new(),
@@ -53,9 +51,7 @@ impl Document {
             return Err(here(GltfProblem::Length { what, found, expected }));
         }
         let joint = |(i, &node): (usize, &u32)| {
-            let world = worlds.get(node as usize).copied();
-            let list = "nodes";
-            let world = world.ok_or_else(|| here(GltfProblem::Index { list, index: node, count: worlds.len() }))?;
+            let world = *item(worlds, "nodes", node).map_err(here)?;
             let bind = inverse.get(i).map_or(DAffine3::IDENTITY, |matrix| {
                 DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from)))
             });

@@ -233,15 +233,21 @@ impl<'a> Node<'a> {
         self.graph.error(place, format!("`{name}` of a {} `{}` must be {expected}", self.tag(), self.plugin()))
     }
 
-    /// - Errors if it is there and no number.
+    /// Returns what `of` makes of a value, `None` if there is none.
+    ///
+    /// # Errors
+    /// If it is there, and `of` makes nothing of it: it must be `expected`.
+    fn read<T>(self, name: &str, expected: &str, of: impl Fn(&'a Value) -> Option<T>) -> Result<Option<T>, SceneError> {
+        self.value(name).map(|value| of(value).ok_or_else(|| self.wrong(name, expected))).transpose()
+    }
+
     pub(crate) fn float(self, name: &str) -> Result<Option<f64>, SceneError> {
-        match self.value(name) {
-            None => Ok(None),
-            Some(Value::Float(number) | Value::Spectrum(Spectrum::Uniform(number))) => Ok(Some(*number)),
-            Some(Value::Integer(number)) => Ok(Some(*number as f64)),
-            Some(Value::Rgb(rgb)) if rgb.x == rgb.y && rgb.y == rgb.z => Ok(Some(rgb.x)),
-            Some(_) => Err(self.wrong(name, "a number")),
-        }
+        self.read(name, "a number", |value| match value {
+            Value::Float(number) | Value::Spectrum(Spectrum::Uniform(number)) => Some(*number),
+            Value::Integer(number) => Some(*number as f64),
+            Value::Rgb(rgb) if rgb.x == rgb.y && rgb.y == rgb.z => Some(rgb.x),
+            _ => None,
+        })
     }
 
     pub(crate) fn float_or(self, name: &str, default: f64) -> Result<f64, SceneError> {
@@ -249,45 +255,35 @@ impl<'a> Node<'a> {
     }
 
     pub(crate) fn integer(self, name: &str) -> Result<Option<i64>, SceneError> {
-        match self.value(name) {
-            None => Ok(None),
-            Some(Value::Integer(number)) => Ok(Some(*number)),
-            Some(Value::Float(number)) if number.fract() == 0.0 => Ok(Some(*number as i64)),
-            Some(_) => Err(self.wrong(name, "a whole number")),
-        }
+        self.read(name, "a whole number", |value| match value {
+            Value::Integer(number) => Some(*number),
+            Value::Float(number) if number.fract() == 0.0 => Some(*number as i64),
+            _ => None,
+        })
     }
 
     pub(crate) fn boolean_or(self, name: &str, default: bool) -> Result<bool, SceneError> {
-        match self.value(name) {
-            None => Ok(default),
-            Some(Value::Boolean(value)) => Ok(*value),
-            Some(_) => Err(self.wrong(name, "true or false")),
-        }
+        let read =
+            self.read(name, "true or false", |value| if let Value::Boolean(it) = value { Some(*it) } else { None });
+        Ok(read?.unwrap_or(default))
     }
 
     pub(crate) fn text(self, name: &str) -> Result<Option<&'a str>, SceneError> {
-        match self.value(name) {
-            None => Ok(None),
-            Some(Value::Text(text)) => Ok(Some(text)),
-            Some(_) => Err(self.wrong(name, "a string")),
-        }
+        self.read(name, "a string", |value| if let Value::Text(text) = value { Some(text.as_str()) } else { None })
     }
 
     pub(crate) fn vector(self, name: &str) -> Result<Option<DVec3>, SceneError> {
-        match self.value(name) {
-            None => Ok(None),
-            Some(Value::Vector(vector) | Value::Rgb(vector)) => Ok(Some(*vector)),
-            Some(_) => Err(self.wrong(name, "a vector")),
-        }
+        self.read(name, "a vector", |value| match value {
+            Value::Vector(vector) | Value::Rgb(vector) => Some(*vector),
+            _ => None,
+        })
     }
 
     /// The identity if there is none.
     pub(crate) fn transform(self, name: &str) -> Result<DMat4, SceneError> {
-        match self.value(name) {
-            None => Ok(DMat4::IDENTITY),
-            Some(Value::Transform(matrix)) => Ok(*matrix),
-            Some(_) => Err(self.wrong(name, "a transform")),
-        }
+        let read =
+            self.read(name, "a transform", |value| if let Value::Transform(it) = value { Some(*it) } else { None });
+        Ok(read?.unwrap_or(DMat4::IDENTITY))
     }
 
     fn follow(self, child: &Child) -> Result<Node<'a>, SceneError> {

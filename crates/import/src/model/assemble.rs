@@ -2,6 +2,7 @@
 
 use crate::error::{ModelError, ModelProblem, Place};
 use crate::model::imported::{ModelNormals, ModelOptions, has_area, with_normals};
+use crate::model::unused::{keep, renumber};
 use firstlight_files::warnings::Warnings;
 use firstlight_mesh::{Mesh, Welding};
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -68,27 +69,10 @@ pub(crate) fn assemble(
 impl Indexed {
     /// Removes unused vertices; the others keep their order.
     fn leave_out_unused(&mut self) {
-        let mut used = vec![false; self.positions.len()];
-        self.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
-        if used.iter().all(|&used| used) {
-            return;
-        }
-        fn keep<T>(list: &mut Vec<T>, used: &[bool]) {
-            let mut used = used.iter();
-            list.retain(|_| *used.next().expect("a list is empty or as long as the positions"));
-        }
+        let Some(used) = renumber(&mut self.triangles, self.positions.len()) else { return };
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
         keep(&mut self.uvs, &used);
         keep(&mut self.colors, &used);
-        let mut next = 0;
-        let numbers: Vec<u32> = (used.iter())
-            .map(|&used| {
-                let number = next;
-                next += u32::from(used);
-                number
-            })
-            .collect();
-        self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = numbers[*vertex as usize]);
     }
 }

@@ -14,3 +14,4 @@ pub mod placing;
 pub(crate) mod polygon;
 pub(crate) mod projection;
 pub(crate) mod texture_map;
+pub(crate) mod unused;

@@ -33,6 +33,16 @@ pub(crate) fn made_mesh(vertices: &[(DVec3, DVec3, [f64; 2])], triangles: Vec<[u
     Mesh { normals, uvs, ..mesh }
 }
 
+/// Area of a mesh where it stands, m².
+pub(crate) fn area_of(mesh: &Mesh, world: &DAffine3) -> f64 {
+    let corner = |vertex: u32| world.transform_vector3(mesh.positions[vertex as usize].as_dvec3());
+    let doubled = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(corner);
+        (b - a).cross(c - a).length()
+    };
+    0.5 * mesh.triangles.iter().map(doubled).sum::<f64>()
+}
+
 /// The same mesh with its front where its normals point, also that of triangles whose order says otherwise; or turned
 /// round.
 pub(crate) fn oriented(mut mesh: Mesh, is_reversed: bool) -> Mesh {

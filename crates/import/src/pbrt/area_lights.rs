@@ -1,5 +1,6 @@
 //! Shapes that emit.
 
+use crate::model::placing::area_of;
 use crate::pbrt::build::{Builder, Geometry};
 use crate::pbrt::lights::{color, factor};
 use crate::pbrt::params::Params;
@@ -7,8 +8,7 @@ use crate::pbrt::state::{AreaLight, State};
 use firstlight_files::printable;
 use firstlight_format::sources::{MeshSource, TextureSource};
 use firstlight_format::value::{ColorValue, Rgb};
-use firstlight_mesh::Mesh;
-use glam::{DAffine3, Vec3};
+use glam::Vec3;
 use std::f64::consts::PI;
 
 impl Builder<'_> {
@@ -35,7 +35,7 @@ impl Builder<'_> {
                     (4.0 * PI * (radius * scale).powi(2), 1)
                 }
                 Geometry::Mesh { source: MeshSource::Part { shape, .. }, .. } => match self.parts.get(shape) {
-                    Some(mesh) => (area_of(mesh, &world), mesh.triangles.len()),
+                    Some(mesh) => (area_of(mesh, &world).max(f64::MIN_POSITIVE), mesh.triangles.len()),
                     None => (1.0, 1),
                 },
                 Geometry::Mesh { .. } => (1.0, 1),
@@ -65,14 +65,4 @@ impl Builder<'_> {
         };
         (value, is_two_sided)
     }
-}
-
-/// Area of a mesh in the world, square metres.
-fn area_of(mesh: &Mesh, world: &DAffine3) -> f64 {
-    let corner = |vertex: u32| world.transform_vector3(mesh.positions[vertex as usize].as_dvec3());
-    let area = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(corner);
-        0.5 * (b - a).cross(c - a).length()
-    };
-    mesh.triangles.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE)
 }

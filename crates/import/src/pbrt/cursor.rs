@@ -1,9 +1,10 @@
 //! Reads the arguments of directives from the text of one file; every error has file, line and column.
 
 use crate::pbrt::params::{Param, Params, Values};
-use crate::pbrt::tokens::{Token, TokenKind, Tokens, Unterminated, line_and_column, unescaped};
+use crate::pbrt::tokens::{Token, TokenKind, Tokens, Unterminated, unescaped};
 use firstlight_files::printable;
 use firstlight_format::error::SceneError;
+use firstlight_format::locate::line_and_column;
 use glam::{DAffine3, DMat4, DVec3};
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -236,7 +237,6 @@ fn number(word: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pbrt::tokens::line_and_column;
 
     #[test]
     fn places_are_those_of_the_text_in_any_order() {

@@ -425,7 +425,7 @@ impl<'a> Reader<'a> {
 
     fn include(
         &mut self,
-        cursor: &Cursor,
+        cursor: &mut Cursor,
         at: usize,
         file: &str,
         is_import: bool,
@@ -439,17 +439,24 @@ impl<'a> Reader<'a> {
         if self.n_includes > MAX_INCLUDES {
             return Err(cursor.wrong(at, format!("more than {MAX_INCLUDES} files are included")));
         }
-        // A part that is missing costs only itself.
-        let found =
-            self.builder.named_files.references.resolve(self.folder, file).map_err(|outside| outside.to_string());
+        let found = self.builder.named_files.references.resolve(self.folder, file);
         let folder = self.folder;
-        let source = found.and_then(|found| self.text(&folder.join(found.path)).map_err(|error| error.to_string()));
+        let source = found.map_err(|outside| outside.to_string()).and_then(|found| {
+            let path = folder.join(&found.path);
+            // A file of that name beside the scene is another scene, or this one.
+            let is_this = path == self.path && found.path != Path::new(file);
+            if leaves_out_folders(file, &found.path) || is_this {
+                return Err(format!("there is no `{}`", printable::name(file)));
+            }
+            self.text(&path).map_err(|error| error.to_string())
+        });
         let source = match source {
             Ok(source) => source,
+            // A part that is missing costs only itself, with the parameters that go on with its last directive.
             Err(error) => {
                 let place = cursor.place(at);
                 self.builder.warnings.push(format!("{place}: {error}; the included file is left out"));
-                return Ok(());
+                return cursor.params().map(drop);
             }
         };
         if !is_import {
@@ -463,6 +470,14 @@ impl<'a> Reader<'a> {
         self.state = state;
         Ok(())
     }
+}
+
+/// Whether a file was found by the last part of a relative name alone.
+fn leaves_out_folders(name: &str, found: &Path) -> bool {
+    let name = name.replace('\\', "/");
+    let is_within = |folders: &str| !folders.is_empty() && !folders.contains([':', '.']);
+    name.rsplit_once('/').is_some_and(|(folders, file)| found == Path::new(file) && is_within(folders))
+        && !name.starts_with('/')
 }
 
 fn too_many(cursor: &Cursor, at: usize, TooMany: TooMany) -> SceneError {

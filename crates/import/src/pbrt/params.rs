@@ -185,20 +185,21 @@ impl Params {
 
     /// Groups of three numbers.
     pub(crate) fn points(&self, name: &str) -> Vec<DVec3> {
-        let (groups, rest) = self.numbers(name).as_chunks::<3>();
-        if let (Some(param), false) = (self.find(name), rest.is_empty()) {
-            return self.complain(param, "three numbers for each of them").unwrap_or_default();
-        }
-        groups.iter().map(|&group| DVec3::from_array(group)).collect()
+        self.groups(name, "three numbers for each of them").iter().copied().map(DVec3::from_array).collect()
     }
 
     /// Pairs of numbers.
     pub(crate) fn pairs(&self, name: &str) -> Vec<DVec2> {
-        let (groups, rest) = self.numbers(name).as_chunks::<2>();
+        self.groups(name, "pairs of numbers").iter().copied().map(DVec2::from_array).collect()
+    }
+
+    /// Groups of `N` numbers; none, with a complaint, if some are left.
+    fn groups<const N: usize>(&self, name: &str, expected: &str) -> &[[f64; N]] {
+        let (groups, rest) = self.numbers(name).as_chunks::<N>();
         if let (Some(param), false) = (self.find(name), rest.is_empty()) {
-            return self.complain(param, "pairs of numbers").unwrap_or_default();
+            return self.complain(param, expected).unwrap_or_default();
         }
-        groups.iter().map(|&group| DVec2::from_array(group)).collect()
+        groups
     }
 
     /// Indices of vertices.

@@ -122,17 +122,10 @@ pub(crate) fn unescaped(text: &str) -> String {
     out
 }
 
-/// Line and column of a position, counted from 1.
-pub(crate) fn line_and_column(text: &str, at: usize) -> (usize, usize) {
-    let before = &text.as_bytes()[..at.min(text.len())];
-    let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-    let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-    (line, 1 + String::from_utf8_lossy(&before[start..]).chars().count())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use firstlight_format::locate::line_and_column;
 
     #[test]
     fn words_strings_and_brackets_are_told_apart() {

@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(told(&scene), Vec::<String>::new());
         let (film, file) = (&scene.file.film, &scene.file);
         assert_eq!((film.width, film.height, film.filter), (1280, 720, PixelFilter::Box));
-        assert_eq!((file.display.exposure, file.max_depth), (1.0, Some(10)), "no shutter");
+        assert_eq!((file.display.exposure_stops, file.max_depth), (1.0, Some(10)), "no shutter");
         assert!((file.camera.vfov - 40.0).abs() < 1e-12);
         let filtered =
             read_text(&format!("Film \"image\"\nPixelFilter \"mitchell\" \"float xwidth\" [2]\nWorldBegin\n{SQUARE}"));

@@ -5,8 +5,8 @@ use crate::pbrt::transforms::world_for;
 use firstlight_files::printable;
 use firstlight_format::bounds;
 use firstlight_format::camera::CameraPart;
-use firstlight_format::parts::{DisplayPart, FilmPart};
-use firstlight_render::PixelFilter;
+use firstlight_format::parts::FilmPart;
+use firstlight_render::{Display, PixelFilter};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// What is before `WorldBegin`.
@@ -25,7 +25,7 @@ pub(crate) struct ViewOptions {
 pub(crate) struct ViewParts {
     pub camera: CameraPart,
     pub film: FilmPart,
-    pub display: DisplayPart,
+    pub display: Display,
     pub max_depth: u32,
     /// From the world of the file to ours.
     pub world: DMat3,
@@ -135,11 +135,11 @@ impl ViewOptions {
     }
 
     /// The sensor as an exposure. With `cie1931` luminance 1 is shown as 1 times the exposure time and ISO / 100.
-    fn display(&self, tell: &mut impl FnMut(String)) -> DisplayPart {
-        let Some((_, film)) = &self.film else { return DisplayPart::default() };
+    fn display(&self, tell: &mut impl FnMut(String)) -> Display {
+        let Some((_, film)) = &self.film else { return Display::default() };
         if self.is_of_version_3() {
             let scale = film.number("scale").filter(|scale| *scale > 0.0).unwrap_or(1.0);
-            return DisplayPart { exposure: scale.log2().clamp(-64.0, 64.0) as f32, ..DisplayPart::default() };
+            return Display { exposure_stops: scale.log2().clamp(-64.0, 64.0) as f32, ..Display::default() };
         }
         if let Some(sensor) = film.string("sensor").filter(|sensor| *sensor != "cie1931") {
             tell(format!("the sensor `{}` is not modelled: colours are those of `cie1931`", printable::name(sensor)));
@@ -149,6 +149,6 @@ impl ViewOptions {
         let seconds = shutter("shutterclose", 1.0) - shutter("shutteropen", 0.0);
         let ratio = seconds * film.number("iso").unwrap_or(100.0) / 100.0;
         let stops = if ratio > 0.0 && ratio != 1.0 { ratio.log2().clamp(-64.0, 64.0) } else { 0.0 };
-        DisplayPart { exposure: stops as f32, ..DisplayPart::default() }
+        Display { exposure_stops: stops as f32, ..Display::default() }
     }
 }

@@ -4,6 +4,7 @@ use crate::error::Place;
 use crate::error::ply::PlyProblem;
 use crate::model::assemble::Indexed;
 use crate::model::polygon::triangulate;
+use crate::model::unused::keep;
 use crate::ply::header::{Element, Property};
 use crate::ply::rows::{Located, Rows, missing, next_length, skip_list};
 use crate::ply::vertices::{ColourProperties, ColourSource, Colours};
@@ -276,22 +277,22 @@ impl Faces {
             return 0;
         }
         let mut start = 0;
-        let keep: Vec<bool> = (self.arities.iter())
+        let kept: Vec<bool> = (self.arities.iter())
             .map(|&count| {
                 start += count as usize;
                 !self.corners[start - count as usize..start].iter().any(|&vertex| is_bad(vertex))
             })
             .collect();
         let of_corners = |arities: &[u32]| -> Vec<bool> {
-            arities.iter().zip(&keep).flat_map(|(&count, &keep)| std::iter::repeat_n(keep, count as usize)).collect()
+            arities.iter().zip(&kept).flat_map(|(&count, &kept)| std::iter::repeat_n(kept, count as usize)).collect()
         };
         let corners_kept = of_corners(&self.arities);
-        retain(&mut self.corners, &corners_kept);
-        retain(&mut self.uvs, &corners_kept);
-        retain(&mut self.textures, &keep);
-        retain(&mut self.colors, &keep);
-        retain(&mut self.arities, &keep);
-        keep.iter().filter(|&&keep| !keep).count()
+        keep(&mut self.corners, &corners_kept);
+        keep(&mut self.uvs, &corners_kept);
+        keep(&mut self.textures, &kept);
+        keep(&mut self.colors, &kept);
+        keep(&mut self.arities, &kept);
+        kept.iter().filter(|&&kept| !kept).count()
     }
 
     /// The vertices with the triangles of the faces; vertices are split where corners have values of their own.
@@ -354,12 +355,6 @@ impl Faces {
         self.corners = numbers;
         found
     }
-}
-
-/// Keeps what is marked; the list may be empty.
-fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
-    let mut keep = keep.iter();
-    list.retain(|_| *keep.next().expect("as many marks as entries"));
 }
 
 /// Index of the list of vertex indices.

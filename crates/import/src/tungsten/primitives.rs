@@ -11,7 +11,6 @@ use firstlight_format::material_textures::texture_names;
 use firstlight_format::parts::{MaterialPart, ObjectPart, TransformPart};
 use firstlight_format::sources::MeshSource;
 use firstlight_format::value::ColorValue;
-use firstlight_mesh::Mesh;
 use firstlight_render::Material;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use serde_json::Value;
@@ -85,7 +84,7 @@ impl<'a> Converter<'a> {
         let radius = scale.max_element();
         let area = match (of.kind(), &mesh) {
             ("sphere", _) => 4.0 * PI * radius * radius,
-            (_, Some(mesh)) => area_of(&mesh.mesh, &world),
+            (_, Some(mesh)) => placing::area_of(&mesh.mesh, &world),
             (_, None) => return,
         };
         let light = self.radiance(of, 1.0 / (PI * area));
@@ -164,14 +163,4 @@ impl<'a> Converter<'a> {
 
 fn is_black(part: Option<&MaterialPart>) -> bool {
     matches!(part, Some(Material::Diffuse { albedo: ColorValue::Rgb(Vec3::ZERO) }))
-}
-
-/// Area of a mesh where it stands, m².
-fn area_of(mesh: &Mesh, world: &DAffine3) -> f64 {
-    let corner = |vertex: u32| world.transform_vector3(mesh.positions[vertex as usize].as_dvec3());
-    let doubled = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(corner);
-        (b - a).cross(c - a).length()
-    };
-    0.5 * mesh.triangles.iter().map(doubled).sum::<f64>()
 }

@@ -10,6 +10,7 @@ use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
 use crate::denoise::Guides;
 use crate::driver::features::{BAND, FEATURE_SAMPLES, Look, PART_PIXELS, Part, PartTracer};
+use crate::film::tiles::Film;
 use crate::integrators::common::seen::Seen;
 use crate::integrators::features::FeatureUse;
 use crate::integrators::simd::camera::Pixels;
@@ -111,6 +112,20 @@ impl GuideGatherer {
     /// Means over the samples so far; meaningless without any.
     pub fn guides(&self) -> &SurfaceGuides {
         &self.guides
+    }
+
+    /// Gathers what the denoiser of a film needs; begins if there are no samples. As [`Self::gather`].
+    pub fn gather_for(
+        &mut self,
+        snapshot: &Prepared,
+        settings: &RenderSettings,
+        film: &Film,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> bool {
+        if self.samples == 0 {
+            self.start(UVec2::new(film.width(), film.height()));
+        }
+        self.gather(snapshot, settings, guide_samples(film.spp()), stop)
     }
 
     /// Adds the samples that are missing of `samples` per pixel, on the current rayon pool. Returns false if `stop`, which

@@ -70,9 +70,7 @@ pub(super) fn advance_moving(
         report.add(tiles);
         if let Some((light, layer)) = light {
             film.light = Some(layer);
-            report.completed &= light.completed;
-            report.rays += light.rays;
-            report.n_bad += light.n_bad;
+            report.add_light(light);
         }
         if !report.completed {
             break;
@@ -160,18 +158,13 @@ fn advance_tiles(passes: &[(u32, Pass)], film: &mut Film, due: &Due, stop: &(dyn
         groups.push(group);
         (tiles_left, of_left) = (others, &of_left[n..]);
     }
-    let mut reports: Vec<(usize, PassReport)> = groups
+    let reports: Vec<(usize, PassReport)> = groups
         .into_iter()
         .enumerate()
         .par_bridge()
         .map_init(Wave::default, |wave, (i, tiles)| (i, advance_group(passes, tiles, due, stop, wave)))
         .collect();
-    reports.sort_unstable_by_key(|(i, _)| *i);
-    let mut total = PassReport::nothing();
-    for (_, report) in reports {
-        total.add(report);
-    }
-    total
+    PassReport::sum(reports)
 }
 
 /// A block and its missing samples.

@@ -140,9 +140,7 @@ fn advance_still(
     );
     if let Some((light, layer)) = light {
         film.light = Some(layer);
-        report.completed &= light.completed;
-        report.rays += light.rays;
-        report.n_bad += light.n_bad;
+        report.add_light(light);
     }
     report
 }
@@ -158,7 +156,7 @@ fn advance_tiles(
     let round = film.round.filter(|_| region.is_none());
     // Tiles are handed out one by one: with a fixed division, all workers would wait for the half that contains the
     // model.
-    let mut reports: Vec<(usize, PassReport)> = film
+    let reports: Vec<(usize, PassReport)> = film
         .tiles
         .iter_mut()
         .enumerate()
@@ -166,12 +164,7 @@ fn advance_tiles(
         .par_bridge()
         .map_init(Wave::default, |wave, (i, tile)| (i, advance_tile(pass, tile, round.as_ref(), budget, stop, wave)))
         .collect();
-    reports.sort_unstable_by_key(|(i, _)| *i);
-    let mut total = PassReport::nothing();
-    for (_, report) in reports {
-        total.add(report);
-    }
-    total
+    PassReport::sum(reports)
 }
 
 /// - `round`: decides which blocks of the tile get samples; without a round, all of them.

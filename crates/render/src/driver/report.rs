@@ -1,6 +1,7 @@
 //! Result of a pass over the film, and invalid samples.
 
 use crate::core::counts::RayCounts;
+use crate::film::light_layer::LayerReport;
 use crate::film::tile::FilmTile;
 use glam::{UVec2, Vec3};
 
@@ -46,6 +47,21 @@ impl PassReport {
         self.bad.extend(other.bad.into_iter().take(MAX_LISTED_BAD - self.bad.len()));
         self.n_above += other.n_above;
         self.above.extend(other.above.into_iter().take(MAX_LISTED_BAD - self.above.len()));
+    }
+
+    /// Adds the report of the light paths of the pass.
+    pub(super) fn add_light(&mut self, light: LayerReport) {
+        self.completed &= light.completed;
+        self.rays += light.rays;
+        self.n_bad += light.n_bad;
+    }
+
+    /// Adds up the reports of numbered parts, in the order of their numbers.
+    pub(super) fn sum(mut parts: Vec<(usize, Self)>) -> Self {
+        parts.sort_unstable_by_key(|(i, _)| *i);
+        let mut total = Self::nothing();
+        parts.into_iter().for_each(|(_, part)| total.add(part));
+        total
     }
 
     /// Adds one sample of every pixel of a block to its tile, and counts invalid ones.

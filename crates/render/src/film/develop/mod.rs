@@ -13,14 +13,17 @@ use crate::film::tiles::Film;
 use firstlight_simd::{Float, InstructionSet, LANES, Real, Simd, Vector, Word, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 pub use crate::film::develop::curve::ToneCurve;
 pub use crate::film::develop::srgb::{decode_srgb, encode_srgb};
 
 /// Display settings; changing them keeps all samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "DisplayPart", deny_unknown_fields, default)]
 pub struct Display {
     /// Exposure in stops (factors of two).
+    #[serde(rename = "exposure")]
     pub exposure_stops: f32,
     /// Map from exposed radiance to display light.
     pub tone_curve: ToneCurve,
