@@ -14,17 +14,17 @@ use firstlight_format::error::{SceneError, suggestion};
 use firstlight_format::parts::MaterialPart;
 use firstlight_format::sources::TextureSource;
 use firstlight_format::value::{ColorValue, ScalarValue};
-use firstlight_render::{MAX_LOBES, Material};
+use firstlight_render::{Fresnel, MAX_LOBES, Material};
 use glam::Vec3;
 
 /// Depth of nested BSDFs.
 const MAX_DEPTH: u32 = 32;
 
 /// Microfacets of a rough surface: α along u and v, and their distribution.
-struct Microfacets {
-    u: ScalarValue,
-    v: ScalarValue,
-    beckmann: bool,
+pub(crate) struct Microfacets {
+    pub u: ScalarValue,
+    pub v: ScalarValue,
+    pub beckmann: bool,
 }
 
 impl Converter<'_> {
@@ -57,6 +57,11 @@ impl Converter<'_> {
                 self.plastic(node)?
             }
             "principled" | "principledthin" => self.principled(node)?,
+            // Of other renderers that read these files.
+            plugin @ ("disneybsdf" | "disneydiffuse" | "disneyglass" | "disneymetal") => {
+                self.tell(node, &format!("a {plugin} is modelled as principled"));
+                Surface { two_sided: true, ..self.principled(node)? }
+            }
             // From here to `mixturebsdf`, of version 0.x.
             "roughdiffuse" => {
                 self.tell(node, "the roughness of a diffuse surface is not modelled: it is smooth");
@@ -64,21 +69,12 @@ impl Converter<'_> {
                 let albedo = self.color(node, "reflectance", 0.5, Use::Reflectance)?;
                 Surface::one_sided(Material::Diffuse { albedo })
             }
-            "phong" | "ward" => {
-                self.tell(node, &format!("highlights of a {} are not modelled: it is diffuse", node.plugin()));
-                node.skip();
-                let albedo = self.color(node, "diffuse_reflectance", 0.5, Use::Reflectance)?;
-                Surface::one_sided(Material::Diffuse { albedo })
-            }
+            "phong" | "ward" => self.with_highlight(node)?,
             "difftrans" => {
                 let transmittance = self.color(node, "transmittance", 0.5, Use::Reflectance)?;
                 Surface::two_sided(Material::Translucent { reflectance: ColorValue::grey(0.0), transmittance })
             }
-            "coating" | "roughcoating" => {
-                self.tell(node, "coatings are not modelled: the surface is the one below");
-                node.skip();
-                return self.only_nested(node, depth);
-            }
+            "coating" | "roughcoating" => return self.coating(node, depth),
             "mixturebsdf" => return self.mixture(node, depth),
             "polarizer" | "circular" | "retarder" => self.polarizing_filter(node)?,
             "twosided" => return self.both_sides(node, depth),
@@ -130,13 +126,13 @@ impl Converter<'_> {
         }
     }
 
-    fn relative_ior(&mut self, node: Node, default: &str) -> Result<f32, SceneError> {
+    pub(crate) fn relative_ior(&mut self, node: Node, default: &str) -> Result<f32, SceneError> {
         let inside = self.ior(node, "int_ior", default)?;
         Ok((inside / self.ior(node, "ext_ior", "air")?) as f32)
     }
 
     /// Microfacets of a rough surface.
-    fn microfacets(&mut self, node: Node) -> Result<Microfacets, SceneError> {
+    pub(crate) fn microfacets(&mut self, node: Node) -> Result<Microfacets, SceneError> {
         // Beckmann's distribution is the default of Mitsuba.
         let distribution = node.text("distribution")?.map(str::to_ascii_lowercase);
         let beckmann = match distribution.as_deref() {
@@ -161,7 +157,7 @@ impl Converter<'_> {
     }
 
     /// Of a kind of surface that ours models with one width.
-    fn isotropic(&mut self, node: Node) -> Result<(ScalarValue, bool), SceneError> {
+    pub(crate) fn isotropic(&mut self, node: Node) -> Result<(ScalarValue, bool), SceneError> {
         let Microfacets { u, v, beckmann } = self.microfacets(node)?;
         if u != v {
             self.tell(node, "anisotropy of this kind of surface is not modelled: its width along v is that along u");
@@ -204,6 +200,13 @@ impl Converter<'_> {
     }
 
     fn conductor(&mut self, node: Node) -> Result<Surface, SceneError> {
+        // Of variants, in place of an index of refraction: what is reflected at normal incidence.
+        if node.has("r0") {
+            let reflectance = self.color(node, "r0", 1.0, Use::Reflectance)?;
+            let (alpha, _) = self.isotropic(node)?;
+            let (fresnel, compensate) = (Fresnel::Schlick, false);
+            return Ok(Surface::one_sided(Material::Metal { alpha, reflectance, fresnel, compensate }));
+        }
         let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
         let usual = if node.object().is_old { "Cu" } else { "none" };
         let material = node.text("material")?.unwrap_or(usual);
@@ -252,13 +255,29 @@ impl Converter<'_> {
             "specular_reflectance_sampling_rate",
             "specular_transmittance_sampling_rate",
         ]);
-        let thin_walled = node.plugin() == "principledthin";
+        let plugin = node.plugin();
+        let thin_walled = plugin == "principledthin";
+        // Other renderers have other defaults, and names that are written out.
+        let usual = |of: &str, default: f64| if plugin == of { 1.0 } else { default };
+        let is_other = plugin.starts_with("disney");
+        if is_other {
+            node.ignore(&["specular"]);
+        }
         let base_color = self.color(node, "base_color", 0.5, Use::Reflectance)?;
-        let mut share = |name: &str, default: f64| self.scalar(node, name, default).map(within_share);
-        let transmission = share("spec_trans", 0.0)?;
+        let mut share = |name: &str, default: f64| {
+            let written_out = match name {
+                "spec_trans" => "specular_transmission",
+                "spec_tint" => "specular_tint",
+                "flatness" => "subsurface",
+                name => name,
+            };
+            let name = if is_other && node.has(written_out) { written_out } else { name };
+            self.scalar(node, name, default).map(within_share)
+        };
+        let transmission = share("spec_trans", usual("disneyglass", 0.0))?;
         let (roughness, anisotropic) = (share("roughness", 0.5)?, share("anisotropic", 0.0)?);
         let (specular_tint, flatness) = (share("spec_tint", 0.0)?, share("flatness", 0.0)?);
-        let (sheen, sheen_tint) = (share("sheen", 0.0)?, share("sheen_tint", 0.0)?);
+        let (sheen, sheen_tint) = (share("sheen", 0.0)?, share("sheen_tint", if is_other { 0.5 } else { 0.0 })?);
         let [mut metallic, mut clearcoat, mut clearcoat_gloss] = [0.0; 3].map(ScalarValue::Number);
         let mut diffuse_transmission = ScalarValue::Number(0.0);
         let ior = if thin_walled {
@@ -268,10 +287,12 @@ impl Converter<'_> {
             };
             self.constant_scalar(node, "eta", 1.5)?
         } else {
-            (metallic, clearcoat) = (share("metallic", 0.0)?, share("clearcoat", 0.0)?);
-            clearcoat_gloss = share("clearcoat_gloss", 0.0)?;
+            (metallic, clearcoat) = (share("metallic", usual("disneymetal", 0.0))?, share("clearcoat", 0.0)?);
+            clearcoat_gloss = share("clearcoat_gloss", if is_other { 1.0 } else { 0.0 })?;
             match node.float("eta")? {
                 Some(eta) => eta,
+                None if plugin == "disneydiffuse" => 1.0,
+                None if is_other => 1.5,
                 None => {
                     let transmits = transmission != ScalarValue::Number(0.0);
                     let specular = node.float_or("specular", 0.5)?.clamp(if transmits { 1e-3 } else { 0.0 }, 12.0);
@@ -311,7 +332,7 @@ impl Converter<'_> {
         }
     }
 
-    fn only_nested(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
+    pub(crate) fn only_nested(&mut self, node: Node, depth: u32) -> Result<Option<Surface>, SceneError> {
         let nested = self.nested(node, 1)?[0];
         self.surface(nested, depth + 1)
     }
@@ -519,7 +540,7 @@ impl Converter<'_> {
     }
 }
 
-fn within_share(value: ScalarValue) -> ScalarValue {
+pub(crate) fn within_share(value: ScalarValue) -> ScalarValue {
     match value {
         ScalarValue::Number(number) => ScalarValue::Number(number.clamp(0.0, 1.0)),
         texture @ ScalarValue::Texture(_) => texture,

@@ -14,6 +14,7 @@ pub(crate) mod emitter;
 pub(crate) mod graph;
 mod lenient;
 pub(crate) mod meshes;
+mod older;
 mod parameters;
 pub(crate) mod read;
 pub(crate) mod scene;

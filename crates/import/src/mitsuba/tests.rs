@@ -338,6 +338,10 @@ fn glass_has_its_colours_and_unknown_variants_are_what_they_begin_with() {
         part(&scene, 0).clone()
     };
     assert_eq!(part(&variant, 0), &usual(""));
+    let gold = "<rgb name=\"R0\" value=\"0.9 0.6 0.25\"/>";
+    let scene = read_as(format!("<bsdf type=\"roughconductorGGX\">{alpha}{gold}</bsdf>"));
+    let Material::Metal { reflectance: ColorValue::Rgb(color), .. } = part(&scene, 0) else { panic!() };
+    assert_eq!(*color, Vec3::new(0.9, 0.6, 0.25));
     let (in_air, in_water) =
         (usual("<float name=\"extEta\" value=\"1\"/>"), usual("<float name=\"extEta\" value=\"2\"/>"));
     let [Material::Conductor { k, .. }, Material::Conductor { k: half, .. }] = [&in_air, &in_water] else { panic!() };
@@ -468,6 +472,116 @@ fn a_map_of_normals_without_its_texture_has_no_effect_and_is_told() {
     assert!(told(&scene).is_empty() && !scene.file.textures.0.is_empty());
 }
 
+/// The parts and the weight of the second one of a blend.
+fn blended(scene: &ForeignScene) -> (&MaterialPart, &MaterialPart, f32) {
+    let Material::Blend { weight: ScalarValue::Number(weight), a, b, .. } = part(scene, 0) else {
+        panic!("{:?}", part(scene, 0))
+    };
+    (named(scene, a), named(scene, b), *weight)
+}
+
+#[test]
+fn highlights_of_old_versions_are_added_to_diffuse_surfaces() {
+    let of = |plugin: &str, diffuse: &str, specular: &str, rest: &str| {
+        let colors = format!(
+            "<rgb name=\"diffuseReflectance\" value=\"{diffuse}\"/>\
+             <rgb name=\"specularReflectance\" value=\"{specular}\"/>{rest}"
+        );
+        read("0.6.0", &format!("<shape type=\"sphere\"><bsdf type=\"{plugin}\">{colors}</bsdf></shape>"))
+    };
+    let exponent = "<float name=\"exponent\" value=\"48\"/>";
+    let widths = "<float name=\"alphaU\" value=\"0.1\"/><float name=\"alphaV\" value=\"0.3\"/>";
+    for (scene, width, along_v) in [
+        (of("phong", "0.6 0.3 0", "0.1 0.1 0.2", exponent), 0.1, 0.0),
+        (of("ward", "0.6 0.3 0", "0.1 0.1 0.2", widths), 0.1, 0.3),
+        // More than there is: two thirds of each.
+        (of("phong", "0.9 0.45 0", "0.6 0.6 0.6", exponent), 0.1, 0.0),
+    ] {
+        assert_eq!(told(&scene), Vec::<String>::new());
+        let (base, highlight, weight) = blended(&scene);
+        let Material::Diffuse { albedo: ColorValue::Rgb(albedo) } = base else { panic!("{base:?}") };
+        let Material::Conductor { alpha, alpha_v, eta, reflectance: ColorValue::Rgb(reflectance), .. } = highlight
+        else {
+            panic!("{highlight:?}")
+        };
+        let is_near = |a: Vec3, b: Vec3| a.abs_diff_eq(b, 1e-6);
+        assert!(is_near((1.0 - weight) * *albedo, Vec3::new(0.6, 0.3, 0.0)), "{albedo}");
+        let specular = weight * *reflectance;
+        assert!([Vec3::new(0.1, 0.1, 0.2), Vec3::splat(0.4)].iter().any(|it| is_near(specular, *it)));
+        assert!(albedo.max_element() <= 1.0 && reflectance.max_element() <= 1.0 && *eta == Rgb(Vec3::ZERO));
+        assert_eq!((alpha, alpha_v), (&ScalarValue::Number(width), &ScalarValue::Number(along_v)));
+    }
+    let plain = of("phong", "0.6 0.3 0", "0 0 0", exponent);
+    assert!(matches!(part(&plain, 0), Material::Diffuse { .. }));
+    let mirror = of("ward", "0 0 0", "0.9 0.9 0.9", widths);
+    assert!(matches!(part(&mirror, 0), Material::Conductor { .. }));
+    // The means of both are those of the file, whatever the image.
+    let textured = image("diffuseReflectance", "grey.png", "");
+    let specular = "<rgb name=\"specularReflectance\" value=\"0.25 0.25 0.25\"/>";
+    let bsdf = format!("<bsdf type=\"phong\">{textured}{specular}</bsdf>");
+    let scene = read("0.6.0", &format!("<shape type=\"sphere\">{bsdf}</shape>"));
+    let (Material::Diffuse { albedo: ColorValue::Texture(name) }, _, weight) = blended(&scene) else { panic!() };
+    let TextureSource::Image { tint, .. } = scene.file.textures.get(name).unwrap() else { panic!("{name}") };
+    assert_eq!((weight, tint.0), (0.25, Vec3::splat(1.0 / 0.75)));
+}
+
+#[test]
+fn coatings_lie_on_diffuse_surfaces_and_metals() {
+    let of = |plugin: &str, inner: &str| {
+        let layer = "<float name=\"intIOR\" value=\"1.5\"/><float name=\"extIOR\" value=\"1\"/>\
+             <float name=\"thickness\" value=\"2\"/><rgb name=\"sigmaA\" value=\"0 0.1 0.2\"/>\
+             <float name=\"alpha\" value=\"0.04\"/>";
+        read("0.6.0", &format!("<shape type=\"sphere\"><bsdf type=\"{plugin}\">{layer}{inner}</bsdf></shape>"))
+    };
+    let diffuse = "<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.5 0.5 0.5\"/></bsdf>";
+    let scene = of("roughcoating", diffuse);
+    let Material::Plastic { diffuse, alpha, ior, nonlinear, .. } = part(&scene, 0) else { panic!() };
+    // 0.596 of diffuse light is reflected inwards at an index of 1.5.
+    let passed = Vec3::new(0.0, -0.4, -0.8).exp();
+    let ColorValue::Rgb(diffuse) = diffuse else { panic!("{diffuse:?}") };
+    assert!(diffuse.abs_diff_eq(0.5 * 0.404 * passed, 0.002), "{diffuse}");
+    assert_eq!((alpha, *ior, *nonlinear), (&ScalarValue::Number(0.04), 1.5, false));
+    let metal = "<bsdf type=\"roughconductor\"><float name=\"alpha\" value=\"0.06\"/>\
+         <float name=\"eta\" value=\"0.2\"/><float name=\"k\" value=\"3\"/></bsdf>";
+    let scene = of("roughcoating", metal);
+    let Material::Principled { base_color, metallic, roughness, clearcoat, clearcoat_roughness, .. } = part(&scene, 0)
+    else {
+        panic!("{:?}", part(&scene, 0))
+    };
+    let ColorValue::Rgb(color) = base_color else { panic!("{base_color:?}") };
+    assert!(color.abs_diff_eq(9.64 / 10.44 * passed, 1e-5), "{color}");
+    let number =
+        |value: &ScalarValue| if let ScalarValue::Number(number) = value { *number } else { panic!("{value:?}") };
+    let numbers = [metallic, roughness, clearcoat, clearcoat_roughness].map(number);
+    for (found, wanted) in numbers.into_iter().zip([1.0, 0.3, 1.0, 0.2]) {
+        assert!((found - wanted).abs() < 1e-6, "{numbers:?}");
+    }
+    let glass = of("roughcoating", "<bsdf type=\"dielectric\"/>");
+    assert!(matches!(part(&glass, 0), Material::Glass { .. }));
+    tells_only(&glass, &["coatings of surfaces other than metals and diffuse ones"]);
+}
+
+/// Names and defaults are those of lajolla.
+#[test]
+fn bsdfs_of_other_renderers_are_principled() {
+    let of = |plugin: &str, rest: &str| {
+        let scene = read("0.5.0", &format!("<shape type=\"sphere\"><bsdf type=\"{plugin}\">{rest}</bsdf></shape>"));
+        tells_only(&scene, &[plugin, "principled"]);
+        let part = part(&scene, 0);
+        let Material::Disney { metallic, ior, transmission, flatness, clearcoat_gloss, .. } = part else {
+            panic!("{part:?}")
+        };
+        let number = |value: &ScalarValue| if let ScalarValue::Number(number) = value { *number } else { panic!() };
+        [number(metallic), *ior, number(transmission), number(flatness), number(clearcoat_gloss)]
+    };
+    let given = "<float name=\"specularTransmission\" value=\"0.25\"/><float name=\"subsurface\" value=\"0.75\"/>\
+         <float name=\"specular\" value=\"0.5\"/><float name=\"eta\" value=\"1.4\"/>";
+    assert_eq!(of("disneybsdf", given), [0.0, 1.4, 0.25, 0.75, 1.0]);
+    assert_eq!(of("disneymetal", ""), [1.0, 1.5, 0.0, 0.0, 1.0]);
+    assert_eq!(of("disneyglass", ""), [0.0, 1.5, 1.0, 0.0, 1.0]);
+    assert_eq!(of("disneydiffuse", ""), [0.0, 1.0, 0.0, 0.0, 1.0]);
+}
+
 #[test]
 fn distributions_of_any_case_and_of_old_versions_open() {
     let of = |name: &str| {
@@ -485,20 +599,11 @@ fn bsdfs_and_textures_of_old_versions_keep_their_colours() {
     let colour = |name: &str| format!("<rgb name=\"{name}\" value=\"0.75 0.5 0.25\"/>");
     let expected = ColorValue::Rgb(Vec3::new(0.75, 0.5, 0.25));
     let diffuse = Material::Diffuse { albedo: expected.clone() };
-    for (plugin, name) in
-        [("roughdiffuse", "reflectance"), ("phong", "diffuseReflectance"), ("ward", "diffuseReflectance")]
-    {
-        let scene =
-            read_as(&format!("<bsdf type=\"{plugin}\">{}<float name=\"alpha\" value=\"0.3\"/></bsdf>", colour(name)));
-        assert_eq!(part(&scene, 0), &diffuse);
-        tells_only(&scene, &[plugin, "not modelled"]);
-    }
+    let alpha = "<float name=\"alpha\" value=\"0.3\"/>";
+    let scene = read_as(&format!("<bsdf type=\"roughdiffuse\">{}{alpha}</bsdf>", colour("reflectance")));
+    assert_eq!(part(&scene, 0), &diffuse);
+    tells_only(&scene, &["roughness", "not modelled"]);
     let inner = format!("<bsdf type=\"diffuse\">{}</bsdf>", colour("reflectance"));
-    for plugin in ["coating", "roughcoating"] {
-        let scene = read_as(&format!("<bsdf type=\"{plugin}\"><float name=\"thickness\" value=\"1\"/>{inner}</bsdf>"));
-        assert_eq!(part(&scene, 0), &diffuse);
-        tells_only(&scene, &[plugin, "coatings"]);
-    }
     let scene = read_as(&format!("<bsdf type=\"difftrans\">{}</bsdf>", colour("transmittance")));
     assert_eq!(part(&scene, 0), &Material::Translucent { reflectance: ColorValue::grey(0.0), transmittance: expected });
     let weights = "<string name=\"weights\" value=\"0.25, 0.25, 0.5\"/>";
