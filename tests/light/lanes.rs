@@ -88,6 +88,13 @@ fn room_with(
         (standing(placed(colored.clone(), scaled(Vec3::new(0.3, 0.3, -0.3), Vec3::new(0.4, 0.9, 1.6)))), 17),
         plain(quad(Vec3::new(-2.4, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.6), Vec3::Y), 15),
     ];
+    // Seen from behind.
+    let mut inside_out = unwrapped.clone();
+    inside_out.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    for (x, material) in [(-2.2, 6), (-1.4, 18), (2.4, 24)] {
+        things.push(plain(quad(Vec3::new(x, 0.6, -1.6), Vec3::Y, 0.7 * Vec3::X), material));
+        things.push((placed(inside_out.clone(), scaled(Vec3::splat(0.2), Vec3::new(x, 2.6, 0.6))), material));
+    }
     for (i, material) in (18..18 + shiny().len() as u32).enumerate() {
         let (x, mesh) = (0.6 * i as f32 - 2.1, if i % 2 == 0 { &unwrapped } else { &colored });
         things.push((placed(mesh.clone(), scaled(Vec3::splat(0.28), Vec3::new(x, 2.0, 0.6))), material));
@@ -272,6 +279,36 @@ fn with_emission(scene: &Prepared) -> Prepared {
     scene.with_shading(Arc::new(shading))
 }
 
+/// The same with the backs of its plain materials black.
+fn one_sided(scene: &Prepared) -> Prepared {
+    let mut shading = (*scene.shading).clone();
+    let n = shading.materials.len();
+    let black = n as u32;
+    shading.materials.push(emissive(0.0));
+    for i in 0..n {
+        use Material::{Conductor, Diffuse, Disney, Metal, Mirror, Plastic, Translucent};
+        let is_plain = matches!(
+            shading.materials[i],
+            Diffuse { .. }
+                | Mirror { .. }
+                | Metal { .. }
+                | Plastic { .. }
+                | Conductor { .. }
+                | Translucent { .. }
+                | Disney { .. }
+        );
+        if is_plain {
+            let mut sided = Material::blend(ScalarInput::Constant(0.0), shading.materials.len() as u32, black);
+            if let Material::Blend { by_side, .. } = &mut sided {
+                *by_side = true;
+            }
+            let plain = std::mem::replace(&mut shading.materials[i], sided);
+            shading.materials.push(plain);
+        }
+    }
+    scene.with_shading(Arc::new(shading))
+}
+
 fn rooms() -> Vec<(&'static str, Prepared)> {
     let ball = || (sphere(Vec3::new(1.5, 2.5, 1.0), 0.4), None);
     let lamp = || (quad(Vec3::new(-1.0, 3.0, -0.5), Vec3::X * 1.2, Vec3::Z * 0.9), None);
@@ -318,12 +355,21 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
         ("many points", room_with(many(), true, Environment::Black, Vec3::splat(0.02))),
         ("a picture and a ball", room(vec![ball()], picture, Vec3::ZERO)),
         ("layers that shine", with_emission(&room(vec![ball()], sky.clone(), fog))),
+        ("black backs", one_sided(&room(vec![ball(), slanted()], sky.clone(), Vec3::ZERO))),
         ("meshes that shine", room(vec![shining(), small(), ball(), lamp()], Environment::Black, Vec3::ZERO)),
     ]
 }
 
 #[test]
 fn lanes_see_the_features_that_one_hit_at_a_time_has() {
+    let albedo = |scene: &Prepared| {
+        let size = UVec2::new(120, 90);
+        gather_features(scene, &RenderSettings::default(), size, 2, &|| false).expect("nothing stops it").albedo
+    };
+    let usual = room(vec![], Environment::Black, Vec3::ZERO);
+    let black = |albedo: &[Vec3]| albedo.iter().filter(|albedo| **albedo == Vec3::ZERO).count();
+    let [n, n_usual] = [&one_sided(&usual), &usual].map(|scene| black(&albedo(scene)));
+    assert!(n > n_usual + 50, "{n} pixels show black backs");
     for (name, scene) in rooms() {
         let features = |simd| {
             let settings = RenderSettings { simd, ..RenderSettings::default() };

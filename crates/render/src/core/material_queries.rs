@@ -102,25 +102,37 @@ impl Material {
         }
     }
 
-    /// The material that scatters: of a blend that adds nothing but holes and a normal map to one opaque part, that part.
+    /// The material that scatters: of a blend that adds nothing but holes, a normal map or a black back to one opaque
+    /// part, that part.
     pub(crate) fn scattering<'a>(&'a self, materials: &'a [Self]) -> &'a Self {
-        match self {
+        let part = match self {
+            Self::Blend { a, .. } if self.has_black_back(materials) => *a,
             Self::Blend { weight: ScalarInput::Constant(weight), a, b, by_side: false, .. }
-                if !(self.turns_normals_over() || 0.0 < *weight && *weight < 1.0) =>
+                if !(0.0 < *weight && *weight < 1.0) =>
             {
-                let part = &materials[if *weight < 1.0 { *a } else { *b } as usize];
-                let is_plain = match part {
-                    Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => true,
-                    Self::Conductor { .. } => !part.asks_for_tangents(),
-                    Self::Translucent { .. } | Self::Disney { .. } => {
-                        !part.asks_for_tangents() && self.normal_map().is_none()
-                    }
-                    _ => false,
-                };
-                if is_plain { part } else { self }
+                if *weight < 1.0 {
+                    *a
+                } else {
+                    *b
+                }
             }
-            _ => self,
-        }
+            _ => return self,
+        };
+        let part = &materials[part as usize];
+        let is_plain = match part {
+            Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => true,
+            Self::Conductor { .. } => !part.asks_for_tangents(),
+            Self::Translucent { .. } | Self::Disney { .. } => !part.asks_for_tangents() && self.normal_map().is_none(),
+            _ => false,
+        };
+        if is_plain && !self.turns_normals_over() { part } else { self }
+    }
+
+    /// Whether its back neither scatters light nor emits any.
+    pub(crate) fn has_black_back(&self, materials: &[Self]) -> bool {
+        const BLACK: ColorInput = ColorInput::Constant(Vec3::ZERO);
+        let Self::Blend { b, by_side: true, .. } = self else { return false };
+        matches!(&materials[*b as usize], Self::Emissive { radiance: BLACK } | Self::Diffuse { albedo: BLACK })
     }
 
     /// Where its surfaces are, unless they are everywhere.

@@ -35,6 +35,8 @@ pub(crate) const BECKMANN: u32 = 256;
 pub(crate) const NONLINEAR: u32 = 512;
 /// The normal map is that of a blend around it: the scalar code turns its normals.
 pub(crate) const TURNED: u32 = 1024;
+/// Paths end where they hit its back.
+pub(crate) const BLACK_BACK: u32 = 2048;
 
 /// The parameters of all materials of one lobe, and of the parts of those of two.
 #[derive(Debug, Default)]
@@ -54,6 +56,8 @@ pub(crate) struct MaterialTable {
     pub layers: LayerTable,
     /// Whether some material is [`TURNED`].
     pub has_turned: bool,
+    /// Whether some material has a [`BLACK_BACK`].
+    pub has_black_backs: bool,
     /// Whether some emission is textured.
     pub textured_emission: bool,
     /// Whether some surface scatters light through itself, so that light is sampled on both sides.
@@ -78,6 +82,10 @@ impl MaterialTable {
             if material.normal_map().is_none() && materials[id as usize].normal_map().is_some() {
                 *table.flags.last_mut().expect("it has been added") |= TURNED;
                 table.has_turned = true;
+            }
+            if materials[id as usize].has_black_back(materials) {
+                *table.flags.last_mut().expect("it has been added") |= BLACK_BACK;
+                table.has_black_backs = true;
             }
             let mut parts = [(0, 0.0); 2];
             match material {
@@ -144,6 +152,7 @@ impl MaterialTable {
             weights: table.weights.map(padded),
             layers: LayerTable::build(materials, textures),
             has_turned: table.has_turned,
+            has_black_backs: table.has_black_backs,
             textured_emission: materials.iter().any(is_textured_emitter),
             two_sided: materials.iter().any(Material::scatters_through),
             of_object: padded(of_object),

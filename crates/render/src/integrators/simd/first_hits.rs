@@ -54,7 +54,7 @@ fn see<S: Simd, const KIND: usize>(s: S, group: FirstHits) {
             let emits = Bits::gather(&scene.tables.materials.flags, material).has(EMITS);
             (layers.color(), mask & layers.scatters() & !emits)
         } else {
-            (colors_of(s, &at, &place, material), mask)
+            (colors_of(s, &at, &place, material), at.without_black_backs(&place))
         };
         let (zero, one) = (Float::splat(s, 0.0), Float::splat(s, 1.0));
         let within = |channel: Float<S>| channel.max(zero).min(one).to_array();

@@ -87,8 +87,13 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
         let chunk = LaneGroup::of(chunk);
         let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
-        let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
+        let mut at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
         let mut place = SurfaceLanes::of(s, &at);
+        let mask = at.without_black_backs(&place);
+        at.mask = mask;
+        if mask == 0 {
+            continue;
+        }
         let mut throughput = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);

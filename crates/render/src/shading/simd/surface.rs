@@ -1,7 +1,7 @@
 //! From sixteen hits to surface interactions; see [`crate::shading::vertex::Vertex`].
 
 use crate::core::texture::TexturePoint;
-use crate::prepare::material_table::{MORE_THAN_UV, TANGENTS, TEXTURED, TURNED};
+use crate::prepare::material_table::{BLACK_BACK, MORE_THAN_UV, TANGENTS, TEXTURED, TURNED};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
@@ -67,6 +67,17 @@ impl<S: Simd> HitGroup<'_, S> {
             return mesh_texture_point(mesh, &hit);
         }
         Vec2::new(uv[0][lane], uv[1][lane]).into()
+    }
+
+    /// Its lanes without those that hit a black back.
+    #[inline(always)]
+    pub fn without_black_backs(&self, place: &SurfaceLanes<S>) -> Mask {
+        let table = &self.scene.tables.materials;
+        if !table.has_black_backs {
+            return self.mask;
+        }
+        let flags = Bits::gather(&table.flags, Bits::gather(self.materials, self.index));
+        self.mask & (place.front | !flags.has(BLACK_BACK))
     }
 
     #[inline(always)]
