@@ -224,7 +224,7 @@ fn errors_have_a_line_and_a_column() {
 #[test]
 fn what_is_not_modelled_is_told_with_its_name_and_the_rest_opens() {
     let scene = opened(
-        r#"<emitter type="constant"/>
+        r#"<emitter type="constant"/><mode type="final"><shape type="sphere"/></mode>
         <shape type="sphere"><bsdf type="hair" id="wig"/><medium name="interior" type="homogeneous"/></shape>
         <shape type="sphere"><bsdf type="measured" id="silk"><string name="filename" value="a"/></bsdf></shape>
         <shape type="linearcurve" id="strand"/>
@@ -241,6 +241,7 @@ fn what_is_not_modelled_is_told_with_its_name_and_the_rest_opens() {
         "`cloud`: emitters of type volprim",
         "`noon`: emitters of type timed_sunsky",
         "`gone.obj`: no such file",
+        "`<mode>` is not known",
     ] {
         assert!(told.contains(part), "{part}: {told}");
     }

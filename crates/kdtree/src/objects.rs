@@ -63,9 +63,11 @@ impl QuadFilter {
 }
 
 #[derive(Debug)]
-struct TriangleObject {
+struct Triangle {
     vertices: [Point; 3],
     object: u32,
+    /// Its index in a mesh, or 0.
+    prim: u32,
 }
 
 #[derive(Debug)]
@@ -82,12 +84,12 @@ struct Plane {
     object: u32,
 }
 
-/// All objects of a scene that are not instances, by kind.
+/// All objects of a scene that are neither instances nor in trees, by kind; and the triangles of meshes if they are few.
 #[derive(Debug, Default)]
 pub(super) struct SimpleObjects {
     quads: Vec<Quad>,
     filter: Option<QuadFilter>,
-    triangles: Vec<TriangleObject>,
+    triangles: Vec<Triangle>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
 }
@@ -96,7 +98,12 @@ impl SimpleObjects {
     /// Collects shapes by kind.
     ///
     /// - `objects`: indices of the shapes to include.
-    pub fn new(shapes: &[Shape], objects: impl Iterator<Item = u32>) -> Self {
+    /// - `of_meshes`: triangles of meshes: object, index there, vertices. Those of an object are ascending.
+    pub fn new(
+        shapes: &[Shape],
+        objects: impl Iterator<Item = u32>,
+        of_meshes: impl Iterator<Item = (u32, u32, [Vec3; 3])>,
+    ) -> Self {
         let (mut simple, mut filter) = (Self::default(), QuadFilter::default());
         for object in objects {
             match &shapes[object as usize] {
@@ -106,7 +113,7 @@ impl SimpleObjects {
                     simple.quads.push(Quad { corners, object });
                 }
                 Shape::Triangle { vertices } => {
-                    simple.triangles.push(TriangleObject { vertices: vertices.map(point), object });
+                    simple.triangles.push(Triangle { vertices: vertices.map(point), object, prim: 0 });
                 }
                 Shape::Sphere { center, radius } => {
                     let center = center.as_dvec3().to_array();
@@ -119,6 +126,9 @@ impl SimpleObjects {
                 Shape::Mesh { .. } | Shape::Spheres { .. } => {}
             }
         }
+        let triangle =
+            |(object, prim, vertices): (u32, u32, [Vec3; 3])| Triangle { vertices: vertices.map(point), object, prim };
+        simple.triangles.extend(of_meshes.map(triangle));
         simple.filter = filter.padded();
         simple
     }
@@ -212,7 +222,12 @@ impl<S: KernelSimd> Packet<S> {
                 let mask = self.lanes & may_hit(s, &a, &b, &c);
                 if mask != 0 {
                     let hits = resolve(s, mask, &a, &b, &c, frame.sz);
-                    self.offer(s, hits, triangle.object);
+                    // Of triangles at equal distance, the first of a mesh is kept already.
+                    let take = self.offer(s, hits, triangle.object);
+                    self.prim = s.select_u(take, s.splat_u(triangle.prim), self.prim);
+                    if self.is_done::<ANY>() {
+                        return;
+                    }
                 }
             }
         }

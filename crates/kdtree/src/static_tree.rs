@@ -224,6 +224,24 @@ impl PlacedStatic {
         Some(Self { tree: tree.clone(), present, objects, order })
     }
 
+    /// The members that take part, with their objects.
+    fn members(&self) -> impl Iterator<Item = (u32, &Member)> {
+        self.objects.iter().copied().zip(&self.tree.members).filter(|(object, _)| *object != Self::GONE)
+    }
+
+    /// Number of triangles that take part.
+    pub fn n_triangles(&self) -> usize {
+        self.members().map(|(_, member)| member.mesh.triangles.len()).sum()
+    }
+
+    /// The triangles that take part: object, index there, and vertices in the space of the snapshot.
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, u32, [Vec3; 3])> {
+        self.members().flat_map(|(object, Member { mesh, world_from_object })| {
+            let indices = 0..mesh.triangles.len() as u32;
+            indices.map(move |own| (object, own, placed_vertices(mesh.vertices(own), world_from_object)))
+        })
+    }
+
     /// The primitives that take part; `None` for all.
     pub fn present(&self) -> Option<&PresentPrimitives> {
         self.present.as_ref()

@@ -199,8 +199,10 @@ impl Reader<'_> {
             }
             _ => {
                 let Some(value) = self.parameter(element, tag, place)? else {
-                    let tag = printable::name(tag);
-                    return Err(self.graph.error(place, format!("`<{tag}>` is not known")));
+                    // As other renderers that read these files add.
+                    let told = format!("`<{}>` is not known and has no effect", printable::name(tag));
+                    self.graph.tell(place, &told, self.warnings);
+                    return Ok(());
                 };
                 let name = match element.attribute("name") {
                     // All transforms but those of textures are of this name.
