@@ -62,19 +62,19 @@ fn within(point: DVec3) -> DVec3 {
 
 /// Centre and radius of the key light.
 ///
-/// - `side`: signs of the direction of the front.
-fn key_sphere((min, max): (DVec3, DVec3), side: DVec3) -> (DVec3, f64) {
+/// - `side`: signs of the direction of the front; `scale`: of both, so that it looks equally large.
+fn key_sphere((min, max): (DVec3, DVec3), side: DVec3, scale: f64) -> (DVec3, f64) {
     let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE);
+    let radius = (0.5 * scale * (max - min).length()).clamp(bounds::MIN_SIZE, bounds::MAX_COORDINATE);
     (within(center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize()), radius)
 }
 
-/// The first side from which the key light is not in the image, as it may be in that of a camera of the file.
-fn unseen_side(file: &SceneFile, bounds: (DVec3, DVec3), side: DVec3) -> DVec3 {
+/// The first place of the key light where it is not in the image, as it may be in that of a camera of the file: beside the
+/// model, or behind a camera that is far away.
+fn unseen_key(file: &SceneFile, bounds: (DVec3, DVec3), side: DVec3) -> (DVec3, f64) {
     let (view, projection, _) = camera(&file.camera);
     let aspect = f64::from(file.film.width) / f64::from(file.film.height);
-    let is_seen = |side: &DVec3| {
-        let (center, radius) = key_sphere(bounds, *side);
+    let is_seen = |&(center, radius): &(DVec3, f64)| {
         let offset = center - view.eye;
         let depth = offset.dot(view.forward);
         // The edges of the image may be oblique.
@@ -84,7 +84,8 @@ fn unseen_side(file: &SceneFile, bounds: (DVec3, DVec3), side: DVec3) -> DVec3 {
             && offset.dot(view.right()).abs() <= half_height * aspect.max(1.0)
     };
     let sides = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(x, z)| side * DVec3::new(x, 1.0, z));
-    sides.into_iter().find(|side| !is_seen(side)).unwrap_or(side)
+    let places = (0..12).flat_map(|doublings| sides.map(|side| key_sphere(bounds, side, f64::from(1 << doublings))));
+    places.into_iter().find(|place| !is_seen(place)).unwrap_or_else(|| key_sphere(bounds, side, 1.0))
 }
 
 /// Adds an environment and a key light to a scene.
@@ -92,7 +93,7 @@ fn unseen_side(file: &SceneFile, bounds: (DVec3, DVec3), side: DVec3) -> DVec3 {
 /// - `side`: signs of the direction of the front; `share`: of the usual light.
 pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3), side: DVec3, share: f32) {
     let material = new_material(file, KEY_LIGHT, key_material(share));
-    let (center, radius) = key_sphere(bounds, unseen_side(file, bounds, side));
+    let (center, radius) = unseen_key(file, bounds, side);
     let (name, transform) = (Some(KEY_LIGHT.to_owned()), TransformPart::default());
     file.objects.push(ObjectPart::Sphere { name, hidden: false, center, radius, material, transform });
     file.environment = sky(share);

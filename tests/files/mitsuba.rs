@@ -197,7 +197,11 @@ fn errors_have_a_line_and_a_column() {
             "<shape type=\"sphere\"><ref id=\"gras\"/></shape><bsdf type=\"diffuse\" id=\"grass\"/>",
             "a.xml:2:22: there is no object with the id `gras` (did you mean `grass`?)",
         ),
-        ("<thing type=\"a\"/>", "a.xml:2:1: `<thing>` is not known"),
+        ("<thing type=\"a\"/>", "a.xml: has no shape that can be shown: a.xml:2:1: `<thing>` is not known"),
+        (
+            "<shape type=\"sphere\"><transform name=\"to_world\"><rotate y=\"1\" angle=\"?\"/></transform></shape>",
+            "a.xml:2:49: `angle` must be a number",
+        ),
         ("<shape type=\"sphere\">", "a.xml:3:1: not valid XML: "),
         ("<shape type=\"$kind\"/>", "a.xml:2:1: `$kind` has no value"),
         ("<bsdf type=\"diffuse\" id=\"a\"/>\n<bsdf type=\"diffuse\" id=\"a\"/>", "a.xml:3:1: the id `a` is used twice"),

@@ -39,6 +39,8 @@ fn check_any(path: &Path, scene: &ForeignScene) -> Result<(), SceneError> {
     if !scene.file.objects.is_empty() || is_environment {
         return Ok(());
     }
+    // Of another format, perhaps.
+    let first = first.or_else(|| scene.warnings.iter().find(|warning| warning.contains(">` is not known")));
     let first = first.map_or_else(String::new, |first| format!(": {}", &**first));
     Err(SceneError::in_file(path, format!("has no shape that can be shown{first}")))
 }

@@ -57,7 +57,12 @@ impl Converter<'_> {
                 self.plastic(node)?
             }
             "principled" | "principledthin" => self.principled(node)?,
-            // Of other renderers that read these files.
+            // From here to `disneymetal`, of other renderers that read these files.
+            "mirror" => {
+                let reflectance = self.color(node, "reflectance", 1.0, Use::Reflectance)?;
+                Surface::two_sided(Material::Mirror { reflectance })
+            }
+            "glass" => self.dielectric(node)?,
             plugin @ ("disneybsdf" | "disneydiffuse" | "disneyglass" | "disneymetal") => {
                 self.tell(node, &format!("a {plugin} is modelled as principled"));
                 Surface { two_sided: true, ..self.principled(node)? }
@@ -170,12 +175,11 @@ impl Converter<'_> {
         let transmittance = self.color(node, "specular_transmittance", 1.0, Use::Reflectance)?;
         let reflectance = self.color(node, "specular_reflectance", 1.0, Use::Reflectance)?;
         let (absorption, dispersion) = (Vec3::ZERO.into(), 0.0);
-        let clear = match node.plugin() {
-            "dielectric" => Material::Glass { ior, absorption, dispersion },
-            _ => {
-                let (alpha, beckmann) = self.isotropic(node)?;
-                Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann }
-            }
+        let clear = if node.plugin().starts_with("rough") {
+            let (alpha, beckmann) = self.isotropic(node)?;
+            Material::RoughGlass { alpha, ior, absorption, dispersion, compensate: false, beckmann }
+        } else {
+            Material::Glass { ior, absorption, dispersion }
         };
         let part = tinted_glass(clear, transmittance, reflectance, |why| self.tell(node, why));
         Ok(Surface::two_sided(part))

@@ -53,7 +53,7 @@ pub(crate) fn read_graph(
         spectra: HashMap::new(),
         include_depth: 0,
         unnamed_scene: false,
-        old: false,
+        old: true,
     };
     reader.file(path, None)?;
     for (name, _) in defines.iter().filter(|(name, _)| !reader.parameters.is_used(name)) {
@@ -103,7 +103,8 @@ impl Reader<'_> {
         })?;
         let root = document.root_element();
         let before = self.old;
-        self.old = root.attribute("version").is_some_and(is_old);
+        // Mitsuba 3 refuses files without one; other renderers write names as in 0.x.
+        self.old = root.attribute("version").map_or(self.old, is_old);
         let place = Place { file: number, offset: root.range().start };
         let read = match (parent, root.tag_name().name()) {
             (None, "scene") => {
@@ -405,7 +406,11 @@ impl Reader<'_> {
                 let value = self.required(element, place, "value")?;
                 transform::matrix(&numbers(&value).unwrap_or_default())
             }
-            other => Err(format!("`<{}>` is no part of a transform", printable::name(other))),
+            other => {
+                let told = format!("`<{}>` is no part of a transform and has no effect", printable::name(other));
+                self.graph.tell(place, &told, self.warnings);
+                Ok(DMat4::IDENTITY)
+            }
         };
         step.map_err(|why| self.graph.error(place, why))
     }

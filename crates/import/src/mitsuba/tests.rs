@@ -561,6 +561,40 @@ fn coatings_lie_on_diffuse_surfaces_and_metals() {
     tells_only(&glass, &["coatings of surfaces other than metals and diffuse ones"]);
 }
 
+/// Some write no version, and elements of their own.
+#[test]
+fn scenes_of_other_renderers_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.xml");
+    let ball = "<transform name=\"toWorld\"><hide/><translate value=\"1, 2, 3\"/></transform>";
+    let text = format!("<scene><mode/>{}</scene>", ["mirror", "glass"].map(|plugin| {
+        format!("<shape type=\"sphere\">{ball}<bsdf type=\"{plugin}\"><float name=\"intIOR\" value=\"1.4\"/></bsdf></shape>")
+    }).concat());
+    std::fs::write(&path, text).unwrap();
+    let options = ForeignOptions {
+        allow_outside: false,
+        defines: Vec::new(),
+        light_images: LightImages::new(|_| None),
+        meshes: Arc::default(),
+    };
+    let scene = read_scene(&path, &options).unwrap();
+    assert!(matches!(part(&scene, 0), Material::Mirror { .. }), "{:?}", part(&scene, 0));
+    assert!(
+        matches!(part(&scene, 1), Material::Glass { ior, .. } if (1.39..1.41).contains(ior)),
+        "{:?}",
+        part(&scene, 1)
+    );
+    let center = |object: &ObjectPart| match object {
+        ObjectPart::Sphere { center, transform, .. } => {
+            Placement::from_part(transform).affine().transform_point3(*center)
+        }
+        _ => DVec3::NAN,
+    };
+    assert!(scene.file.objects.iter().all(|object| center(object).abs_diff_eq(DVec3::new(1.0, 2.0, 3.0), 1e-9)));
+    let told = told(&scene).join("\n");
+    assert!(told.contains("`<mode>` is not known") && told.contains("`<hide>` is no part of a transform"), "{told}");
+}
+
 /// Names and defaults are those of lajolla.
 #[test]
 fn bsdfs_of_other_renderers_are_principled() {
