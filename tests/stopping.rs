@@ -103,7 +103,9 @@ fn is_stopped(folder: &Path, line: &str, delay: f64) -> bool {
     if is_stopped {
         assert!(said.contains("stopped"), "{line}, after {delay} s: {said}");
     } else {
-        assert!(status.success(), "{line}, after {delay} s: {status}\n{said}");
+        // On a slow machine it has not come to its handler of signals, and ends as any other program.
+        let has_not_begun = std::os::unix::process::ExitStatusExt::signal(&status) == Some(2) && said.is_empty();
+        assert!(status.success() || has_not_begun, "{line}, after {delay} s: {status}\n{said}");
     }
     // Files are whole or not there.
     for entry in std::fs::read_dir(folder).unwrap() {
