@@ -60,8 +60,9 @@ impl Default for Instances {
     }
 }
 
-/// Up to this many triangles of static trees are tested by every ray, sixteen rays at a time: in rooms that takes 0.75 to
-/// 0.8 times as long as streams, beside which it does not matter whether it is a dozen or hundreds; in the open as long.
+/// Up to this many triangles of static trees are tested by every ray, sixteen rays at a time. Rooms render in 0.75 to 0.8
+/// of the time that streams take, whose cost hardly depends on a dozen or hundreds of triangles; scenes in the open in as
+/// much.
 const MAX_TESTED: usize = 256;
 
 /// Clouds of up to this many spheres are tested by packets, sphere by sphere.
